@@ -1,0 +1,1 @@
+"""tacdata: the data engine for soft tactile skins."""

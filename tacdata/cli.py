@@ -1,0 +1,45 @@
+"""The one command: finds the verbs in `tacdata/commands`, orders them as the pipeline, turns errors into words."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from tacdata import registry
+from tacdata.errors import TacdataError
+
+ROOM, BASE = "tacdata.commands", "command"
+
+
+def application() -> typer.Typer:
+    """Build the command line from the folder `tacdata/commands`: one file, one verb."""
+    app = typer.Typer(
+        name="tacdata",
+        help="The data engine for soft tactile skins. Verbs stand in the order of the pipeline.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+    )
+    modules = [registry.load_module(ROOM, BASE, name) for name in registry.names(ROOM, BASE)]
+    for module in sorted(modules, key=lambda m: (m.ORDER, m.__name__)):
+        name = module.__name__.rsplit(".", 1)[-1].replace("_", "-")
+        app.command(name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)(module.run)
+    return app
+
+
+def main() -> None:
+    """Run the command line; an error meant for a person ends in words and a non-zero exit, never a traceback."""
+    try:
+        application()(prog_name="tacdata")
+    except TacdataError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(error.exit_code) from None
+    except KeyboardInterrupt:
+        print("interrupted: what was finished is kept", file=sys.stderr)
+        raise SystemExit(130) from None
+
+
+if __name__ == "__main__":
+    main()

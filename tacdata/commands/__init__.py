@@ -1,0 +1,1 @@
+"""The verbs, one file each; see `command.py` for what a file must hold."""

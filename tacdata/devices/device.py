@@ -1,0 +1,204 @@
+"""What a driver's file holds.
+
+``tacdata/devices/my_device.py`` defines one class derived from `MotionController`, `TaxelBoard` or `Camera`. A rig file
+names it by its file's name (``driver: my_device``) and hands its other settings to the constructor. A driver answers
+`describe` before it is opened, is a context manager, never blocks longer than the timeout it is given, stamps what
+arrives with the host's clock as early as it can, and counts what is lost or damaged instead of hiding it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+import numpy as np
+
+from tacdata import registry
+from tacdata.clock import Clock
+
+ROOM, BASE = "tacdata.devices", "device"
+
+
+@dataclass(frozen=True)
+class TaxelFrame:
+    """One reading of all channels, un-tared."""
+
+    arrival_ns: int
+    """Host time at which the last byte of the frame was received [ns]."""
+    counter: int
+    """The device's frame counter, unwrapped from the wire's width [frames]; -1 if the format has none."""
+    counts: np.ndarray
+    """Raw readings [counts], shape (channels,), float64."""
+
+
+@dataclass(frozen=True)
+class CncStatus:
+    """One status report."""
+
+    sent_ns: int
+    """Host time at which the query went out [ns]."""
+    arrival_ns: int
+    """Host time at which the answer was complete [ns]."""
+    state: str
+    """Controller state as it names it, for example "Run", "Idle", "Hold:0", "Alarm"."""
+    position: np.ndarray
+    """Machine position [mm], shape (3,)."""
+    feed: float
+    """Reported feed rate [mm/min]."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One acknowledged motion command."""
+
+    line: str
+    """The line as sent."""
+    sent_ns: int
+    """Host time at which it was sent [ns]."""
+    acknowledged_ns: int
+    """Host time of its `ok` [ns]."""
+
+
+@dataclass(frozen=True)
+class ImageFrame:
+    """One camera image."""
+
+    arrival_ns: int
+    """Host time at which the image was received [ns]."""
+    sequence: int
+    """Number of the image since the camera was opened."""
+    image: np.ndarray
+    """Grey or BGR image, shape (height, width) or (height, width, 3), uint8."""
+
+
+@dataclass
+class StreamCounts:
+    """What a stream has delivered so far."""
+
+    received: int = 0
+    """Good frames."""
+    lost: int = 0
+    """Frames missing by the device's counter."""
+    repeated: int = 0
+    """Frames with a counter already seen."""
+    corrupt: int = 0
+    """Frames discarded by checksum or format."""
+    garbage_bytes: int = 0
+    """Bytes skipped while resynchronizing."""
+    notes: list[str] = field(default_factory=list)
+    """What else a person should know, in words."""
+
+
+class Device(ABC):
+    """A device that is described before it is opened, and closed whatever happens."""
+
+    def __init__(self, clock: Clock, **settings: Any) -> None:
+        """Keep the settings of the rig file; do not open anything yet."""
+        self.clock = clock
+
+    @abstractmethod
+    def describe(self) -> dict[str, Any]:
+        """Return what the device delivers (channels, units, shapes, nominal rate), without opening it."""
+
+    @abstractmethod
+    def open(self) -> None:
+        """Open the device.
+
+        Raises:
+            DeviceError: If the port is missing, busy, silent or speaks another language.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the device; never raises, may be called twice."""
+
+    def __enter__(self) -> Self:
+        """Open."""
+        self.open()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Close."""
+        self.close()
+
+
+class TaxelBoard(Device):
+    """A board that streams frames of all channels."""
+
+    counts: StreamCounts
+
+    @abstractmethod
+    def read(self, timeout: float) -> list[TaxelFrame]:
+        """Return the frames that have arrived, waiting at most ``timeout`` [s of the host's clock]; may be empty."""
+
+
+class MotionController(Device):
+    """A motion controller with three axes."""
+
+    @abstractmethod
+    def settings(self) -> dict[str, str]:
+        """Return what the controller says of itself (banner, `$$`, `$I`, ...), as text, read at opening.
+
+        Its keys include ``banner``; GRBL-like numeric settings appear as ``$110`` etc.
+        """
+
+    @property
+    @abstractmethod
+    def acceleration(self) -> np.ndarray:
+        """Acceleration limit of each axis [mm/s^2], shape (3,)."""
+
+    @property
+    @abstractmethod
+    def max_rate(self) -> np.ndarray:
+        """Speed limit of each axis [mm/s], shape (3,)."""
+
+    @abstractmethod
+    def move(self, position: tuple[float, float, float], speed: float) -> Motion:
+        """Queue a straight move to a machine position [mm] at ``speed`` [mm/s]; returns once it is acknowledged."""
+
+    @abstractmethod
+    def dwell(self, seconds: float) -> Motion:
+        """Queue a pause [s of the controller's time]."""
+
+    @abstractmethod
+    def wait_idle(self, timeout: float) -> None:
+        """Return when every queued motion is finished, polling the status meanwhile.
+
+        Raises:
+            DeviceError: On alarm, controller reset or when ``timeout`` [s of the host's clock] is over.
+        """
+
+    @abstractmethod
+    def statuses(self) -> list[CncStatus]:
+        """Return the status reports received since the last call (the driver polls in its own thread)."""
+
+    @abstractmethod
+    def feed_hold(self) -> None:
+        """Stop the motion now, keeping the position (real-time command); safe from any thread and signal handler."""
+
+    @abstractmethod
+    def resume(self) -> None:
+        """Go on after a feed hold."""
+
+    @abstractmethod
+    def abandon(self) -> None:
+        """After a feed hold: throw the queued motion away, keeping the position, so that a retract can be sent."""
+
+
+class Camera(Device):
+    """A camera."""
+
+    @abstractmethod
+    def read(self, timeout: float) -> list[ImageFrame]:
+        """Return the images that have arrived, waiting at most ``timeout`` [s of the host's clock]; may be empty."""
+
+
+def create(settings: dict[str, Any], kind: type[Device], clock: Clock) -> Any:
+    """Build the device that a rig file's entry describes (``{"driver": name, ...}``).
+
+    Raises:
+        UsageError: If no such driver exists.
+    """
+    values = dict(settings)
+    return registry.load(ROOM, BASE, values.pop("driver"), kind)(clock=clock, **values)

@@ -1,0 +1,5 @@
+"""Labels: what the simulation says of a press, frame by frame, with where it came from."""
+
+from tacdata.labels.label import Label, PathSolution, read_label, write_label
+
+__all__ = ["Label", "PathSolution", "read_label", "write_label"]

@@ -1,0 +1,143 @@
+"""A press plan and its presses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tacdata import documents
+from tacdata.errors import FormatError
+from tacdata.indenters import Indenter, from_document
+from tacdata.sensor import Sensor
+
+
+@dataclass(frozen=True)
+class Press:
+    """One press: the nominal contact configuration and how it is driven. Sensor frame."""
+
+    index: int
+    """Place in the plan, from 0; also the episode's number."""
+    indenter: Indenter
+    """What presses."""
+    indenter_name: str
+    """The plan's name for that specimen."""
+    x: float
+    """Location of the indenter's lowest point [mm]."""
+    y: float
+    """Location of the indenter's lowest point [mm]."""
+    yaw: float
+    """Rotation of the indenter about z [deg]."""
+    depth: float
+    """Depth of the lowest point below the undeformed outer face [mm]; negative flies over without contact."""
+    speed: float
+    """Loading and unloading speed [mm/s]."""
+    hold: float
+    """Time at full depth [s]."""
+    repeat: int = 0
+    """Which repetition of the same configuration this is, from 0."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The press as plain data (JSON types)."""
+        values = {k: v for k, v in vars(self).items() if k != "indenter"}
+        return {**values, "indenter": self.indenter.document}
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], origin: str = "press") -> Press:
+        """Rebuild a press from `document`."""
+        return cls(**{**document, "indenter": from_document(document["indenter"], origin)})
+
+
+@dataclass(frozen=True)
+class MotionSettings:
+    """How the plan's presses are driven unless a press says otherwise."""
+
+    clearance: float
+    """Height above the skin for travel between sites [mm]."""
+    travel_speed: float
+    """Speed between sites [mm/s]."""
+    approach_speed: float
+    """Speed from the clearance down to the standoff [mm/s]."""
+    press_speed: float
+    """Loading and unloading speed [mm/s]."""
+    hold: float
+    """Time at full depth [s]."""
+    rest: float
+    """Time without contact before each press [s]."""
+    standoff: float = 0.3
+    """Height at which the approach speed gives way to the press speed [mm]."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A named list of presses."""
+
+    name: str
+    motion: MotionSettings
+    presses: tuple[Press, ...]
+    purpose: str = ""
+    document: dict[str, Any] | None = None
+    """The file's document, kept as written."""
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], origin: str) -> Plan:
+        """Build a plan from a parsed file.
+
+        Raises:
+            FormatError: If the document breaks the schema or a press names an unknown indenter.
+        """
+        documents.check(document, "plan", origin)
+        indenters = {
+            name: from_document(values, f"{origin}: indenters/{name}") for name, values in document["indenters"].items()
+        }
+        motion = MotionSettings(**document["motion"])
+        presses = []
+        for index, entry in enumerate(document["presses"]):
+            name = entry["indenter"]
+            if name not in indenters:
+                raise FormatError(
+                    f"{origin}: presses/{index}/indenter: {name!r} is not among the plan's indenters",
+                    ", ".join(indenters),
+                    "name one of them or add it under indenters",
+                )
+            presses.append(
+                Press(
+                    index=index, indenter=indenters[name], indenter_name=name, x=entry["x"], y=entry["y"],
+                    yaw=entry.get("yaw", 0.0), depth=entry["depth"], speed=entry.get("speed", motion.press_speed),
+                    hold=entry.get("hold", motion.hold), repeat=entry.get("repeat", 0),
+                )
+            )
+        return cls(document["name"], motion, tuple(presses), document.get("purpose", ""), document)
+
+    def check_against(self, sensor: Sensor) -> None:
+        """Refuse presses that would miss the skin or go through it.
+
+        Raises:
+            FormatError: Naming the first such press.
+        """
+        for press in self.presses:
+            where = f"plan {self.name}: presses/{press.index}"
+            if press.depth >= sensor.skin.thickness:
+                raise FormatError(
+                    f"{where}: depth {press.depth:g} mm, the skin is {sensor.skin.thickness:g} mm thick",
+                    f"less than {sensor.skin.thickness:g} mm",
+                    "reduce the depth or use another sensor file",
+                )
+            for axis, value, size in (("x", press.x, sensor.skin.size_x), ("y", press.y, sensor.skin.size_y)):
+                if abs(value) > size / 2:
+                    raise FormatError(
+                        f"{where}: {axis} = {value:g} mm is off the skin",
+                        f"-{size / 2:g} to {size / 2:g} mm",
+                        f"move the press or enlarge skin/size_{axis}",
+                    )
+
+
+def read_plan(path: Path) -> Plan:
+    """Read a plan file.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: If it is damaged or contradicts itself.
+    """
+    return Plan.from_document(documents.read(path, "plan"), str(path))

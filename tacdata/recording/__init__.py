@@ -1,0 +1,1 @@
+"""Recording: devices in, one MCAP file per episode out, and back again."""

@@ -1,0 +1,57 @@
+"""The folder is the registry: a member's name is its file's name, and listing imports nothing."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import pkgutil
+from types import ModuleType
+
+from tacdata.errors import UsageError
+
+
+def names(room: str, base: str) -> list[str]:
+    """Return the members of a room, sorted, without importing any of them.
+
+    Args:
+        room: Dotted package name, for example ``"tacdata.indenters"``.
+        base: File name of the room's base, which is no member itself.
+    """
+    package = importlib.import_module(room)
+    return sorted(m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in (base, "__init__"))
+
+
+def load_module(room: str, base: str, name: str) -> ModuleType:
+    """Import one member of a room.
+
+    Raises:
+        UsageError: If no file of that name lies in the room.
+    """
+    known = names(room, base)
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        kind = room.rsplit(".", 1)[-1]
+        raise UsageError(
+            f"{name!r} is not among the {kind}",
+            ", ".join(known),
+            f"did you mean {close[0]!r}?" if close else f"choose one of them, or add {room.replace('.', '/')}/{name}.py",
+        )
+    return importlib.import_module(f"{room}.{name}")
+
+
+def load[T](room: str, base: str, name: str, kind: type[T]) -> type[T]:
+    """Import one member and return its one public class derived from ``kind``."""
+    module = load_module(room, base, name)
+    found = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, kind) and value.__module__ == module.__name__
+        and not value.__name__.startswith("_")
+    ]
+    if len(found) != 1:
+        raise UsageError(
+            f"{module.__name__} defines {len(found)} public classes derived from {kind.__name__}",
+            "exactly one",
+            "keep one class per file; variants are parameters",
+        )
+    return found[0]

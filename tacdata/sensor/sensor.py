@@ -1,0 +1,220 @@
+"""The sensor as immutable data, read from its file."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+import schemas
+from tacdata import documents, provenance
+from tacdata.errors import FormatError
+
+
+@dataclass(frozen=True)
+class Taxels:
+    """The taxel array. Taxel k = i + columns * j lies at x = pitch_x (i - (columns-1)/2), y likewise with j."""
+
+    columns: int
+    """Taxels along x."""
+    rows: int
+    """Taxels along y."""
+    pitch_x: float
+    """Column spacing [mm]."""
+    pitch_y: float
+    """Row spacing [mm]."""
+    rate: float = 30.0
+    """Nominal frame rate [Hz]."""
+
+    @property
+    def count(self) -> int:
+        """Number of taxels."""
+        return self.columns * self.rows
+
+    @property
+    def centers(self) -> np.ndarray:
+        """Taxel centres [mm], shape (count, 2), sensor frame, x running fastest."""
+        x = self.pitch_x * (np.arange(self.columns) - (self.columns - 1) / 2)
+        y = self.pitch_y * (np.arange(self.rows) - (self.rows - 1) / 2)
+        return np.stack(np.meshgrid(x, y, indexing="xy"), axis=-1).reshape(-1, 2)
+
+
+@dataclass(frozen=True)
+class Skin:
+    """Stress-free geometry: a slab from z = 0 to z = thickness, hemispheres hanging below z = 0 over the taxels."""
+
+    size_x: float
+    """Footprint along x [mm]."""
+    size_y: float
+    """Footprint along y [mm]."""
+    thickness: float
+    """Slab thickness [mm]; the outer face is z = thickness."""
+    protrusion_radius: float = 0.0
+    """Radius of the hemispheres [mm]; 0 for a plain slab."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """Elastic constants and the law that they enter."""
+
+    law: str
+    """File name in tacdata/skin/materials."""
+    youngs_modulus: float
+    """Young's modulus E [MPa]."""
+    poisson_ratio: float
+    """Poisson's ratio nu [1]."""
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus mu = E / 2(1 + nu) [MPa]."""
+        return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
+
+    @property
+    def bulk_modulus(self) -> float:
+        """Bulk modulus kappa = E / 3(1 - 2 nu) [MPa]."""
+        return self.youngs_modulus / (3 * (1 - 2 * self.poisson_ratio))
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What touches and holds the skin."""
+
+    friction: float
+    """Coulomb coefficient between indenter and skin [1]."""
+    bonded: tuple[str, ...]
+    """Faces that are fixed to the support: "sides", "bottom"."""
+    board: bool = False
+    """True if a rigid board at z = -protrusion_radius carries the protrusions (unilateral)."""
+
+
+@dataclass(frozen=True)
+class DepthMap:
+    """The label's pixel grid, centred on the array: array[i, j] has i along x and j along y."""
+
+    pixels_x: int
+    """Pixels along x."""
+    pixels_y: int
+    """Pixels along y."""
+    pixel_pitch: float
+    """Side of a pixel [mm]."""
+    depth_max: float
+    """D_max of the label scaling [mm]."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Array shape (pixels_x, pixels_y)."""
+        return self.pixels_x, self.pixels_y
+
+    @property
+    def x(self) -> np.ndarray:
+        """Pixel centres along x [mm], shape (pixels_x,)."""
+        return self.pixel_pitch * (np.arange(self.pixels_x) - (self.pixels_x - 1) / 2)
+
+    @property
+    def y(self) -> np.ndarray:
+        """Pixel centres along y [mm], shape (pixels_y,)."""
+        return self.pixel_pitch * (np.arange(self.pixels_y) - (self.pixels_y - 1) / 2)
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One taxel skin. Frame: x along columns, y along rows, z outward, origin at the array's centre on z = 0."""
+
+    name: str
+    taxels: Taxels
+    skin: Skin
+    material: Material
+    contact: Contact
+    map: DepthMap
+    assumptions: dict[str, str]
+    """Field path -> why the value is an assumption."""
+    source: str = ""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The sensor as its file's document (`schemas/sensor.schema.json`)."""
+        document = {"version": schemas.version("sensor"), **asdict(self)}
+        document["contact"]["bonded"] = list(self.contact.bonded)
+        return document
+
+    @property
+    def content_hash(self) -> str:
+        """Hash of every value that can change a result; names and remarks do not count."""
+        document = self.document
+        return provenance.content_hash({k: document[k] for k in ("taxels", "skin", "material", "contact", "map")})
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], origin: str) -> Sensor:
+        """Build a sensor from a parsed file; ``origin`` names it in errors.
+
+        Raises:
+            FormatError: If the document breaks the schema or its parts contradict each other.
+        """
+        documents.check(document, "sensor", origin)
+        contact = dict(document["contact"])
+        contact["bonded"] = tuple(contact["bonded"])
+        sensor = cls(
+            name=document["name"],
+            taxels=Taxels(**document["taxels"]),
+            skin=Skin(**document["skin"]),
+            material=Material(**document["material"]),
+            contact=Contact(**contact),
+            map=DepthMap(**document["map"]),
+            assumptions=dict(document["assumptions"]),
+            source=document.get("source", ""),
+        )
+        _check_consistency(sensor, origin)
+        return sensor
+
+
+def _check_consistency(sensor: Sensor, origin: str) -> None:
+    taxels, skin = sensor.taxels, sensor.skin
+    for axis, count, pitch, size in (
+        ("x", taxels.columns, taxels.pitch_x, skin.size_x),
+        ("y", taxels.rows, taxels.pitch_y, skin.size_y),
+    ):
+        needed = (count - 1) * pitch + 2 * skin.protrusion_radius
+        if needed > size:
+            raise FormatError(
+                f"{origin}: {count} taxels along {axis} need {needed:g} mm, the skin is {size:g} mm",
+                f"an array that fits the footprint along {axis}",
+                f"enlarge skin/size_{axis} or reduce taxels/pitch_{axis}",
+            )
+        if count > 1 and 2 * skin.protrusion_radius > pitch:
+            raise FormatError(
+                f"{origin}: protrusions of radius {skin.protrusion_radius:g} mm at {pitch:g} mm pitch overlap along {axis}",
+                f"a radius of at most {pitch / 2:g} mm",
+                "reduce skin/protrusion_radius",
+            )
+    if not sensor.contact.bonded and not sensor.contact.board:
+        raise FormatError(
+            f"{origin}: nothing holds the skin (no bonded face, no board)",
+            "at least one bonded face, or a board",
+            "set contact/bonded or contact/board",
+        )
+    if sensor.contact.board and not skin.protrusion_radius:
+        raise FormatError(
+            f"{origin}: a board carries protrusions, and protrusion_radius is 0 mm",
+            "a positive protrusion_radius with a board, or board: false",
+            "for a plain slab on a support, bond its bottom",
+        )
+
+
+def read_sensor(path: Path) -> Sensor:
+    """Read a sensor file.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: If it is damaged or contradicts itself.
+    """
+    return Sensor.from_document(documents.read(path, "sensor"), str(path))
+
+
+def default_sensor() -> Sensor:
+    """Return the sensor of the paper (`tacdata/sensor/tacprint.yaml`)."""
+    text = (files("tacdata.sensor") / "tacprint.yaml").read_text()
+    return Sensor.from_document(yaml.safe_load(text), "tacprint.yaml")
