@@ -20,7 +20,7 @@ def application() -> typer.Typer:
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
+        rich_markup_mode="markdown",
     )
     modules = [registry.load_module(ROOM, BASE, name) for name in registry.names(ROOM, BASE)]
     for module in sorted(modules, key=lambda m: (m.ORDER, m.__name__)):

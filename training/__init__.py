@@ -1,1 +1,1 @@
-"""training."""
+"""Learn depth maps from taxel signals, and say how well."""

@@ -1,1 +1,1 @@
-"""viewers."""
+"""What there is to see, as plain arrays, and the backends that draw it."""

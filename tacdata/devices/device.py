@@ -30,6 +30,8 @@ class TaxelFrame:
     """The device's frame counter, unwrapped from the wire's width [frames]; -1 if the format has none."""
     counts: np.ndarray
     """Raw readings [counts], shape (channels,), float64."""
+    device_ns: int = -1
+    """The device's own time, unwrapped [ns of the device's clock]; -1 if the format has none."""
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,25 @@
 """What an indenter's file holds.
 
-A file ``tacdata/indenters/my_shape.py`` defines one frozen dataclass derived from `Indenter`. Its fields are lengths
-[mm] or angles [deg]; they are the shape's parameters in plans, recordings and labels. Indenter frame: origin at the
-lowest point, z pointing away from the skin; the solid fills z >= 0 around the origin.
+A file ``tacdata/indenters/my_shape.py`` defines one frozen dataclass derived from `Indenter`. Its fields are
+lengths [mm] or angles [deg]; they are the shape's parameters in plans, recordings and labels. Indenter frame:
+origin at the lowest point (a ring: at the middle of its lowest circle), z pointing away from the skin; the
+solid fills z >= 0 around it.
+
+Distance functions are Warp functions defined inside `Indenter.distance_function`, so that listing or reading
+plans never imports Warp. ``wp = warp()`` must be used in the function's body: that makes it a closure
+variable, by which Warp resolves the annotations (strings, under ``from __future__ import annotations``). Warp
+matches vector types by length and scalar, so ``wp.types.vector(8, wp.float64)`` may be written anew in every
+file. Take lengths with ``wp.length``, not ``wp.sqrt``: its derivative at zero (points on the axis) is zero
+instead of NaN. Kernels built over a distance function want ``@wp.kernel(module="unique")``; else each shape
+recompiles the others.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Any
+from numbers import Real
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -18,7 +28,7 @@ from tacdata.errors import FormatError
 
 if TYPE_CHECKING:
     import trimesh
-    import warp as wp
+    from warp import Function
 
 ROOM, BASE = "tacdata.indenters", "indenter"
 
@@ -35,12 +45,19 @@ class Indenter(ABC):
         """
         for field in fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, int | float) and not (np.isfinite(value) and value > 0):
-                raise FormatError(
-                    f"indenter {self.shape}: {field.name} = {value}",
-                    "a positive length [mm] or angle [deg]",
-                    f"correct {field.name} in the plan or case",
-                )
+            is_number = isinstance(value, Real) and not isinstance(value, bool)
+            if not (is_number and 0 < float(value) < np.inf):
+                self._refuse(field.name, "a positive length [mm] or angle [deg]")
+
+    def _refuse(self, name: str, allowed: str) -> None:
+        """Raise the error of a parameter that makes no solid of this shape."""
+        given = f"indenter {self.shape}: {name} = {getattr(self, name)!r}"
+        raise FormatError(given, allowed, f"correct {name} in the plan or case")
+
+    @classmethod
+    @abstractmethod
+    def example(cls) -> Self:
+        """Return a typical one, fit to press a skin 3 mm thick; catalogues and conformance tests use it."""
 
     @property
     def shape(self) -> str:
@@ -57,18 +74,20 @@ class Indenter(ABC):
     def parameters(self) -> tuple[float, ...]:
         """At most 8 numbers handed to the distance function, in mm or radians."""
 
+    @staticmethod
     @abstractmethod
-    def distance_function(self) -> wp.Function:
+    def distance_function() -> Function:
         """Return a Warp function ``f(p: wp.vec3d, q: Parameters) -> wp.float64``.
 
-        It gives the signed distance [mm] of point ``p`` [mm, indenter frame], negative inside the solid, where
-        ``q`` is ``wp.types.vector(8, wp.float64)`` holding `parameters`. It must be continuous, exact near the
-        surface, and defined in terms of ``q`` alone, so that one compiled kernel serves every size.
+        It gives the signed distance [mm] of point ``p`` [mm, indenter frame], negative inside the solid,
+        where ``q`` is ``wp.types.vector(8, wp.float64)`` holding `parameters`. It must be continuous, exact
+        near the surface, and the same object at every call (``@staticmethod @cache``), so that one compiled
+        kernel serves every size.
         """
 
     @abstractmethod
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height [mm] of the lower surface above the lowest point at (x, y) [mm]; ``inf`` beside the solid."""
+        """Return the height [mm] of the lower surface over (x, y) [mm]; ``inf`` beside the solid."""
 
     @property
     @abstractmethod
@@ -76,9 +95,9 @@ class Indenter(ABC):
         """Largest horizontal distance [mm] of the solid from its axis."""
 
     def surface(self, height: float = 6.0) -> trimesh.Trimesh:
-        """Return a closed surface for pictures [mm, indenter frame], cut off at ``height`` [mm].
+        """Return a surface for pictures [mm, indenter frame], cut off at ``height`` [mm].
 
-        The default revolves or samples `profile`; a shape may return something better.
+        The default samples `profile` and is open above; a shape returns something closed where that is easy.
         """
         import trimesh
 
@@ -89,9 +108,47 @@ class Indenter(ABC):
         n = len(samples)
         index = np.arange(n * n).reshape(n, n)
         a, b, c, d = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
-        faces = np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)])
+        faces = np.stack([a, c, b, a, d, c], axis=-1).reshape(-1, 3)
         inside = (lower[faces][:, :, 2] < height).any(axis=1)
         return trimesh.Trimesh(lower, faces[inside], process=True)
+
+
+def warp() -> Any:
+    """Import Warp, typed as Any: the bodies of Warp functions are Python in form only."""
+    import warp
+
+    return warp
+
+
+def rounded_hull(corners: np.ndarray, radius: float, height: float) -> trimesh.Trimesh:
+    """Return the Minkowski sum of a convex polyhedron and a ball as a closed mesh, cut at ``height`` [mm].
+
+    Args:
+        corners: Corners of the polyhedron [mm], shape (n, 3).
+        radius: Radius of the ball [mm].
+        height: Where the cut is [mm].
+    """
+    import trimesh
+
+    normals = np.asarray(trimesh.creation.icosphere(subdivisions=3).vertices)
+    support = normals @ corners.T
+    # The sum's surface point of a normal rises over the corner that lies farthest along it.
+    normal, corner = np.nonzero(support > support.max(axis=1, keepdims=True) - 1e-9)
+    return cut(trimesh.convex.convex_hull(corners[corner] + radius * normals[normal]), height)
+
+
+def cut(convex: trimesh.Trimesh, height: float) -> trimesh.Trimesh:
+    """Return the part of a convex mesh below ``height`` [mm], closed again."""
+    import trimesh
+
+    if convex.bounds[1, 2] <= height:
+        return convex
+    points = np.asarray(convex.vertices)
+    first, second = points[convex.edges_unique[:, 0]], points[convex.edges_unique[:, 1]]
+    crossing = (first[:, 2] - height) * (second[:, 2] - height) < 0
+    a, b = first[crossing], second[crossing]
+    rim = a + (b - a) * ((height - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+    return trimesh.convex.convex_hull(np.vstack([points[points[:, 2] <= height], rim]))
 
 
 def from_document(document: dict[str, Any], origin: str = "indenter") -> Indenter:
@@ -104,8 +161,9 @@ def from_document(document: dict[str, Any], origin: str = "indenter") -> Indente
     values = dict(document)
     shape = values.pop("shape", None)
     if not isinstance(shape, str):
-        raise FormatError(f"{origin}: no shape given", ", ".join(registry.names(ROOM, BASE)), "add shape: NAME")
-    kind = registry.load(ROOM, BASE, shape, Indenter)
+        known = ", ".join(registry.names(ROOM, BASE))
+        raise FormatError(f"{origin}: no shape given", known, "add shape: NAME")
+    kind: type[Indenter] = registry.load(ROOM, BASE, shape, Indenter)
     wanted = {f.name for f in fields(kind)}
     if set(values) != wanted:
         raise FormatError(

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from tacdata.indenters.indenter import Indenter
+from tacdata.indenters.indenter import Indenter, warp
 
 if TYPE_CHECKING:
-    import warp as wp
+    import trimesh
+    from warp import Function
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,11 @@ class Sphere(Indenter):
 
     radius: float
     """Radius [mm]."""
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a sphere of 4 mm diameter."""
+        return cls(radius=2.0)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -35,12 +42,28 @@ class Sphere(Indenter):
         inside = self.radius**2 - x**2 - y**2
         return np.where(inside >= 0, self.radius - np.sqrt(np.maximum(inside, 0.0)), np.inf)
 
-    def distance_function(self) -> wp.Function:
+    @staticmethod
+    @cache
+    def distance_function() -> Function:
         """Return |p - c| - R with the centre at (0, 0, R)."""
-        import warp as wp
+        wp = warp()
 
         @wp.func
-        def sphere_distance(p: wp.vec3d, q: wp.types.vector(8, wp.float64)):  # type: ignore[valid-type]
+        def sphere_distance(p: wp.vec3d, q: wp.types.vector(8, wp.float64)):
             return wp.length(p - wp.vec3d(wp.float64(0.0), wp.float64(0.0), q[0])) - q[0]
 
         return sphere_distance
+
+    def surface(self, height: float = 6.0) -> trimesh.Trimesh:
+        """Return the sphere, cut off at ``height`` [mm]."""
+        from trimesh.creation import revolve
+
+        top = min(height, 2 * self.radius)
+        angle = np.linspace(0.0, np.arccos(1 - top / self.radius), 49)
+        line = np.stack([self.radius * np.sin(angle), self.radius * (1 - np.cos(angle))], axis=-1)
+        line[0, 0] = 0.0
+        if top < 2 * self.radius:
+            line = np.vstack([line, [0.0, top]])
+        else:
+            line[-1, 0] = 0.0
+        return revolve(line, sections=96)

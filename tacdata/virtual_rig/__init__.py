@@ -1,1 +1,5 @@
-"""virtual_rig."""
+"""Emulated devices behind real operating-system wires, with a world of their own; see README.md."""
+
+from tacdata.virtual_rig.mounting import mount
+
+__all__ = ["mount"]

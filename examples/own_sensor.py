@@ -1,0 +1,12 @@
+"""Describe a taxel skin of your own by a file, and ask what was made of it."""
+
+from pathlib import Path
+
+from tacdata.sensor import read_sensor
+
+sensor = read_sensor(Path(__file__).with_name("own_sensor.yaml"))
+material = sensor.material
+print(f"{sensor.name}: {sensor.taxels.count} taxels, a map of {sensor.map.shape} pixels")
+print(f"shear modulus {material.shear_modulus:.4f} MPa, bulk modulus {material.bulk_modulus:.4f} MPa")
+print(f"first taxel at x, y = {sensor.taxels.centers[0]} mm")
+assert abs(material.bulk_modulus - 1.25) < 1e-12

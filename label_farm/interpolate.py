@@ -1,0 +1,61 @@
+"""Between the solved states of a path: values in depth, and how far they can be off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from tacdata.labels import PathSolution
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One quantity along one branch of a path, by increasing depth."""
+
+    depth: np.ndarray
+    """Depths of the states [mm], shape (k,), from 0, strictly increasing."""
+    values: np.ndarray
+    """The quantity at these depths [mm or N, as in `PathSolution`], shape (k, m)."""
+
+    @classmethod
+    def of(cls, solution: PathSolution, quantity: str, loading: bool) -> Branch:
+        """Take a quantity along the loading branch (up to the deepest state) or the unloading branch."""
+        peak = int(np.argmax(solution.depth))
+        chosen = slice(0, peak + 1) if loading else slice(peak, None)
+        order = slice(None) if loading else slice(None, None, -1)
+        values = getattr(solution, quantity)[chosen][order]
+        return cls(solution.depth[chosen][order], values.reshape(len(values), -1))
+
+    def at(self, depth: np.ndarray) -> np.ndarray:
+        """Return the values at depths [mm], shape (n,), as shape (n, m).
+
+        Piecewise cubic, monotone where the states are: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980)
+        238-246. Held constant beyond the deepest state.
+        """
+        return PchipInterpolator(self.depth, self.values, axis=0)(np.clip(depth, 0.0, self.depth[-1]))
+
+    def bound(self, depth: np.ndarray) -> np.ndarray:
+        """Return how far `at` can be off at depths [mm], shape (n,), as shape (n, m).
+
+        Where a quantity bends one way over an interval and its neighbours, it lies between the chord and the
+        nearer of the two neighbouring chords prolonged into the interval; the bound is the distance of `at`
+        from the farther edge of that gap. It is 0 for a path linear in depth, an upper limit on any convex or
+        concave stretch, a kink included, and several times the error where the path is smooth. Before contact
+        the slope is 0; beyond the deepest state the slope is taken to go on changing as it did, and what `at`
+        leaves out there is added.
+        """
+        slope = np.diff(self.values, axis=0) / np.diff(self.depth)[:, None]
+        last = slope[-1] if len(slope) < 2 else 2 * slope[-1] - slope[-2]
+        padded = np.concatenate([np.zeros_like(slope[:1]), slope, last[None]])
+        inside = np.clip(depth, 0.0, self.depth[-1])
+        i = np.clip(np.searchsorted(self.depth, inside, side="right") - 1, 0, len(slope) - 1)
+        after, before = (inside - self.depth[i])[:, None], (self.depth[i + 1] - inside)[:, None]
+        bend = self.at(depth) - self.values[i] - slope[i] * after
+        left, right = (padded[i] - slope[i]) * after, (slope[i] - padded[i + 2]) * before
+        nearer = np.where(np.abs(left) < np.abs(right), left, right)
+        one_way = np.maximum(np.abs(bend), np.abs(nearer - bend))
+        within = np.where(left * right >= 0, one_way, np.abs(bend) + np.abs(nearer))
+        beyond = np.maximum(depth - self.depth[-1], 0.0)[:, None] * np.abs(slope[-1])
+        return within + beyond

@@ -1,0 +1,68 @@
+"""A job: one press path of one sensor and model version, named by the hash of all that decides its result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import schemas
+from tacdata import documents, provenance
+
+
+@dataclass(frozen=True)
+class Job:
+    """One path to solve. Presses with the same configuration share it, whatever recording they come from."""
+
+    sensor: str
+    """Content hash of the sensor."""
+    model: str
+    """Content hash of the skin model: sensor, law, mesh, settings and the sources that decide a result."""
+    indenter: dict[str, Any]
+    """The indenter as plain data: shape and parameters [mm, deg]."""
+    x: float
+    """Location of the indenter's lowest point [mm]."""
+    y: float
+    """Location of the indenter's lowest point [mm]."""
+    yaw: float
+    """Rotation of the indenter about z [deg]."""
+    depths: tuple[float, ...]
+    """Depths of the states [mm]: from 0 rising to the deepest, then falling to 0."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The job as plain data (`schemas/label_job.schema.json`)."""
+        return {"version": schemas.version("label_job"), **self._content}
+
+    @property
+    def _content(self) -> dict[str, Any]:
+        return {
+            "sensor": self.sensor,
+            "model": self.model,
+            "indenter": self.indenter,
+            "x": self.x,
+            "y": self.y,
+            "yaw": self.yaw,
+            "depths": list(self.depths),
+        }
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of everything that decides the result (hex, 64 characters), not the format's version."""
+        return provenance.content_hash(self._content)
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], origin: str = "job") -> Job:
+        """Rebuild a job from `document`.
+
+        Raises:
+            FormatError: If it breaks the schema.
+        """
+        documents.check(document, "label_job", origin)
+        values = {k: v for k, v in document.items() if k != "version"}
+        return cls(**{**values, "depths": tuple(document["depths"])})
+
+    @property
+    def deepest(self) -> float:
+        """Greatest depth of the path [mm]."""
+        return max(self.depths)

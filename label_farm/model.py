@@ -1,0 +1,93 @@
+"""The skin model as the farm sees it: something built once per process from a sensor, which solves jobs."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+from typing import Protocol
+
+import tacdata.errors
+from label_farm import environment
+from label_farm.job import Job
+from tacdata.errors import SolveError, TacdataError, UsageError
+from tacdata.labels import PathSolution
+from tacdata.sensor import Sensor
+
+FACTORY = "label_farm.fem:FemModel"
+"""Dotted path of what builds the model from a sensor."""
+
+
+class Model(Protocol):
+    """What a factory builds."""
+
+    @property
+    def content_hash(self) -> str:
+        """Hash of everything in the model that decides a result."""
+        ...
+
+    def solve(self, job: Job) -> PathSolution:
+        """Solve one job; raises SolveError with the reason if it fails."""
+        ...
+
+
+def build(factory: str, sensor: Sensor) -> Model:
+    """Build a model in this process; costs seconds.
+
+    Raises:
+        UsageError: If ``factory`` names nothing ("package.module:name").
+        SolveError: If the sensor cannot be modelled.
+    """
+    module, _, name = factory.partition(":")
+    try:
+        return getattr(importlib.import_module(module), name)(sensor)
+    except (ImportError, AttributeError) as error:
+        raise UsageError(f"no model {factory!r}: {error}", "package.module:name", "check the name") from error
+
+
+def version(factory: str, sensor: Sensor) -> str:
+    """Return the model's content hash, found by a process of its own.
+
+    The caller stays free of the solver's libraries, and the mesh is cached before the workers ask for it.
+
+    Raises:
+        SolveError: If the sensor cannot be modelled.
+    """
+    asked = json.dumps({"factory": factory, "sensor": sensor.document})
+    finished = subprocess.run(
+        environment.python("label_farm.model"),
+        env=environment.variables(),
+        input=asked,
+        capture_output=True,
+        text=True,
+    )
+    try:
+        answer = json.loads(finished.stdout)
+    except ValueError:
+        raise SolveError(
+            f"the skin model of {sensor.name} cannot be built:\n{finished.stderr[-2000:]}",
+            "a model that can be built on this machine",
+            "see the last lines above",
+        ) from None
+    if "error" in answer:
+        raise getattr(tacdata.errors, answer["kind"], SolveError)(*answer["error"])
+    return answer["version"]
+
+
+def main() -> None:
+    """Answer one question of `version` on standard input and output."""
+    answer_to = os.dup(1)
+    os.dup2(2, 1)  # what libraries print while they load must not mix with the answer
+    asked = json.load(sys.stdin)
+    try:
+        model = build(asked["factory"], Sensor.from_document(asked["sensor"], "sensor"))
+        answer = {"version": model.content_hash}
+    except TacdataError as error:
+        answer = {"kind": type(error).__name__, "error": [error.given, error.allowed, error.remedy]}
+    os.write(answer_to, json.dumps(answer).encode())
+
+
+if __name__ == "__main__":
+    main()

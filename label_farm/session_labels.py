@@ -1,0 +1,79 @@
+"""The labels of one session: which are current, which must not be touched, and why some are missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from label_farm.failure import Failure
+from label_farm.job import Job
+from label_farm.label import make_label, parents
+from label_farm.plan import LabelRequest
+from tacdata import documents
+from tacdata.errors import FormatError, UsageError
+from tacdata.labels import PathSolution, read_label, write_label
+
+
+class SessionLabels:
+    """The folder ``SESSION/labels``: one label file an episode, or the reason why there is none."""
+
+    def __init__(self, folder: Path) -> None:
+        """Name the folder; it is made when the first file is written."""
+        self.folder = folder
+        self._parents: dict[int, dict[str, str] | None] = {}
+
+    def path(self, episode: int) -> Path:
+        """Return where an episode's label lies, or would lie."""
+        return self.folder / f"episode-{episode:06d}.parquet"
+
+    def failure_path(self, episode: int) -> Path:
+        """Return where the reason lies if an episode has no label."""
+        return self.folder / f"episode-{episode:06d}.failure.json"
+
+    def parents(self, episode: int) -> dict[str, str] | None:
+        """Return what the present label was made from; None if there is no readable label."""
+        if episode not in self._parents:
+            self._parents[episode] = self._read_parents(self.path(episode))
+        return self._parents[episode]
+
+    def _read_parents(self, path: Path) -> dict[str, str] | None:
+        try:
+            return dict(read_label(path).provenance["parents"]) if path.exists() else None
+        except FormatError:
+            return None
+
+    def refuse_other_models(self, requests: list[LabelRequest]) -> None:
+        """Refuse to mix model versions within the folder.
+
+        Raises:
+            UsageError: If a label there is of another model version than the request's.
+        """
+        others = []
+        for request in requests:
+            found = self.parents(request.episode)
+            if found is not None and found.get("model") != request.model:
+                others.append((request, str(found.get("model"))))
+        if others:
+            request, model = others[0]
+            raise UsageError(
+                f"{self.folder} is a label store from another model version: {len(others)} of "
+                f"{len(requests)} labels, first {self.path(request.episode).name}, are of {model[:12]}…",
+                f"labels of the current model {request.model[:12]}… (sensor, law, mesh, settings, code)",
+                "give --redo to replace them, or use the tacdata release and sensor file that made them",
+            )
+
+    def current(self, request: LabelRequest) -> bool:
+        """Return whether the label lies there, made from exactly what this request would be made from."""
+        return self.parents(request.episode) == parents(request)
+
+    def write(self, request: LabelRequest, solution: PathSolution | None) -> None:
+        """Make and write a label, and forget an earlier failure."""
+        write_label(self.path(request.episode), make_label(request, solution))
+        self._parents.pop(request.episode, None)
+        self.failure_path(request.episode).unlink(missing_ok=True)
+
+    def write_failure(self, episode: int, failure: Failure, job: Job | None) -> None:
+        """Write why an episode has no label; an older label, no longer current, becomes ``.superseded``."""
+        documents.write(self.failure_path(episode), failure.document(job), "label_failure")
+        if self.path(episode).exists():
+            self.path(episode).replace(self.path(episode).with_suffix(".superseded"))
+        self._parents.pop(episode, None)

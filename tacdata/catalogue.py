@@ -1,0 +1,107 @@
+"""What the registries hold, read from the sources: listing imports no member, needs no driver and no GPU."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from tacdata import registry
+from tacdata.errors import UsageError
+
+PACKAGES = ("tacdata", "label_farm", "training", "viewers")
+
+
+@dataclass(frozen=True)
+class Registry:
+    """A folder whose files are members."""
+
+    name: str
+    """What people call it: the folder's name."""
+    room: str
+    """Dotted package name."""
+    base: str
+    """File name of the base, whose docstring says what a member's file holds."""
+    meaning: str
+    """First line of the package's docstring."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One file of a registry."""
+
+    name: str
+    """The file's name."""
+    meaning: str
+    """First line of its docstring."""
+    parameters: tuple[tuple[str, str], ...]
+    """Name and first line of the docstring of each public field of its classes."""
+
+
+def registries() -> dict[str, Registry]:
+    """Return every registry by name: a module that sets ``ROOM, BASE = "package", "base"`` declares one."""
+    found = {}
+    for path in (p for package in PACKAGES for p in sorted(_folder(package).rglob("*.py"))):
+        for node in _parse(path).body:
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "(ROOM, BASE)":
+                room, base = ast.literal_eval(node.value)
+                name = room.rsplit(".", 1)[-1]
+                found[name] = Registry(name, room, base, _first_line(_parse(_folder(room) / "__init__.py")))
+    return dict(sorted(found.items()))
+
+
+def members(name: str) -> list[Member]:
+    """Return the members of a registry, sorted by name.
+
+    Raises:
+        UsageError: If there is no such registry.
+    """
+    known = registries()
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        raise UsageError(
+            f"no folder of members is called {name!r}",
+            ", ".join(known),
+            f"did you mean {close[0]!r}?" if close else "tacdata list shows them all",
+        )
+    room, base = known[name].room, known[name].base
+    return [_member(_folder(room), member) for member in registry.names(room, base)]
+
+
+def _member(folder: Path, name: str) -> Member:
+    path = folder / f"{name}.py" if (folder / f"{name}.py").exists() else folder / name / "__init__.py"
+    tree = _parse(path)
+    classes = [n for n in tree.body if isinstance(n, ast.ClassDef) and not n.name.startswith("_")]
+    return Member(name, _first_line(tree), tuple(field for kind in classes for field in _fields(kind)))
+
+
+def _fields(kind: ast.ClassDef) -> list[tuple[str, str]]:
+    """Name and first docstring line of the dataclass fields of a class."""
+    if not any("dataclass" in ast.unparse(d) for d in kind.decorator_list):
+        return []
+    result = []
+    for statement, following in zip(kind.body, [*kind.body[1:], ast.Pass()], strict=True):
+        if isinstance(statement, ast.AnnAssign) and not ast.unparse(statement.target).startswith("_"):
+            value = following.value if isinstance(following, ast.Expr) else None
+            text = str(value.value) if isinstance(value, ast.Constant) else ""
+            result.append((ast.unparse(statement.target), text.strip().split("\n")[0]))
+    return result
+
+
+def _folder(package: str) -> Path:
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        raise UsageError(
+            f"the package {package} is not installed", "an installation of tacdata", "install tacdata again"
+        )
+    return Path(next(iter(spec.submodule_search_locations)))
+
+
+def _parse(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def _first_line(tree: ast.Module) -> str:
+    return (ast.get_docstring(tree) or "").split("\n")[0]

@@ -1,0 +1,65 @@
+"""Score a trained network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import PIPELINE
+
+ORDER = 60
+PANEL = PIPELINE
+
+
+def run(
+    network: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Folder of a training run, or a checkpoint file.")
+    ],
+    dataset: Annotated[
+        Path | None, typer.Option(help="Dataset folder; default: the one that the network was trained on.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the scores; default: RUN/scores, predictions in RUN/predictions."),
+    ] = None,
+    device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")
+    ] = None,
+) -> None:
+    """Score a network on its test episodes (or on another dataset): table, JSON, picture, predictions.
+
+    On the dataset that it was trained on only the test episodes count; another dataset counts as a whole.
+    """
+    from rich.progress import Progress
+
+    from tacdata.errors import UsageError
+    from training import checkpoint, report
+    from training.data import read_frames
+    from training.evaluate import evaluate
+    from training.score_sheet import markdown
+
+    place = report.places(network, out)
+    place.check()
+    trained = checkpoint.load(network)
+    recorded = Path(trained.document["dataset"]["path"])
+    if dataset is None and not recorded.is_dir():
+        raise UsageError(
+            f"the dataset {recorded} of {network} is not there", "a dataset folder", "give --dataset"
+        )
+    frames = read_frames(dataset or recorded)
+    with Progress(transient=True) as bar:
+        task = bar.add_task("predict", total=None)
+        evaluation = evaluate(
+            trained,
+            frames,
+            device,
+            threads,
+            lambda done, total: bar.update(task, completed=done, total=total),
+        )
+        report.write(place, evaluation, frames)
+    print(markdown(evaluation.document))
+    print(f"scores      {place.scores / report.JSON}, {report.SHEET}, {report.PICTURE}")
+    print(f"predictions {place.predictions}")

@@ -1,0 +1,126 @@
+"""Compute the labels of a session with the FEM skin model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tacdata.commands.command import PIPELINE
+from tacdata.errors import SolveError, UsageError
+
+if TYPE_CHECKING:
+    from label_farm.labelling import Summary
+
+ORDER = 30
+PANEL = PIPELINE
+
+
+def run(
+    session: Annotated[Path, typer.Argument(help="Folder that `tacdata record` wrote.")],
+    sensor: Annotated[Path | None, typer.Option(help="Sensor file, if not each recording's own.")] = None,
+    store: Annotated[
+        Path | None,
+        typer.Option(help="Folder of solved presses, may serve many sessions; else SESSION/labels/store."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one per core.")] = None,
+    redo: Annotated[
+        bool, typer.Option("--redo", help="Replace labels of another model version; retry failed presses.")
+    ] = False,
+    load_step: Annotated[float, typer.Option(help="Largest depth step while loading [mm].")] = 0.25,
+    unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
+    factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
+) -> None:
+    """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
+    from functools import partial
+
+    from label_farm.environment import cores
+    from label_farm.labelling import FarmSettings, Labelling
+    from label_farm.ladder import Ladder
+    from label_farm.model import FACTORY
+    from label_farm.store import Store
+    from tacdata.recording.reader import read_episode
+    from tacdata.recording.session import read_session
+    from tacdata.sensor import read_sensor
+
+    recorded = read_session(session)
+    if not recorded.episodes:
+        raise UsageError(f"{session} holds no finished recording", "at least one", "record: `tacdata record`")
+    settings = FarmSettings(
+        factory=factory or FACTORY,
+        ladder=Ladder(load_step=load_step, unload_step=unload_step),
+        workers=workers or cores(),
+        redo=redo,
+    )
+    skin = read_sensor(sensor) if sensor else None
+    labels = session / "labels"
+    recordings = {int(path.stem[-6:]): partial(read_episode, path) for path in recorded.episodes}
+    with _Bars() as bars:
+        labelling = Labelling(labels, Store(store or labels / "store"), settings, bars.show)
+        summary = labelling.run(recordings, skin)
+    _report(summary, labels, session)
+
+
+class _Bars:
+    """One bar a stage, with the time that remains."""
+
+    def __enter__(self) -> _Bars:
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("remaining"),
+            # A press takes seconds to minutes, so the speed is estimated from all that this run has solved.
+            TimeRemainingColumn(elapsed_when_finished=False),
+            speed_estimate_period=24 * 3600.0,
+        )
+        self._progress.start()
+        self._tasks: dict = {}
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._progress.stop()
+
+    def show(self, stage: str, done: int, total: int) -> None:
+        """Move the bar of a stage."""
+        names = {"read": "reading recordings", "solve": "solving presses"}
+        if stage not in self._tasks:
+            self._tasks[stage] = self._progress.add_task(names[stage], total=total)
+        self._progress.update(self._tasks[stage], completed=done)
+
+
+def _report(summary: Summary, labels: Path, session: Path) -> None:
+    import statistics
+
+    print(
+        f"labels written: {len(summary.written)} ({summary.untouched} without contact), "
+        f"already there: {len(summary.current)}, failed: {len(summary.failed)}"
+    )
+    if summary.found:
+        print(f"presses taken from the store: {summary.found}")
+    if summary.seconds:
+        print(
+            f"presses solved: {len(summary.seconds)}, {statistics.median(summary.seconds):.1f} s each, median"
+        )
+    for episode, reason in sorted(summary.failed.items()):
+        print(f"episode {episode}: no label: {reason.splitlines()[0]}")
+    print(f"labels lie in {labels}")
+    if summary.failed:
+        count = len(summary.failed) + len(summary.written) + len(summary.current)
+        raise SolveError(
+            f"{len(summary.failed)} of {count} episodes have no label",
+            "a label for every episode",
+            f"read {labels}/episode-*.failure.json; `tacdata label {session} --redo` tries again",
+        )
+    print(f"next: tacdata pack {session} --out DATASET")

@@ -1,0 +1,28 @@
+"""`tacdata recover`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+ORDER = 120
+PANEL = TOOLS
+
+
+def run(
+    file: Annotated[Path, typer.Argument(help="The damaged recording (MCAP).")],
+    out: Annotated[
+        Path | None, typer.Option(help="Where to write the repaired copy; default beside it.")
+    ] = None,
+) -> None:
+    """Write a repaired copy of a recording that a crash cut off."""
+    from tacdata.recording.recover import recover
+
+    target, records = recover(file, out)
+    for damage in records.damage or ["nothing was wrong with it"]:
+        print(f"{file.name}: {damage}")
+    print(f"{len(records.messages)} messages and {len(records.attachments)} attachments are in {target}")

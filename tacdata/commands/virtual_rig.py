@@ -1,0 +1,41 @@
+"""The verb ``tacdata virtual-rig``."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+ORDER, PANEL = 110, TOOLS
+
+
+def run(
+    directory: Annotated[
+        Path, typer.Argument(metavar="DIR", help="where rig.yaml and truth.yaml are written")
+    ],
+    speed: Annotated[float, typer.Option(help="seconds of the rig per real second")] = 8.0,
+    seed: Annotated[int, typer.Option(help="which world: registration error, gains, noise")] = 0,
+    camera: Annotated[bool, typer.Option(help="with a camera that watches the AprilTag cube")] = True,
+    sensor: Annotated[Path | None, typer.Option(help="sensor file; default: the paper's")] = None,
+) -> None:
+    """Emulate a rig (GRBL, taxel board, camera) that other verbs reach by its rig.yaml, until Ctrl-C."""
+    from tacdata.sensor import read_sensor
+    from tacdata.virtual_rig.rig import VirtualRig
+
+    stopped = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stopped.set())
+    rig = VirtualRig(directory, speed, seed, camera, read_sensor(sensor) if sensor else None)
+    try:
+        rig.start()
+        print("\n".join([*rig.emulates, f"rig file           {rig.path}", "Ctrl-C stops it."]), flush=True)
+        while not stopped.wait(0.5):
+            pass
+    finally:
+        rig.stop()
+    print("stopped", flush=True)

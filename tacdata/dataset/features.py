@@ -1,0 +1,134 @@
+"""Names, shapes and units of a dataset's columns, in LeRobot's terms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tacdata.sensor import Sensor
+
+STATE = "observation.state"
+"""Tared readings: raw counts minus their mean in the episode's rest phase [counts], shape (taxels,)."""
+RAW = "observation.tactile_raw"
+"""Raw readings [counts], shape (taxels,), float32."""
+DEPTH = "observation.depth"
+"""The label: the depth map clipped at 0, shape (pixels_x, pixels_y).
+
+Stored as float32 TIFF in metres, which LeRobot takes for a depth image and its viewers show; `read_dataset`,
+`WindowDataset` and LeRobot itself give millimetres. The signed map stays in the label file."""
+TIP = "tacdata.tip"
+"""Nominal x, y and depth of the indenter's lowest point [mm], shape (3,), float32."""
+FORCE = "tacdata.force"
+"""Simulated force of the skin on the indenter [N], shape (3,), float32."""
+TAXEL_FORCE = "tacdata.taxel_force"
+"""Simulated normal force of each protrusion [N], shape (taxels,), float32."""
+LABEL_ERROR = "tacdata.label_error"
+"""Estimated numerical error of the map, root mean square [mm], float32."""
+TIME = "tacdata.time_ns"
+"""Estimated sample time on the host's clock [ns], int64. LeRobot's `timestamp` is frame_index / fps."""
+PHASE = "tacdata.phase"
+"""Index into `tacdata.recording.episode.PHASES`, -1 outside every phase, int64."""
+VALID = "tacdata.valid"
+"""False where frames were lost just before, or where the commanded path says nothing of the time."""
+SENSOR = "tacdata.sensor"
+"""First 60 bits of the sensor's content hash, int64: survives every edit, so a wrong sensor is noticed."""
+RECORD = "tacdata.record"
+"""First 60 bits of the record's hash, int64: leads to recording, label and press after every edit."""
+
+INDEX_COLUMNS = {
+    "timestamp": "float32",
+    "frame_index": "int64",
+    "episode_index": "int64",
+    "index": "int64",
+    "task_index": "int64",
+}
+"""LeRobot's own columns."""
+
+UNITS = {
+    STATE: "counts",
+    RAW: "counts",
+    DEPTH: "mm",
+    TIP: "mm",
+    FORCE: "N",
+    TAXEL_FORCE: "N",
+    LABEL_ERROR: "mm",
+    TIME: "ns",
+    PHASE: "1",
+    VALID: "1",
+    SENSOR: "1",
+    RECORD: "1",
+    "timestamp": "s",
+}
+"""Unit of every column as `read_dataset` gives it."""
+
+DTYPES = {
+    STATE: "float32",
+    RAW: "float32",
+    DEPTH: "image",
+    TIP: "float32",
+    FORCE: "float32",
+    TAXEL_FORCE: "float32",
+    LABEL_ERROR: "float32",
+    TIME: "int64",
+    PHASE: "int64",
+    VALID: "bool",
+    SENSOR: "int64",
+    RECORD: "int64",
+}
+"""LeRobot dtype of every column that `DatasetWriter` is given."""
+
+
+def short_hash(digest: str) -> int:
+    """Return the first 60 bits of a hex digest, which fit an int64 column."""
+    return int(digest[:15], 16)
+
+
+def shapes(sensor: Sensor) -> dict[str, tuple[int, ...]]:
+    """Return the shape of one frame of every own column; scalars are ``()``."""
+    taxels = (sensor.taxels.count,)
+    vectors = {
+        STATE: taxels,
+        RAW: taxels,
+        DEPTH: sensor.map.shape,
+        TIP: (3,),
+        FORCE: (3,),
+        TAXEL_FORCE: taxels,
+    }
+    return {key: vectors.get(key, ()) for key in DTYPES}
+
+
+def _names(key: str, sensor: Sensor) -> list[str] | None:
+    columns = sensor.taxels.columns
+    taxels = [f"taxel_{k % columns}_{k // columns}" for k in range(sensor.taxels.count)]
+    return {
+        STATE: taxels,
+        RAW: taxels,
+        TAXEL_FORCE: taxels,
+        DEPTH: ["height", "width", "channels"],
+        TIP: ["x", "y", "depth"],
+        FORCE: ["x", "y", "z"],
+    }.get(key)
+
+
+def lerobot_features(sensor: Sensor) -> dict[str, dict[str, Any]]:
+    """Return the ``features`` entry of info.json. Units stand under ``info``, which LeRobot's edits keep."""
+    features: dict[str, dict[str, Any]] = {}
+    for key, shape in shapes(sensor).items():
+        info: dict[str, Any] = {"unit": UNITS[key]}
+        if key == DEPTH:
+            shape, info = (*shape, 1), {"is_depth_map": True, "depth_unit": "m", "unit": "m"}
+        features[key] = {
+            "dtype": DTYPES[key],
+            "shape": list(shape or (1,)),
+            "names": _names(key, sensor),
+            "info": info,
+        }
+    for key, dtype in INDEX_COLUMNS.items():
+        features[key] = {"dtype": dtype, "shape": [1], "names": None}
+    return features
+
+
+def cast(key: str, values: np.ndarray) -> np.ndarray:
+    """Return ``values`` in the column's own type (the depth map as float32)."""
+    return np.ascontiguousarray(values, dtype="float32" if DTYPES[key] == "image" else DTYPES[key])

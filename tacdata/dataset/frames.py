@@ -1,0 +1,125 @@
+"""From an episode and its label to the columns of a dataset."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from tacdata import provenance
+from tacdata.dataset import features
+from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.errors import FormatError
+from tacdata.labels import Label
+from tacdata.recording.episode import PHASES, Episode
+from tacdata.sensor import Sensor
+
+
+def label_hash(label: Label) -> str:
+    """Return the SHA-256 of a label's values (hex); provenance, with its time of making, does not count."""
+    digest = hashlib.sha256()
+    for values in (label.time_ns, label.tip, label.signed, label.taxel_force, label.force, label.error):
+        digest.update(np.ascontiguousarray(values).data)
+    return digest.hexdigest()
+
+
+def recording_hash(episode: Episode) -> str:
+    """Return the SHA-256 of the recording's file, or of the readings if there is no file (hex)."""
+    if episode.path.is_file():
+        return provenance.file_hash(episode.path)
+    digest = hashlib.sha256(np.ascontiguousarray(episode.taxels.sample_ns).data)
+    digest.update(np.ascontiguousarray(episode.taxels.counts).data)
+    return digest.hexdigest()
+
+
+def check_pair(episode: Episode, label: Label, wanted: dict[str, str | None]) -> None:
+    """Refuse a label that is not of this recording, sensor or skin model.
+
+    Args:
+        episode: The recording.
+        label: Its label.
+        wanted: What it must be made from: recording, sensor, model -> content hash, None if any will do.
+
+    Raises:
+        FormatError: Naming what differs.
+    """
+    where = f"label of {episode.path.name}"
+    parents = label.provenance.get("parents", {})
+    for name, digest in wanted.items():
+        if digest is not None and parents.get(name) != digest:
+            have = parents.get(name)
+            raise FormatError(
+                f"{where}: made for {name} {have[:12] if have else 'unknown'}",
+                f"{name} {digest[:12]}",
+                "run `tacdata label` for this session and this sensor again",
+            )
+    if not np.array_equal(label.time_ns, episode.taxels.sample_ns):
+        raise FormatError(
+            f"{where}: {len(label.time_ns)} frames, the recording has {len(episode.taxels.sample_ns)}"
+            if len(label.time_ns) != len(episode.taxels.sample_ns)
+            else f"{where}: its times are not those of the recording's frames",
+            "one label frame for each taxel frame, at its time",
+            "run `tacdata label` for this session again",
+        )
+
+
+def baseline(episode: Episode) -> np.ndarray:
+    """Return the mean reading of each taxel in the rest phase [counts], shape (taxels,).
+
+    Raises:
+        FormatError: If no frame lies in the rest phase, so that the readings cannot be tared.
+    """
+    resting = episode.phase_at(episode.taxels.sample_ns) == PHASES.index("rest")
+    if not resting.any():
+        raise FormatError(
+            f"{episode.path.name}: no taxel frame lies in the rest phase",
+            "at least one frame without contact, to tare with",
+            "record with a longer rest (motion/rest in the plan)",
+        )
+    return episode.taxels.counts[resting].mean(axis=0)
+
+
+def valid(episode: Episode) -> np.ndarray:
+    """Return which frames follow their neighbour without loss and lie on the commanded path, (n,), bool."""
+    times = episode.taxels.sample_ns
+    follows = np.diff(episode.taxels.counter, prepend=episode.taxels.counter[:1] - 1) == 1
+    return follows & (times >= episode.tip_ns[0]) & (times <= episode.tip_ns[-1])
+
+
+def episode_columns(episode: Episode, label: Label) -> dict[str, np.ndarray]:
+    """Return the columns that `DatasetWriter.append` takes, for an episode and its label.
+
+    Raises:
+        FormatError: If the readings cannot be tared.
+    """
+    counts = episode.taxels.counts
+    return {
+        features.STATE: (counts - baseline(episode)).astype(np.float32),
+        features.RAW: counts.astype(np.float32),
+        features.DEPTH: label.depth.astype(np.float32),
+        features.TIP: label.tip.astype(np.float32),
+        features.FORCE: label.force,
+        features.TAXEL_FORCE: label.taxel_force,
+        features.LABEL_ERROR: label.error,
+        features.TIME: label.time_ns,
+        features.PHASE: episode.phase_at(label.time_ns),
+        features.VALID: valid(episode),
+    }
+
+
+def episode_record(episode: Episode, label: Label, recording: str, sensor: Sensor) -> EpisodeRecord:
+    """Return where the episode comes from; ``recording`` is its hash, ``sensor`` that of its label."""
+    return EpisodeRecord(
+        sensor=sensor.content_hash,
+        recording=recording,
+        recording_file=episode.path.name,
+        label=label_hash(label),
+        label_provenance=label.provenance,
+        press=episode.press.document,
+        rig=str(episode.rig.get("name", "")),
+        virtual="clock" in episode.rig,
+        baseline=tuple(baseline(episode).tolist()),
+        quality=float(valid(episode).mean()),
+        complete=episode.complete,
+        notes=episode.notes,
+    )

@@ -1,0 +1,209 @@
+"""Read a dataset folder: columns as memory maps, episodes with their provenance, the sensor, the units."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from tacdata.dataset import cache, features, folder, metadata
+from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.errors import FormatError
+from tacdata.plans import Press
+from tacdata.sensor import Sensor
+
+
+class LostProvenanceWarning(UserWarning):
+    """A tool that edited the dataset dropped part of where it comes from."""
+
+
+@dataclass(frozen=True)
+class DatasetEpisode:
+    """One episode of a dataset."""
+
+    index: int
+    """Number in the dataset, from 0."""
+    start: int
+    """First frame."""
+    stop: int
+    """One past the last frame."""
+    task: str
+    """What is done in it, in words."""
+    sensor: str
+    """Content hash of its sensor."""
+    record: EpisodeRecord | None
+    """Where it comes from; None if an edit lost it."""
+
+    @property
+    def press(self) -> Press | None:
+        """The nominal configuration; None if an edit lost it."""
+        return self.record.configuration if self.record else None
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A dataset on disk. ``dataset[key]`` is a column, frames first, in the units of `units`."""
+
+    root: Path
+    """The folder."""
+    columns: dict[str, np.ndarray]
+    """Column by name (`tacdata.dataset.features`), read-only memory maps."""
+    episodes: tuple[DatasetEpisode, ...]
+    """Episodes in order; their frames follow each other without gaps."""
+    sensors: dict[str, Sensor]
+    """Sensor by content hash."""
+    fps: int
+    """Frames a second as LeRobot counts them: the nominal rate, rounded [Hz]."""
+    content_hash: str
+    """Identity of the content (hex, 64 characters)."""
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return self.episodes[-1].stop
+
+    def __getitem__(self, key: str) -> np.ndarray:
+        """Return a column.
+
+        Raises:
+            FormatError: If there is none of that name.
+        """
+        if key not in self.columns:
+            raise FormatError(
+                f"{self.root} has no column {key!r}", ", ".join(self.columns), "name one of them"
+            )
+        return self.columns[key]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every column."""
+        return {key: features.UNITS.get(key, "1") for key in self.columns}
+
+    @cached_property
+    def sensor(self) -> Sensor:
+        """The sensor, where all episodes share one.
+
+        Raises:
+            FormatError: If they are of several sensors.
+        """
+        used = {episode.sensor for episode in self.episodes}
+        if len(used) != 1:
+            raise FormatError(
+                f"{self.root} holds episodes of {len(used)} sensors",
+                "one sensor",
+                "use `sensors` and `episodes`",
+            )
+        return self.sensors[used.pop()]
+
+
+def read_dataset(root: Path, cache_folder: Path | None = None) -> Dataset:
+    """Open a dataset folder, also one that lerobot's own tools have edited.
+
+    The first call after a change decodes the data files into memory maps (`tacdata.dataset.cache`); later
+    ones only map them. Datasets may be larger than memory.
+
+    Args:
+        root: The folder.
+        cache_folder: Where the maps lie; None takes the user's cache.
+
+    Raises:
+        UsageError: If there is no dataset.
+        FormatError: If it is damaged, foreign, or does not say which sensor recorded it.
+
+    Warns:
+        LostProvenanceWarning: If an edit dropped what can be missed or found again.
+    """
+    root = Path(root)
+    info = folder.read_info(root)
+    _check_columns(root, info)
+    rows = folder.read_rows(root, info)
+    if not rows:
+        raise FormatError(f"{root} holds no episodes", "at least one", "pack a session into it")
+    paths = cache.data_files(root, rows)
+    place = cache.place_of(root, cache_folder)
+    digest = cache.dataset_hash(root, info, paths, place)
+    columns = cache.open_columns(root, info, paths, place, digest)
+    sensors, records = _provenance(root, paths)
+    by_key = {features.short_hash(full): full for full in sensors}
+    episodes = []
+    for row in rows:
+        key = _single(root, columns[features.SENSOR], row, "sensors")
+        if key not in by_key:
+            raise FormatError(
+                f"{root}: episode {row.index} is of sensor {key:015x}, which {metadata.MAIN} lacks",
+                ", ".join(f"{k:015x} ({sensors[full].name})" for k, full in by_key.items()),
+                "put the meta/tacdata.json of the dataset that this episode comes from back "
+                "(tacdata.dataset.restore), or delete the episode",
+            )
+        record = records.get(_single(root, columns[features.RECORD], row, "records"))
+        episodes.append(
+            DatasetEpisode(row.index, row.start, row.stop, " / ".join(row.tasks), by_key[key], record)
+        )
+    nameless = [episode.index for episode in episodes if episode.record is None]
+    if nameless:
+        _warn(
+            f"{root}: {len(nameless)} of {len(episodes)} episodes (first: {nameless[0]}) lost their records; "
+            f"tacdata.dataset.restore finds their records in the dataset that this one was made from"
+        )
+    return Dataset(root, columns, tuple(episodes), sensors, info["fps"], digest)
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, LostProvenanceWarning, stacklevel=3)
+
+
+def _check_columns(root: Path, info: dict[str, Any]) -> None:
+    missing = [key for key in (*features.DTYPES, *features.INDEX_COLUMNS) if key not in info["features"]]
+    if missing:
+        raise FormatError(
+            f"{root} is a LeRobot dataset without {', '.join(missing)}",
+            "a dataset that `tacdata pack` wrote",
+            "name such a dataset; others have no labels to train on",
+        )
+    for key, unit in features.UNITS.items():
+        stored = "m" if key == features.DEPTH else unit
+        said = (info["features"][key].get("info") or {}).get("unit", stored)
+        if said != stored:
+            raise FormatError(
+                f"{root}: {key} is in {said}", stored, "convert the column, or pack the session again"
+            )
+
+
+def _provenance(root: Path, paths: list[Path]) -> tuple[dict[str, Sensor], dict[int, EpisodeRecord]]:
+    """Return sensors and records, from meta/ or, where an edit dropped them, from the data files."""
+    main, records = metadata.read_main(root), metadata.read_records(root)
+    documents = main["sensors"] if main else {}
+    if main is None or not records:
+        stamps = _shard_stamps(paths)
+        if not documents and stamps:
+            _warn(f"{root}: {metadata.MAIN} is gone; the sensor is taken from the data files")
+        documents = documents or {stamp["sensor_hash"]: stamp["sensor"] for stamp in stamps}
+        found = [EpisodeRecord.from_document(stamp["record"], str(root)) for stamp in stamps]
+        records = records or {record.key: record for record in found}
+    if not documents:
+        raise metadata.lost(root)
+    sensors = {digest: Sensor.from_document(document, str(root)) for digest, document in documents.items()}
+    if any(sensor.content_hash != digest for digest, sensor in sensors.items()):
+        raise FormatError(
+            f"{root}: a sensor description was changed", "it as recorded", "put the original back"
+        )
+    return sensors, records
+
+
+def _shard_stamps(paths: list[Path]) -> list[dict[str, Any]]:
+    stamps = ((pq.read_schema(path).metadata or {}).get(metadata.SHARD_KEY) for path in paths)
+    return [json.loads(stamp) for stamp in stamps if stamp]
+
+
+def _single(root: Path, column: np.ndarray, row: folder.EpisodeRow, what: str) -> int:
+    values = np.unique(column[row.start : row.stop])
+    if len(values) != 1:
+        raise FormatError(
+            f"{root}: episode {row.index} mixes {len(values)} {what}", "one", "pack the session again"
+        )
+    return int(values[0])

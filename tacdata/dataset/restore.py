@@ -1,0 +1,62 @@
+"""Give an edited dataset its sensors and records back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.dataset import cache, features, folder, metadata
+from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.errors import FormatError
+
+
+def restore(root: Path, sources: Iterable[Path]) -> list[int]:
+    """Write meta/tacdata.json and the records of a dataset that lerobot deleted from, split or merged.
+
+    Frames carry the hashes of their sensor and record, so only what belongs to them is taken from the
+    sources.
+
+    Args:
+        root: The edited dataset.
+        sources: Datasets that it was made from.
+
+    Returns:
+        Numbers of the episodes whose record was not found.
+
+    Raises:
+        FormatError: If no source describes the sensor of some frames.
+    """
+    root = Path(root)
+    info = folder.read_info(root)
+    rows = folder.read_rows(root, info)
+    wanted: set[int] = set()
+    keys: list[int] = []
+    for path in cache.data_files(root, rows):
+        table = folder.read_parquet(path, [features.SENSOR, features.RECORD])
+        wanted.update(np.unique(table[features.SENSOR].to_numpy()).tolist())
+        keys.extend(dict.fromkeys(table[features.RECORD].to_pylist()))
+    sensors: dict[str, dict] = {}
+    records: dict[int, EpisodeRecord] = metadata.read_records(root)
+    present = set(records)
+    rate = float(info["fps"])
+    for source in (root, *map(Path, sources)):
+        main = metadata.read_main(source)
+        if main is None:
+            continue
+        rate = main["rate"]
+        sensors |= {k: v for k, v in main["sensors"].items() if features.short_hash(k) in wanted}
+        records = {**metadata.read_records(source), **records}
+    lacking = wanted - {features.short_hash(k) for k in sensors}
+    if lacking:
+        raise FormatError(
+            f"{root}: no source describes the sensor {min(lacking):015x}",
+            "the datasets that it was made from",
+            "name them all",
+        )
+    metadata.write_main(root, sensors, rate)
+    for key in keys:
+        if key in records and key not in present:
+            metadata.append_record(root, records[key])
+    return [number for number, key in enumerate(keys) if key not in records]

@@ -1,0 +1,114 @@
+"""Windows of neighbouring frames for torch, gathered from memory maps, under LeRobotDataset's keys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch  # noqa: TID253 - only who trains imports this module
+
+from tacdata.dataset import features
+from tacdata.dataset.reader import Dataset, read_dataset
+from tacdata.errors import UsageError
+
+
+def centred(length: int = 9) -> tuple[int, ...]:
+    """Return the offsets -K ... K [frames] of a window of ``length`` = 2 K + 1 frames (paper: T = 9, K = 4).
+
+    Raises:
+        UsageError: If the length is even or not positive.
+    """
+    if length < 1 or length % 2 == 0:
+        raise UsageError(
+            f"a window of {length} frames", "an odd number of frames, 1 or more", "choose 9, for example"
+        )
+    return tuple(range(-(length // 2), length // 2 + 1))
+
+
+class WindowDataset(torch.utils.data.Dataset):
+    """Frames with windows around them, as ``LeRobotDataset(delta_timestamps=...)`` gives them.
+
+    Beyond an episode's ends its first or last frame is repeated, and ``KEY_is_pad`` says so. ``dataset[i]``
+    is one frame; ``dataset[[i, j, ...]]`` and `batch` are a batch, so that a DataLoader with
+    ``batch_size=None`` and a BatchSampler reads whole batches at once.
+    """
+
+    def __init__(
+        self,
+        dataset: Dataset | Path,
+        offsets: Mapping[str, Iterable[int]] | None = None,
+        keys: Sequence[str] | None = None,
+    ) -> None:
+        """Prepare the gather.
+
+        Args:
+            dataset: The dataset or its folder.
+            offsets: Column -> frames of its window relative to the frame asked for; None takes the paper's
+            nine
+                around it for `features.STATE`. Columns not named here give the one frame.
+            keys: Columns to return; None returns all.
+
+        Raises:
+            FormatError: If a column is not in the dataset.
+        """
+        self.data = dataset if isinstance(dataset, Dataset) else read_dataset(dataset)
+        given = {features.STATE: centred()} if offsets is None else offsets
+        self.offsets = {key: np.array(tuple(frames), dtype=np.int64) for key, frames in given.items()}
+        self.keys = tuple(self.data.columns) if keys is None else tuple(keys)
+        # Plain views of the memory maps: numpy's own class for them costs time in every gather.
+        self._columns = {key: np.asarray(self.data[key]) for key in (*self.keys, *self.offsets)}
+        self._episode_of = np.asarray(self.data["episode_index"])
+        self._starts = np.array([episode.start for episode in self.data.episodes])
+        self._lasts = np.array([episode.stop - 1 for episode in self.data.episodes])
+
+    def __len__(self) -> int:
+        """Number of frames, each with its window."""
+        return len(self.data)
+
+    def __getitem__(self, index: int | Sequence[int]) -> dict[str, Any]:
+        """Return one frame as LeRobotDataset would, or a batch for a sequence of frames.
+
+        Raises:
+            IndexError: If a frame is not in the dataset.
+        """
+        if not isinstance(index, int | np.integer):
+            return self.batch(index)
+        item: dict[str, Any] = {key: value[0] for key, value in self.batch([int(index)]).items()}
+        item["task"] = self.data.episodes[int(self._episode_of[int(index)])].task
+        return item
+
+    def batch(self, indices: Sequence[int] | np.ndarray | torch.Tensor) -> dict[str, torch.Tensor]:
+        """Return the frames and their windows.
+
+        Args:
+            indices: Frames, shape (b,); negative ones count from the end.
+
+        Returns:
+            Column -> tensor (b, ...), or (b, T, ...) with ``KEY_is_pad`` (b, T) where it has a window. Depth
+            maps have LeRobot's channel axis: (b, 1, pixels_x, pixels_y) [mm].
+
+        Raises:
+            IndexError: If a frame is not in the dataset.
+        """
+        frames = np.asarray(indices, dtype=np.int64)
+        frames = np.where(frames < 0, frames + len(self), frames)
+        if frames.size and (frames.min() < 0 or frames.max() >= len(self)):
+            raise IndexError(f"frames {frames.min()} to {frames.max()} of a dataset of {len(self)}")
+        episode = self._episode_of[frames]
+        first, last = self._starts[episode][:, None], self._lasts[episode][:, None]
+        result: dict[str, torch.Tensor] = {}
+        for key, column in self._columns.items():
+            if key in self.offsets:
+                wanted = frames[:, None] + self.offsets[key]
+                inside = np.clip(wanted, first, last)
+                result[key] = self._tensor(key, np.take(column, inside, axis=0))
+                result[f"{key}_is_pad"] = torch.from_numpy(wanted != inside)
+            else:
+                result[key] = self._tensor(key, np.take(column, frames, axis=0))
+        return result
+
+    def _tensor(self, key: str, values: np.ndarray) -> torch.Tensor:
+        tensor = torch.from_numpy(np.asarray(values))
+        return tensor.unsqueeze(-3) if key == features.DEPTH else tensor

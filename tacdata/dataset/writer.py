@@ -1,0 +1,259 @@
+"""A LeRobot v3.0 folder, written one finished episode at a time.
+
+Order of an append: data file, record, episode row, tasks, statistics, info.json; each is written beside,
+brought to the disk and renamed. info.json counts the episodes, so what a crash left behind it is no part of
+the dataset and is replaced by the next append.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from tacdata import documents
+from tacdata.dataset import cache, features, folder, metadata, statistics, tiff
+from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.errors import FormatError, UsageError
+from tacdata.sensor import Sensor
+
+
+@dataclass
+class DatasetWriter:
+    """Appends episodes to one dataset folder. Nothing needs closing: each append is whole when it returns."""
+
+    root: Path
+    """The folder."""
+    sensor: Sensor
+    """The sensor of the episodes to come."""
+    info: dict[str, Any]
+    """Content of meta/info.json."""
+    tasks: list[str] = field(default_factory=list)
+    """Tasks by index."""
+    stats: dict[str, statistics.Statistics] = field(default_factory=dict)
+    """Statistics of the whole dataset by column."""
+    recordings: set[str] = field(default_factory=set)
+    """Hashes of the recordings in the dataset."""
+    data_file: int = 0
+    """Number of the next data file, counted through all chunks."""
+    row_file: int = 0
+    """Number of the next file under meta/episodes."""
+    own_columns: bool = True
+    """Whether rows get columns of ours: LeRobot wants the first file's in all, and its edits drop them."""
+
+    @classmethod
+    def create(cls, root: Path, sensor: Sensor) -> DatasetWriter:
+        """Start a dataset; its folder is made by the first append.
+
+        Raises:
+            UsageError: If the folder exists.
+        """
+        if root.exists():
+            raise UsageError(
+                f"{root} exists",
+                "a folder that does not exist yet",
+                "name another folder, or append to this dataset",
+            )
+        info = folder.empty_info(features.lerobot_features(sensor), sensor.taxels.rate, sensor.name)
+        return cls(root, sensor, info)
+
+    @classmethod
+    def open(cls, root: Path, sensor: Sensor) -> DatasetWriter:
+        """Open an existing dataset to append episodes of ``sensor`` to it.
+
+        Raises:
+            UsageError: If there is none.
+            FormatError: If it is damaged, lost its sensor description, or has other columns than episodes of
+                this sensor.
+        """
+        if not (root / folder.INFO).exists() and (root / metadata.MAIN).exists():
+            # The very first append never finished: nothing counts yet.
+            info = folder.empty_info(features.lerobot_features(sensor), sensor.taxels.rate, sensor.name)
+            return cls(root, sensor, info)
+        info = folder.read_info(root)
+        main = metadata.read_main(root)
+        if main is None:
+            raise metadata.lost(root)
+        _same_columns(root, info, sensor)
+        rows = folder.read_rows(root, info)
+        if sensor.content_hash not in main["sensors"]:
+            metadata.write_main(root, {**main["sensors"], sensor.content_hash: sensor.document}, main["rate"])
+        keys = _record_keys(cache.data_files(root, rows), info)
+        recordings = {record.recording for key, record in metadata.read_records(root).items() if key in keys}
+        return cls(
+            root,
+            sensor,
+            info,
+            folder.read_tasks(root),
+            folder.read_row_stats(root, info),
+            recordings,
+            1 + max((row.data_file for row in rows), default=-1),
+            1 + max((row.row_file for row in rows), default=-1),
+            folder.row_columns(root) >= set(OWN_COLUMNS),
+        )
+
+    def append(self, columns: dict[str, np.ndarray], record: EpisodeRecord, task: str) -> int:
+        """Append one episode and bring it to the disk.
+
+        Args:
+            columns: Every column of `features.DTYPES` but the two hashes, frames first, in the units of
+                `features.UNITS`; shapes as `features.shapes`.
+            record: Where the episode comes from.
+            task: What is done in it, in words.
+
+        Returns:
+            The episode's index.
+
+        Raises:
+            UsageError: If the dataset holds this recording already.
+            FormatError: If columns are missing, of the wrong shape, or not finite.
+        """
+        if record.recording in self.recordings:
+            raise UsageError(
+                f"{self.root} holds {record.recording_file} already", "each episode once", "leave it out"
+            )
+        if record.sensor != self.sensor.content_hash:
+            raise FormatError(
+                f"{record.recording_file} is of sensor {record.sensor[:8]}",
+                f"sensor {self.sensor.content_hash[:8]} ({self.sensor.name})",
+                "pack each sensor with a writer of its own",
+            )
+        frames = _check(columns, self.sensor, record.recording_file)
+        episode, first = self.info["total_episodes"], self.info["total_frames"]
+        tasks = self.tasks if task in self.tasks else [*self.tasks, task]
+        whole = {
+            **{key: features.cast(key, values) for key, values in columns.items()},
+            features.SENSOR: np.full(frames, features.short_hash(record.sensor)),
+            features.RECORD: np.full(frames, record.key),
+            "timestamp": (np.arange(frames) / self.info["fps"]).astype(np.float32),
+            "frame_index": np.arange(frames),
+            "episode_index": np.full(frames, episode),
+            "index": np.arange(first, first + frames),
+            "task_index": np.full(frames, tasks.index(task)),
+        }
+        # LeRobot takes float depth for metres: millimetres are stored a thousandth.
+        whole[features.DEPTH] = whole[features.DEPTH] / tiff.MM_PER_METRE
+        if not episode:
+            metadata.write_main(self.root, {record.sensor: self.sensor.document}, self.sensor.taxels.rate)
+        stats = {key: statistics.column_statistics(whole[key]) for key in self.info["features"]}
+        self._write_files(whole, stats, record, tasks, task)
+        self.stats = {
+            key: statistics.merge([self.stats[key], new]) if key in self.stats else new
+            for key, new in stats.items()
+        }
+        folder.write_stats(self.root, self.stats)
+        self.info |= {
+            "total_episodes": episode + 1,
+            "total_frames": first + frames,
+            "total_tasks": len(tasks),
+            "splits": {"train": f"0:{episode + 1}"},
+        }
+        documents.write_text(self.root / folder.INFO, json.dumps(self.info, indent=4))
+        self.tasks, self.data_file, self.row_file = tasks, self.data_file + 1, self.row_file + 1
+        self.recordings.add(record.recording)
+        return episode
+
+    def _write_files(
+        self,
+        whole: dict[str, np.ndarray],
+        stats: dict[str, statistics.Statistics],
+        record: EpisodeRecord,
+        tasks: list[str],
+        task: str,
+    ) -> None:
+        folder.write_parquet(
+            self.root / folder.data_path(self.data_file),
+            _table(whole, self.info["features"], metadata.shard_metadata(self.sensor, record)),
+        )
+        metadata.append_record(self.root, record)
+        row = folder.EpisodeRow(
+            index=self.info["total_episodes"],
+            start=self.info["total_frames"],
+            stop=self.info["total_frames"] + len(whole["index"]),
+            tasks=(task,),
+            data_file=self.data_file,
+            row_file=self.row_file,
+        )
+        folder.write_row(self.root, row, stats, _own(record) if self.own_columns else {})
+        if len(tasks) > len(self.tasks):
+            folder.write_tasks(self.root, tasks)
+
+
+OWN_COLUMNS = ("tacdata/sensor", "tacdata/recording", "tacdata/label", "tacdata/indenter", "tacdata/quality")
+
+
+def _own(record: EpisodeRecord) -> dict[str, Any]:
+    """Return the columns of an episode's row that `episode_filter` can choose by."""
+    return {
+        "tacdata/sensor": record.sensor,
+        "tacdata/recording": record.recording,
+        "tacdata/label": record.label,
+        "tacdata/indenter": str(record.press["indenter"]["shape"]),
+        "tacdata/quality": record.quality,
+    }
+
+
+def _record_keys(paths: list[Path], info: dict[str, Any]) -> set[int]:
+    """Return the record keys of the counted frames."""
+    found: set[int] = set()
+    for path in paths:
+        table = folder.read_parquet(path, ["index", features.RECORD])
+        counted = table["index"].to_numpy() < info["total_frames"]
+        found.update(np.unique(table[features.RECORD].to_numpy()[counted]).tolist())
+    return found
+
+
+def _same_columns(root: Path, info: dict[str, Any], sensor: Sensor) -> None:
+    for key, feature in features.lerobot_features(sensor).items():
+        have = info["features"].get(key, {})
+        if (have.get("dtype"), have.get("shape")) != (feature["dtype"], feature["shape"]):
+            raise FormatError(
+                f"{root}: {key} is {have.get('dtype')} {have.get('shape')}",
+                f"{feature['dtype']} {feature['shape']} as sensor {sensor.name!r} needs",
+                "pack this sensor's episodes into a dataset of their own",
+            )
+
+
+def _check(columns: dict[str, np.ndarray], sensor: Sensor, origin: str) -> int:
+    wanted = {k: v for k, v in features.shapes(sensor).items() if k not in (features.SENSOR, features.RECORD)}
+    if set(columns) != set(wanted):
+        difference = sorted(set(columns) ^ set(wanted))
+        raise FormatError(
+            f"{origin}: {', '.join(difference)} missing or unknown", ", ".join(wanted), "correct the columns"
+        )
+    frames = len(columns[features.TIME])
+    for key, shape in wanted.items():
+        values = columns[key]
+        if values.shape != (frames, *shape) or frames == 0:
+            raise FormatError(
+                f"{origin}: {key} has shape {values.shape}",
+                f"({max(frames, 1)}, {', '.join(map(str, shape))}) for sensor {sensor.name!r}",
+                "check that recording, label and sensor file belong together",
+            )
+        if not np.isfinite(values).all():
+            raise FormatError(
+                f"{origin}: {key} holds values that are not finite (first in frame "
+                f"{int(np.argwhere(~np.isfinite(values.reshape(frames, -1)))[0, 0])})",
+                "finite values",
+                "leave this episode out, or record or label it again",
+            )
+    return frames
+
+
+def _table(whole: dict[str, np.ndarray], described: dict[str, Any], stamp: bytes) -> pa.Table:
+    arrays = {}
+    for key in described:
+        values = whole[key]
+        if described[key]["dtype"] == "image":
+            arrays[key] = tiff.encode(values)
+        elif values.ndim == 2:
+            arrays[key] = pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
+        else:
+            arrays[key] = pa.array(values)
+    return pa.table(arrays).replace_schema_metadata(
+        {b"huggingface": folder.huggingface_metadata(described), metadata.SHARD_KEY: stamp}
+    )

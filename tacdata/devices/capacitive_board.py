@@ -1,0 +1,174 @@
+"""Capacitive taxel boards on a serial port, whatever their frame format."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import serial
+
+from tacdata.clock import Clock
+from tacdata.devices.device import StreamCounts, TaxelBoard, TaxelFrame
+from tacdata.errors import DeviceError
+from tacdata.wire import Decoder, FrameFormat, default_format, read_format
+from tacdata.wire.frame_format import from_document
+from tacdata.wire.serial_port import open_port, read_available
+
+FIRST_FRAME = 2.0
+"""Longest wait for the first good frame [s, real time]."""
+
+
+class CapacitiveBoard(TaxelBoard):
+    """A board that streams frames by itself.
+
+    Settings in the rig file: ``port``; ``baud`` (115200); ``format``: path of a frame format file or the
+    format itself (absent: tacdata/wire/cap24.yaml).
+    """
+
+    def __init__(
+        self, clock: Clock, port: str, baud: int = 115200, format: str | dict[str, Any] | None = None
+    ) -> None:  # fmt: skip
+        """Keep the settings and read the format; see the class.
+
+        Raises:
+            UsageError: If the format file does not exist.
+            FormatError: If the format is damaged.
+        """
+        super().__init__(clock)
+        self.port, self.baud = port, baud
+        self.format = _format(format)
+        self.counts = StreamCounts()
+        self._line: serial.SerialBase | None = None
+        self._decoder = Decoder(self.format)
+        self._frames: list[TaxelFrame] = []
+        self._seen = bytearray()
+        self._fault: DeviceError | None = None
+        self._changed = threading.Condition()
+        self._stopped = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def describe(self) -> dict[str, Any]:
+        """Return channels, type, rate and the frame format."""
+        return {
+            "kind": "taxel board", "driver": "capacitive_board", "port": self.port, "baud": self.baud,
+            "channels": self.format.channels, "unit": "counts", "shape": [self.format.channels],
+            "rate": {"nominal": self.format.rate, "unit": "Hz"}, "format": self.format.document,
+        }  # fmt: skip
+
+    def open(self) -> None:
+        """Open the port and wait for the first good frame.
+
+        Raises:
+            DeviceError: If the port is missing or busy, or no good frame comes within 2 s.
+        """
+        self._line = open_port(self.port, self.baud, "taxel board", 0.05)
+        self._decoder = Decoder(self.format)
+        self.counts = self._decoder.counts
+        self._frames, self._seen, self._fault = [], bytearray(), None
+        self._stopped.clear()
+        self._thread = threading.Thread(target=self._listen, name="taxel-board", daemon=True)
+        self._thread.start()
+        with self._changed:
+            self._changed.wait_for(lambda: self._frames or self._fault, FIRST_FRAME)
+            begun, fault = bool(self._frames), self._fault
+        if not begun:
+            self.close()
+            raise fault or self._nothing_understood()
+
+    def close(self) -> None:
+        """Close the port; never raises."""
+        self._stopped.set()
+        if self._thread is not None:
+            self._thread.join(timeout=2.0)
+            self._thread = None
+        if self._line is not None:
+            try:
+                self._line.close()
+            except (serial.SerialException, OSError):
+                pass
+            self._line = None
+
+    def read(self, timeout: float) -> list[TaxelFrame]:
+        """Return what has arrived, waiting at most ``timeout`` [s of the clock] for something.
+
+        Raises:
+            DeviceError: If the line broke and every frame before that has been handed out.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._frames or self._fault, max(timeout, 0.0) / self.clock.rate)
+            frames, self._frames = self._frames, []
+            if not frames and self._fault:
+                raise DeviceError(self._fault.given, self._fault.allowed, self._fault.remedy)
+        return frames
+
+    def _listen(self) -> None:
+        line, begun = self._line, False
+        while line is not None and not self._stopped.is_set():
+            try:
+                data = read_available(line)
+            except (serial.SerialException, OSError, TypeError) as error:
+                if not self._stopped.is_set():
+                    self._break(error)
+                return
+            arrival_ns = self.clock.now_ns()
+            if not data:
+                continue
+            with self._changed:
+                self._seen += data[: max(0, 4096 - len(self._seen))]
+                frames = self._decoder.feed(data, arrival_ns)
+                if frames and not begun:
+                    begun = True
+                    self._forget_partial_frame()
+                self._frames += frames
+                self._changed.notify_all()
+
+    def _forget_partial_frame(self) -> None:
+        # The port is opened in the middle of some frame: what came before the first good one is no fault of
+        # the stream, and worth a note only if it was more than such a rest.
+        counts, rest = self.counts, 4 * self.format.size if self.format.encoding == "binary" else 4096
+        if counts.corrupt > 1 or counts.garbage_bytes > rest:
+            counts.notes.append(f"{counts.garbage_bytes} B, {counts.corrupt} frames were damaged at first")
+        counts.garbage_bytes = counts.corrupt = 0
+
+    def _break(self, error: Exception) -> None:
+        with self._changed:
+            self._fault = DeviceError(
+                f"the line to the taxel board on {self.port} broke: {error}",
+                "a port that stays connected",
+                "check the cable and the power; what was received so far is kept",
+            )
+            self._changed.notify_all()
+
+    def _nothing_understood(self) -> DeviceError:
+        seen, layout, counts = bytes(self._seen), self.format, self.counts
+        wait, limit = (
+            f"no {layout.name} frame on {self.port} within {FIRST_FRAME:g} s at {self.baud} baud",
+            "good frames",
+        )
+        if not seen:
+            return DeviceError(
+                f"{wait}: not one byte came",
+                limit,
+                "check power, cable and port, and whether the board must be started",
+            )
+        what = f"{wait}: {len(seen)} bytes came, beginning {seen[:24].hex(' ')}"
+        if layout.sync and layout.sync not in seen:
+            return DeviceError(
+                f"{what}; the sync {layout.sync.hex(' ')} is not among them",
+                f"frames that begin with {layout.sync.hex(' ')}",
+                "check the baud rate first, then sync in the frame format",
+            )
+        return DeviceError(
+            f"{what}; {max(counts.corrupt, 1)} or more frames were refused",
+            f"frames of {layout.size} bytes, {layout.channels} channels, a right {layout.checksum} checksum"
+            if layout.encoding == "binary"
+            else f"lines of {layout.channels + len(layout.order) - 1} numbers",
+            "check channels, counter and checksum in the frame format, then the baud rate",
+        )
+
+
+def _format(given: str | dict[str, Any] | None) -> FrameFormat:
+    if given is None:
+        return default_format()
+    return from_document(given, "board: format") if isinstance(given, dict) else read_format(Path(given))

@@ -1,0 +1,129 @@
+"""A plan to train on: random sites, depths and speeds, spread evenly over indenters and kinds of site."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata import documents, registry
+from tacdata.errors import UsageError
+from tacdata.indenters import from_document
+from tacdata.indenters.indenter import BASE, ROOM
+from tacdata.sensor import Sensor
+
+STANDARD: dict[str, dict[str, Any]] = {
+    "sphere_2": {"shape": "sphere", "radius": 2.0},
+    "sphere_4": {"shape": "sphere", "radius": 4.0},
+    "punch": {"shape": "flat_punch", "radius": 1.5, "edge_radius": 0.3},
+    "pin": {"shape": "cylinder", "radius": 1.5, "length": 5.0, "edge_radius": 0.5},
+    "ellipsoid": {"shape": "ellipsoid", "a": 3.0, "b": 1.8, "c": 2.0},
+    "square": {"shape": "square_punch", "side": 2.5, "edge_radius": 0.3},
+    "ring": {"shape": "ring", "ring_radius": 1.8, "tube_radius": 0.7},
+    "cone": {"shape": "cone", "half_angle": 60.0, "tip_radius": 0.6, "radius": 2.5},
+    "prism": {"shape": "prism", "angle": 120.0, "edge_radius": 0.5, "length": 5.0, "width": 4.0},
+}
+"""Specimens that a lab can print; lengths in mm, angles in deg."""
+USUAL = ("sphere_2", "sphere_4", "punch", "pin", "ellipsoid")
+"""Those of a plan that names none."""
+YAWS: dict[str, tuple[float, ...]] = {
+    "cylinder": (0.0, 60.0), "ellipsoid": (0.0, 60.0), "prism": (0.0, 60.0), "square_punch": (0.0, 45.0),
+}  # fmt: skip
+"""Mounting angles of shapes that are not round [deg]; each costs a change of indenter."""
+DEPTHS = (0.3, 1.2)
+"""Shallowest and deepest press [mm]."""
+SPEEDS = (0.5, 1.0)
+"""Slowest and fastest loading [mm/s]."""
+HOLDS = (0.5, 1.0)
+"""Shortest and longest hold [s]."""
+KINDS = ("taxel", "between", "anywhere", "edge")
+MOTION = {
+    "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.7,
+    "hold": 0.7, "rest": 1.0,
+}  # fmt: skip
+
+
+def training_plan(
+    sensor: Sensor, presses: int = 24, seed: int = 0, indenters: tuple[str, ...] = USUAL
+) -> dict[str, Any]:
+    """Return a plan's document (`schemas/plan.schema.json`).
+
+    Sites take turns among: on a taxel, half way between taxels, anywhere on the array, and at its edge.
+    Depths are stratified: one in each of ``presses`` equal parts of `DEPTHS`. Presses are ordered by
+    mounting, so that each indenter is mounted once per angle; within a mounting the order is random.
+
+    Args:
+        sensor: The skin that will be pressed.
+        presses: How many [count].
+        seed: Same seed, same plan.
+        indenters: Names in `STANDARD`.
+
+    Raises:
+        UsageError: If an indenter is unknown or there are no presses.
+    """
+    if presses < 1:
+        raise UsageError(f"{presses} presses", "1 or more", "ask for some")
+    known = [name for name, shape in STANDARD.items() if shape["shape"] in registry.names(ROOM, BASE)]
+    unknown = [name for name in indenters if name not in known]
+    if unknown or not indenters:
+        raise UsageError(
+            f"indenter {', '.join(unknown) or 'none'}",
+            ", ".join(known),
+            "choose among them, or write a plan by hand",
+        )
+    rng = np.random.default_rng(seed)
+    mountings = [(name, yaw) for name in indenters for yaw in YAWS.get(STANDARD[name]["shape"], (0.0,))]
+    depths = rng.permutation(
+        DEPTHS[0] + (DEPTHS[1] - DEPTHS[0]) * (np.arange(presses) + rng.random(presses)) / presses
+    )
+    # Depth and kind of site must not follow the mounting: both are dealt out in random order.
+    kinds = rng.permutation([KINDS[k % len(KINDS)] for k in range(presses)])
+    entries = []
+    for k in range(presses):
+        name, yaw = mountings[k % len(mountings)]
+        x, y = _site(sensor, str(kinds[k]), rng)
+        entries.append(
+            {
+                "indenter": name,
+                "x": x,
+                "y": y,
+                "yaw": yaw,
+                "depth": round(float(depths[k]), 3),
+                "speed": round(float(rng.uniform(*SPEEDS)), 2),
+                "hold": round(float(rng.uniform(*HOLDS)), 2),
+            }
+        )
+    entries.sort(key=lambda entry: mountings.index((entry["indenter"], entry["yaw"])))
+    used = [name for name in indenters if any(entry["indenter"] == name for entry in entries)]
+    document = {
+        "version": schemas.version("plan"), "name": f"training-{presses}-{seed}",
+        "purpose": "random presses to train on",
+        "indenters": {name: dict(STANDARD[name]) for name in used},
+        "motion": dict(MOTION), "presses": entries,
+    }  # fmt: skip
+    for name in used:
+        from_document(document["indenters"][name], name)
+    documents.check(document, "plan", "training plan")
+    return document
+
+
+def _site(sensor: Sensor, kind: str, rng: np.random.Generator) -> tuple[float, float]:
+    """Return a site [mm, sensor frame], at least 1 mm inside the skin's rim."""
+    taxels, centers = sensor.taxels, sensor.taxels.centers
+    half = np.array([taxels.pitch_x * (taxels.columns - 1), taxels.pitch_y * (taxels.rows - 1)]) / 2
+    pitch = np.array([taxels.pitch_x, taxels.pitch_y])
+    rim = np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2 - 1.0
+    if kind == "taxel":
+        site = centers[rng.integers(len(centers))]
+    elif kind == "between":
+        shift = pitch / 2 * rng.permuted([[1, 0], [0, 1], [1, 1]], axis=0)[0]
+        site = np.clip(centers[rng.integers(len(centers))] + shift, -half, half)
+    elif kind == "anywhere":
+        site = rng.uniform(-half, half)
+    else:
+        site = rng.uniform(-half, half)
+        axis = int(rng.integers(2))
+        site[axis] = (half[axis] + rng.uniform(0.0, 0.4) * pitch[axis]) * rng.choice([-1.0, 1.0])
+    x, y = np.clip(site, -rim, rim)
+    return round(float(x), 3), round(float(y), 3)

@@ -1,0 +1,93 @@
+"""One camera's images on their way into a recording: compressed, and searched for tags as time allows."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, wait
+from io import BytesIO
+from typing import Any
+
+from PIL import Image
+
+from tacdata.devices.device import ImageFrame
+from tacdata.errors import DeviceError
+from tacdata.recording.detection_process import Detect
+from tacdata.recording.writer import CubePoseRecord, EpisodeWriter
+
+JPEG_QUALITY = 90
+
+
+class CameraStream:
+    """Writes every image, and searches the next one for tags whenever the search before has ended.
+
+    Images are in the file, so the search can be redone on those that were passed over.
+    """
+
+    def __init__(self, name: str, entry: dict[str, Any], detect: Detect | None) -> None:
+        """Keep the camera's name, its rig file's entry and the detector, if tags are to be searched."""
+        self.name, self._intrinsics, self._cube = name, entry.get("intrinsics"), entry.get("cube")
+        self._detect = detect if self._cube is not None else None
+        self._search: tuple[Future, ImageFrame, EpisodeWriter | None] | None = None
+        self._last, self._warm = None, False
+
+    def take(self, frame: ImageFrame, sink: EpisodeWriter | None) -> None:
+        """Write one image; without a recording, search a first one, as a detector's first call takes long.
+
+        An image has no device counter that a clock could be fitted to; its sample time is its arrival.
+
+        Raises:
+            DeviceError: If the image is none.
+        """
+        if sink:
+            sink.image(self.name, frame.arrival_ns, frame.arrival_ns, frame.sequence, self._jpeg(frame))
+        self.collect(0.0)
+        if self._detect is not None and self._search is None and (sink or not self._warm):
+            search = self._detect(frame.image, self._intrinsics, self._cube, self._last)
+            self._search, self._warm = (search, frame, sink), True
+
+    def collect(self, patience: float) -> None:
+        """Write the pose of the search under way if it ends within ``patience`` [s of real time].
+
+        A detector that fails is not asked again; the recording goes on without poses and says so.
+        """
+        if self._search is None:
+            return
+        search, frame, sink = self._search
+        if patience:
+            wait([search], patience)
+        if not search.done():
+            return
+        self._search = None
+        try:
+            self._last = search.result()
+        except Exception as error:  # whatever breaks in a detector, the press goes on
+            self._detect = None
+            if sink:
+                sink.note(
+                    f"camera {self.name}: the search for tags failed ({type(error).__name__}: {error})",
+                    "error",
+                )
+            return
+        if sink:
+            sink.cube(self.name, frame.arrival_ns, frame.arrival_ns, frame.sequence, _record(self._last))
+
+    def _jpeg(self, frame: ImageFrame) -> bytes:
+        image, data = frame.image, BytesIO()
+        try:
+            # Drivers give BGR; a picture file is RGB.
+            picture = Image.fromarray(image if image.ndim == 2 else image[..., ::-1])
+            picture.save(data, "JPEG", quality=JPEG_QUALITY)
+        except (TypeError, ValueError, OSError) as error:
+            raise DeviceError(
+                f"camera {self.name}: {image.dtype} image of shape {image.shape}: {error}",
+                "grey or BGR uint8",
+                "correct the camera's driver settings",
+            ) from error
+        return data.getvalue()
+
+
+def _record(pose: Any) -> CubePoseRecord | None:
+    if pose is None:
+        return None
+    x, y, z = (float(value) for value in pose.position)
+    qx, qy, qz, qw = (float(value) for value in pose.quaternion)
+    return CubePoseRecord((x, y, z), (qx, qy, qz, qw), float(pose.reprojection), int(pose.faces))

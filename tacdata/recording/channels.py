@@ -1,0 +1,46 @@
+"""Which channel carries which protobuf message: the one place that names topics."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+
+from schemas import tacdata_pb2
+
+TAXELS = "/taxels"
+STATUS = "/cnc/status"
+MOTION = "/cnc/motion"
+PHASE = "/phase"
+LOG = "/log"
+
+FIXED: dict[str, Any] = {
+    TAXELS: tacdata_pb2.Taxels,
+    STATUS: tacdata_pb2.CncStatus,
+    MOTION: tacdata_pb2.Motion,
+    PHASE: tacdata_pb2.Phase,
+    LOG: Log,
+}
+"""Channels of every recording."""
+
+
+def image(camera: str) -> str:
+    """Return the topic of a camera's images."""
+    return f"/camera/{camera}/image"
+
+
+def cube(camera: str) -> str:
+    """Return the topic of what the tag detector says of each image."""
+    return f"/camera/{camera}/cube"
+
+
+def pose(camera: str) -> str:
+    """Return the topic of the cube's poses."""
+    return f"/camera/{camera}/pose"
+
+
+def of_camera(camera: str) -> dict[str, Any]:
+    """Return the channels of one camera."""
+    return {image(camera): CompressedImage, cube(camera): tacdata_pb2.CubeView, pose(camera): PoseInFrame}

@@ -1,0 +1,137 @@
+"""Judges a recording or a session: is it fit to be labelled and learned from?"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata.errors import FormatError, UsageError
+from tacdata.recording.channel_map import misplaced, silent
+from tacdata.recording.check_figures import Figures, figures
+from tacdata.recording.check_findings import UNUSABLE, WARNING, Finding, findings
+from tacdata.recording.reader import read_recording
+from tacdata.recording.session import read_session
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found."""
+
+    source: Path
+    """File or folder that was checked."""
+    episodes: tuple[Figures, ...]
+    """Figures of every recording that could be read."""
+    findings: tuple[Finding, ...]
+
+    @property
+    def usable(self) -> bool:
+        """False if anything makes a recording unusable."""
+        return not any(finding.severity == UNUSABLE for finding in self.findings)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The report as its file's document (`schemas/check.schema.json`)."""
+        return {
+            "version": schemas.version("check"),
+            "source": self.source.name,
+            "usable": self.usable,
+            "findings": [asdict(finding) for finding in self.findings],
+            "episodes": [entry.document for entry in self.episodes],
+        }
+
+    @property
+    def text(self) -> str:
+        """One page of words."""
+        lines = [f"{self.source}: {len(self.episodes)} recordings"]
+        lines += _summary([entry.document for entry in self.episodes])
+        lines += _grouped(self.findings) or ["nothing to remark"]
+        return "\n".join([*lines, "usable" if self.usable else "NOT usable as it is"])
+
+
+def check(path: Path) -> Report:
+    """Check a recording or a session folder.
+
+    Raises:
+        UsageError: If it is neither.
+        FormatError: If a single recording cannot be read, or the session's document is damaged.
+    """
+    path = Path(path)
+    if path.is_file():
+        entry = figures(read_recording(path))
+        return Report(path, (entry,), tuple(findings(entry)))
+    if not path.is_dir():
+        raise UsageError(f"no file or folder {path}", "a recording or a session folder", "check the path")
+    session = read_session(path)
+    entries, found = [], []
+    for file in session.episodes:
+        try:
+            entries.append(figures(read_recording(file)))
+            found += findings(entries[-1])
+        except FormatError as error:
+            found.append(Finding(UNUSABLE, "recording", file.name, error.given))
+    return Report(path, tuple(entries), (*found, *_of_session(session, entries)))
+
+
+def _of_session(session: Any, entries: list[Figures]) -> list[Finding]:
+    found = []
+    if not session.episodes:
+        found.append(Finding(UNUSABLE, "session", "", "no finished recording"))
+    if session.remaining:
+        text = f"{len(session.remaining)} of {len(session.plan.presses)} presses of the plan are not recorded"
+        found.append(Finding(WARNING, "session", "", f"{text}; go on with tacdata record --resume"))
+    for channel, taxel in misplaced(entries).items() if entries else ():
+        text = (
+            f"channel {channel} answers like taxel {taxel}: swapped wires, or a wrong yaw in the registration"
+        )
+        found.append(Finding(UNUSABLE, "taxels", "", text))
+    quiet = silent(entries) if entries else []
+    if quiet:
+        text = f"channel {', '.join(map(str, quiet))} did not answer to presses close by"
+        found.append(Finding(UNUSABLE, "taxels", "", text))
+    return found
+
+
+def _summary(documents: list[dict[str, Any]]) -> list[str]:
+    if not documents:
+        return []
+    taxels, cnc = [d["taxels"] for d in documents], [d["cnc"] for d in documents]
+    noise = [v for t in taxels for v in t["idle_noise"] if v is not None]
+    lines = [
+        f"  taxels  {_middle(t['rate'] for t in taxels):.2f} Hz, {sum(t['frames'] for t in taxels)} frames, "
+        f"{sum(t['lost'] for t in taxels)} lost, jitter {_middle(t['jitter'] for t in taxels):.1f} ms, "
+        f"latency {_middle(t['latency'] for t in taxels):.0f} ms, idle noise {_middle(noise):.1f} counts",
+        f"  cnc     {_middle(c['rate'] for c in cnc):.1f} reports/s, start of a move known to "
+        f"{_middle(c['start_uncertainty'] for c in cnc):.1f} ms, depth to "
+        f"{max(c['depth_uncertainty'] for c in cnc):.3f} mm",
+    ]
+    for name in sorted({name for d in documents for name in d["cameras"]}):
+        views = [d["cameras"][name] for d in documents if name in d["cameras"]]
+        searched = sum(v["searched"] for v in views)
+        seen = sum(v["searched"] * (v["seen"] or 0.0) for v in views)
+        lines.append(
+            f"  camera {name}: {sum(v['images'] for v in views)} images, {searched} searched, "
+            f"tags in view in {100 * seen / max(searched, 1):.0f} %"
+        )
+    return lines
+
+
+def _middle(values: Any) -> float:
+    known = [value for value in values if value is not None]
+    return float(np.median(known)) if known else float("nan")
+
+
+def _grouped(found: tuple[Finding, ...]) -> list[str]:
+    """Return a line per finding; what several recordings share is said once."""
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for finding in found:
+        groups.setdefault((finding.severity, finding.stream, finding.text), []).append(finding.file)
+    lines = []
+    for (severity, stream, text), files in sorted(groups.items(), key=lambda item: item[0][0] != UNUSABLE):
+        named = [name for name in files if name]
+        where = named[0] if len(named) == 1 else f"{len(named)} recordings" if named else "session"
+        lines.append(f"  {severity.upper():<8}  {stream}: {text} ({where})")
+    return lines

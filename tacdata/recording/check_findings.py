@@ -1,0 +1,163 @@
+"""What a person must know of a recording, judged by its figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.recording.check_figures import Figures
+
+WARNING, UNUSABLE = "warning", "unusable"
+LOST_SHARE = 0.01
+"""Share of lost frames from which a recording is unusable [1]."""
+GAP_MS = 200.0
+"""Time without a sample from which a recording is unusable [ms]: its 9-frame windows would lie."""
+RATE_SHARE = 0.02
+"""Deviation from the nominal rate that is worth a word [1]."""
+LATENCY_MS = 250.0
+"""Delay of the host that is worth a word [ms of real time]."""
+REPORT_GAP_MS = 1500.0
+"""Time without a status report that is worth a word [ms of real time]."""
+DEPTH_MM = (0.05, 0.2)
+"""Depth uncertainty that is worth a word, and that makes a recording unusable [mm]."""
+HOLD_MM = 0.05
+"""Distance of the guide from the commanded position in the hold that makes a recording unusable [mm]."""
+NOISE_RATIO = 5.0
+"""How much noisier than the median a channel may be [1]."""
+SEEN_SHARE = 0.5
+"""Share of images with a face in view under which it is worth a word [1]."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a person should know."""
+
+    severity: str
+    """``warning`` or ``unusable``."""
+    stream: str
+    """What it concerns."""
+    file: str
+    """Name of the recording; empty for the session."""
+    text: str
+    """In words."""
+
+
+def findings(figures: Figures) -> list[Finding]:
+    """Judge one recording."""
+    found = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
+    name = figures.recording.episode.path.name
+    return [Finding(severity, stream, name, text) for severity, stream, text in found]
+
+
+Judgement = tuple[str, str, str]
+
+
+def _rate_of_clock(figures: Figures) -> float:
+    return float(figures.recording.episode.rig.get("clock", {}).get("rate", 1.0))
+
+
+def _recording(figures: Figures) -> list[Judgement]:
+    episode, found = figures.recording.episode, []
+    if not episode.complete:
+        found.append((UNUSABLE, "recording", "; ".join(episode.notes) or "it was broken off"))
+    registration = episode.rig.get("registration", {})
+    if not registration.get("method") or not registration.get("date"):
+        found.append(
+            (
+                WARNING,
+                "registration",
+                "the rig file does not say how and when the sensor was registered to the guide",
+            )
+        )
+    phases = {phase.name for phase in episode.phases}
+    missing = [name for name in ("rest", "approach", "press", "hold", "release") if name not in phases]
+    if episode.complete and missing:
+        found.append((UNUSABLE, "recording", f"no {', '.join(missing)} phase"))
+    return found
+
+
+def _taxels(figures: Figures) -> list[Judgement]:
+    values, found = figures.document["taxels"], []
+    if values["frames"] < 2:
+        return [(UNUSABLE, "taxels", f"{values['frames']} frames")]
+    period = 1000 / values["nominal_rate"]
+    if values["lost"]:
+        share = values["lost"] / (values["frames"] + values["lost"])
+        bad = share > LOST_SHARE or values["longest_gap"] > GAP_MS
+        text = (
+            f"{values['lost']} frames lost ({100 * share:.1f} %), longest gap {values['longest_gap']:.0f} ms"
+        )
+        found.append((UNUSABLE if bad else WARNING, "taxels", text))
+    elif values["longest_gap"] > max(GAP_MS, 2.5 * period):
+        found.append((UNUSABLE, "taxels", f"a gap of {values['longest_gap']:.0f} ms without a sample"))
+    if values["rate"] and abs(values["rate"] / values["nominal_rate"] - 1) > RATE_SHARE:
+        text = f"{values['rate']:.2f} Hz, nominal {values['nominal_rate']:g} Hz"
+        found.append((WARNING, "taxels", text))
+    corrupt = values["driver_counts"].get("corrupt", 0)
+    if corrupt:
+        found.append((WARNING, "taxels", f"{corrupt} damaged frames discarded since the session's start"))
+    if figures.recording.episode.taxels.counter.min() < 0:
+        text = "the board sends no counter: lost frames cannot be seen, sample times are arrival times"
+        found.append((WARNING, "taxels", text))
+    if values["latency"] / _rate_of_clock(figures) > LATENCY_MS:
+        found.append((WARNING, "taxels", f"the host was up to {values['latency']:.0f} ms late in reading"))
+    return found
+
+
+def _channels(figures: Figures) -> list[Judgement]:
+    values, found = figures.document["taxels"], []
+    if values["stuck"]:
+        found.append((UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"))
+    if values["saturated"]:
+        found.append((UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"))
+    noise = np.array([np.nan if v is None else v for v in values["idle_noise"]])
+    if np.isnan(noise).all():
+        found.append((WARNING, "taxels", "no idle stretch to measure noise and baseline"))
+    else:
+        loud = np.flatnonzero(noise > NOISE_RATIO * max(float(np.nanmedian(noise)), 1e-9))
+        if len(loud):
+            text = f"channel {_list(loud.tolist())} is over {NOISE_RATIO:g} times as noisy as the others"
+            found.append((WARNING, "taxels", text))
+    return found
+
+
+def _cnc(figures: Figures) -> list[Judgement]:
+    values, found = figures.document["cnc"], []
+    if not values["reports"]:
+        return [(UNUSABLE, "cnc", "no status report")]
+    alarms = [state for state in values["states"] if state.split(":")[0] in ("Alarm", "Door")]
+    if alarms:
+        found.append((UNUSABLE, "cnc", f"the controller was in state {', '.join(alarms)}"))
+    if values["longest_gap"] / _rate_of_clock(figures) > REPORT_GAP_MS:
+        found.append((WARNING, "cnc", f"no status report for {values['longest_gap']:.0f} ms"))
+    if figures.document["complete"] and values["depth_uncertainty"] > DEPTH_MM[0]:
+        severity = UNUSABLE if values["depth_uncertainty"] > DEPTH_MM[1] else WARNING
+        text = f"the depth while pressing is known to {values['depth_uncertainty']:.3f} mm only"
+        if values["contradiction"]:
+            text += f": reports contradict the commanded profile by {values['contradiction']:.0f} ms"
+        found.append((severity, "cnc", text))
+    if values["hold_error"] is not None and values["hold_error"] > HOLD_MM:
+        text = f"the guide stood {values['hold_error']:.3f} mm from the commanded position in the hold"
+        found.append((UNUSABLE, "cnc", text))
+    return found
+
+
+def _cameras(figures: Figures) -> list[Judgement]:
+    found = []
+    entries = figures.recording.episode.rig.get("cameras", {})
+    for name, entry in entries.items():
+        values = figures.document["cameras"].get(name)
+        stream = f"camera {name}"
+        if values is None or not values["images"]:
+            found.append((WARNING, stream, "no image"))
+        elif "cube" in entry and not values["searched"]:
+            found.append((WARNING, stream, f"{values['images']} images, none searched for tags"))
+        elif "cube" in entry and values["seen"] < SEEN_SHARE:
+            text = f"tags in view in {100 * values['seen']:.0f} % of {values['searched']} images"
+            found.append((WARNING, stream, "no tag in view in any image" if values["seen"] == 0 else text))
+    return found
+
+
+def _list(channels: list[int]) -> str:
+    return ", ".join(str(channel) for channel in channels)

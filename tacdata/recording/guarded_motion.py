@@ -1,0 +1,117 @@
+"""Motion that stops the moment something is wrong, whoever notices."""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import suppress
+
+import numpy as np
+
+from tacdata.clock import Clock
+from tacdata.devices.device import MotionController
+from tacdata.errors import DeviceError, TacdataError
+from tacdata.recording.anchoring import Command
+from tacdata.recording.press_steps import Position, Step
+from tacdata.recording.streams import POLL, Streams
+from tacdata.recording.writer import EpisodeWriter
+
+WATCH = 0.02
+"""How often the motion is watched for faults and Ctrl-C [s of real time]."""
+MARGIN = 15.0
+"""What coming to rest may take at the end of a path before it counts as hung [s of the host's clock]."""
+LETTING_GO = 10.0
+"""How long a stopped motion's thread may take to end [s of real time]."""
+
+
+class GuardedMotion:
+    """Carries out steps in a thread of its own, so that the calling one can stop them at any moment."""
+
+    def __init__(self, cnc: MotionController, clock: Clock) -> None:
+        """Drive ``cnc``; nothing moves before `drive`."""
+        self._cnc, self._clock = cnc, clock
+        self._halted = threading.Event()
+        self._obedient = True
+
+    def stop(self) -> None:
+        """Feed hold, now; and no further step is sent. Safe from any thread."""
+        self._halted.set()
+        self._cnc.feed_hold()
+
+    def drive(
+        self, path: tuple[Step, ...], start: Position, streams: Streams, writer: EpisodeWriter | None
+    ) -> Position:
+        """Carry out the steps and return where they end [mm].
+
+        Args:
+            path: The steps; each move starts from rest.
+            start: Where the guide stands [mm].
+            streams: Watched meanwhile for faults.
+            writer: Where every acknowledged step is noted.
+
+        Raises:
+            DeviceError: On a fault, after feed hold and abandoning what was queued.
+            KeyboardInterrupt: On Ctrl-C, after the same.
+        """
+        failure: list[BaseException] = []
+        work = threading.Thread(target=self._carry_out, args=(path, start, writer, failure), daemon=True)
+        try:
+            work.start()
+            while work.is_alive():
+                work.join(WATCH)
+                if streams.fault:
+                    raise streams.fault
+            if failure:
+                raise failure[0]
+        except BaseException:
+            self.stop()
+            self._obedient = False
+            with suppress(TacdataError):
+                self._cnc.abandon()
+                self._obedient = True
+            work.join(LETTING_GO)
+            raise
+        return next((step.target for step in reversed(path) if step.target), start)
+
+    def _carry_out(
+        self,
+        path: tuple[Step, ...],
+        start: Position,
+        writer: EpisodeWriter | None,
+        failure: list[BaseException],
+    ) -> None:
+        position, phase = start, ""
+        try:
+            for step in path:
+                if self._halted.is_set():
+                    return
+                if writer and step.phase != phase:
+                    writer.phase(step.phase, self._clock.now_ns())
+                before, phase = position, step.phase
+                if step.target is None:
+                    done = self._cnc.dwell(step.seconds)
+                else:
+                    done, position = self._cnc.move(step.target, step.speed), step.target
+                if writer:
+                    times = done.sent_ns, done.acknowledged_ns
+                    ends = np.array(before, float), np.array(position, float)
+                    writer.motion(Command(phase, *ends, step.speed, step.seconds, *times, done.line))
+            self._cnc.wait_idle(MARGIN)
+        except BaseException as error:  # handed to the watching thread, which raises it
+            failure.append(error)
+
+    def lift(self, streams: Streams, height: float, speed: float) -> str:
+        """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; say what came of it."""
+        if not self._obedient:
+            return "the indenter was not lifted: the controller no longer obeys; free it by hand"
+        time.sleep(2 * POLL)  # the position after the stop has to arrive
+        try:
+            if streams.position is None:
+                raise DeviceError("the position is unknown", "a status report", "check the controller")
+            x, y, z = streams.position
+            if z < height:
+                self._cnc.move((x, y, height), speed)
+                self._cnc.wait_idle(MARGIN + (height - z) / speed)
+            return "the indenter was lifted off the skin"
+        except TacdataError as error:
+            return f"the indenter was not lifted: {error.given}"

@@ -1,0 +1,205 @@
+"""Drives a rig through a plan and records every press; whatever goes wrong, the motion stops first."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.errors import DeviceError, TacdataError, UsageError
+from tacdata.plans import Plan, Press
+from tacdata.recording import file_names
+from tacdata.recording.detection_process import Detect
+from tacdata.recording.guarded_motion import WATCH, GuardedMotion
+from tacdata.recording.motion_profile import AxisLimits
+from tacdata.recording.preflight import Preflight, preflight
+from tacdata.recording.press_steps import Position, Step, steps
+from tacdata.recording.rig_devices import RigDevices
+from tacdata.recording.session import Session, create_session, refresh, resume_session
+from tacdata.recording.streams import Streams
+from tacdata.recording.writer import EpisodeWriter, Header
+from tacdata.rig import Rig
+from tacdata.sensor import Sensor
+
+FIRST_FRAME = 5.0
+"""How long the streams may take to begin [s of real time]."""
+
+
+class Recorder:
+    """One session of recording.
+
+    Example:
+        ``Recorder(rig, sensor, plan, Path("session")).run(confirm=lambda summary: True)``
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        sensor: Sensor,
+        plan: Plan,
+        out: Path,
+        resume: bool = False,
+        devices: RigDevices | None = None,
+        mount: Callable[[Press], None] | None = None,
+        detect: Detect | None = None,
+        progress: Callable[[int, int, float], None] | None = None,
+    ) -> None:
+        """Prepare; nothing is opened, created or moved.
+
+        Args:
+            rig: The rig; its clock is the recording's.
+            sensor: The skin that is pressed.
+            plan: What to press. Without a plan there is no motion.
+            out: Session folder to create, or to continue with ``resume``.
+            resume: Continue with the next press that has no finished recording.
+            devices: Drivers; by default those that the rig file names.
+            mount: Called when another indenter, or another yaw of it, is wanted; returns once it sits.
+            detect: Searches an image for its cube (`detection_process`); without it images are only stored.
+            progress: Called with (presses done, presses wanted, real seconds left) after each press.
+        """
+        self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(out), resume
+        self.devices = devices or RigDevices.of(rig)
+        self._mount, self._detect, self._progress = mount, detect, progress
+        self._mounted: tuple[str, float] | None = None
+        self._height = rig.registration.origin[2] + plan.motion.clearance
+        self._motion = GuardedMotion(self.devices.cnc, rig.clock)
+
+    def run(self, confirm: Callable[[Preflight], bool]) -> Session:
+        """Check, ask, then record every press that is wanted.
+
+        Args:
+            confirm: Is shown the preflight summary before the first move; False ends the session without one.
+
+        Returns:
+            The session as it stands on disk.
+
+        Raises:
+            UsageError: If the folder exists (or, resuming, does not), or the summary was refused.
+            FormatError: If a press would leave the envelope or the skin.
+            DeviceError: On a fault; the motion was stopped, the recording closed, and --resume continues.
+            KeyboardInterrupt: On Ctrl-C, after the same.
+        """
+        self.plan.check_against(self.sensor)
+        session = self._existing_session()
+        wanted = session.remaining if session else tuple(press.index for press in self.plan.presses)
+        if session and not wanted:
+            return session
+        with self.devices.opened() as devices:
+            cnc = devices.cnc
+            limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))
+            summary = preflight(self.plan, self.sensor, self.rig, limits, wanted)
+            if not confirm(summary):
+                raise UsageError(
+                    "the summary was not confirmed", "yes", "nothing was moved; start again when ready"
+                )
+            session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
+            with Streams(devices, self.rig.cameras, self._motion.stop, self._detect) as streams:
+                try:
+                    self._record_all(session, streams, limits, summary, wanted)
+                finally:
+                    session = refresh(session)
+        return session
+
+    def _existing_session(self) -> Session | None:
+        if self.resume:
+            return resume_session(self.out, self.plan, self.sensor, self.rig.document)
+        if self.out.exists():
+            raise UsageError(
+                f"{self.out} exists",
+                "a new session folder",
+                "choose another --out, or continue it with --resume",
+            )
+        return None
+
+    def _record_all(
+        self,
+        session: Session,
+        streams: Streams,
+        limits: AxisLimits,
+        summary: Preflight,
+        wanted: tuple[int, ...],
+    ) -> None:
+        self._wait_for_streams(streams)
+        position = self._rise(streams)
+        for done, number in enumerate(wanted, start=1):
+            press = self.plan.presses[number]
+            self._change_indenter(press)
+            position = self._record(press, position, streams, limits)
+            refresh(session)
+            if self._progress:
+                self._progress(done, len(wanted), sum(summary.seconds[done:]) / self.rig.clock.rate)
+
+    def _wait_for_streams(self, streams: Streams) -> None:
+        end = time.monotonic() + FIRST_FRAME
+        while streams.frames < 2 or streams.position is None:
+            if streams.fault:
+                raise streams.fault
+            if time.monotonic() > end:
+                silent = "the taxel board" if streams.frames < 2 else "the motion controller"
+                raise DeviceError(
+                    f"nothing received from {silent} within {FIRST_FRAME:g} s",
+                    "a running stream",
+                    "check cable and power",
+                )
+            time.sleep(WATCH)
+        streams.catch_up()
+
+    def _rise(self, streams: Streams) -> Position:
+        """Go straight up to the clearance from wherever the guide stands; return where that is [mm]."""
+        here = streams.position or (np.nan, np.nan, np.nan)
+        above = (here[0], here[1], max(here[2], self._height))
+        if not self.rig.envelope.contains(above):
+            raise DeviceError(
+                f"the guide stands at {tuple(round(value, 2) for value in here)} mm, outside the envelope",
+                f"{self.rig.envelope.min} to {self.rig.envelope.max} mm",
+                "jog it inside, or correct the rig file",
+            )
+        if here[2] < self._height:
+            rise = Step("", above, self.plan.motion.approach_speed)
+            return self._motion.drive((rise,), here, streams, None)
+        return here
+
+    def _change_indenter(self, press: Press) -> None:
+        wanted = (press.indenter_name, press.yaw)
+        if wanted != self._mounted and self._mount:
+            self._mount(press)
+        self._mounted = wanted
+
+    def _record(self, press: Press, position: Position, streams: Streams, limits: AxisLimits) -> Position:
+        """Record one press from ``position`` [mm]; return where the guide stands then."""
+        path = file_names.episode(self.out, press.index)
+        writer = EpisodeWriter(path, self._header(press, limits), self.rig.clock, tuple(self.devices.cameras))
+        streams.record_into(writer)
+        try:
+            position = self._motion.drive(
+                steps(press, self.plan.motion, self.rig.registration), position, streams, writer
+            )
+        except BaseException as error:
+            reason = error.given if isinstance(error, TacdataError) else "stopped by Ctrl-C"
+            try:
+                lifted = self._motion.lift(streams, self._height, self.plan.motion.approach_speed)
+                writer.note(f"broken off: {reason}; {lifted}", "error")
+            finally:
+                with suppress(DeviceError):  # the fault itself is what the person must hear of
+                    self._close(writer, streams, reason)
+            raise
+        self._close(writer, streams)
+        return position
+
+    def _close(self, writer: EpisodeWriter, streams: Streams, broken_off: str = "") -> None:
+        streams.catch_up()
+        streams.record_into(None)
+        reason = f"broken off: {broken_off}" if broken_off else ""
+        writer.close(not broken_off, reason, streams.clock_models, streams.counts)
+
+    def _header(self, press: Press, limits: AxisLimits) -> Header:
+        controller = {
+            "settings": self.devices.cnc.settings(),
+            "acceleration": limits.acceleration.tolist(),
+            "max_rate": limits.max_rate.tolist(),
+        }
+        board = self.devices.board.describe()
+        return Header(press, self.sensor, self.rig.document, self.plan.document or {}, board, controller)

@@ -1,0 +1,140 @@
+"""A folder of recordings made by one plan on one rig."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from tacdata import documents, provenance
+from tacdata.errors import FormatError, UsageError
+from tacdata.plans import Plan
+from tacdata.recording import file_names
+from tacdata.sensor import Sensor
+
+FILE = "session.json"
+
+
+@dataclass(frozen=True)
+class Session:
+    """The folder as it stands."""
+
+    folder: Path
+    """Where it lies."""
+    episodes: tuple[Path, ...]
+    """Finished recordings, in the order of the plan."""
+    unfinished: tuple[Path, ...]
+    """Recordings that were broken off; readable, but never a label."""
+    plan: Plan
+    sensor: Sensor
+    document: dict[str, Any]
+    """`session.json` (`schemas/session.schema.json`)."""
+
+    @property
+    def done(self) -> frozenset[int]:
+        """Numbers of the presses that are recorded."""
+        return frozenset(file_names.finished(self.folder))
+
+    @property
+    def remaining(self) -> tuple[int, ...]:
+        """Numbers of the presses still to be recorded, in order."""
+        done = self.done
+        return tuple(press.index for press in self.plan.presses if press.index not in done)
+
+
+def read_session(folder: Path) -> Session:
+    """Read a session folder.
+
+    Raises:
+        UsageError: If it is no session.
+        FormatError: If its document is damaged or names recordings that are missing.
+    """
+    folder = Path(folder)
+    if not (folder / FILE).is_file():
+        raise UsageError(
+            f"{folder} is no session: no {FILE} in it", "a folder written by tacdata record", "check the path"
+        )
+    document = documents.read(folder / FILE, "session")
+    origin = str(folder / FILE)
+    found = file_names.finished(folder)
+    missing = [entry["file"] for entry in document["episodes"] if not (folder / entry["file"]).is_file()]
+    if missing:
+        raise FormatError(
+            f"{origin} names {', '.join(missing)}, not in {folder}",
+            "every finished recording beside its session.json",
+            "put the files back, or remove their entries",
+        )
+    return Session(
+        folder,
+        tuple(found.values()),
+        tuple(file_names.unfinished(folder)),
+        Plan.from_document(document["plan"], f"{origin}: plan"),
+        Sensor.from_document(document["sensor"], f"{origin}: sensor"),
+        document,
+    )
+
+
+def create_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]) -> Session:
+    """Create the folder with its document.
+
+    Raises:
+        UsageError: If it exists.
+    """
+    if folder.exists():
+        raise UsageError(
+            f"{folder} exists", "a new session folder", "choose another --out, or continue it with --resume"
+        )
+    if plan.document is None:
+        raise UsageError(
+            f"plan {plan.name} has no document", "a plan read from a file", "write the plan to a file first"
+        )
+    document = {
+        "version": "1.0",
+        "code_version": provenance.code_version(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "rig": rig,
+        "plan": plan.document,
+        "plan_hash": provenance.content_hash(plan.document),
+        "sensor": sensor.document,
+        "sensor_hash": sensor.content_hash,
+        "episodes": [],
+    }
+    documents.write(folder / FILE, document, "session")
+    return read_session(folder)
+
+
+def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]) -> Session:
+    """Take up a session again; what a crash left half written is put aside under a name of its own.
+
+    Raises:
+        UsageError: If it was made with another plan or sensor, or the skin lies elsewhere on the rig.
+    """
+    session = read_session(folder)
+    old = session.document
+    for what, before, now in (
+        ("plan", old["plan_hash"], provenance.content_hash(plan.document)),
+        ("sensor", old["sensor_hash"], sensor.content_hash),
+        ("registration", old["rig"].get("registration"), rig.get("registration")),
+    ):
+        if before != now:
+            raise UsageError(
+                f"{folder} was begun with another {what}",
+                f"the same {what}; one session holds one of each",
+                "use the files it was begun with, or start a new session",
+            )
+    for path in folder.glob(f"*{file_names.PARTIAL}"):
+        final = path.with_name(path.name.removesuffix(file_names.PARTIAL) + ".mcap")
+        path.rename(file_names.next_interrupted(final))
+    return refresh(read_session(folder))
+
+
+def refresh(session: Session) -> Session:
+    """Bring the document up to the folder's finished recordings and return the session as it stands."""
+    known = {entry["number"]: entry for entry in session.document["episodes"]}
+    episodes = [
+        known.get(number, {"number": number, "file": path.name, "code_version": provenance.code_version()})
+        for number, path in file_names.finished(session.folder).items()
+    ]
+    documents.write(session.folder / FILE, {**session.document, "episodes": episodes}, "session")
+    return read_session(session.folder)

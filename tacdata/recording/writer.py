@@ -1,0 +1,253 @@
+"""One press into one MCAP file, from any thread, safe against kill -9 but for the last second.
+
+While it is written the file is called ``*.partial.mcap``. Closed complete, it takes its final name; closed
+for a fault, it becomes ``*.interrupted-K.mcap``. Whatever the name, everything that reached the disk can be
+read.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+
+from schemas import tacdata_pb2 as pb
+from tacdata.clock import Clock
+from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
+from tacdata.errors import DeviceError, UsageError
+from tacdata.plans import Press
+from tacdata.recording import channels, file_names
+from tacdata.recording.anchoring import Command
+from tacdata.recording.chunked_file import ChunkedFile
+from tacdata.recording.clock_model import ClockModel
+from tacdata.sensor import Sensor
+
+LEVELS = {"info": Log.Level.INFO, "warning": Log.Level.WARNING, "error": Log.Level.ERROR}
+
+
+@dataclass(frozen=True)
+class Header:
+    """What is attached to every recording."""
+
+    press: Press
+    sensor: Sensor
+    rig: dict[str, Any]
+    """The rig file's document."""
+    plan: dict[str, Any]
+    """The plan file's document."""
+    board: dict[str, Any] = field(default_factory=dict)
+    """The board's description of itself: channels, frame format, units, nominal rate."""
+    controller: dict[str, Any] = field(default_factory=dict)
+    """``settings`` as read, ``acceleration`` [mm/s^2] and ``max_rate`` [mm/s] of each axis."""
+
+    @property
+    def attachments(self) -> dict[str, Any]:
+        """Name of each attachment and its document."""
+        return {
+            "press.json": self.press.document,
+            "sensor.json": self.sensor.document,
+            "rig.json": self.rig,
+            "registration.json": self.rig.get("registration", {}),
+            "plan.json": self.plan,
+            "board.json": self.board,
+            "controller.json": self.controller,
+        }
+
+
+@dataclass(frozen=True)
+class CubePoseRecord:
+    """A cube's pose as the detector gives it."""
+
+    position: tuple[float, float, float]
+    """Cube origin in the camera frame [m]."""
+    quaternion: tuple[float, float, float, float]
+    """Cube orientation in the camera frame, xyzw [1]."""
+    reprojection: float
+    """Reprojection error, root mean square [px]."""
+    faces: int
+    """Faces seen [count]."""
+
+
+class EpisodeWriter:
+    """A recording in progress. Methods may be called from any thread; writing happens in one of its own."""
+
+    def __init__(self, path: Path, header: Header, clock: Clock, cameras: tuple[str, ...] = ()) -> None:
+        """Create the file under its partial name and put the attachments on disk.
+
+        Raises:
+            UsageError: If a recording of that name, finished or partial, exists.
+        """
+        if path.exists():
+            raise UsageError(
+                f"{path} exists", "a recording is never overwritten", "choose another session folder"
+            )
+        self.path, self._clock = path, clock
+        self.begun_ns = clock.now_ns()
+        """Host time of creation [ns]; what arrived before belongs to no recording or to the one before."""
+        self._file = ChunkedFile(file_names.partial(path))
+        for topic, message in channels.FIXED.items():
+            self._file.register(topic, message)
+        for camera in cameras:
+            for topic, message in channels.of_camera(camera).items():
+                self._file.register(topic, message)
+        for name, document in header.attachments.items():
+            data = json.dumps(document, indent=1).encode()
+            self._file.attach(name, "application/json", data, clock.now_ns())
+        self._file.flush()
+        self._queue: queue.SimpleQueue[tuple[str, int, int, int, bytes] | None] = queue.SimpleQueue()
+        self._failure: Exception | None = None
+        self._thread = threading.Thread(target=self._drain, name=f"write {path.name}", daemon=True)
+        self._add(
+            channels.LOG, clock.now_ns(), clock.now_ns(), 0, self._log_message("recording begins", "info")
+        )
+        self._thread.start()
+
+    @property
+    def failure(self) -> Exception | None:
+        """What stopped the writing (a full disk, say), or None."""
+        return self._failure
+
+    def _drain(self) -> None:
+        while True:
+            try:
+                item = self._queue.get(timeout=0.1)
+            except queue.Empty:
+                item = ()
+            if item is None:
+                return
+            try:
+                if self._failure is None:
+                    self._file.add(*item) if item else self._file.tick()
+            except (OSError, ValueError) as error:
+                self._failure = error
+
+    def _add(self, topic: str, log_ns: int, publish_ns: int, sequence: int, message: Any) -> None:
+        self._queue.put((topic, log_ns, publish_ns, sequence, message.SerializeToString()))
+
+    def taxels(self, frame: TaxelFrame, sample_ns: int) -> None:
+        """Write one reading of the board with its sample time as estimated so far [ns]."""
+        message = pb.Taxels(
+            arrival_ns=frame.arrival_ns,
+            sample_ns=sample_ns,
+            counter=frame.counter,
+            counts=frame.counts.tolist(),
+            device_ns=frame.device_ns,
+        )
+        self._add(channels.TAXELS, frame.arrival_ns, sample_ns, max(frame.counter, 0), message)
+
+    def status(self, status: CncStatus) -> None:
+        """Write one status report; its sample time is the middle of query and answer."""
+        x, y, z = (float(value) for value in status.position)
+        message = pb.CncStatus(
+            sent_ns=status.sent_ns,
+            arrival_ns=status.arrival_ns,
+            state=status.state,
+            position=pb.Vector3(x=x, y=y, z=z),
+            feed=status.feed,
+        )
+        self._add(channels.STATUS, status.arrival_ns, (status.sent_ns + status.arrival_ns) // 2, 0, message)
+
+    def motion(self, command: Command) -> None:
+        """Write one acknowledged command."""
+        message = pb.Motion(
+            line=command.line,
+            sent_ns=command.sent_ns,
+            acknowledged_ns=command.acknowledged_ns,
+            phase=command.phase,
+            start=pb.Vector3(**dict(zip("xyz", command.start.tolist(), strict=True))),
+            target=pb.Vector3(**dict(zip("xyz", command.target.tolist(), strict=True))),
+            speed=command.speed,
+            dwell=command.dwell,
+        )
+        self._add(channels.MOTION, command.acknowledged_ns, command.sent_ns, 0, message)
+
+    def phase(self, name: str, start_ns: int) -> None:
+        """Mark the beginning of a phase; an empty name ends the one before."""
+        self._add(channels.PHASE, start_ns, start_ns, 0, pb.Phase(name=name, start_ns=start_ns))
+
+    def image(self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, jpeg: bytes) -> None:
+        """Write one compressed image."""
+        message = CompressedImage(frame_id=camera, data=jpeg, format="jpeg")
+        message.timestamp.FromNanoseconds(sample_ns)
+        self._add(channels.image(camera), arrival_ns, sample_ns, sequence, message)
+
+    def cube(
+        self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None
+    ) -> None:
+        """Write what the tag detector says of one image; ``None`` if no face was seen."""
+        view = pb.CubeView(arrival_ns=arrival_ns, sample_ns=sample_ns, sequence=sequence)
+        if pose is not None:
+            view.faces, view.reprojection = pose.faces, pose.reprojection
+            message = PoseInFrame(frame_id=camera)
+            message.timestamp.FromNanoseconds(sample_ns)
+            for target, names, values in (
+                (message.pose.position, "xyz", pose.position),
+                (message.pose.orientation, "xyzw", pose.quaternion),
+            ):
+                for name, value in zip(names, values, strict=True):
+                    setattr(target, name, float(value))
+            self._add(channels.pose(camera), arrival_ns, sample_ns, sequence, message)
+        self._add(channels.cube(camera), arrival_ns, sample_ns, sequence, view)
+
+    def note(self, text: str, level: str = "info") -> None:
+        """Write a remark for a person."""
+        now = self._clock.now_ns()
+        self._add(channels.LOG, now, now, 0, self._log_message(text, level))
+
+    def _log_message(self, text: str, level: str) -> Log:
+        message = Log(level=LEVELS[level], message=text, name="tacdata")
+        message.timestamp.FromNanoseconds(self._clock.now_ns())
+        return message
+
+    def close(
+        self,
+        complete: bool,
+        reason: str = "",
+        clock_models: dict[str, ClockModel] | None = None,
+        counts: dict[str, StreamCounts] | None = None,
+    ) -> Path:
+        """Finish the file and give it its name.
+
+        Args:
+            complete: Whether the press was carried out and recorded whole.
+            reason: Why not, in words.
+            clock_models: Clock model of each stream, by its name ("taxels").
+            counts: What each stream delivered and lost.
+
+        Returns:
+            The file's path: the final one, or that of an interrupted recording.
+
+        Raises:
+            DeviceError: If the disk refused something; the message says which file holds what was written.
+        """
+        self._queue.put(None)
+        self._thread.join()
+        target = self.path if complete and self._failure is None else file_names.next_interrupted(self.path)
+        try:
+            if self._failure is not None:
+                raise self._failure
+            for name, model in (clock_models or {}).items():
+                self._file.describe(f"clock_model/{name}", model.document)
+            for name, count in (counts or {}).items():
+                self._file.describe(
+                    f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()}
+                )
+            self._file.describe("episode", {"complete": json.dumps(complete), "reason": reason})
+            self._file.close()
+        except (OSError, ValueError) as error:
+            self._file.let_go()
+            partial = self._file.path
+            raise DeviceError(
+                f"writing {partial} failed: {error}",
+                "a disk with room for the recording",
+                f"make room, then continue with --resume; what was written stays readable in {partial.name}",
+            ) from error
+        self._file.path.rename(target)
+        return target

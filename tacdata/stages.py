@@ -1,0 +1,139 @@
+"""Run command lines one after the other as a person would type them: shown, timed, and stopped gently."""
+
+from __future__ import annotations
+
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tacdata.errors import DeviceError, TacdataError
+
+PATIENCE = 60.0
+"""Time that an interrupted verb gets to stop the motion and close its files [s]."""
+
+
+class StageError(TacdataError):
+    """A stage ended with an error of its own, which the person has already read."""
+
+    def __init__(self, number: int, line: str, code: int, kept: str) -> None:
+        self.exit_code = code if 0 < code < 256 else 1
+        super().__init__(
+            f"stage {number} ended with exit code {code}: {line}",
+            "exit code 0",
+            f"see the message above; {kept}",
+        )
+
+
+def command_line(arguments: list[str]) -> list[str]:
+    """Return the process arguments of ``tacdata ARGUMENTS`` in this very installation."""
+    return [sys.executable, "-m", "tacdata.cli", *arguments]
+
+
+def written(arguments: list[str]) -> str:
+    """Return ``tacdata ARGUMENTS`` as it would be typed."""
+    return shlex.join(["tacdata", *arguments])
+
+
+class Line:
+    """Verbs run one after the other; each shows its command, its place and its time."""
+
+    def __init__(self, total: int, kept: str) -> None:
+        """Prepare for ``total`` stages; ``kept`` says in words what is left if one fails."""
+        self.total, self.kept = total, kept
+        self.number = 0
+        self.begin = time.monotonic()
+
+    def run(self, purpose: str, arguments: list[str]) -> None:
+        """Run ``tacdata ARGUMENTS``; ``purpose`` says what for.
+
+        Raises:
+            StageError: With the verb's exit code, if it fails.
+            KeyboardInterrupt: If interrupted, once the verb has closed its files.
+        """
+        self.number += 1
+        started = time.monotonic()
+        print(f"\n[{self.number}/{self.total}] {purpose}   (after {clock_face(started - self.begin)})")
+        print(f"$ {written(arguments)}", flush=True)
+        code = _run(command_line(arguments))
+        if code:
+            raise StageError(self.number, written(arguments), code, self.kept)
+        print(f"    done in {clock_face(time.monotonic() - started)}", flush=True)
+
+
+def _run(line: list[str]) -> int:
+    # A group of its own: the terminal's Ctrl-C then reaches it once, through us, and not twice.
+    process = subprocess.Popen(line, stdin=subprocess.DEVNULL, process_group=0)
+    try:
+        return process.wait()
+    except BaseException:
+        stop(process)
+        raise
+
+
+def stop(process: subprocess.Popen) -> None:
+    """Interrupt a verb and wait until it has closed its files, for `PATIENCE` or until a second Ctrl-C."""
+    if process.poll() is not None:
+        return
+    process.send_signal(signal.SIGINT)
+    try:
+        process.wait(PATIENCE)
+    except (subprocess.TimeoutExpired, KeyboardInterrupt):
+        process.terminate()
+        try:
+            process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+class Background:
+    """A verb that runs beside the others and speaks to a log file; stopped at the end of a ``with`` block."""
+
+    def __init__(self, arguments: list[str], log: Path) -> None:
+        self.arguments, self.log = arguments, log
+
+    def __enter__(self) -> Background:
+        """Start it."""
+        print(f"$ {written(self.arguments)} &", flush=True)
+        with self.log.open("wb") as stream:
+            self.process = subprocess.Popen(
+                command_line(self.arguments),
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=stream,
+                process_group=0,
+            )
+        return self
+
+    def wait_until(self, ready: Callable[[], bool], what: str, timeout: float) -> None:
+        """Return once ``ready()``; ``what`` names in words what is waited for, at most ``timeout`` [s].
+
+        Raises:
+            DeviceError: If the verb ends before, or takes longer.
+        """
+        deadline = time.monotonic() + timeout
+        while not ready():
+            if (code := self.process.poll()) is not None or time.monotonic() > deadline:
+                said = self.log.read_text(errors="replace").strip().splitlines()[-5:]
+                state = (
+                    f"is not ready after {timeout:g} s" if code is None else f"ended with exit code {code}"
+                )
+                raise DeviceError(
+                    f"{written(self.arguments)} {state}" + "".join(f"\n    {line}" for line in said),
+                    what,
+                    f"read {self.log}",
+                )
+            time.sleep(0.05)
+
+    def __exit__(self, *exception: object) -> None:
+        """Stop it."""
+        stop(self.process)
+
+
+def clock_face(seconds: float) -> str:
+    """Return a duration [s] as minutes:seconds."""
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"

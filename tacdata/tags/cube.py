@@ -1,0 +1,88 @@
+"""A cube with AprilTags on its faces.
+
+Cube frame: origin at the cube's centre, axes along its edges, right-handed. A face's tag is centred on the
+face and stands upright as OpenCV draws it (`cv2.aruco.generateImageMarker`): on the side faces its upper
+edge looks to the cube's +z, on the +z face to the cube's +y. The images published by AprilRobotics are the
+same tags turned by 180 degrees.
+
+Corner order is the AprilTag library's: in that upright view from outside, right-top, left-top, left-bottom,
+right-bottom (counter-clockwise). OpenCV's ArUco detector gives left-top, right-top, right-bottom,
+left-bottom.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+
+NORMALS = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1)}
+"""Outward normals of the five faces that may carry a tag; -z is where the cube is mounted."""
+_UPS = {face: (0, 1, 0) if face == "+z" else (0, 0, 1) for face in NORMALS}
+AXES = {
+    face: np.stack([np.cross(_UPS[face], normal), _UPS[face], normal], axis=-1).astype(float)
+    for face, normal in NORMALS.items()
+}
+"""A face's right, up and outward directions in the cube frame as columns, shape (3, 3)."""
+
+CORNERS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+"""Right and up of a tag's corners in half tags [1], in the AprilTag library's order."""
+
+
+@dataclass(frozen=True)
+class Cube:
+    """A cube's measures and tags."""
+
+    side: float
+    """Edge of the cube [mm]."""
+    tag: float
+    """Edge of a tag's black square [mm]."""
+    ids: dict[str, int]
+    """Face ("+x", "-x", "+y", "-y", "+z") to tag number."""
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], origin: str = "cube") -> Cube:
+        """Build a cube from a rig file's ``cube`` entry.
+
+        Raises:
+            FormatError: If a measure is missing or impossible, or two faces carry the same tag.
+        """
+        missing = {"side", "tag", "ids"} - set(document)
+        if missing:
+            given = f"{origin}: no {', '.join(sorted(missing))}"
+            raise FormatError(given, "side, tag [mm] and ids", "add it")
+        side, tag, ids = document["side"], document["tag"], document["ids"]
+        if not 0 < tag <= side:
+            given = f"{origin}: tag {tag} mm on a side of {side} mm"
+            raise FormatError(given, "0 < tag <= side", "measure the black square")
+        unknown = sorted(set(ids) - set(NORMALS))
+        if unknown or not ids:
+            given = f"{origin}: ids for {', '.join(unknown) or 'no face'}"
+            raise FormatError(given, ", ".join(NORMALS), "correct ids")
+        if len(set(ids.values())) < len(ids) or not all(0 <= i <= 586 for i in ids.values()):
+            raise FormatError(f"{origin}: ids {ids}", "different numbers from 0 to 586", "correct ids")
+        return cls(float(side), float(tag), dict(ids))
+
+    @property
+    def faces(self) -> dict[int, str]:
+        """Tag number to face."""
+        return {tag: face for face, tag in self.ids.items()}
+
+    def points(self, face: str, places: np.ndarray) -> np.ndarray:
+        """Return points of a face in the cube frame [m].
+
+        Args:
+            face: Which face.
+            places: Right and up from the tag's centre in half tags [1], shape (n, 2); the black square's
+                corners lie at +-1.
+        """
+        half = self.tag / 2000
+        flat = np.column_stack([half * np.asarray(places), np.full(len(places), self.side / 2000)])
+        return flat @ AXES[face].T
+
+    def corners(self, face: str) -> np.ndarray:
+        """Return a tag's corners in the cube frame [m], shape (4, 3), in the AprilTag library's order."""
+        return self.points(face, CORNERS)

@@ -1,0 +1,206 @@
+"""The whole virtual rig: controller, board and camera on one clock, with a rig file like any other."""
+
+from __future__ import annotations
+
+import fcntl
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+import schemas
+from tacdata import documents
+from tacdata.clock import Clock
+from tacdata.errors import UsageError
+from tacdata.rig import Registration
+from tacdata.sensor import Sensor, default_sensor
+from tacdata.virtual_rig.board import Board, draw_timing
+from tacdata.virtual_rig.camera import Camera
+from tacdata.virtual_rig.controller import Controller
+from tacdata.virtual_rig.mounting import Mounted
+from tacdata.virtual_rig.scene import CUBE, INTRINSICS, draw_scene
+from tacdata.virtual_rig.world import World, draw
+from tacdata.wire import default_format
+from tacdata.wire.frame_format import FrameFormat, from_document
+
+NAME = "virtual rig"
+NOMINAL = Registration((-96.0, -61.5, -38.0), 1.2)
+"""Where the lab believes the sensor to lie: what its touch-off measured."""
+PARKED = 25.0
+"""Height above the skin at which the machine waits [mm]."""
+IMAGES = 30.0
+"""Most images drawn per real second."""
+BAUDS = (115200, 230400, 460800, 921600, 2000000, 4000000)
+
+
+def board_format(sensor: Sensor) -> FrameFormat:
+    """Return the default frame format with as many channels and frames a second as a sensor has."""
+    base = default_format().document
+    channels = {**base["channels"], "count": sensor.taxels.count}
+    return from_document({**base, "channels": channels, "rate": sensor.taxels.rate}, "virtual board")
+
+
+class VirtualRig:
+    """Emulated devices and their world; only the rig file and the wires reach the outside.
+
+    Files in its directory: ``rig.yaml`` while it runs, ``mounted.json`` (written by whoever mounts an
+    indenter), ``truth.yaml`` (what it really is; for tests only).
+    """
+
+    def __init__(
+        self, directory: Path, speed: float = 1.0, seed: int = 0, camera: bool = True,
+        sensor: Sensor | None = None,
+    ) -> None:  # fmt: skip
+        """Set up a rig whose clock runs ``speed`` times as fast as real time; ``seed`` decides its world.
+
+        Raises:
+            UsageError: If ``speed`` is not positive or too fast.
+        """
+        if not 0 < speed <= 100:
+            raise UsageError(
+                f"speed {speed:g}", "above 0, at most 100", "choose another speed (8 suits two cores)"
+            )
+        self.directory, self.path = directory, directory / "rig.yaml"
+        self._lock: IO[str] | None = None
+        self.clock = Clock.start(speed)
+        self.sensor = sensor or default_sensor()
+        self.truth = draw(seed, self.sensor, NOMINAL)
+        self.world = World(self.truth, self.sensor)
+        self.mounted = Mounted(directory / "mounted.json")
+        parked = (NOMINAL.origin[0], NOMINAL.origin[1], NOMINAL.origin[2] + PARKED)
+        self.controller = Controller(self.clock, seed, parked)
+        layout = board_format(self.sensor)
+        needed = layout.size * 10 * layout.rate / 0.8
+        baud = next((b for b in BAUDS if b >= needed), BAUDS[-1])
+        timing = draw_timing(seed, self.clock.now_ns(), layout.rate)
+        self.layout = layout
+        self.board = Board(self.clock, layout, timing, self._readings, baud, seed)
+        self.scene = draw_scene(seed, NOMINAL.to_machine(0.0, 0.0, 0.0))
+        self._rng = np.random.default_rng([seed, 7])
+        rate = min(30.0, IMAGES / speed)
+        self.camera = Camera(self.clock, rate, self._picture, seed=seed) if camera else None
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The rig file's document (`schemas/rig.schema.json`)."""
+        x, y, z = NOMINAL.origin
+        half_x, half_y = self.sensor.skin.size_x / 2 + 2.5, self.sensor.skin.size_y / 2 + 2.5
+        document: dict[str, Any] = {
+            "version": schemas.version("rig"),
+            "name": NAME,
+            "clock": asdict(self.clock),
+            "cnc": {"driver": "grbl", "port": self.controller.port.path, "baud": 115200},
+            "board": {
+                "driver": "capacitive_board", "port": self.board.port.path, "baud": self.board.baud,
+                "format": self.layout.document,
+            },
+            "mounting": {"file": str(self.mounted.path.absolute())},
+            "registration": {
+                "origin": [x, y, z], "yaw": NOMINAL.yaw, "method": "virtual touch-off", "residual": 0.05,
+                "date": datetime.fromtimestamp(self.clock.epoch_ns * 1e-9, UTC).date().isoformat(),
+            },
+            "envelope": {
+                "min": [x - half_x, y - half_y, z - 0.95 * self.sensor.skin.thickness],
+                "max": [x + half_x, y + half_y, z + PARKED + 5],
+            },
+        }  # fmt: skip
+        if self.camera:
+            document["cameras"] = {
+                "side": {
+                    "driver": "opencv_camera", "source": self.camera.url, "rate": self.camera.rate,
+                    "intrinsics": dict(INTRINSICS), "cube": {**CUBE, "ids": dict(CUBE["ids"])},
+                }
+            }  # fmt: skip
+        return document
+
+    @property
+    def emulates(self) -> list[str]:
+        """What it emulates, a line each, for people."""
+        layout = self.layout
+        lines = [
+            f"motion controller  {self.controller.port.path}  GRBL 1.1",
+            f"taxel board        {self.board.port.path}  {layout.channels} channels, {layout.rate:g} Hz",
+        ]
+        if self.camera:
+            lines.append(f"camera             {self.camera.url}  {self.camera.rate:g} Hz")
+        return [*lines, f"clock              {self.clock.rate:g} times real time"]
+
+    def start(self) -> None:
+        """Switch everything on; the rig file comes last, so that whoever finds it finds the devices too.
+
+        Raises:
+            UsageError: If another rig runs in the directory or another rig's file lies there.
+        """
+        self._lock = _claim(self.directory, self.path)
+        camera = (
+            {"rate": self.camera.rate, "start_ns": self.camera.start_ns, **self.scene.document}
+            if self.camera
+            else None
+        )
+        truth = {
+            "version": schemas.version("virtual_truth"), "world": self.truth.document,
+            "board": asdict(self.board.timing), "camera": camera,
+        }  # fmt: skip
+        documents.write(self.directory / "truth.yaml", truth, "virtual_truth")
+        self.mounted.path.unlink(missing_ok=True)
+        for device in (self.controller, self.board, self.camera):
+            if device:
+                device.start()
+        documents.write(self.path, self.document, "rig")
+
+    def stop(self) -> None:
+        """Switch everything off and take the rig file away, whose ports are gone."""
+        if self._lock:
+            self.path.unlink(missing_ok=True)
+        for device in (self.camera, self.board, self.controller):
+            if device:
+                device.stop()
+        if self._lock:
+            self._lock.close()
+
+    def _readings(self, sampled_ns: int) -> np.ndarray:
+        self.mounted.look()
+        tip = self.controller.position_at(sampled_ns)
+        return self.world.readings(tip, self.mounted.indenter, self.mounted.yaw, sampled_ns)
+
+    def _picture(self, exposed_ns: int) -> np.ndarray:
+        from tacdata.virtual_rig.render import render_cube
+
+        pose = self.scene.camera_cube(self.controller.position_at(exposed_ns))
+        return render_cube(pose, INTRINSICS, CUBE, self._rng)
+
+
+def _claim(directory: Path, path: Path) -> IO[str]:
+    directory.mkdir(parents=True, exist_ok=True)
+    if path.exists() and documents.read(path, "rig")["name"] != NAME:
+        raise UsageError(
+            f"{path} describes another rig", "a directory without one", "choose another directory"
+        )
+    lock = (directory / ".virtual_rig.lock").open("w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        lock.close()
+        raise UsageError(
+            f"a virtual rig is running in {directory}",
+            "one rig a directory",
+            "stop it or choose another directory",
+        ) from None
+    return lock
+
+
+@contextmanager
+def running(
+    directory: Path, speed: float = 8.0, seed: int = 0, camera: bool = True, sensor: Sensor | None = None
+) -> Iterator[Path]:
+    """Run a virtual rig in threads of this process; yields the path of its ``rig.yaml``."""
+    rig = VirtualRig(directory, speed, seed, camera, sensor)
+    try:
+        rig.start()
+        yield rig.path
+    finally:
+        rig.stop()

@@ -1,0 +1,58 @@
+"""Where the emulated camera stands and what it sees of the cube on the carriage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+INTRINSICS = {"width": 640, "height": 480, "fx": 900.0, "fy": 900.0, "cx": 319.5, "cy": 239.5}
+CUBE = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}
+CUBE_HEIGHT = 60.0
+"""Height of the cube's centre above the indenter's lowest point [mm]."""
+CAMERA_OFFSET = (170.0, -190.0, 140.0)
+"""From the cube above the sensor to the camera [mm, machine axes]: three faces are seen."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A fixed camera and a cube that rides on the carriage."""
+
+    machine_camera: np.ndarray
+    """Camera pose in the machine frame, shape (4, 4), translation in [m]."""
+    carriage_cube: np.ndarray
+    """Cube pose on the carriage (machine axes, origin at the indenter's lowest point), shape (4, 4), [m]."""
+
+    def camera_cube(self, position: np.ndarray) -> np.ndarray:
+        """Return the cube's pose in the camera frame, shape (4, 4), [m], at a position [mm], shape (3,)."""
+        machine_cube = self.carriage_cube.copy()
+        machine_cube[:3, 3] += position / 1000
+        return np.linalg.inv(self.machine_camera) @ machine_cube
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The poses as plain data."""
+        return {
+            "pose_machine_camera": self.machine_camera.tolist(),
+            "cube_on_carriage": self.carriage_cube.tolist(),
+        }
+
+
+def draw_scene(seed: int, over: tuple[float, float, float]) -> Scene:
+    """Set the camera up, by hand, to look at the cube when the carriage is at ``over`` [mm]."""
+    from scipy.spatial.transform import Rotation
+
+    rng = np.random.default_rng([seed, 6])
+    cube = np.add(over, (0.0, 0.0, CUBE_HEIGHT))
+    eye = cube + CAMERA_OFFSET + rng.normal(0, 4, 3)
+    forward = (cube - eye) / np.linalg.norm(cube - eye)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    camera = np.eye(4)
+    camera[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    camera[:3, 3] = eye / 1000
+    riding = np.eye(4)
+    riding[:3, :3] = Rotation.from_rotvec(rng.normal(0, 0.5, 3), degrees=True).as_matrix()
+    riding[:3, 3] = (np.array([0, 0, CUBE_HEIGHT]) + rng.normal(0, 0.3, 3)) / 1000
+    return Scene(camera, riding)

@@ -1,0 +1,72 @@
+"""Checksums by name; each CRC by its Rocksoft parameters (Williams, "A Painless Guide to CRC", 1993)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+
+@dataclass(frozen=True)
+class Crc:
+    """Parameters of one cyclic redundancy check."""
+
+    width: int
+    """Width [bits]."""
+    polynomial: int
+    """Generator without its leading bit."""
+    initial: int
+    """Register before the first byte."""
+    reflected: bool
+    """True if bytes and register run least significant bit first."""
+    final: int
+    """XORed onto the result."""
+
+
+CRCS = {
+    "crc8": Crc(8, 0x07, 0x00, False, 0x00),
+    "crc16_ccitt_false": Crc(16, 0x1021, 0xFFFF, False, 0x0000),
+    "crc16_xmodem": Crc(16, 0x1021, 0x0000, False, 0x0000),
+    "crc16_modbus": Crc(16, 0x8005, 0xFFFF, True, 0x0000),
+    "crc32": Crc(32, 0x04C11DB7, 0xFFFFFFFF, True, 0xFFFFFFFF),
+}
+WIDTHS = {"none": 0, "xor8": 1, "sum8": 1, "sum16": 2} | {name: crc.width // 8 for name, crc in CRCS.items()}
+"""Bytes that each kind takes in a frame."""
+
+
+def _reflect(value: int, width: int) -> int:
+    return int(f"{value:0{width}b}"[::-1], 2)
+
+
+@cache
+def _table(crc: Crc) -> tuple[int, ...]:
+    top, mask = 1 << (crc.width - 1), (1 << crc.width) - 1
+    entries = []
+    for byte in range(256):
+        register = (_reflect(byte, 8) if crc.reflected else byte) << (crc.width - 8)
+        for _ in range(8):
+            register = ((register << 1) ^ crc.polynomial if register & top else register << 1) & mask
+        entries.append(_reflect(register, crc.width) if crc.reflected else register)
+    return tuple(entries)
+
+
+def _crc(crc: Crc, data: bytes) -> int:
+    table, mask = _table(crc), (1 << crc.width) - 1
+    register = _reflect(crc.initial, crc.width) if crc.reflected else crc.initial
+    for byte in data:
+        if crc.reflected:
+            register = (register >> 8) ^ table[(register ^ byte) & 0xFF]
+        else:
+            register = ((register << 8) & mask) ^ table[(register >> (crc.width - 8)) ^ byte]
+    return register ^ crc.final
+
+
+def checksum(kind: str, data: bytes) -> int:
+    """Return the checksum of ``data`` by its name in `WIDTHS`; 0 for ``none``."""
+    if kind in CRCS:
+        return _crc(CRCS[kind], data)
+    if kind == "xor8":
+        value = 0
+        for byte in data:
+            value ^= byte
+        return value
+    return sum(data) & ((1 << 8 * WIDTHS[kind]) - 1)

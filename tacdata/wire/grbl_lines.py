@@ -1,0 +1,61 @@
+"""What a line from a GRBL controller is, by its form alone (Grbl v1.1 interface documentation)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+MM_PER_INCH = 25.4
+
+RESPONSE = re.compile(r"^(?:ok|error:(\d+))$")
+ALARM = re.compile(r"^ALARM:(\d+)$")
+WELCOME = re.compile(r"grbl(?:hal)? v?\d\S* \[", re.IGNORECASE)
+SETTING = re.compile(r"^(\$[A-Z0-9]+)=([^\s(]*)")
+MESSAGE = re.compile(r"^\[([A-Z0-9]+):(.*)\]$")
+
+READY_STATES = ("Idle", "Alarm")
+"""States in which GRBL answers ``$$``, ``$#`` and ``$I``."""
+
+
+@dataclass(frozen=True)
+class StatusReport:
+    """A status report as written, before the work offset is applied."""
+
+    state: str
+    """State with its substate, for example ``Hold:0``."""
+    position: np.ndarray
+    """First three axes [report units], shape (3,)."""
+    is_work: bool
+    """True if `position` is WPos, False if MPos."""
+    offset: np.ndarray | None
+    """Work coordinate offset WCO [report units], shape (3,), if the report has one."""
+    feed: float
+    """Feed rate [report units/min]; NaN if the report has none."""
+
+
+def parse_status(line: str) -> StatusReport | None:
+    """Return what ``<State|MPos:x,y,z|...>`` says, or None if the line is damaged.
+
+    After the first two fields any other may follow in any order or be absent.
+    """
+    if not (line.startswith("<") and line.endswith(">")):
+        return None
+    state, *fields = line[1:-1].split("|")
+    values: dict[str, list[float]] = {}
+    for field in fields:
+        name, _, text = field.partition(":")
+        if name in ("MPos", "WPos", "WCO", "FS", "F"):
+            try:
+                values[name] = [float(number) for number in text.split(",")]
+            except ValueError:
+                return None
+    kind = "MPos" if "MPos" in values else "WPos"
+    position, offset = values.get(kind, []), values.get("WCO")
+    if not re.fullmatch(r"[A-Za-z]+(:\d+)?", state) or len(position) < 3 or (offset and len(offset) < 3):
+        return None
+    feed = (values.get("FS") or values.get("F") or [float("nan")])[0]
+    return StatusReport(
+        state, np.array(position[:3]), kind == "WPos", np.array(offset[:3]) if offset else None, feed
+    )

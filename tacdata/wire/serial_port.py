@@ -1,0 +1,102 @@
+"""Opening a serial port so that what is wrong is said and a board is not reset without need."""
+
+from __future__ import annotations
+
+import errno
+
+import serial
+from serial.tools import list_ports
+
+from tacdata.errors import DeviceError
+
+try:
+    import termios
+except ImportError:  # Windows has no hang-up flag to clear.
+    termios = None
+
+
+def ports() -> str:
+    """Return the serial ports that this machine has, in words."""
+    found = [
+        f"{p.device} ({p.description})" if p.description != "n/a" else p.device for p in list_ports.comports()
+    ]
+    return ", ".join(found) or "this machine shows none"
+
+
+def open_port(
+    port: str, baud: int, device: str, timeout: float, dtr: bool | None = None
+) -> serial.SerialBase:
+    """Open a port for one process alone.
+
+    The kernel raises DTR when a port is opened, which resets an Arduino board only if DTR was low. Clearing
+    HUPCL keeps DTR up at closing, so that from the second opening on a board in motion is not reset.
+
+    Args:
+        port: Path, ``COM`` name or pyserial URL.
+        baud: Bits per second.
+        device: What is meant to be there, for the error.
+        timeout: Longest wait of one read [s, real time].
+        dtr: State of the DTR line after opening; None leaves it raised, as the system does.
+
+    Raises:
+        DeviceError: If the port is missing, busy, forbidden or no serial port.
+    """
+    try:
+        line = serial.serial_for_url(port, baud, timeout=timeout, write_timeout=2.0, do_not_open=True)
+        if "://" not in port:
+            line.exclusive = True
+        if dtr is not None:
+            line.dtr = dtr
+        line.open()
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise _refusal(port, device, error) from None
+    _keep_dtr(line)
+    return line
+
+
+def read_available(line: serial.SerialBase) -> bytes:
+    """Return what has arrived, waiting for the first byte at most as long as the port's timeout.
+
+    Raises:
+        serial.SerialException: If the line broke (OSError or TypeError on some systems).
+    """
+    return line.read(max(1, getattr(line, "in_waiting", 0)))
+
+
+def _keep_dtr(line: serial.SerialBase) -> None:
+    handle = getattr(line, "fd", None)
+    if termios is None or not isinstance(handle, int):
+        return
+    try:
+        attributes = termios.tcgetattr(handle)
+        attributes[2] &= ~termios.HUPCL
+        termios.tcsetattr(handle, termios.TCSANOW, attributes)
+    except (termios.error, OSError):
+        return  # a port without modem lines has no DTR to keep
+
+
+def _refusal(port: str, device: str, error: Exception) -> DeviceError:
+    number = getattr(error, "errno", None)
+    if number == errno.ENOENT or "FileNotFound" in str(error):
+        return DeviceError(
+            f"no port {port} for the {device}",
+            f"a port that exists: {ports()}",
+            "plug it in, or correct port in the rig file",
+        )
+    if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
+        return DeviceError(
+            f"port {port} of the {device} is in use by another program",
+            "a port that nothing else has open",
+            "close the other program (G-code sender, serial monitor, another recording)",
+        )
+    if number in (errno.EACCES, errno.EPERM):
+        return DeviceError(
+            f"port {port} of the {device} may not be opened by this user",
+            "read and write permission",
+            "add the user to the group that owns it (often dialout or uucp) and log in again",
+        )
+    return DeviceError(
+        f"port {port} of the {device} cannot be opened: {error}",
+        f"a serial port: {ports()}",
+        "correct port in the rig file",
+    )

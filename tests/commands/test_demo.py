@@ -1,0 +1,85 @@
+"""The demo goes through the verbs, leaves everything it names, and stops gently."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tacdata.commands import demo
+from tacdata.errors import UsageError
+
+DEMO = [sys.executable, "-m", "tacdata.cli", "demo"]
+
+
+def test_an_existing_folder_is_left_alone(tmp_path, capsys):
+    (tmp_path / "demo").mkdir()
+    (tmp_path / "demo" / "mine.txt").write_text("mine")
+    (tmp_path / "demo-2").mkdir()
+    assert demo._new_folder(tmp_path / "demo") == tmp_path / "demo-3"
+    assert "left as it is" in capsys.readouterr().out
+    assert [p.name for p in (tmp_path / "demo").iterdir()] == ["mine.txt"]
+    assert demo._new_folder(tmp_path / "new") == tmp_path / "new"
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(UsageError, match="file"):
+        demo._new_folder(tmp_path / "file" / "demo")
+
+
+def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
+    from tacdata.recording.reader import read_episode
+    from tacdata.recording.session import read_session
+
+    log = tmp_path / "log"
+    with log.open("wb") as stream:
+        process = subprocess.Popen(
+            [*DEMO, "--out", str(tmp_path / "out"), "--presses", "8"], stdout=stream, stderr=stream
+        )
+    try:
+        deadline = time.monotonic() + 120
+        while (
+            "press 1 of 8" not in log.read_text() and process.poll() is None and time.monotonic() < deadline
+        ):
+            time.sleep(0.05)
+        time.sleep(0.4)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 130, log.read_text()
+    finally:
+        process.kill()
+    shown = log.read_text()
+    assert "stopped at stage 2" in shown
+    assert "Traceback" not in shown
+    session = read_session(tmp_path / "out" / "session")
+    assert 1 <= len(session.episodes) < 8
+    for path in (*session.episodes, *session.unfinished):
+        assert len(read_episode(path).taxels.counter) > 0
+    assert not (tmp_path / "out" / "session" / "labels").exists()
+    # The rig went with it: its ports are closed and its rig file is gone.
+    assert "stopped" in (tmp_path / "out" / "virtual-rig.log").read_text()
+    assert not (tmp_path / "out" / "rig" / "rig.yaml").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_the_whole_job(tmp_path):
+    done = subprocess.run(
+        [*DEMO, "--out", str(tmp_path / "out"), "--presses", "8", "--epochs", "1"],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    typed = re.findall(r"^\$ tacdata ([a-z-]+)", done.stdout, re.M)
+    assert typed == ["virtual-rig", "plan", "record", "check", "label", "pack", "train", "evaluate", "view"]
+    assert "MISSING" not in done.stdout
+    out = tmp_path / "out"
+    assert len(list((out / "session").glob("episode-*.mcap"))) == 8
+    assert len(list((out / "session" / "labels").glob("episode-*.parquet"))) == 8
+    scores = json.loads((out / "network" / "scores" / "scores.json").read_text())
+    assert scores["version"] == "1.0"
+    for picture in (out / "episode.png", out / "network" / "scores" / "scores.png"):
+        assert picture.read_bytes()[:4] == b"\x89PNG"
+    assert (out / "episode.rrd").stat().st_size > 10_000

@@ -1,0 +1,73 @@
+"""`tacdata label`: what it prints, what it refuses, and its exit codes."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from typer.testing import CliRunner
+
+from tacdata import cli, recording
+from tacdata.errors import SolveError
+
+FARM = Path(__file__).resolve().parent.parent / "label_farm"
+
+
+@pytest.fixture
+def label(tmp_path, monkeypatch):
+    """Run the verb on three presses of a session whose recordings are made up."""
+    monkeypatch.syspath_prepend(FARM)
+    from farm_examples import press_episode
+
+    monkeypatch.setenv("PYTHONPATH", str(FARM))
+    episodes = {
+        f"episode-{k:06d}.mcap": press_episode(tmp_path, k, x=float(k), depth=k - 0.5) for k in range(3)
+    }
+    session = SimpleNamespace(episodes=tuple(tmp_path / name for name in episodes))
+    monkeypatch.setattr(recording.session, "read_session", lambda folder: session)
+    monkeypatch.setattr(recording.reader, "read_episode", lambda path: episodes[path.name])
+
+    def run(*options):
+        arguments = ["label", str(tmp_path), "--factory", "fast_model:FastModel", "--workers", "1", *options]
+        return CliRunner().invoke(cli.application(), arguments)
+
+    return run
+
+
+def test_it_labels_a_session_and_says_what_it_did(tmp_path, label):
+    shown = label()
+    assert shown.exit_code == 0, shown.output
+    assert "labels written: 3 (1 without contact), already there: 0, failed: 0" in shown.output
+    assert "presses solved: 2" in shown.output and "next: tacdata pack" in shown.output
+    assert len(list((tmp_path / "labels").glob("episode-*.parquet"))) == 3
+    assert "labels written: 0 (0 without contact), already there: 3" in label().output
+
+
+def test_a_store_elsewhere_serves_as_well(tmp_path, label):
+    assert label("--store", str(tmp_path / "shared")).exit_code == 0
+    assert (
+        len(list((tmp_path / "shared").rglob("*.npz"))) == 2 and not (tmp_path / "labels" / "store").exists()
+    )
+
+
+def test_a_failed_press_is_named_and_ends_with_an_error(tmp_path, label, monkeypatch):
+    monkeypatch.setenv("FAST_MODEL_FAILS", "2")
+    shown = label()
+    assert isinstance(shown.exception, SolveError) and "1 of 3 episodes" in shown.exception.given
+    assert "episode 2: no label: no equilibrium at state 3" in shown.output
+    assert "labels written: 2" in shown.output
+
+
+def test_bad_input_ends_in_words(tmp_path):
+    finished = subprocess.run(
+        [sys.executable, "-m", "tacdata.cli", "label", "nowhere"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(FARM.parent.parent)},
+    )
+    assert finished.returncode == 2
+    assert "nowhere is no session" in finished.stderr and "next:" in finished.stderr
+    assert "Traceback" not in finished.stderr

@@ -1,0 +1,95 @@
+"""Stages stop at the first failure with its exit code, and an interrupted one closes its files first."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from tacdata import stages
+from tacdata.errors import DeviceError
+
+PATIENT = """
+import signal, sys, time
+from pathlib import Path
+folder = Path(sys.argv[1])
+try:
+    (folder / "started").touch()
+    time.sleep(30)
+except KeyboardInterrupt:
+    time.sleep(0.2)
+    (folder / "closed").write_text("once")
+    time.sleep(0.2)
+    sys.exit(130)
+"""
+
+
+@pytest.fixture
+def scripts(monkeypatch):
+    """Stages are Python scripts instead of verbs: the first argument is the program's text."""
+    monkeypatch.setattr(stages, "command_line", lambda arguments: [sys.executable, "-c", *arguments])
+
+
+def test_stages_run_in_order_and_print_what_would_be_typed(scripts, tmp_path, capfd):
+    program = "import sys; open(sys.argv[1], 'a').write(sys.argv[2])"
+    line = stages.Line(2, "")
+    line.run("first", [program, str(tmp_path / "x"), "a"])
+    line.run("second", [program, str(tmp_path / "x"), "b"])
+    assert (tmp_path / "x").read_text() == "ab"
+    shown = capfd.readouterr().out
+    assert "[1/2] first" in shown
+    assert "[2/2] second" in shown
+    assert shown.count("$ tacdata ") == 2
+
+
+def test_a_failure_carries_the_exit_code_of_its_verb(scripts):
+    with pytest.raises(stages.StageError) as caught:
+        stages.Line(3, "nothing is lost").run("a", ["raise SystemExit(3)"])
+    assert caught.value.exit_code == 3
+    assert "stage 1" in str(caught.value)
+    assert "nothing is lost" in str(caught.value)
+
+
+def test_a_verb_killed_by_a_signal_counts_as_failed(scripts):
+    with pytest.raises(stages.StageError) as caught:
+        stages.Line(1, "").run("a", ["import os; os.kill(os.getpid(), 9)"])
+    assert caught.value.exit_code == 1
+
+
+def test_an_interrupt_waits_until_the_stage_has_closed_its_files(scripts, tmp_path):
+    def interrupt():
+        while not (tmp_path / "started").exists():
+            time.sleep(0.01)
+        time.sleep(0.1)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt):
+        stages.Line(1, "").run("a", [PATIENT, str(tmp_path)])
+    thread.join()
+    assert (tmp_path / "closed").read_text() == "once"
+
+
+def test_a_background_verb_is_stopped_at_the_end(scripts, tmp_path):
+    with stages.Background([PATIENT, str(tmp_path)], tmp_path / "log") as background:
+        background.wait_until((tmp_path / "started").exists, "a file", 20.0)
+        assert background.process.poll() is None
+    assert background.process.poll() == 130
+    assert (tmp_path / "closed").exists()
+
+
+def test_a_background_verb_that_dies_is_named_with_its_last_words(scripts, tmp_path):
+    with (
+        stages.Background(["raise SystemExit('no pseudo-terminal')"], tmp_path / "log") as background,
+        pytest.raises(DeviceError, match=r"(?s)exit code 1.*no pseudo-terminal"),
+    ):
+        background.wait_until(lambda: False, "a rig file", 20.0)
+
+
+def test_a_command_line_is_this_installation():
+    shown = subprocess.run(stages.command_line(["--help"]), capture_output=True, text=True, check=True).stdout
+    assert "soft tactile skins" in shown or "Usage" in shown

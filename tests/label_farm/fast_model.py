@@ -1,0 +1,58 @@
+"""A model that answers at once; it notes each solve in a file, so that a test can count them."""
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from tacdata import provenance
+from tacdata.errors import SolveError
+from tacdata.labels import PathSolution
+
+
+class FastModel:
+    """The surface is a bump times the depth. ``FAST_MODEL_*`` variables make it slow, wrong or deadly."""
+
+    def __init__(self, sensor):
+        self.sensor = sensor
+        self.content_hash = provenance.content_hash(
+            [sensor.content_hash, os.environ.get("FAST_MODEL_VERSION", "1")]
+        )
+
+    def solve(self, job):
+        log = os.environ.get("FAST_MODEL_LOG")
+        if log:
+            with open(log, "a") as stream:
+                stream.write(f"{os.getpid()} {job.x:g}\n")
+        time.sleep(float(os.environ.get("FAST_MODEL_SECONDS", "0")))
+        if f"{job.x:g}" in os.environ.get("FAST_MODEL_FAILS", "").split():
+            raise SolveError("no equilibrium at state 3", "convergence in 50 iterations", "reduce the depth")
+        if f"{job.x:g}" in os.environ.get("FAST_MODEL_KILLS", "").split():
+            os.kill(os.getpid(), 9)
+        if f"{job.x:g}" in os.environ.get("FAST_MODEL_KILLS_ONCE", "").split():
+            mark = Path(os.environ["FAST_MODEL_LOG"] + ".killed")
+            if not mark.exists():
+                mark.touch()
+                os.kill(os.getpid(), 9)
+        return path(self.sensor, job.depths, lambda d: d, job.x, bad=os.environ.get("FAST_MODEL_NAN") == "1")
+
+
+def path(sensor, depths, answer, x=0.0, bad=False):
+    """A path whose surface is ``answer(depth)`` times a bump around x."""
+    depth = np.array(depths)
+    bump = np.exp(-((sensor.map.x[:, None] - x) ** 2 + sensor.map.y[None] ** 2) / 4.0)
+    values = np.array([answer(d) for d in depth])
+    if bad:
+        values[1] = np.nan
+    taxels = np.ones(sensor.taxels.count)
+    return PathSolution(
+        depth=depth,
+        surface=values[:, None, None] * bump,
+        taxel_force=values[:, None] * taxels,
+        taxel_closure=values[:, None] * taxels,
+        force=values[:, None] * np.array([0.0, 0.0, -1.0]),
+        residual=np.zeros(len(depth)),
+        penetration=np.zeros(len(depth)),
+        provenance={"law": "bump"},
+    )

@@ -1,0 +1,91 @@
+"""Between the states of a path: exact where the path is straight, bounded where it bends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from farm_examples import SENSOR, press_episode
+from fast_model import path
+
+from label_farm.interpolate import Branch
+from label_farm.label import make_label
+from label_farm.ladder import Ladder
+from label_farm.plan import request
+
+DEPTH = np.linspace(0.0, 1.5, 401)
+CURVES = {
+    "hertz": lambda d: d**1.5,
+    "square": lambda d: d**2,
+    "late contact": lambda d: max(0.0, d - 0.37),
+    "stiffening": lambda d: np.expm1(2 * d) / 20,
+    "early": lambda d: d**0.75,
+    "S": lambda d: 1 / (1 + np.exp(-6 * (d - 0.75))) - 1 / (1 + np.exp(4.5)),
+}
+
+
+def label_of(tmp_path, answer, **changes):
+    episode = press_episode(tmp_path, frames=400, **changes)
+    wish = request(episode, SENSOR, "0" * 64, Ladder())
+    return wish, make_label(wish, path(SENSOR, wish.job.depths, answer))
+
+
+def test_a_path_linear_in_depth_is_exact_and_says_so(tmp_path):
+    wish, label = label_of(tmp_path, lambda d: 0.8 * d, depth=1.5)
+    bump = np.exp(-(SENSOR.map.x[:, None] ** 2 + SENSOR.map.y[None] ** 2) / 4.0)
+    wanted = 0.8 * np.maximum(wish.tip[:, 2], 0)[:, None, None] * bump
+    np.testing.assert_allclose(label.signed, wanted, atol=2e-7)
+    assert label.error.max() < 1e-9
+
+
+@pytest.mark.parametrize("name", CURVES)
+@pytest.mark.parametrize("loading", [True, False])
+def test_the_bound_holds_on_curved_paths_and_is_not_idle(name, loading):
+    curve = CURVES[name]
+    states = path(SENSOR, Ladder().depths(1.5), curve)
+    branch = Branch.of(states, "force", loading)
+    true = -np.array([curve(d) for d in DEPTH])
+    error = np.abs(branch.at(DEPTH)[:, 2] - true)
+    bound = branch.bound(DEPTH)[:, 2]
+    assert error.max() > 1e-5, "the curve is no test"
+    assert (error <= bound + 1e-12).all()
+    assert error.max() <= bound.max() < 0.08 * np.abs(true).max()
+    assert (branch.bound(branch.depth)[:, 2] < 1e-12).all(), "at a solved state nothing is interpolated"
+
+
+def test_finer_steps_shrink_the_bound_at_second_order():
+    largest = []
+    for step in (0.2, 0.1, 0.05):
+        states = path(SENSOR, Ladder(step, 1.0, step, step).depths(1.6), CURVES["square"])
+        largest.append(Branch.of(states, "force", True).bound(np.linspace(0.4, 1.2, 999))[:, 2].max())
+    assert largest[0] / largest[1] > 3.5 and largest[1] / largest[2] > 3.5
+
+
+def test_loading_and_unloading_take_their_own_branch(tmp_path):
+    episode = press_episode(tmp_path, depth=1.0, frames=400)
+    wish = request(episode, SENSOR, "0" * 64, Ladder())
+    states = path(SENSOR, wish.job.depths, lambda d: d)
+    peak = int(np.argmax(states.depth))
+    factor = np.where(np.arange(len(states.depth)) <= peak, 1.0, 0.5)
+    factor[peak] = 1.0
+    states = replace(states, force=states.force * factor[:, None])
+    label = make_label(wish, states)
+    depth, seconds = wish.tip[:, 2], (wish.time_ns - wish.time_ns[0]) / 1e9
+    down = (depth > 0.1) & (depth < 0.7) & (seconds < 1)
+    up = (depth > 0.1) & (depth < 0.4) & (seconds > 2)
+    np.testing.assert_allclose(label.force[down, 2], -depth[down], rtol=1e-5)
+    np.testing.assert_allclose(label.force[up, 2], -0.5 * depth[up], rtol=1e-5)
+
+
+def test_what_a_shared_path_leaves_out_is_in_the_error(tmp_path):
+    _, exact = label_of(tmp_path, lambda d: d, number=0)
+    _, deeper = label_of(tmp_path, lambda d: d, number=1, reached=1.004)
+    episode = press_episode(tmp_path, 2, frames=400)
+    aside = replace(episode, tip=episode.tip + np.array([0.015, 0.0, 0.0]))
+    wish = request(aside, SENSOR, "0" * 64, Ladder())
+    moved = make_label(wish, path(SENSOR, wish.job.depths, lambda d: d))
+    bump = np.exp(-(SENSOR.map.x[:, None] ** 2 + SENSOR.map.y[None] ** 2) / 4.0)
+    true = np.exp(-((SENSOR.map.x[:, None] - 0.015) ** 2 + SENSOR.map.y[None] ** 2) / 4.0)
+    hold = 200
+    assert exact.error[hold] < 1e-12
+    assert deeper.error[hold] == pytest.approx(0.004 * np.sqrt((bump**2).mean()), rel=1e-3)
+    assert moved.error[hold] == pytest.approx(np.sqrt(((true - bump) ** 2).mean()), rel=0.05)

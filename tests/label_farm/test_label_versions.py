@@ -1,0 +1,81 @@
+"""What changes between two runs: damage, another model version, another sensor, another recording."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from farm_examples import SENSOR, press_episode
+
+from tacdata.errors import UsageError
+from tacdata.labels import read_label
+
+
+@pytest.mark.parametrize("damage", ["flip", "cut", "empty"])
+def test_a_damaged_result_is_made_again(tmp_path, label_all, solves, damage):
+    episode = press_episode(tmp_path)
+    label_all([episode])
+    (result,) = (tmp_path / "labels" / "store").rglob("*.npz")
+    intact, label = result.read_bytes(), tmp_path / "labels" / "episode-000000.parquet"
+    surface = read_label(label).signed
+    data = bytearray(intact)
+    data[len(data) // 2] ^= 0xFF
+    result.write_bytes({"flip": bytes(data), "cut": intact[: len(intact) // 2], "empty": b""}[damage])
+    label.unlink()
+    assert label_all([episode]).written == [0]
+    assert len(solves()) == 2 and result.with_suffix(".damaged").exists()
+    assert np.array_equal(read_label(label).signed, surface)
+
+
+def test_labels_of_another_model_version_are_not_touched_unless_asked(
+    tmp_path, label_all, solves, monkeypatch
+):
+    episode = press_episode(tmp_path)
+    label_all([episode])
+    label = tmp_path / "labels" / "episode-000000.parquet"
+    old = label.read_bytes()
+    monkeypatch.setenv("FAST_MODEL_VERSION", "2")
+    with pytest.raises(UsageError, match="a label store from another model version") as refusal:
+        label_all([episode])
+    assert "--redo" in refusal.value.remedy
+    assert label.read_bytes() == old and len(solves()) == 1
+    assert label_all([episode], redo=True).written == [0]
+    assert label.read_bytes() != old and len(solves()) == 2
+    monkeypatch.setenv("FAST_MODEL_VERSION", "1")
+    assert label_all([episode], redo=True).found == 1, "results of both versions lie side by side"
+    assert len(solves()) == 2
+
+
+def test_a_new_recording_of_a_press_renews_its_label_without_a_solve(tmp_path, label_all, solves):
+    episode = press_episode(tmp_path)
+    label_all([episode])
+    episode.path.write_bytes(b"recorded again")
+    assert label_all([episode]).written == [0]
+    assert len(solves()) == 1
+
+
+def test_another_sensor_file_gives_other_jobs(tmp_path, label_all, solves):
+    softer = replace(SENSOR, material=replace(SENSOR.material, youngs_modulus=0.2))
+    label_all([press_episode(tmp_path)])
+    with pytest.raises(UsageError, match="another model version"):
+        label_all([press_episode(tmp_path)], sensor=softer)
+    assert label_all([press_episode(tmp_path)], sensor=softer, redo=True).written == [0]
+    assert len(solves()) == 2
+
+
+def test_a_refused_run_changes_nothing(tmp_path, label_all, monkeypatch):
+    episodes = [press_episode(tmp_path, 0), press_episode(tmp_path, 1, x=1.0)]
+    label_all(episodes)
+    before = {p: p.read_bytes() for p in (tmp_path / "labels").glob("episode*")}
+    monkeypatch.setenv("FAST_MODEL_VERSION", "2")
+    with pytest.raises(UsageError, match="another model version"):
+        label_all([episodes[0], replace(episodes[1], tip_ns=np.array([], dtype=np.int64))])
+    assert before == {p: p.read_bytes() for p in (tmp_path / "labels").glob("episode*")}
+
+
+def test_a_label_whose_recording_went_bad_is_put_aside_not_lost(tmp_path, label_all):
+    episode = press_episode(tmp_path)
+    label_all([episode])
+    label = tmp_path / "labels" / "episode-000000.parquet"
+    content = label.read_bytes()
+    assert label_all([replace(episode, tip_ns=np.array([], dtype=np.int64))]).failed
+    assert not label.exists() and label.with_suffix(".superseded").read_bytes() == content

@@ -1,0 +1,135 @@
+"""The queue: each job to one worker at a time, none forgotten."""
+
+import subprocess
+import sys
+
+import pytest
+from farm_examples import HERE
+
+from label_farm.job import Job
+from label_farm.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING, Ledger, owner_name
+from tacdata.errors import FormatError
+
+MODEL = "a" * 64
+
+
+def jobs(count, model=MODEL):
+    return [
+        Job("0" * 64, model, {"shape": "sphere", "radius": 2.0}, float(k), 0.0, 0.0, (0.0, 1.0, 0.0))
+        for k in range(count)
+    ]
+
+
+@pytest.fixture
+def ledger(tmp_path):
+    with Ledger(tmp_path / "ledger.sqlite") as opened:
+        yield opened
+
+
+def test_each_job_goes_to_one_worker(ledger):
+    ledger.enqueue(jobs(5))
+    ledger.enqueue(jobs(5))
+    taken = [lease.job.x for worker in "abc" for lease in ledger.claim(worker, MODEL, 2)]
+    assert sorted(taken) == [0, 1, 2, 3, 4] and not ledger.claim("d", MODEL)
+    assert ledger.counts() == {WAITING: 0, LEASED: 5, DONE: 0, FAILED: 0}
+
+
+def test_a_higher_priority_comes_first_and_other_models_are_left_alone(ledger):
+    ledger.enqueue(jobs(3))
+    ledger.enqueue(jobs(3)[2:], priority=5)
+    ledger.enqueue(jobs(1, "b" * 64), priority=9)
+    assert [lease.job.x for lease in ledger.claim("a", MODEL, 3)] == [2, 0, 1]
+
+
+def test_a_silent_worker_loses_its_job_and_a_beating_one_keeps_it(tmp_path):
+    with (
+        Ledger(tmp_path / "ledger.sqlite", lease_seconds=-1.0) as short,
+        Ledger(tmp_path / "ledger.sqlite") as long,
+    ):
+        short.enqueue(jobs(2))
+        first, second = short.claim("silent", MODEL)[0], short.claim("beating", MODEL)[0]
+        long.heartbeat("beating")
+        (again,) = long.claim("other", MODEL, 5)
+        assert again.job == first.job and again.tries == 2
+        assert not long.finish(first.job.key, "silent", 1.0), "the lease was lost"
+        assert long.finish(first.job.key, "other", 1.0) and long.finish(second.job.key, "beating", 1.0)
+        assert long.counts()[DONE] == 2
+
+
+def test_changes_are_told_once_in_order(ledger):
+    ledger.enqueue(jobs(3))
+    start = ledger.last_change()
+    a, b, c = ledger.claim("w", MODEL, 3)
+    ledger.finish(b.job.key, "w", 2.5)
+    ledger.fail(a.job.key, "w", "no equilibrium")
+    first = ledger.changes(start)
+    assert [(x.key, x.done, x.error, x.seconds) for x in first] == [
+        (b.job.key, True, "", 2.5),
+        (a.job.key, False, "no equilibrium", 0.0),
+    ]
+    ledger.finish(c.job.key, "w", 1.0)
+    assert [x.key for x in ledger.changes(first[-1].number)] == [c.job.key]
+
+
+def test_a_job_that_kills_its_workers_is_not_given_back_for_ever(ledger):
+    ledger.enqueue(jobs(1))
+    for _ in range(MAX_TRIES - 1):
+        ledger.claim("w", MODEL)
+        assert ledger.release("w", blame=True) == []
+    ledger.claim("w", MODEL)
+    (kept,) = ledger.release("w", blame=True)
+    assert kept.tries == MAX_TRIES and ledger.fail(kept.job.key, "w", "deadly")
+    assert not ledger.claim("w", MODEL)
+
+
+def test_being_stopped_is_not_held_against_a_job(ledger):
+    ledger.enqueue(jobs(1))
+    for _ in range(MAX_TRIES + 2):
+        assert ledger.claim("w", MODEL)[0].tries == 1
+        assert ledger.release("w", blame=False) == []
+
+
+def test_leases_of_the_dead_and_of_before_a_restart_are_given_back(tmp_path):
+    path = tmp_path / "ledger.sqlite"
+    dead = subprocess.run(
+        [sys.executable, "-c", "from label_farm.ledger import owner_name; print(owner_name())"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=HERE.parent.parent,
+    ).stdout.strip()
+    with Ledger(path) as ledger:
+        ledger.enqueue(jobs(3))
+        ledger.claim(dead, MODEL)
+        (mine,) = ledger.claim(owner_name(), MODEL)
+        ledger._boot = "before"
+        ledger.claim("elsewhere/1", MODEL)
+    with Ledger(path) as ledger:
+        assert ledger.counts()[LEASED] == 3
+        ledger.release_dead()
+        assert ledger.counts() == {WAITING: 2, LEASED: 1, DONE: 0, FAILED: 0}
+        assert ledger.finish(mine.job.key, owner_name(), 0.0)
+
+
+def test_claims_use_the_indices(ledger):
+    from label_farm.ledger import TAKE_EXPIRED, TAKE_WAITING
+
+    ledger.enqueue(jobs(20))
+    for statement, values in ((TAKE_WAITING, (MODEL, 1)), (TAKE_EXPIRED, (MODEL, 0.0, 1))):
+        plan = [
+            row[3] for row in ledger._db.execute("EXPLAIN QUERY PLAN " + statement, ("w", "", 0.0, *values))
+        ]
+        assert not [step for step in plan if step.startswith("SCAN")], plan
+
+
+@pytest.mark.parametrize("content", [b"this is no database" * 100, None])
+def test_an_unusable_ledger_is_said_in_words(tmp_path, content):
+    path = tmp_path / "ledger.sqlite"
+    if content is None:
+        with Ledger(path) as ledger:
+            ledger._db.execute("PRAGMA user_version = 99")
+    else:
+        path.write_bytes(content)
+    with pytest.raises(FormatError, match=r"damaged|layout 99") as error:
+        Ledger(path)
+    assert "no result is lost" in error.value.remedy

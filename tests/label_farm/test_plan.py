@@ -1,0 +1,94 @@
+"""From recordings to jobs: the same configuration is the same job, and every step keeps its limit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from farm_examples import SENSOR, press_episode
+
+from label_farm.job import Job
+from label_farm.ladder import Ladder
+from label_farm.plan import request
+from tacdata.errors import FormatError, UsageError
+
+MODEL = "0" * 64
+
+
+def job_of(episode, model=MODEL, sensor=SENSOR):
+    return request(episode, sensor, model, Ladder()).job
+
+
+@pytest.mark.parametrize("deepest", [0.01, 0.05, 0.3, 1.0, 1.37, 2.9])
+def test_a_ladder_meets_its_deepest_point_with_small_first_steps(deepest):
+    ladder = Ladder(unload_step=0.4)
+    depths = np.array(ladder.depths(deepest))
+    peak = int(np.argmax(depths))
+    load, unload = np.diff(depths[: peak + 1]), -np.diff(depths[peak:])
+    assert depths.max() == deepest and depths[0] == depths[-1] == 0.0
+    assert (load > 0).all() and (unload > 0).all()
+    assert load.max() <= 0.25 + 1e-6 and unload.max() <= 0.4 + 1e-6
+    assert load[0] <= 0.05 + 1e-6 and unload[-1] <= 0.05 + 1e-6
+
+
+def test_a_ladder_refuses_steps_that_lead_nowhere():
+    for settings in ({"load_step": 0.0}, {"growth": 0.5}, {"first_step": float("nan")}):
+        with pytest.raises(UsageError, match="depth steps"):
+            Ladder(**settings)
+
+
+def test_a_key_depends_on_all_that_decides_and_on_nothing_else(tmp_path):
+    job = job_of(press_episode(tmp_path, 0))
+    assert job_of(press_episode(tmp_path, 7)).key == job.key, "the recording does not count"
+    assert Job.from_document(job.document) == job
+    changed = [
+        replace(job, sensor="1" * 64),
+        replace(job, model="1" * 64),
+        replace(job, x=0.1),
+        replace(job, y=0.1),
+        replace(job, yaw=0.1),
+        replace(job, depths=(0.0, 0.5, 0.0)),
+        replace(job, indenter={"shape": "sphere", "radius": 2.1}),
+    ]
+    assert len({job.key, *(other.key for other in changed)}) == 8
+
+
+def test_the_recorded_depth_counts_and_small_scatter_does_not(tmp_path):
+    planned = job_of(press_episode(tmp_path, 0, depth=1.0))
+    assert job_of(press_episode(tmp_path, 0, depth=1.0, reached=0.997)).key == planned.key
+    assert job_of(press_episode(tmp_path, 0, depth=1.0, reached=0.8)).deepest == 0.8
+    assert job_of(press_episode(tmp_path, 0, depth=1.0, reached=0.801)).deepest == 0.81
+    assert job_of(press_episode(tmp_path, 0, depth=1.0, reached=-0.1)) is None
+
+
+def test_the_recorded_place_counts_and_small_scatter_does_not(tmp_path):
+    episode = press_episode(tmp_path)
+    near = replace(episode, tip=episode.tip + np.array([0.01, -0.01, 0.0]))
+    far = replace(episode, tip=episode.tip + np.array([0.3, -0.2, 0.0]))
+    assert job_of(near).key == job_of(episode).key
+    assert (job_of(far).x, job_of(far).y) == (0.3, -0.2)
+
+
+def test_travel_above_the_skin_may_go_anywhere(tmp_path):
+    episode = press_episode(tmp_path)
+    tip = episode.tip.copy()
+    tip[0, :2], tip[0, 2] = (5.0, 5.0), -3.0
+    step = np.array([[0.0, 0.0, -0.5]])
+    joined = replace(
+        episode,
+        tip=np.concatenate([tip[:1], step, tip[1:]]),
+        tip_ns=np.concatenate([episode.tip_ns[:1] - 10**9, episode.tip_ns]),
+    )
+    assert job_of(joined).key == job_of(episode).key
+
+
+def test_two_presses_in_one_recording_are_refused(tmp_path):
+    episode = press_episode(tmp_path)
+    tip = episode.tip.copy()
+    tip[:, 2] = [0.0, 0.9, 0.2, 1.0]
+    with pytest.raises(FormatError, match=r"falls and rises again by 0\.70 mm"):
+        job_of(replace(episode, tip=tip, press=replace(episode.press, depth=1.0)))
+
+
+def test_a_recording_without_frames_is_refused(tmp_path):
+    with pytest.raises(FormatError, match="0 taxel frames"):
+        job_of(press_episode(tmp_path, frames=0))

@@ -1,0 +1,123 @@
+"""The label file: exact round trip, refusals in words, nothing half written."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import schemas
+from tacdata import provenance
+from tacdata.errors import FormatError, UsageError
+from tacdata.labels import Label, read_label, table, write_label
+
+ARRAYS = ("time_ns", "tip", "signed", "taxel_force", "force", "error")
+
+
+def example(frames: int = 7, **changes) -> Label:
+    random = np.random.default_rng(3)
+    values = {
+        "episode": 4,
+        "time_ns": 1_700_000_000_000_000_000 + np.arange(frames) * 33_333_333,
+        "tip": random.normal(size=(frames, 3)),
+        "signed": random.normal(size=(frames, 35, 26)).astype(np.float32),
+        "taxel_force": random.normal(size=(frames, 24)).astype(np.float32),
+        "force": random.normal(size=(frames, 3)).astype(np.float32),
+        "error": random.random(frames).astype(np.float32),
+        "provenance": provenance.stamp("test", {"sensor": "a" * 64, "recording": "b" * 64}, {"mesh": 0.4}),
+    }
+    return Label(**{**values, **changes})
+
+
+def test_round_trip_is_exact(tmp_path: Path) -> None:
+    label = example(
+        signed=np.nextafter(np.float32(0.1), np.float32(1), dtype=np.float32)
+        * np.ones((7, 35, 26), np.float32)
+    )
+    write_label(tmp_path / "a" / "label.parquet", label)
+    back = read_label(tmp_path / "a" / "label.parquet")
+    for name in ARRAYS:
+        assert getattr(back, name).dtype == getattr(label, name).dtype
+        assert np.array_equal(getattr(back, name), getattr(label, name))
+    assert back.provenance == label.provenance
+    assert back.episode == 4
+    assert back.depth.min() >= 0
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["label.parquet"]
+
+
+def test_header_says_units_and_is_checked(tmp_path: Path) -> None:
+    write_label(tmp_path / "l.parquet", example())
+    header = json.loads(pq.read_schema(tmp_path / "l.parquet").metadata[table.HEADER])
+    assert header["units"]["signed"] == "mm"
+    assert header["version"] == schemas.version("label")
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"signed": np.full((7, 35, 26), np.nan, np.float32)}, "not finite"),
+        ({"force": np.zeros((6, 3), np.float32)}, "label.force"),
+        ({"tip": np.zeros((7, 2))}, "three columns"),
+        ({"time_ns": np.zeros(7, np.int64)}, "does not increase"),
+        ({"provenance": {"made_by": "hand"}}, "code_version"),
+    ],
+)
+def test_a_bad_label_is_refused_and_the_old_file_kept(tmp_path: Path, changes: dict, word: str) -> None:
+    path = tmp_path / "l.parquet"
+    write_label(path, example())
+    before = path.read_bytes()
+    with pytest.raises(FormatError, match=word):
+        write_label(path, example(**changes))
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_no_file(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no label file"):
+        read_label(tmp_path / "none.parquet")
+
+
+def test_damaged_and_foreign_files(tmp_path: Path) -> None:
+    path = tmp_path / "l.parquet"
+    write_label(path, example())
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(FormatError, match="damaged"):
+        read_label(path)
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 0xFF
+    path.write_bytes(bytes(flipped))
+    with pytest.raises(FormatError, match="damaged"):
+        read_label(path)
+    pq.write_table(pq.read_table(_saved(path, whole)).replace_schema_metadata({}), path)
+    with pytest.raises(FormatError, match=r"no key tacdata\.label"):
+        read_label(path)
+
+
+def test_another_major_version(tmp_path: Path) -> None:
+    path = tmp_path / "l.parquet"
+    write_label(path, example())
+    content = pq.read_table(path)
+    header = json.loads(content.schema.metadata[table.HEADER])
+    header["version"] = "9.0"
+    pq.write_table(content.replace_schema_metadata({table.HEADER: json.dumps(header)}), path)
+    with pytest.raises(FormatError, match=r"version 9\.0"):
+        read_label(path)
+
+
+def test_header_and_columns_must_agree(tmp_path: Path) -> None:
+    path = tmp_path / "l.parquet"
+    write_label(path, example())
+    content = pq.read_table(path)
+    pq.write_table(content.slice(0, 3), path)
+    with pytest.raises(FormatError, match="3 rows"):
+        read_label(path)
+    pq.write_table(content.drop_columns(["error"]), path)
+    with pytest.raises(FormatError, match="rows of"):
+        read_label(path)
+
+
+def _saved(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path

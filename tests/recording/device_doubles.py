@@ -1,0 +1,169 @@
+"""A rig in memory: devices derived from the abstract classes, with faults to plant."""
+
+import threading
+import time
+
+import numpy as np
+from recording_examples import LIMITS
+
+from tacdata.devices.device import (
+    Camera,
+    CncStatus,
+    ImageFrame,
+    Motion,
+    MotionController,
+    StreamCounts,
+    TaxelBoard,
+    TaxelFrame,
+)
+from tacdata.errors import DeviceError
+
+
+class Controller(MotionController):
+    """Moves in straight lines from rest to rest; `calls` says what was asked of it."""
+
+    def __init__(self, clock, at=(10.0, 20.0, -20.0)):
+        super().__init__(clock)
+        self.calls, self.refuses, self.fault_at, self.on_fault = [], False, None, None
+        self._at, self._move, self._begin, self._until = np.array(at, float), None, 0, 0
+        self._told, self._reset = 0, threading.Event()
+        self._lock = threading.RLock()
+
+    def describe(self):
+        return {}
+
+    def open(self):
+        self.calls.append("open")
+
+    def close(self):
+        self.calls.append("close")
+
+    def settings(self):
+        return {"banner": "double", "$110": "3000"}
+
+    @property
+    def acceleration(self):
+        return LIMITS.acceleration
+
+    @property
+    def max_rate(self):
+        return LIMITS.max_rate
+
+    def position(self):
+        with self._lock:
+            if self._move is None:
+                return self._at.copy()
+            share = self._move.distance((self.clock.now_ns() - self._begin) / 1e9) / max(
+                self._move.length, 1e-12
+            )
+            return self._move.start + share * (self._move.target - self._move.start)
+
+    def _wait(self, until_ns):
+        while self.clock.now_ns() < until_ns:
+            if self._reset.wait(0.001):
+                raise DeviceError("the line was thrown away by a reset", "none", "send it again")
+
+    def move(self, position, speed):
+        self.calls.append(("move", tuple(round(v, 6) for v in position)))
+        if self.refuses:
+            raise DeviceError("the controller does not obey", "one that does", "free it by hand")
+        sent = self.clock.now_ns()
+        self._wait(self._until)
+        with self._lock:
+            self._reset.clear()
+            self._at = self.position()
+            self._move = LIMITS.straight_move(self._at, np.array(position), speed)
+            self._begin = self.clock.now_ns()
+            self._until = self._begin + round(self._move.duration * 1e9)
+        moves = sum(call[0] == "move" for call in self.calls)
+        if self.fault_at == moves:
+            threading.Timer(0.5 * self._move.duration / self.clock.rate, self.on_fault).start()
+        return Motion("G1", sent, self.clock.now_ns())
+
+    def dwell(self, seconds):
+        self.calls.append(("dwell", seconds))
+        sent = self.clock.now_ns()
+        self._wait(max(self._until, sent) + round(seconds * 1e9))
+        return Motion("G4", sent, self.clock.now_ns())
+
+    def wait_idle(self, timeout):
+        self._wait(self._until)
+
+    def statuses(self):
+        now = self.clock.now_ns()
+        if now - self._told < 100_000_000:
+            return []
+        self._told = now
+        return [CncStatus(now, self.clock.now_ns(), "Idle", np.round(self.position(), 3), 0.0)]
+
+    def feed_hold(self):
+        with self._lock:
+            self._at, self._move = self.position(), None
+        self.calls.append("feed_hold")
+
+    def resume(self):
+        self.calls.append("resume")
+
+    def abandon(self):
+        self.calls.append("abandon")
+        if self.refuses:
+            raise DeviceError("the controller does not obey", "one that does", "free it by hand")
+        self._until = 0
+        self._reset.set()
+
+
+class Board(TaxelBoard):
+    """24 channels at 30 Hz of its clock; answers to where the controller is."""
+
+    def __init__(self, clock, cnc, surface=-30.0):
+        super().__init__(clock)
+        self.counts, self._cnc, self._surface = StreamCounts(), cnc, surface
+        self._rng, self._next, self.broken = np.random.default_rng(0), 0, None
+
+    def describe(self):
+        return {"channels": 24, "rate": {"nominal": 30.0, "unit": "Hz"}}
+
+    def open(self):
+        self._start = self.clock.now_ns()
+
+    def close(self):
+        pass
+
+    def read(self, timeout):
+        time.sleep(timeout / self.clock.rate)
+        if self.broken:
+            raise self.broken
+        frames, now = [], self.clock.now_ns()
+        while self._start + self._next * 33_333_333 <= now:
+            depth = max(self._surface - self._cnc.position()[2], 0.0)
+            counts = np.round(9000 + 800 * depth + self._rng.normal(0, 5, 24))
+            frames.append(TaxelFrame(now, self._next, counts))
+            self._next += 1
+        self.counts.received += len(frames)
+        return frames
+
+
+class Eye(Camera):
+    """10 grey images a second of its clock."""
+
+    def __init__(self, clock):
+        super().__init__(clock)
+        self._next = 0
+
+    def describe(self):
+        return {}
+
+    def open(self):
+        self._start = self.clock.now_ns()
+
+    def close(self):
+        pass
+
+    def read(self, timeout):
+        time.sleep(timeout / self.clock.rate)
+        frames = []
+        while self._start + self._next * 100_000_000 <= self.clock.now_ns():
+            image = np.full((48, 64), self._next % 256, np.uint8)
+            frames.append(ImageFrame(self.clock.now_ns(), self._next, image))
+            self._next += 1
+        return frames

@@ -1,0 +1,134 @@
+"""The recorder, through real drivers and pseudo-terminals, on the emulated rig, whose truth is known."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from recording_examples import SENSOR, plan
+
+from tacdata.errors import DeviceError
+from tacdata.recording import file_names
+from tacdata.recording.check import check
+from tacdata.recording.reader import read_recording
+from tacdata.recording.recorder import Recorder
+from tacdata.rig import read_rig
+from tacdata.virtual_rig.mounting import mount
+from tacdata.virtual_rig.rig import VirtualRig
+
+SPEED = 10.0
+
+
+class Truth:
+    """Where the carriage really was, sampled while the rig runs."""
+
+    def __init__(self, rig):
+        self.rig, self.times, self.positions = rig, [], []
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+
+    def _watch(self):
+        while not self._stop.wait(0.002):
+            now = self.rig.clock.now_ns() - 5_000_000
+            self.times.append(now)
+            self.positions.append(self.rig.controller.position_at(now).copy())
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception):
+        self._stop.set()
+        self._thread.join()
+
+
+@pytest.fixture
+def virtual(tmp_path):
+    rig = VirtualRig(tmp_path / "rig", SPEED, seed=3, camera=False)
+    rig.start()
+    yield rig
+    rig.stop()
+
+
+def recorder(virtual, out, **options):
+    rig = read_rig(virtual.path)
+    return Recorder(
+        rig, SENSOR, options.pop("plan", plan(2)), out,
+        mount=lambda press: mount(rig.document, press.indenter.document, press.yaw), **options,
+    )  # fmt: skip
+
+
+def test_two_presses_agree_with_what_really_happened(virtual, tmp_path):
+    with Truth(virtual) as truth:
+        session = recorder(virtual, tmp_path / "session").run(lambda summary: True)
+    times, positions = np.array(truth.times), np.array(truth.positions)
+    registration = read_rig(virtual.path).registration
+    timing = virtual.board.timing
+    assert len(session.episodes) == 2
+    for path in session.episodes:
+        recording = read_recording(path)
+        episode = recording.episode
+        assert episode.complete
+        assert recording.counts["taxels"]["lost"] == 0
+        assert (np.diff(episode.taxels.counter) == 1).all()
+        # Late by the link's least delay, which the fast clock multiplies; never early, never adrift.
+        device = np.array([timing.sample_ns(int(k)) for k in episode.taxels.counter])
+        error = (episode.taxels.sample_ns - device) / 1e6 / SPEED
+        assert -0.5 < error.min()
+        assert error.max() < 10.0, "milliseconds of real time"
+        assert np.ptp(error) < 1.0
+        # The nominal depth against the carriage's, on the rig's own clock, while the indenter is loaded.
+        inside = (times > episode.tip_ns[0]) & (times < episode.tip_ns[-1])
+        real = registration.to_sensor(positions[inside])
+        nominal = episode.tip_at(times[inside])
+        loaded = real[:, 2] > 0.0
+        assert loaded.sum() > 50
+        slack = max(m.uncertainty_ns for m in recording.moves if m.command.phase in ("press", "release"))
+        assert np.abs(nominal - real)[loaded].max() < 1.0 * slack * 1e-9 + 0.01
+        assert real[:, 2].max() == pytest.approx(episode.press.depth, abs=0.006)
+    report = check(tmp_path / "session")
+    assert report.usable, report.text
+
+
+def test_an_alarm_in_mid_press_leaves_a_readable_file_and_a_session_to_resume(virtual, tmp_path):
+    out = tmp_path / "session"
+    with pytest.raises(DeviceError, match=r"(?i)alarm"):
+        recorder(virtual, out, progress=lambda *_: strike(virtual)).run(lambda summary: True)
+    assert list(file_names.finished(out)) == [0]
+    (broken,) = file_names.unfinished(out)
+    episode = read_recording(broken).episode
+    assert not episode.complete
+    assert any("broken off" in note for note in episode.notes)
+    assert len(episode.taxels.counter) > 5
+
+
+def strike(virtual):
+    def later():
+        time.sleep(2.0 / SPEED)
+        virtual.controller.inject_alarm(1)
+
+    threading.Thread(target=later, daemon=True).start()
+
+
+def test_ctrl_c_on_the_skin_lifts_the_indenter(virtual, tmp_path):
+    out = tmp_path / "session"
+    surface = read_rig(virtual.path).registration.origin[2]
+
+    def interrupt_on_the_skin():
+        while virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000)[2] > surface - 0.2:
+            time.sleep(0.002)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt_on_the_skin, daemon=True).start()
+    with pytest.raises(KeyboardInterrupt):
+        recorder(virtual, out).run(lambda summary: True)
+    height = virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000)[2]
+    assert height == pytest.approx(surface + 3.0, abs=0.01)
+    (broken,) = file_names.unfinished(out)
+    episode = read_recording(broken).episode
+    assert any("Ctrl-C" in note for note in episode.notes)
+    assert any("lifted off the skin" in note for note in episode.notes)
+    session = recorder(virtual, out, resume=True).run(lambda summary: True)
+    assert len(session.episodes) == 2

@@ -1,0 +1,72 @@
+"""Forms of GRBL's lines, as its interface documentation and real firmware write them."""
+
+import numpy as np
+import pytest
+
+from tacdata.wire.grbl_codes import ALARMS, ERRORS, alarm_in_words, error_in_words
+from tacdata.wire.grbl_lines import ALARM, MESSAGE, RESPONSE, SETTING, WELCOME, parse_status
+
+
+def test_every_code_of_grbl_1_1_has_words():
+    assert set(ERRORS) == {*range(1, 18), *range(20, 39)}
+    assert set(ALARMS) == set(range(1, 10))
+    assert "not a GRBL 1.1 code" in error_in_words(79)
+    assert alarm_in_words(2).startswith("ALARM:2 (the target lies beyond the soft limits")
+
+
+@pytest.mark.parametrize("line", ["ok", "error:22"])
+def test_responses(line):
+    assert RESPONSE.match(line)
+
+
+@pytest.mark.parametrize("line", ["ok ", "okay", ">G54G20:ok", "[MSG:ok]", "error:", "ALARM:1", "<Idle>"])
+def test_what_is_no_response(line):
+    assert not RESPONSE.match(line)
+
+
+@pytest.mark.parametrize("line", [
+    "Grbl 1.1h ['$' for help]", "GrblHAL 1.1f ['$' or '$HELP' for help]", "\ufffdGrbl 0.9j ['$' for help]",
+])  # fmt: skip
+def test_welcomes(line):
+    assert WELCOME.search(line)
+
+
+@pytest.mark.parametrize("line", ["[VER:1.1h.20190825:]", "[FIRMWARE:grblHAL]", "[MSG:Caution: Unlocked]"])
+def test_what_is_no_welcome(line):
+    assert not WELCOME.search(line)
+
+
+def test_settings_and_messages():
+    found = SETTING.match("$110=500.000 (x max rate, mm/min)")
+    assert found
+    assert found.groups() == ("$110", "500.000")
+    said = MESSAGE.match("[OPT:VL,15,128]")
+    assert said
+    assert said.groups() == ("OPT", "VL,15,128")
+    alarm = ALARM.match("ALARM:9")
+    assert alarm
+    assert alarm[1] == "9"
+
+
+@pytest.mark.parametrize(("line", "state", "position", "work", "feed"), [
+    ("<Idle|MPos:0.000,-1.500,2.250|FS:0,0>", "Idle", (0, -1.5, 2.25), False, 0),
+    ("<Hold:0|WPos:1,2,3|Bf:15,128|FS:120,0|WCO:10,20,30>", "Hold:0", (1, 2, 3), True, 120),
+    ("<Run|MPos:1,2,3|F:500|Pn:XYZ|Ov:100,100,100|A:SFM>", "Run", (1, 2, 3), False, 500),
+    ("<Idle|MPos:1,2,3,4|Bf:100,1023|FS:0,0,0|Pn:>", "Idle", (1, 2, 3), False, 0),
+])  # fmt: skip
+def test_status_reports(line, state, position, work, feed):
+    report = parse_status(line)
+    assert report is not None
+    assert (report.state, report.is_work, report.feed) == (state, work, feed)
+    np.testing.assert_allclose(report.position, position)
+    if "WCO" in line:
+        np.testing.assert_allclose(report.offset, [10, 20, 30])
+
+
+@pytest.mark.parametrize("line", [
+    "<Idle|MPos:0.000,-1.5", "<Idle|MPos:0.0.0,1,2|FS:0,0>", "<Idle|MPos:1,2|FS:0,0>", "<|MPos:1,2,3>",
+    "<Idle>",
+    "<Idle|FS:0,0>", "<Id\ufffdle|MPos:1,2,3>", "<Idle|MPos:1,2,3|WCO:1,2>",
+])  # fmt: skip
+def test_damaged_reports_are_none(line):
+    assert parse_status(line) is None

@@ -1,0 +1,72 @@
+"""What a network's file holds.
+
+A file ``training/networks/my_network.py`` defines one class derived from `Network`. It sets ``offsets``,
+takes the sensor's sizes and its own arguments (plain JSON values) in ``__init__``, hands both to the base,
+and implements `estimate`. Every size must follow from the sensor's, so that another skin needs no code.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from torch import nn
+
+from tacdata import registry
+from tacdata.errors import FormatError
+from tacdata.sensor import Sensor
+
+ROOM, BASE = "training.networks", "network"
+
+
+class Network(nn.Module, ABC):
+    """A map from a window of taxel signals to the depth map of its target frame."""
+
+    offsets: ClassVar[tuple[int, ...]]
+    """Frames of the window relative to the target frame; the largest is the look-ahead."""
+
+    def __init__(self, taxels: int, map_shape: tuple[int, int], arguments: dict[str, Any]) -> None:
+        """Keep the sizes and the arguments, from which `create` can build the same network again."""
+        super().__init__()
+        self.taxels, self.map_shape, self.arguments = taxels, map_shape, arguments
+        # The checkpoint's document holds these two; a second copy among the weights could contradict it.
+        self.register_buffer("mean", torch.zeros(taxels), persistent=False)
+        self.register_buffer("sd", torch.ones(taxels), persistent=False)
+
+    @property
+    def name(self) -> str:
+        """The network's name: its file's name."""
+        return type(self).__module__.rsplit(".", 1)[-1]
+
+    def set_normalization(self, mean: np.ndarray, sd: np.ndarray) -> None:
+        """Set the mean and standard deviation of each channel [counts], shape (taxels,)."""
+        self.get_buffer("mean").copy_(torch.as_tensor(mean, dtype=torch.float32))
+        self.get_buffer("sd").copy_(torch.as_tensor(sd, dtype=torch.float32))
+
+    def forward(self, windows: torch.Tensor) -> torch.Tensor:
+        """Return depth maps over D_max, not clipped; (b, T, taxels) [counts] -> (b, pixels_x, pixels_y)."""
+        return self.estimate((windows - self.get_buffer("mean")) / self.get_buffer("sd"))
+
+    @abstractmethod
+    def estimate(self, signals: torch.Tensor) -> torch.Tensor:
+        """Return maps over D_max from standardized windows; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
+
+
+def create(name: str, sensor: Sensor, arguments: dict[str, Any] | None = None) -> Network:
+    """Build a network for a sensor.
+
+    Raises:
+        UsageError: If no such network exists.
+        FormatError: If it does not know one of the arguments.
+    """
+    kind = registry.load(ROOM, BASE, name, Network)
+    try:
+        return kind(taxels=sensor.taxels.count, map_shape=sensor.map.shape, **(arguments or {}))  # type: ignore[call-arg]
+    except TypeError as error:
+        raise FormatError(
+            f"network {name} with arguments {arguments}: {error}",
+            f"the arguments in training/networks/{name}.py",
+            "correct the arguments",
+        ) from None

@@ -1,0 +1,1 @@
+"""Ways to divide a dataset: one file each; the file's name is the split's name."""

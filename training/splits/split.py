@@ -1,0 +1,80 @@
+"""What a split's file holds.
+
+A file ``training/splits/my_split.py`` defines one function,
+``held_out(episodes, sensor, generator) -> set[int]``, that returns the numbers of the test episodes. Whole
+episodes only: frames of one press are so alike that dividing them would score memory. The file's docstring
+says what the split asks of the network; `divide` draws the validation episodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from tacdata import registry
+from tacdata.errors import UsageError
+from training.frames import Frames
+
+ROOM, BASE = "training.splits", "split"
+TEST_SHARE = 0.15
+VALIDATION_SHARE = 0.15
+
+
+@dataclass(frozen=True)
+class Split:
+    """Which episodes a network learns from, is watched on, and is scored on."""
+
+    name: str
+    """File name in training/splits."""
+    seed: int
+    """Seed of every draw."""
+    train: tuple[int, ...]
+    """Numbers of the training episodes."""
+    validation: tuple[int, ...]
+    """Numbers of the validation episodes: they choose the best epoch, nothing else."""
+    test: tuple[int, ...]
+    """Numbers of the test episodes."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The split as plain data (JSON types)."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> Split:
+        """Rebuild a split from `document`."""
+        return cls(
+            document["name"], document["seed"], *(tuple(document[k]) for k in ("train", "validation", "test"))
+        )
+
+
+def divide(frames: Frames, name: str, seed: int) -> Split:
+    """Divide a dataset by whole episodes.
+
+    Raises:
+        UsageError: If no such split exists, or one of the three parts would be empty.
+    """
+    rule = registry.load_module(ROOM, BASE, name)
+    generator = np.random.default_rng(seed)
+    test = rule.held_out(frames.episodes, frames.sensor, generator)
+    rest = [e.number for e in frames.episodes if e.number not in test]
+    count = share(len(frames.episodes), VALIDATION_SHARE)
+    validation = set(generator.permutation(rest)[:count].tolist()) if len(rest) > 1 else set()
+    train = tuple(n for n in rest if n not in validation)
+    split = Split(name, seed, train, tuple(sorted(validation)), tuple(sorted(test)))
+    for part in ("train", "validation", "test"):
+        if not getattr(split, part):
+            raise UsageError(
+                f"split {name!r} of the {len(frames.episodes)} episodes in {frames.origin} leaves no {part} "
+                "episode",
+                "at least one episode each for train, validation and test",
+                "record more episodes, or choose another --split",
+            )
+    return split
+
+
+def share(total: int, fraction: float) -> int:
+    """Return ``fraction`` of ``total``, rounded, and at least 1."""
+    return max(1, round(total * fraction))

@@ -1,0 +1,268 @@
+"""The training loop."""
+
+from __future__ import annotations
+
+import json
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+import schemas
+from tacdata import documents, provenance
+from tacdata.errors import TacdataError, UsageError
+from training import checkpoint, metrics
+from training.compute import choose_device, reproducible
+from training.frames import Frames
+from training.inference import predict
+from training.loss import normalized
+from training.networks.network import Network, create
+from training.settings import Settings
+from training.splits.split import Split, divide
+from training.windows import Windows
+
+METRICS = "metrics.jsonl"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run has come."""
+
+    epoch: int
+    """The present epoch, from 1."""
+    epochs: int
+    """Epochs asked for."""
+    step: int
+    """Steps done in this epoch."""
+    steps: int
+    """Steps an epoch."""
+    finished: dict[str, Any] | None = None
+    """The epoch's line of metrics.jsonl, once it is finished."""
+
+
+@dataclass
+class _Run:
+    """What the loop changes from step to step."""
+
+    network: Network
+    optimizer: torch.optim.Optimizer
+    document: dict[str, Any]
+    """The checkpoint's document as far as it is known; epoch, best and history grow."""
+    epoch: int = 0
+    """Epochs done."""
+
+
+def train(
+    frames: Frames,
+    settings: Settings,
+    out: Path,
+    device: str = "auto",
+    resume: bool = False,
+    threads: int | None = None,
+    listener: Callable[[Progress], None] = lambda progress: None,
+) -> checkpoint.Checkpoint:
+    """Train a network and write ``out``: best.safetensors, last.safetensors, metrics.jsonl.
+
+    The same frames, settings, device and machine give the same weights bit for bit, in one go or resumed.
+
+    Args:
+        frames: The dataset.
+        settings: The recipe.
+        out: Folder of the run; must not exist, or be empty, unless ``resume``.
+        device: "auto", "cpu", "cuda" or "cuda:N".
+        resume: Go on from ``out``'s last epoch; settings must be the same except for the number of epochs.
+        threads: CPU threads; by default one a core, at most `compute.THREADS`; others may change last bits.
+        listener: Called after every step and every epoch.
+
+    Returns:
+        The checkpoint of the epoch with the lowest validation loss.
+
+    Raises:
+        UsageError: If ``out`` is taken, the split is empty, or a resumed run has other settings or data.
+        TacdataError: If the loss is no longer finite.
+    """
+    place = choose_device(device)
+    if out.exists() and not resume and (not out.is_dir() or any(out.iterdir())):
+        raise UsageError(
+            f"{out} already exists",
+            "a folder that does not exist yet",
+            "choose another --out, or go on with that run by --resume",
+        )
+    with reproducible(threads):
+        run = _resumed(frames, settings, out, place) if resume else _started(frames, settings, place)
+        split = Split.from_document(run.document["split"])
+        windows = Windows(frames, run.network.offsets, place)
+        depth = _labels(frames.depth, place)
+        while run.epoch < settings.epochs:
+            began = time.monotonic()
+            run.epoch += 1
+            train_loss = _epoch(
+                run, windows, depth, torch.as_tensor(frames.indices(split.train)), frames, settings, listener
+            )
+            line = {
+                "epoch": run.epoch,
+                "train_loss": train_loss,
+                **_validate(run.network, windows, frames, frames.indices(split.validation), settings),
+                "seconds": round(time.monotonic() - began, 3),
+            }
+            _keep(run, line, out)
+            listener(Progress(run.epoch, settings.epochs, 0, 0, line))
+    return checkpoint.load(out)
+
+
+def normalization(taxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return mean and deviation of each channel [counts], (taxels,), float32, of readings (n, taxels).
+
+    A channel that never moves gets a deviation of 1 count, so that it stays at 0 instead of becoming noise.
+    """
+    mean, sd = taxels.mean(axis=0, dtype=np.float64), taxels.std(axis=0, dtype=np.float64)
+    still = sd <= 1e-6 * np.maximum(np.abs(mean), 1.0)
+    return mean.astype(np.float32), np.where(still, 1.0, sd).astype(np.float32)
+
+
+def _started(frames: Frames, settings: Settings, place: torch.device) -> _Run:
+    split = divide(frames, settings.split, settings.seed)
+    torch.manual_seed(settings.seed)
+    network = create(settings.network, frames.sensor, settings.arguments)
+    mean, sd = normalization(frames.taxels[frames.indices(split.train)])
+    network.set_normalization(mean, sd)
+    network.to(place)
+    sensor_hash = frames.sensor.content_hash
+    parents = {"dataset": frames.dataset_hash, "sensor": sensor_hash}
+    document = {
+        "version": schemas.version("checkpoint"),
+        "network": {
+            "name": network.name,
+            "arguments": network.arguments,
+            "parameters": sum(p.numel() for p in network.parameters()),
+        },
+        "sensor": {"hash": sensor_hash, "document": frames.sensor.document},
+        "dataset": {
+            "hash": frames.dataset_hash,
+            "path": frames.origin,
+            "episodes": len(frames.episodes),
+            "frames": len(frames.taxels),
+            "virtual": frames.virtual,
+        },
+        "normalization": {"mean": mean.tolist(), "sd": sd.tolist()},
+        "split": split.document,
+        "settings": settings.document,
+        "history": [],
+        "provenance": provenance.stamp("training.train", parents, _circumstances(place)),
+    }
+    return _Run(network, _optimizer(network, settings), document)
+
+
+def _resumed(frames: Frames, settings: Settings, out: Path, place: torch.device) -> _Run:
+    last = checkpoint.load(out / checkpoint.LAST, place)
+    last.check_sensor(frames.sensor, frames.origin)
+    if last.document["dataset"]["hash"] != frames.dataset_hash:
+        raise UsageError(
+            f"{out} was trained on dataset {last.document['dataset']['hash'][:12]}, "
+            f"{frames.origin} is {frames.dataset_hash[:12]}",
+            "the same dataset",
+            "resume with it, or start a new run",
+        )
+    before = last.settings.document
+    changed = [k for k, v in settings.document.items() if k != "epochs" and v != before[k]]
+    if changed:
+        words = "; ".join(f"{k} {settings.document[k]} instead of {before[k]}" for k in changed)
+        raise UsageError(
+            f"resuming {out} with {words}",
+            "the settings that it was started with; epochs may grow",
+            "drop these options, or start a new run",
+        )
+    optimizer = _optimizer(last.network, settings)
+    checkpoint.restore(optimizer, last.optimizer)
+    last.document["settings"] = settings.document
+    return _Run(last.network, optimizer, last.document, last.document["epoch"])
+
+
+def _optimizer(network: Network, settings: Settings) -> torch.optim.Optimizer:
+    return torch.optim.AdamW(network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
+
+
+def _circumstances(place: torch.device) -> dict[str, Any]:
+    """What besides the settings decides the last bits."""
+    name = torch.cuda.get_device_name(place) if place.type == "cuda" else "cpu"
+    return {"torch": torch.__version__, "device": name, "threads": torch.get_num_threads()}
+
+
+def _epoch(
+    run: _Run,
+    windows: Windows,
+    depth: torch.Tensor,
+    chosen: torch.Tensor,
+    frames: Frames,
+    settings: Settings,
+    listener: Callable[[Progress], None],
+) -> float:
+    """Run one pass over the training frames ``chosen`` (m,) and return the mean loss over them."""
+    run.network.train()
+    # Seeded by epoch, so that a resumed run draws the same order without any stored generator.
+    torch.manual_seed(1_000_003 * settings.seed + run.epoch)
+    place = windows.taxels.device
+    order = chosen[torch.randperm(len(chosen))].to(place)
+    batches = order.split(settings.batch_size)
+    total = torch.zeros((), device=place)
+    for step, batch in enumerate(batches, start=1):
+        label = normalized(depth[batch.to(depth.device)].to(place), frames.sensor.map.depth_max)
+        loss = settings.loss(run.network(windows.batch(batch)), label)
+        run.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        run.optimizer.step()
+        total += loss.detach() * len(batch)
+        listener(Progress(run.epoch, settings.epochs, step, len(batches)))
+    mean = float(total) / len(order)
+    if not np.isfinite(mean):
+        raise TacdataError(
+            f"the loss of epoch {run.epoch} is {mean}",
+            "a finite loss",
+            "lower the learning rate, or resume from the last epoch, which is kept",
+        )
+    return mean
+
+
+def _labels(depth: np.ndarray, place: torch.device) -> torch.Tensor:
+    """Return the labels [mm], (n, pixels_x, pixels_y): on the device if they fit, else where they lie."""
+    with warnings.catch_warnings():
+        # A read-only memory map must not be copied into memory; nothing here writes to it.
+        warnings.filterwarnings("ignore", message="The given NumPy array is not writable")
+        labels = torch.from_numpy(depth)
+    if place.type == "cuda" and depth.nbytes < torch.cuda.mem_get_info(place)[0] // 2:
+        return labels.to(place)
+    return labels
+
+
+def _validate(
+    network: Network, windows: Windows, frames: Frames, chosen: np.ndarray, settings: Settings
+) -> dict[str, float | None]:
+    """Return loss and median contact-region RMSE [mm] over the frames ``chosen``."""
+    top = frames.sensor.map.depth_max
+    prediction = predict(network, windows, chosen, top)
+    label = frames.depth[chosen]
+    loss = settings.loss(torch.from_numpy(prediction) / top, normalized(torch.from_numpy(label), top))
+    return {
+        "validation_loss": float(loss),
+        "validation_contact_rmse_mm": metrics.summarize(
+            metrics.score_frames(prediction, label).contact_rmse
+        ).median,
+    }
+
+
+def _keep(run: _Run, line: dict[str, Any], out: Path) -> None:
+    """Write the epoch down: best first, then last, so that a run cut between them repeats the epoch alike."""
+    document = run.document
+    document["history"] = [*document["history"], line]
+    document["epoch"] = run.epoch
+    better = "best" not in document or line["validation_loss"] < document["best"]["validation_loss"]
+    if better:
+        document["best"] = {"epoch": run.epoch, "validation_loss": line["validation_loss"]}
+        checkpoint.save(out / checkpoint.BEST, run.network, None, document)
+    checkpoint.save(out / checkpoint.LAST, run.network, run.optimizer, document)
+    documents.write_text(out / METRICS, "".join(json.dumps(entry) + "\n" for entry in document["history"]))

@@ -1,0 +1,40 @@
+"""A file that a viewer writes: new, and whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tacdata.errors import UsageError
+
+RERUN, PICTURE = ".rrd", ".png"
+"""Endings of the files."""
+
+
+def new_file(path: Path, suffix: str) -> Path:
+    """Return ``path`` if it can become a new file.
+
+    Raises:
+        UsageError: If it exists or has another ending than ``suffix``.
+    """
+    if path.suffix != suffix:
+        raise UsageError(
+            f"output file {path}", f"a name that ends in {suffix}", f"use {path.with_suffix(suffix)}"
+        )
+    if path.exists():
+        raise UsageError(f"{path} exists", "a new file", "choose another name, or delete it")
+    return path
+
+
+@contextmanager
+def written_beside(path: Path) -> Iterator[Path]:
+    """Yield a temporary name in the same folder; on success it becomes ``path``, else it is removed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}.partial{path.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,37 @@
+"""Draws scenes with Rerun, into a file that `viewers.rerun_window` or any Rerun viewer shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import rerun as rr
+
+from viewers.backend import Backend
+from viewers.output_file import RERUN, new_file, written_beside
+from viewers.rerun_blueprint import episode_blueprint
+from viewers.rerun_parts import RerunParts
+from viewers.scene import Scene
+
+APPLICATION = "tacdata"
+
+
+class RerunBackend(Backend):
+    """Writes each scene into a file (.rrd) that the stock Rerun viewer opens."""
+
+    def __init__(self, path: Path) -> None:
+        """Take the file to write.
+
+        Raises:
+            UsageError: If it exists or does not end in .rrd.
+        """
+        self._path = new_file(path, RERUN)
+
+    def draw(self, scene: Scene) -> None:
+        """Write the file; a crash leaves none rather than half of one."""
+        with written_beside(self._path) as temporary:
+            recording = rr.RecordingStream(APPLICATION)
+            recording.save(temporary, default_blueprint=episode_blueprint(scene))
+            recording.send_recording_name(scene.title)
+            RerunParts(recording, scene).write()
+            recording.flush()
+            recording.disconnect()

@@ -1,0 +1,93 @@
+"""How an episode is laid out in Rerun."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from viewers.rerun_parts import HOST
+from viewers.scene import Scene
+
+MAP_TITLES = {
+    "label": "Label: depth, 0 to {high:g} mm",
+    "prediction": "Prediction: depth, 0 to {high:g} mm",
+    "error": "Prediction − label, ±{high:g} mm",
+}
+SKIN_TITLES = {
+    "label": "Skin by the label [mm]",
+    "prediction": "Skin by the prediction [mm]",
+    "undeformed": "Skin without a label: undeformed [mm]",
+}
+EYE = (-10.0, -16.5, 14.0)
+"""Where the skin is seen from [mm]."""
+
+
+def episode_blueprint(scene: Scene) -> rrb.Blueprint:
+    """Return the layout for one episode: skin, maps and curves in rows, text and cameras beside them."""
+    rows: list[rrb.ContainerLike] = [rrb.Horizontal(*[_skin(s.name, scene) for s in scene.surfaces])]
+    shares = [7.0]
+    if scene.maps:
+        rows.append(rrb.Horizontal(*[_map(m.name, m.scale.high) for m in scene.maps], _heat_map(scene)))
+        shares.append(5.0)
+    rows.append(_curves(scene))
+    shares.append(5.0)
+    if scene.phases:
+        rows.append(rrb.StateTimelineView(origin="phase", name="Phases"))
+        shares.append(2.2)
+    main = rrb.Vertical(*rows, row_shares=shares)
+    return rrb.Blueprint(
+        rrb.Horizontal(main, _side(scene), column_shares=[3, 1]),
+        rrb.TimePanel(timeline=HOST, state="collapsed", loop_mode="All"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )
+
+
+def _skin(name: str, scene: Scene) -> rrb.Spatial3DView:
+    others = [f"- /world/skin/{s.name}/**" for s in scene.surfaces if s.name != name]
+    return rrb.Spatial3DView(
+        origin="world",
+        contents=["$origin/**", *others],
+        name=SKIN_TITLES[name],
+        eye_controls=rrb.EyeControls3D(position=EYE, look_target=(0.0, 0.0, 2.6)),
+        line_grid=rrb.LineGrid3D(visible=False),
+    )
+
+
+def _side(scene: Scene) -> rrb.Container:
+    parts: list[rrb.ContainerLike] = [rrb.TextDocumentView(origin="about", name="About")]
+    for camera in scene.cameras:
+        path = f"cameras/{camera.name}"
+        parts.append(
+            rrb.Spatial2DView(origin=f"{path}/image", contents=f"{path}/**", name=f"Camera {camera.name}")
+        )
+    if not scene.maps:
+        parts.append(_heat_map(scene))
+    return rrb.Vertical(*parts)
+
+
+def _map(name: str, high: float) -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(
+        origin="maps", contents=[f"maps/{name}", "maps/marks/**"], name=MAP_TITLES[name].format(high=high)
+    )
+
+
+def _heat_map(scene: Scene) -> rrb.Spatial2DView:
+    scale = scene.taxels.scale
+    return rrb.Spatial2DView(origin="heat_map", name=f"Taxels, {scale.low:g} to {scale.high:g} {scale.unit}")
+
+
+def _curves(scene: Scene) -> rrb.Container:
+    """Return the taxels' change beside tabs with everything else that has a course in time."""
+    hidden = rrb.PlotLegend(visible=False)
+    origin = "curves/taxels/change"
+    first = rrb.TimeSeriesView(origin=origin, name="Change since rest [counts]", plot_legend=hidden)
+    tabs: list[rrb.ContainerLike] = []
+    if scene.tip is not None:
+        tabs.append(rrb.TimeSeriesView(origin="curves/tip/nominal", name="Tip [mm]"))
+    for curves in scene.curves:
+        if curves.name == "taxels/change":
+            continue
+        title = f"{curves.name.replace('_', ' ').replace('/', ' ')} [{curves.unit}]"
+        legend = hidden if curves.name.startswith("taxels/") else None
+        tabs.append(rrb.TimeSeriesView(origin=f"curves/{curves.name}", name=title, plot_legend=legend))
+    return rrb.Horizontal(first, rrb.Tabs(*tabs))

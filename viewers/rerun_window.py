@@ -1,0 +1,148 @@
+"""Opens a Rerun file in a window or in a browser, on this machine only and without telling anybody."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tacdata.errors import UsageError
+
+LOOPBACK = "127.0.0.1"
+GRPC_PORT, WEB_PORT = 9876, 9090
+"""Rerun's own ports; others are taken where these are in use."""
+
+
+def has_display() -> bool:
+    """Say whether a window can be opened."""
+    return sys.platform in ("darwin", "win32") or bool(
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    )
+
+
+def require_display() -> None:
+    """Refuse to open a window where there is none.
+
+    Raises:
+        UsageError: Naming what can be done instead.
+    """
+    if not has_display():
+        raise UsageError(
+            "no display to open a window on",
+            "a display (DISPLAY or WAYLAND_DISPLAY is set), or an output that needs none",
+            "add --save FILE.rrd, --picture FILE.png, or --web",
+        )
+
+
+def free_port(preferred: int) -> int:
+    """Return ``preferred`` if nothing listens there on the loopback, else a free port."""
+    with socket.socket() as probe:
+        # Without this a port just left by another viewer counts as taken.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((LOOPBACK, preferred))
+        except OSError:
+            with socket.socket() as other:
+                other.bind((LOOPBACK, 0))
+                return other.getsockname()[1]
+    return preferred
+
+
+@contextmanager
+def quiet_environment() -> Iterator[dict[str, str]]:
+    """Yield an environment in which Rerun's usage statistics are off, leaving the user's own choice alone."""
+    with tempfile.TemporaryDirectory(prefix="tacdata-rerun-") as folder:
+        environment = {**os.environ, "XDG_CONFIG_HOME": folder}
+        subprocess.run(
+            [executable(), "analytics", "disable"], env=environment, capture_output=True, timeout=60
+        )
+        yield environment
+
+
+def executable() -> str:
+    """Return the path of the viewer that the package rerun-sdk ships.
+
+    Raises:
+        UsageError: If it ships none for this platform.
+    """
+    import rerun_cli
+
+    folder = Path(rerun_cli.__file__).parent
+    for name in ("rerun", "rerun.exe", "Rerun.app/Contents/MacOS/Rerun"):
+        if (folder / name).is_file():
+            return str(folder / name)
+    raise UsageError(
+        "the installed rerun-sdk ships no viewer for this platform",
+        "a wheel with one",
+        "use --save FILE.rrd and open the file with Rerun on another machine",
+    )
+
+
+def window(file: Path) -> None:
+    """Show a file in a native window; returns when the window is closed.
+
+    Raises:
+        UsageError: If there is no display.
+    """
+    require_display()
+    with quiet_environment() as environment:
+        command = [executable(), "--bind", LOOPBACK, "--port", str(free_port(GRPC_PORT)), str(file)]
+        with _running(command, environment) as viewer:
+            wait_for(viewer)
+
+
+def wait_for(viewer: subprocess.Popen) -> None:
+    """Return when a viewer has been closed.
+
+    Raises:
+        UsageError: If it broke down instead.
+    """
+    if code := viewer.wait():
+        raise UsageError(
+            f"the viewer ended with code {code}",
+            "a display with working graphics, or with --web a machine that lets it listen",
+            "add --save FILE.rrd or --picture FILE.png, which need neither",
+        )
+
+
+@contextmanager
+def web_server(file: Path) -> Iterator[tuple[subprocess.Popen, str]]:
+    """Serve a file with Rerun's web viewer on the loopback.
+
+    Yields:
+        The serving process and the address to open.
+    """
+    grpc, web = free_port(GRPC_PORT), free_port(WEB_PORT)
+    with quiet_environment() as environment:
+        command = [
+            executable(),
+            "--serve-web",
+            "--bind",
+            LOOPBACK,
+            "--port",
+            str(grpc),
+            "--web-viewer-port",
+            str(web),
+            str(file),
+        ]
+        with _running(command, environment) as server:
+            yield server, f"http://{LOOPBACK}:{web}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{grpc}%2Fproxy"
+
+
+@contextmanager
+def _running(command: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen]:
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(timeout=10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
