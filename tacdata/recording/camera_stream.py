@@ -27,7 +27,9 @@ class CameraStream:
         self.name, self._intrinsics, self._cube = name, entry.get("intrinsics"), entry.get("cube")
         self._detect = detect if self._cube is not None else None
         self._search: tuple[Future, ImageFrame, EpisodeWriter | None] | None = None
-        self._last, self._warm = None, False
+        self._last, self._asked = None, False
+        self.ready = self._detect is None
+        """Whether the detector has answered once (or there is none)."""
 
     def take(self, frame: ImageFrame, sink: EpisodeWriter | None) -> None:
         """Write one image; without a recording, search a first one, as a detector's first call takes long.
@@ -40,9 +42,9 @@ class CameraStream:
         if sink:
             sink.image(self.name, frame.arrival_ns, frame.arrival_ns, frame.sequence, self._jpeg(frame))
         self.collect(0.0)
-        if self._detect is not None and self._search is None and (sink or not self._warm):
+        if self._detect is not None and self._search is None and (sink or not self._asked):
             search = self._detect(frame.image, self._intrinsics, self._cube, self._last)
-            self._search, self._warm = (search, frame, sink), True
+            self._search, self._asked = (search, frame, sink), True
 
     def collect(self, patience: float) -> None:
         """Write the pose of the search under way if it ends within ``patience`` [s of real time].
@@ -56,7 +58,7 @@ class CameraStream:
             wait([search], patience)
         if not search.done():
             return
-        self._search = None
+        self._search, self.ready = None, True
         try:
             self._last = search.result()
         except Exception as error:  # whatever breaks in a detector, the press goes on

@@ -1,7 +1,7 @@
 """Searching images for tags in a process of its own, so that the streams' threads never wait for it.
 
-A search costs tens of milliseconds of computing; in the recorder's process it would hold up the reading of the serial
-lines, whose arrival times are what the clocks are fitted to.
+A search costs tens of milliseconds of computing; in the recorder's process it would hold up the reading of
+the serial lines, whose arrival times are what the clocks are fitted to.
 """
 
 from __future__ import annotations

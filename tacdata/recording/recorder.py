@@ -26,6 +26,8 @@ from tacdata.sensor import Sensor
 
 FIRST_FRAME = 5.0
 """How long the streams may take to begin [s of real time]."""
+FIRST_SEARCH = 20.0
+"""How long the motion waits for the tag detector to load [s of real time]; then it goes on without."""
 
 
 class Recorder:
@@ -145,7 +147,9 @@ class Recorder:
                     "check cable and power",
                 )
             time.sleep(WATCH)
-        streams.catch_up()
+        end = time.monotonic() + FIRST_SEARCH
+        while not streams.searching and not streams.fault and time.monotonic() < end:
+            time.sleep(WATCH)
 
     def _rise(self, streams: Streams) -> Position:
         """Go straight up to the clearance from wherever the guide stands; return where that is [mm]."""

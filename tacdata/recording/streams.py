@@ -62,13 +62,10 @@ class Streams:
             ("taxel board", self._read_board),
             ("motion controller", self._read_status),
         ]
+        self._cameras: list[CameraStream] = []
         for name, camera in devices.cameras.items():
-            work.append(
-                (
-                    f"camera {name}",
-                    self._camera_reader(camera, CameraStream(name, cameras.get(name, {}), detect)),
-                )
-            )
+            self._cameras.append(CameraStream(name, cameras.get(name, {}), detect))
+            work.append((f"camera {name}", self._camera_reader(camera, self._cameras[-1])))
         self._threads = [
             threading.Thread(target=self._run, args=(name, read), name=name, daemon=True)
             for name, read in work
@@ -95,6 +92,11 @@ class Streams:
                 DeviceError(f"writing failed: {failure}", "a disk with room", "make room, then --resume")
             )
         return self._fault
+
+    @property
+    def searching(self) -> bool:
+        """Whether every camera's detector has loaded its libraries and answered once."""
+        return all(stream.ready for stream in self._cameras)
 
     def record_into(self, sink: EpisodeWriter | None) -> None:
         """Send everything that arrives from now on into a recording, or nowhere."""

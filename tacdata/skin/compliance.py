@@ -60,8 +60,9 @@ class ContactPreconditioner:
         self._place = torch.full((3 * nodes,), len(compliance.dofs), dtype=torch.int64)
         self._place[compliance.dofs] = torch.arange(len(compliance.dofs))
         self._slots: dict[int, torch.Tensor] = {}
-        self._active = torch.empty(0, dtype=torch.int64)
-        self._core = self._response = torch.empty(0)
+        self._kept = self._active = torch.empty(0, dtype=torch.int64)
+        self._within = torch.empty(0, dtype=torch.int64)
+        self._stiffness = self._factors = self._pivots = self._response = torch.empty(0)
 
     def update(self, contacts: list[Contact]) -> None:
         """Take the contact stiffness that was evaluated last."""
@@ -75,12 +76,19 @@ class ContactPreconditioner:
                 rows, columns = slots[:, :, None].expand(-1, 18, 18), slots[:, None, :].expand(-1, 18, 18)
                 stiffness.index_put_((rows, columns), blocks, accumulate=True)
         active = stiffness[:m, :m].diagonal().nonzero().squeeze(1)
-        s = stiffness[active][:, active]
-        g = self._compliance.matrix[active][:, active]
-        core = torch.linalg.solve(torch.eye(len(active), dtype=torch.float64) + s @ g, s)
+        self._stiffness = stiffness[active][:, active]
+        system = torch.eye(len(active), dtype=torch.float64) + self._stiffness @ self._compliance.matrix[active][:, active]
+        self._factors, self._pivots = torch.linalg.lu_factor(system)
         self._active = self._compliance.dofs[active]
-        self._core = (core + core.T) / 2
-        self._response = self._compliance.response[active]
+        self._keep(active)
+
+    def _keep(self, active: torch.Tensor) -> None:
+        """Hold the responses of the active candidates; copied anew only when one is missing, as that costs a solve."""
+        known = torch.isin(active, self._kept)
+        if not bool(known.all()):
+            self._kept = torch.unique(torch.cat([self._kept, active]))
+            self._response = self._compliance.response[self._kept]
+        self._within = torch.searchsorted(self._kept, active)
 
     def _face_slots(self, contact: Contact) -> torch.Tensor:
         if id(contact) not in self._slots:
@@ -92,6 +100,9 @@ class ContactPreconditioner:
         """Return the approximate solution for one residual of shape (1, n, 3)."""
         z = self._factor.apply(residual)
         if len(self._active):
-            y = self._core @ z.reshape(-1)[self._active]
-            z = z - (y.float() @ self._response).double().reshape(z.shape)
+            y = self._stiffness @ z.reshape(-1)[self._active]
+            y = torch.linalg.lu_solve(self._factors, self._pivots, y[:, None])[:, 0]
+            load = torch.zeros(len(self._kept), dtype=torch.float32)
+            load[self._within] = y.float()
+            z = z - (load @ self._response).double().reshape(z.shape)
         return z

@@ -13,6 +13,7 @@ from tacdata.sensor import Material
 from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
 
+wp.config.log_level = wp.LOG_WARNING
 Parameters = wp.types.vector(length=8, dtype=wp.float64)
 
 

@@ -6,7 +6,9 @@ that they belong to, and the mid-side nodes of protrusion faces are put on the t
 
 from __future__ import annotations
 
+import contextlib
 import os
+import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -103,10 +105,12 @@ def _tetrahedralize(sensor: Sensor, settings: MeshSettings) -> tuple[np.ndarray,
 
     hull = surface(sensor)
     points, cells, size = _background(sensor, settings)
-    vertices, tets = pytetwild.tetrahedralize(
-        hull.vertices, hull.faces.astype(np.int32), edge_length_abs=settings.interior, epsilon=settings.envelope,
-        num_threads=1, bg_vertices=points, bg_tets=cells, bg_values=size,
-    )
+    # fTetWild leaves a file of its own in the working folder.
+    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+        vertices, tets = pytetwild.tetrahedralize(
+            hull.vertices, hull.faces.astype(np.int32), edge_length_abs=settings.interior, epsilon=settings.envelope,
+            num_threads=1, bg_vertices=points, bg_tets=cells, bg_values=size,
+        )
     return np.asarray(vertices, dtype=float), np.asarray(tets, dtype=np.int32)
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import torch
-import warp as wp
 
 from tacdata import provenance
 from tacdata.errors import SolveError
@@ -26,8 +25,9 @@ from tacdata.skin.preconditioner import RestFactor, rest_stiffness
 from tacdata.skin.raster import OuterFace
 
 
-_MARGIN = 0.15
-"""How far beyond the deepest nominal pose a node of the outer face is still a candidate for contact [mm]."""
+_REACH, _MARGIN = 0.6, 0.1
+"""Nodes of the outer face whose height under the indenter is below this share of the depth, and this much [mm], are
+candidates for contact: a sphere touches to half its depth (Hertz). Contact beyond costs iterations, not accuracy."""
 
 _TIP = 0.4
 """Height of a protrusion's tip region, over its radius, whose nodes are candidates for contact with the board [1]."""
@@ -107,7 +107,6 @@ class SkinModel:
         Raises:
             SolveError: If the geometry cannot be meshed or nothing holds the skin.
         """
-        wp.config.quiet = True
         self.sensor, self.settings, self.device = sensor, settings or ModelSettings(), device
         self.mesh = mesh or build_mesh(sensor, self.settings.mesh)
         self._nodes = torch.as_tensor(self.mesh.nodes, device=device)
@@ -168,11 +167,9 @@ class SkinModel:
     def _board_compliance(self) -> Compliance:
         """Of the protrusions' tips, vertically: the same for every press."""
         radius = self.sensor.skin.protrusion_radius
-        tips = np.unique(self.mesh.protrusions)
-        low = self.mesh.nodes[tips, 2] < -(1 - _TIP) * radius
-        faces = np.unique(self.mesh.protrusions[np.isin(self.mesh.protrusions, tips[low]).any(axis=1)])
-        held = self._fixed[faces]
-        return Compliance.of(self._factor, len(self.mesh.nodes), 3 * faces[~held] + 2)
+        nodes = np.unique(self.mesh.protrusions)
+        tips = nodes[(self.mesh.nodes[nodes, 2] < -(1 - _TIP) * radius) & ~self._fixed[nodes]]
+        return Compliance.of(self._factor, len(self.mesh.nodes), 3 * tips + 2)
 
     def _compliance(self, request: PressRequest) -> Compliance:
         """Of the outer nodes that the indenter can reach, in all directions, and of the protrusions' tips."""
@@ -180,7 +177,7 @@ class SkinModel:
         c, s = np.cos(np.radians(request.yaw)), np.sin(np.radians(request.yaw))
         dx, dy = self.mesh.nodes[outer, 0] - request.x, self.mesh.nodes[outer, 1] - request.y
         height = request.indenter.profile(c * dx + s * dy, -s * dx + c * dy)
-        reach = outer[height < max(request.depths) + _MARGIN]
+        reach = outer[height < _REACH * max(request.depths) + _MARGIN]
         faces = np.unique(self.mesh.outer[np.isin(self.mesh.outer, reach).any(axis=1)])
         nodes = faces[~self._fixed[faces]]
         dofs = (3 * nodes[:, None] + np.arange(3)).ravel()

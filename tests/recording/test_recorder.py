@@ -1,3 +1,5 @@
+import math
+import multiprocessing
 import os
 import signal
 import threading
@@ -14,6 +16,7 @@ from tacdata import documents
 from tacdata.clock import Clock
 from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.recording import file_names, read_session
+from tacdata.recording.detection_process import in_background
 from tacdata.recording.reader import read_recording
 from tacdata.recording.recorder import Recorder
 from tacdata.recording.rig_devices import RigDevices
@@ -46,7 +49,7 @@ class Bench:
         return Recorder(
             changes.get("rig", self.rig), SENSOR, changes.get("plan", self.plan), self.folder, resume=resume,
             devices=RigDevices(self.cnc, self.board, cameras), mount=self.mounted.append,
-            detect=found,
+            detect=changes.get("detect", found),
             progress=lambda *values: self.progress.append(values),
         )  # fmt: skip
 
@@ -89,6 +92,26 @@ def test_presses_are_recorded_one_file_each(tmp_path):
         assert (episode.tags[0].faces == 2).all()
     assert bench.cnc.calls[-1] == "close"
     assert "feed_hold" not in bench.cnc.calls
+
+
+def test_a_detector_that_fails_costs_the_poses_only(tmp_path):
+    def broken(*_):
+        search = Future()
+        search.set_exception(RuntimeError("no libraries"))
+        return search
+
+    bench = Bench(tmp_path / "session", presses=1, camera=True)
+    session = bench.run(detect=broken)
+    recording = read_recording(session.episodes[0])
+    assert recording.episode.complete
+    assert recording.images["side"] > 10
+    assert len(recording.episode.tags[0].faces) == 0
+
+
+def test_the_detection_process_answers_and_ends():
+    with in_background(math.hypot) as detect:
+        assert detect(3.0, 4.0).result(timeout=60) == 5.0
+    assert multiprocessing.active_children() == []
 
 
 def test_nothing_moves_without_a_yes(bench):

@@ -1,0 +1,41 @@
+"""One small model of each kind for the whole room; meshes go into a folder of the test run."""
+
+import pytest
+from skin_examples import bumps_sensor, slab_sensor
+
+from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.press import ModelSettings, SkinModel
+
+
+@pytest.fixture(scope="session", autouse=True)
+def mesh_cache(tmp_path_factory):
+    """Keep meshes of the tests apart from the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("cache")
+        patch.setenv("TACDATA_CACHE", str(folder))
+        yield folder
+
+
+@pytest.fixture(scope="session")
+def slab():
+    """A slab of 6 x 6 x 2 mm, bottom bonded, without friction, about 900 elements."""
+    return SkinModel(slab_sensor(), ModelSettings(mesh=MeshSettings(outer=0.8, interior=1.2)))
+
+
+@pytest.fixture(scope="session")
+def rough_slab(slab):
+    """The same slab on the same mesh, with friction 0.2."""
+    return SkinModel(slab_sensor(friction=0.2), slab.settings, mesh=slab.mesh)
+
+
+@pytest.fixture(scope="session")
+def fine_slab():
+    """A wide slab, refined under its centre."""
+    mesh = MeshSettings(outer=1.2, interior=1.5, focus=(0.0, 0.0, 0.7, 0.16))
+    return SkinModel(slab_sensor(size=10.0), ModelSettings(mesh=mesh))
+
+
+@pytest.fixture(scope="session")
+def bumps():
+    """Four protrusions on a board."""
+    return SkinModel(bumps_sensor(), ModelSettings(mesh=MeshSettings(outer=0.9, interior=1.5, protrusion=1.0)))

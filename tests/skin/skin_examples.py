@@ -1,0 +1,110 @@
+"""Small sensors, a structured mesh and law evaluation for the tests of the skin model."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+from tacdata.sensor import Sensor, default_sensor
+from tacdata.sensor.sensor import Contact, DepthMap, Skin, Taxels
+from tacdata.skin import elements
+from tacdata.skin.mesh import SkinMesh
+from tacdata.skin.mesher import quadratic
+
+Parameters = wp.types.vector(length=8, dtype=wp.float64)
+
+
+def slab_sensor(size=6.0, thickness=2.0, friction=0.0, bonded=("bottom",), pixels=15) -> Sensor:
+    """A plain slab [mm] with a map of ``pixels`` x ``pixels`` 0.4 mm pixels."""
+    return replace(
+        default_sensor(), name="slab", taxels=Taxels(1, 1, 1.0, 1.0), skin=Skin(size, size, thickness, 0.0),
+        contact=Contact(friction, bonded, False), map=DepthMap(pixels, pixels, 0.4, 1.0),
+    )
+
+
+def bumps_sensor() -> Sensor:
+    """Four protrusions under a slab held at its sides, standing on a board."""
+    return replace(
+        default_sensor(), name="bumps", taxels=Taxels(2, 2, 2.0, 1.8), skin=Skin(5.0, 5.0, 2.0, 0.7),
+        contact=Contact(0.2, ("sides",), True), map=DepthMap(11, 11, 0.4, 1.0),
+    )
+
+
+def box_mesh(sensor: Sensor, nx: int, ny: int, nz: int) -> SkinMesh:
+    """A structured mesh of a plain slab: every cell cut into six tetrahedra (Kuhn)."""
+    skin = sensor.skin
+    axes = [
+        np.linspace(-skin.size_x / 2, skin.size_x / 2, nx + 1), np.linspace(-skin.size_y / 2, skin.size_y / 2, ny + 1),
+        np.linspace(0, skin.thickness, nz + 1),
+    ]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    index = np.arange(len(points)).reshape(nx + 1, ny + 1, nz + 1)
+    tets = []
+    for order in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
+        bits, path = [0, 0, 0], []
+        for axis in (None, *order):
+            if axis is not None:
+                bits[axis] = 1
+            i, j, k = bits
+            path.append(index[i : nx + i, j : ny + j, k : nz + k].ravel())
+        tets.append(np.stack(path, axis=-1))
+    return quadratic(sensor, points, np.concatenate(tets))
+
+
+def tetrahedron_shapes(points: np.ndarray) -> np.ndarray:
+    """The 10 shape functions at (xi, eta, zeta), shape (q, 10), written anew from the barycentric coordinates."""
+    b = np.concatenate([1 - points.sum(axis=1, keepdims=True), points], axis=1)
+    edges = [4 * b[:, i] * b[:, j] for i, j in elements.EDGES]
+    return np.concatenate([b * (2 * b - 1), np.stack(edges, axis=-1)], axis=-1)
+
+
+def conical_rule(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss' rule on the cube collapsed onto the tetrahedron: n^3 points, exact to degree 2n - 3."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    x, w = (x + 1) / 2, w / 2
+    a, b, c = (g.ravel() for g in np.meshgrid(x, x, x, indexing="ij"))
+    weights = np.einsum("i,j,k->ijk", w, w, w).ravel() * (1 - a) ** 2 * (1 - b)
+    return np.stack([a, b * (1 - a), c * (1 - a) * (1 - b)], axis=-1), weights
+
+
+def evaluate(law, material, F: np.ndarray, dF: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Energy (n,), stress (n, 3, 3) and tangent along dF (n, 3, 3) of a law, by its own Warp functions."""
+    values = law.parameters(material)
+    n = len(F)
+    energy = wp.zeros(n, dtype=wp.float64, device="cpu")
+    stress, tangent = (wp.zeros(n, dtype=wp.mat33d, device="cpu") for _ in range(2))
+    wp.launch(
+        _law_kernel(type(law)), dim=n,
+        inputs=[
+            wp.array(F, dtype=wp.mat33d, device="cpu"), wp.array(dF, dtype=wp.mat33d, device="cpu"),
+            Parameters(*values, *([0.0] * (8 - len(values)))),
+        ],
+        outputs=[energy, stress, tangent], device="cpu",
+    )
+    return energy.numpy(), stress.numpy(), tangent.numpy()
+
+
+@cache
+def _law_kernel(kind):
+    law = kind()
+    energy_of, stress_of, tangent_of = law.energy_function(), law.stress_function(), law.tangent_function()
+
+    @wp.kernel(module="unique")
+    def values(
+        F: wp.array(dtype=wp.mat33d), dF: wp.array(dtype=wp.mat33d), m: Parameters,
+        energy: wp.array(dtype=wp.float64), stress: wp.array(dtype=wp.mat33d), tangent: wp.array(dtype=wp.mat33d),
+    ):
+        i = wp.tid()
+        energy[i] = energy_of(F[i], m)
+        stress[i] = stress_of(F[i], m)
+        tangent[i] = tangent_of(F[i], dF[i], m)
+
+    return values
+
+
+def random_rotation(random: np.random.Generator) -> np.ndarray:
+    """A rotation matrix."""
+    q, r = np.linalg.qr(random.normal(size=(3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q * np.linalg.det(q)
