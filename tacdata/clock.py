@@ -1,4 +1,4 @@
-"""The host's one clock: monotonic, mapped once to Unix time, and able to run faster than real time for a virtual rig."""
+"""The host's one clock: monotonic, mapped once to Unix time, faster than real time for a virtual rig if wanted."""
 
 from __future__ import annotations
 

@@ -75,5 +75,6 @@ def write_text(path: Path, text: str) -> None:
 def write(path: Path, document: dict[str, Any], schema: str) -> None:
     """Check a document and write it, as YAML or JSON by the file's ending."""
     check(document, schema, str(path))
-    text = yaml.safe_dump(document, sort_keys=False) if path.suffix in (".yaml", ".yml") else json.dumps(document, indent=1)
+    as_yaml = path.suffix in (".yaml", ".yml")
+    text = yaml.safe_dump(document, sort_keys=False) if as_yaml else json.dumps(document, indent=1)
     write_text(path, text + ("" if text.endswith("\n") else "\n"))

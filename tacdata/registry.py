@@ -34,7 +34,7 @@ def load_module(room: str, base: str, name: str) -> ModuleType:
         raise UsageError(
             f"{name!r} is not among the {kind}",
             ", ".join(known),
-            f"did you mean {close[0]!r}?" if close else f"choose one of them, or add {room.replace('.', '/')}/{name}.py",
+            f"did you mean {close[0]!r}?" if close else f"choose one, or add {room.replace('.', '/')}/{name}.py",
         )
     return importlib.import_module(f"{room}.{name}")
 

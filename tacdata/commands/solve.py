@@ -15,7 +15,7 @@ PANEL = TOOLS
 
 def run(
     case: Annotated[Path, typer.Argument(help="Case file (schemas/case.schema.json).")],
-    out: Annotated[Path, typer.Option(help="Folder for NAME.json (forces) and NAME.parquet (displacements).")] = Path("."),
+    out: Annotated[Path, typer.Option(help="Folder for NAME.json (forces), NAME.parquet (displacements).")] = Path("."),
 ) -> None:
     """Solve one press with the skin model: displacements of the outer face and forces, as files."""
     from rich.console import Console

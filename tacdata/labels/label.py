@@ -44,7 +44,9 @@ class Label:
     tip: np.ndarray
     """Nominal x, y and depth of the indenter's lowest point [mm], shape (n, 3)."""
     signed: np.ndarray
-    """Undeformed minus deformed height of the outer face [mm], shape (n, pixels_x, pixels_y), float32; bulging is negative."""
+    """Undeformed minus deformed height of the outer face [mm], shape (n, pixels_x, pixels_y), float32.
+
+    Signed: bulging is negative."""
     taxel_force: np.ndarray
     """Normal force carried by each protrusion [N], shape (n, taxels), float32."""
     force: np.ndarray

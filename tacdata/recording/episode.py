@@ -92,7 +92,7 @@ class Episode:
     tip_ns: np.ndarray
     """Times of the commanded profile [ns], shape (k,), int64, strictly increasing."""
     tip: np.ndarray
-    """Indenter's lowest point in the sensor frame: x, y [mm] and depth below the undeformed outer face [mm], shape (k, 3).
+    """Indenter's lowest point in the sensor frame: x, y and depth below the undeformed outer face [mm], shape (k, 3).
 
     The commanded, acceleration-limited profile anchored by the status reports; linear in between."""
     complete: bool

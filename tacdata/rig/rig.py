@@ -23,7 +23,7 @@ class Registration:
     """Rotation of the sensor's x axis against the machine's [deg]."""
 
     def to_machine(self, x: float, y: float, depth: float) -> tuple[float, float, float]:
-        """Return the machine position [mm] of a tip at (x, y) [mm, sensor frame], ``depth`` [mm] below the outer face."""
+        """Return the machine position [mm] of a tip at (x, y) in the sensor frame, ``depth`` below the outer face [mm]."""
         c, s = np.cos(np.radians(self.yaw)), np.sin(np.radians(self.yaw))
         return (
             float(self.origin[0] + c * x - s * y),
@@ -80,7 +80,9 @@ def from_document(document: dict[str, Any], origin: str) -> Rig:
     envelope = Envelope(tuple(document["envelope"]["min"]), tuple(document["envelope"]["max"]))
     if any(a >= b for a, b in zip(envelope.min, envelope.max, strict=True)):
         raise FormatError(
-            f"{origin}: envelope min {envelope.min} mm, max {envelope.max} mm", "min below max on every axis", "correct the envelope"
+            f"{origin}: envelope min {envelope.min} mm, max {envelope.max} mm",
+            "min below max on every axis",
+            "correct the envelope",
         )
     clock = Clock(**document["clock"]) if "clock" in document else Clock.start()
     registration = document["registration"]
