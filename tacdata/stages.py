@@ -47,8 +47,10 @@ class Line:
         self.number = 0
         self.begin = time.monotonic()
 
-    def run(self, purpose: str, arguments: list[str]) -> None:
+    def run(self, purpose: str, arguments: list[str], tolerated: int = 0) -> None:
         """Run ``tacdata ARGUMENTS``; ``purpose`` says what for.
+
+        An exit code of ``tolerated`` is shown and does not end the line: the verb after it can use what is there.
 
         Raises:
             StageError: With the verb's exit code, if it fails.
@@ -59,8 +61,10 @@ class Line:
         print(f"\n[{self.number}/{self.total}] {purpose}   (after {clock_face(started - self.begin)})")
         print(f"$ {written(arguments)}", flush=True)
         code = _run(command_line(arguments))
-        if code:
+        if code not in (0, tolerated):
             raise StageError(self.number, written(arguments), code, self.kept)
+        if code:
+            print(f"    exit code {code}: going on with what there is", flush=True)
         print(f"    done in {clock_face(time.monotonic() - started)}", flush=True)
 
 
@@ -119,9 +123,7 @@ class Background:
         while not ready():
             if (code := self.process.poll()) is not None or time.monotonic() > deadline:
                 said = self.log.read_text(errors="replace").strip().splitlines()[-5:]
-                state = (
-                    f"is not ready after {timeout:g} s" if code is None else f"ended with exit code {code}"
-                )
+                state = f"is not ready after {timeout:g} s" if code is None else f"ended with exit code {code}"
                 raise DeviceError(
                     f"{written(self.arguments)} {state}" + "".join(f"\n    {line}" for line in said),
                     what,

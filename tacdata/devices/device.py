@@ -8,6 +8,7 @@ arrives with the host's clock as early as it can, and counts what is lost or dam
 
 from __future__ import annotations
 
+import inspect
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any, Self
@@ -16,6 +17,7 @@ import numpy as np
 
 from tacdata import registry
 from tacdata.clock import Clock
+from tacdata.errors import UsageError
 
 ROOM, BASE = "tacdata.devices", "device"
 
@@ -200,7 +202,17 @@ def create(settings: dict[str, Any], kind: type[Device], clock: Clock) -> Any:
     """Build the device that a rig file's entry describes (``{"driver": name, ...}``).
 
     Raises:
-        UsageError: If no such driver exists.
+        UsageError: If no such driver exists or it has no such setting.
     """
     values = dict(settings)
-    return registry.load(ROOM, BASE, values.pop("driver"), kind)(clock=clock, **values)
+    driver = values.pop("driver")
+    maker = registry.load(ROOM, BASE, driver, kind)
+    allowed = [name for name in inspect.signature(maker).parameters if name != "clock"]
+    unknown = sorted(set(values) - set(allowed))
+    if unknown:
+        raise UsageError(
+            f"driver {driver}: setting {', '.join(unknown)} in the rig file",
+            ", ".join(allowed),
+            "correct the name in the rig file",
+        )
+    return maker(clock=clock, **values)

@@ -101,16 +101,31 @@ class Indenter(ABC):
         """
         import trimesh
 
-        samples = np.linspace(-self.extent, self.extent, 65)
-        x, y = np.meshgrid(samples, samples, indexing="ij")
+        x, y = self._grid()
         z = np.minimum(self.profile(x, y), height)
         lower = np.stack([x, y, z], axis=-1).reshape(-1, 3)
-        n = len(samples)
+        n = len(x)
         index = np.arange(n * n).reshape(n, n)
         a, b, c, d = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
         faces = np.stack([a, c, b, a, d, c], axis=-1).reshape(-1, 3)
         inside = (lower[faces][:, :, 2] < height).any(axis=1)
         return trimesh.Trimesh(lower, faces[inside], process=True)
+
+    def _grid(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return places that cover the solid [mm], two arrays of shape (65, 65)."""
+        samples = np.linspace(-self.extent, self.extent, 65)
+        x, y = np.meshgrid(samples, samples, indexing="ij")
+        return x, y
+
+    def footprint(self, depth: float, yaw: float) -> tuple[float, float]:
+        """Return how far the part below ``depth`` [mm] reaches from the axis along x and y [mm], turned by ``yaw`` [deg]."""
+        x, y = self._grid()
+        within = self.profile(x, y) <= depth
+        if not within.any():
+            return 0.0, 0.0
+        c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
+        along_x, along_y = np.abs(c * x - s * y)[within].max(), np.abs(s * x + c * y)[within].max()
+        return float(along_x), float(along_y)
 
 
 def warp() -> Any:

@@ -1,5 +1,7 @@
 """Labels: what the simulation says of a press, frame by frame, with where it came from."""
 
-from tacdata.labels.label import Label, PathSolution, read_label, write_label
+from tacdata.labels.label import Label, PathSolution
+from tacdata.labels.table import read as read_label
+from tacdata.labels.table import write as write_label
 
 __all__ = ["Label", "PathSolution", "read_label", "write_label"]

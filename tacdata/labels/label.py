@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -61,21 +60,3 @@ class Label:
         """The label proper: the signed map clipped at 0 [mm], shape (n, pixels_x, pixels_y), float32."""
         return np.maximum(self.signed, 0.0)
 
-
-def write_label(path: Path, label: Label) -> None:
-    """Write a label file (Parquet, one row a frame); beside, then renamed."""
-    from tacdata.labels import table
-
-    table.write(path, label)
-
-
-def read_label(path: Path) -> Label:
-    """Read a label file.
-
-    Raises:
-        UsageError: If it does not exist.
-        FormatError: If it is damaged or of another format version.
-    """
-    from tacdata.labels import table
-
-    return table.read(path)

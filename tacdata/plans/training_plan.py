@@ -37,6 +37,8 @@ SPEEDS = (0.5, 1.0)
 """Slowest and fastest loading [mm/s]."""
 HOLDS = (0.5, 1.0)
 """Shortest and longest hold [s]."""
+CLEARANCE = 0.5
+"""Least distance of an indenter at full depth from the skin's rim, which is held by the frame [mm]."""
 KINDS = ("taxel", "between", "anywhere", "edge")
 MOTION = {
     "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.7,
@@ -82,14 +84,15 @@ def training_plan(
     entries = []
     for k in range(presses):
         name, yaw = mountings[k % len(mountings)]
-        x, y = _site(sensor, str(kinds[k]), rng)
+        depth = round(float(depths[k]), 3)
+        x, y = _site(sensor, str(kinds[k]), rng, from_document(STANDARD[name]).footprint(depth, yaw))
         entries.append(
             {
                 "indenter": name,
                 "x": x,
                 "y": y,
                 "yaw": yaw,
-                "depth": round(float(depths[k]), 3),
+                "depth": depth,
                 "speed": round(float(rng.uniform(*SPEEDS)), 2),
                 "hold": round(float(rng.uniform(*HOLDS)), 2),
             }
@@ -108,12 +111,14 @@ def training_plan(
     return document
 
 
-def _site(sensor: Sensor, kind: str, rng: np.random.Generator) -> tuple[float, float]:
-    """Return a site [mm, sensor frame], at least 1 mm inside the skin's rim."""
+def _site(
+    sensor: Sensor, kind: str, rng: np.random.Generator, footprint: tuple[float, float]
+) -> tuple[float, float]:
+    """Return a site [mm, sensor frame] at which the whole footprint [mm] lies inside the skin's rim by `CLEARANCE`."""
     taxels, centers = sensor.taxels, sensor.taxels.centers
     half = np.array([taxels.pitch_x * (taxels.columns - 1), taxels.pitch_y * (taxels.rows - 1)]) / 2
     pitch = np.array([taxels.pitch_x, taxels.pitch_y])
-    rim = np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2 - 1.0
+    rim = np.maximum(np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2 - footprint - CLEARANCE, 0.0)
     if kind == "taxel":
         site = centers[rng.integers(len(centers))]
     elif kind == "between":

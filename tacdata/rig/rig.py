@@ -23,7 +23,7 @@ class Registration:
     """Rotation of the sensor's x axis against the machine's [deg]."""
 
     def to_machine(self, x: float, y: float, depth: float) -> tuple[float, float, float]:
-        """Return the machine position [mm] of a tip at (x, y) in the sensor frame, ``depth`` below the outer face [mm]."""
+        """Return the machine position [mm] of a tip at (x, y) [mm, sensor frame], ``depth`` [mm] below the skin."""
         c, s = np.cos(np.radians(self.yaw)), np.sin(np.radians(self.yaw))
         return (
             float(self.origin[0] + c * x - s * y),

@@ -186,7 +186,7 @@ def _check_consistency(sensor: Sensor, origin: str) -> None:
             )
         if count > 1 and 2 * skin.protrusion_radius > pitch:
             raise FormatError(
-                f"{origin}: protrusions of radius {skin.protrusion_radius:g} mm overlap along {axis}, pitch {pitch:g} mm",
+                f"{origin}: protrusions of radius {skin.protrusion_radius:g} mm overlap at {pitch:g} mm along {axis}",
                 f"a radius of at most {pitch / 2:g} mm",
                 "reduce skin/protrusion_radius",
             )

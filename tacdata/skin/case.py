@@ -1,4 +1,4 @@
-"""A case: one press for the skin model alone, from a file, with its results as files that other codes can be held against."""
+"""A case: one press for the skin model alone, from a file; its results are files to hold other codes against."""
 
 from __future__ import annotations
 
@@ -77,7 +77,9 @@ def solve_case(case: Case, out: Path, done: Callable[[float], None] = lambda dep
     report, table = out / f"{case.name}.json", out / f"{case.name}.parquet"
     for path in (report, table):
         if path.exists():
-            raise UsageError(f"{path} exists", "a folder without it: results are never overwritten", "choose another --out")
+            raise UsageError(
+                f"{path} exists", "a folder without it: results are never overwritten", "choose another --out"
+            )
     model = SkinModel(case.sensor, case.settings)
     top = np.unique(model.mesh.outer)
     columns: dict[str, list[np.ndarray]] = {k: [] for k in ("depth", "x", "y", "ux", "uy", "uz")}

@@ -1,4 +1,4 @@
-"""The rest state's compliance seen from the contact faces: which nodes may touch, and how they move under unit forces."""
+"""The rest state's compliance seen from the contact faces: how nodes that may touch move under unit forces."""
 
 from __future__ import annotations
 
@@ -77,7 +77,8 @@ class ContactPreconditioner:
                 stiffness.index_put_((rows, columns), blocks, accumulate=True)
         active = stiffness[:m, :m].diagonal().nonzero().squeeze(1)
         self._stiffness = stiffness[active][:, active]
-        system = torch.eye(len(active), dtype=torch.float64) + self._stiffness @ self._compliance.matrix[active][:, active]
+        compliance = self._compliance.matrix[active][:, active]
+        system = torch.eye(len(active), dtype=torch.float64) + self._stiffness @ compliance
         self._factors, self._pivots = torch.linalg.lu_factor(system)
         self._active = self._compliance.dofs[active]
         self._keep(active)

@@ -1,10 +1,13 @@
+# Warp kernels are Python in form only; their operators have no types that pyright knows.
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Contact of a face of the skin with a rigid shape: augmented Lagrangian, integrated over the faces, Coulomb friction.
 
 At every quadrature point the normal traction is t = max(0, lambda - penalty * gap) (Alart and Curnier 1991; Simo and
 Laursen 1992). Friction is a return mapping of the tangential traction onto the disc of radius mu t, with history kept
-from the last converged state. Far from the solution friction enters the stiffness by its secant (Kacanov's method): a majorant of the dissipation,
-so that iterates do not flip between opposite slips as they do with the tangent; near it by the tangent, without the
-derivative of the disc's radius, so that the stiffness stays symmetric.
+from the last converged state. Far from the solution friction enters the stiffness by its secant (Kacanov's method): a
+majorant of the dissipation, so that iterates do not flip between opposite slips as they do with the tangent; near it by
+the tangent, without the derivative of the disc's radius, so that the stiffness stays symmetric.
 Tractions are per undeformed area.
 """
 
@@ -30,7 +33,7 @@ def board_distance(p: wp.vec3d, q: Parameters):
 
 
 @cache
-def _kernels(distance) -> SimpleNamespace:  # noqa: ANN001
+def _kernels(distance) -> SimpleNamespace:
     """Compile the contact kernels of one shape."""
 
     @wp.func
@@ -153,7 +156,7 @@ class Contact:
         self, mesh_nodes: torch.Tensor, faces: torch.Tensor, area_weights: torch.Tensor, shapes: torch.Tensor,
         distance: wp.Function, parameters: tuple[float, ...], friction: float, penalty: float, stick: float,
     ) -> None:
-        """Bind faces (f, 6), their quadrature (weights (f, k) [mm^2], shapes (k, 6)) and the shape's distance function."""
+        """Bind faces (f, 6), quadrature (weights (f, k) [mm^2], shapes (k, 6)) and the shape's distance function."""
         self.device = str(mesh_nodes.device)
         self.faces, self.weights, self.shapes, self.nodes = faces, area_weights, shapes, mesh_nodes
         self.friction, self.penalty, self.stick = friction, penalty, stick
@@ -161,7 +164,8 @@ class Contact:
         """0 for the secant of friction, 1 for its tangent."""
         self._q = Parameters(*parameters, *([0.0] * (8 - len(parameters))))
         self._kernels = _kernels(distance)
-        self._faces, self._shapes, self._weights = wp.from_torch(faces), wp.from_torch(shapes), wp.from_torch(area_weights)
+        self._faces, self._shapes = wp.from_torch(faces), wp.from_torch(shapes)
+        self._weights = wp.from_torch(area_weights)
         self._nodes = wp.from_torch(mesh_nodes, dtype=wp.vec3d)
         self.pressure = self.gap = self.shear = self.place = self.stiffness = torch.empty(0)
 

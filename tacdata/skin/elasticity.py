@@ -1,3 +1,6 @@
+# Warp kernels are Python in form only; their operators have no types that pyright knows.
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Internal forces of the skin and their linearization, matrix-free, for a batch of states of one mesh."""
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from tacdata.sensor import Material
 from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
 
-wp.config.log_level = wp.LOG_WARNING
+wp.config.log_level = wp.LOG_ERROR
 Parameters = wp.types.vector(length=8, dtype=wp.float64)
 
 
@@ -41,9 +44,9 @@ def _kernels(law_name: str) -> SimpleNamespace:
         force: wp.array2d(dtype=wp.vec3d), smallest_volume_ratio: wp.array(dtype=wp.float64),
     ):
         b, e = wp.tid()
-        I = wp.identity(n=3, dtype=wp.float64)
+        identity = wp.identity(n=3, dtype=wp.float64)
         for q in range(4):
-            F = I + gradient(u, tets, slopes, b, e, q)
+            F = identity + gradient(u, tets, slopes, b, e, q)
             wp.atomic_min(smallest_volume_ratio, b, wp.determinant(F))
             P = stress_of(F, m) * weights[e, q]
             for a in range(10):
@@ -57,9 +60,9 @@ def _kernels(law_name: str) -> SimpleNamespace:
         weights: wp.array2d(dtype=wp.float64), m: Parameters, product: wp.array2d(dtype=wp.vec3d),
     ):
         b, e = wp.tid()
-        I = wp.identity(n=3, dtype=wp.float64)
+        identity = wp.identity(n=3, dtype=wp.float64)
         for q in range(4):
-            F = I + gradient(u, tets, slopes, b, e, q)
+            F = identity + gradient(u, tets, slopes, b, e, q)
             dP = tangent_of(F, gradient(p, tets, slopes, b, e, q), m) * weights[e, q]
             for a in range(10):
                 g = wp.vec3d(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2])
@@ -71,9 +74,9 @@ def _kernels(law_name: str) -> SimpleNamespace:
         weights: wp.array2d(dtype=wp.float64), m: Parameters, total: wp.array(dtype=wp.float64),
     ):
         b, e = wp.tid()
-        I = wp.identity(n=3, dtype=wp.float64)
+        identity = wp.identity(n=3, dtype=wp.float64)
         for q in range(4):
-            wp.atomic_add(total, b, energy_of(I + gradient(u, tets, slopes, b, e, q), m) * weights[e, q])
+            wp.atomic_add(total, b, energy_of(identity + gradient(u, tets, slopes, b, e, q), m) * weights[e, q])
 
     return SimpleNamespace(internal_force=internal_force, tangent_product=tangent_product, energy=energy)
 
@@ -96,7 +99,7 @@ class Elasticity:
         self._kernels = _kernels(material.law)
 
     def internal_force(self, u: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return nodal forces [N], shape (b, n, 3), and the smallest J = det F [1], shape (b,), of displacements [mm]."""
+        """Return nodal forces [N], shape (b, n, 3), and the smallest det F [1], shape (b,), of displacements [mm]."""
         force = torch.zeros_like(u)
         ratio = torch.full((u.shape[0],), np.inf, dtype=torch.float64, device=u.device)
         wp.launch(

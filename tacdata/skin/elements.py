@@ -76,9 +76,9 @@ def triangle_quadrature(subdivisions: int = 1) -> tuple[np.ndarray, np.ndarray]:
     all_points, all_weights = [], []
     for i in range(n):
         for j in range(n - i):
-            all_points.append((points + [i, j]) / n)
+            all_points.append((points + np.array([i, j])) / n)
             all_weights.append(weights / n**2)
             if i + j < n - 1:
-                all_points.append(([i + 1, j + 1] - points) / n)
+                all_points.append((np.array([i + 1, j + 1]) - points) / n)
                 all_weights.append(weights / n**2)
     return np.concatenate(all_points), np.concatenate(all_weights)

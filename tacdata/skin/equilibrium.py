@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,6 +11,11 @@ import torch
 from tacdata.skin.contact import Contact, ContactState
 from tacdata.skin.elasticity import Elasticity
 
+_PATIENCE = 12
+"""Newton iterations without progress after which a state is given up, so that the path can try a smaller step."""
+
+_LEAST_VOLUME = 0.1
+"""Volume ratio det F below which a Newton step is shortened [1]."""
 
 _NEAR = 3e-2
 """Relative residual below which the tangent of friction replaces its secant [1]."""
@@ -24,7 +30,7 @@ class SolverSettings:
     penetration: float = 5e-3
     """Largest |gap| of a point that carries load over the indentation depth [1]."""
     forcing: float = 0.1
-    """Relative tolerance of the conjugate gradients in each Newton iteration [1]; loose, as an evaluation costs one iteration."""
+    """Relative tolerance of the conjugate gradients in a Newton iteration [1]; loose, as an evaluation costs one."""
     newton_limit: int = 60
     """Newton iterations per state before giving up."""
     cg_limit: int = 400
@@ -75,7 +81,7 @@ class Equilibrium:
     def residual(
         self, u: torch.Tensor, poses: list[torch.Tensor], states: list[ContactState]
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Return out-of-balance forces [N] (b, n, 3) on free nodes, their scale [N] (b,), and the smallest J [1] (b,)."""
+        """Return out-of-balance forces [N] (b, n, 3) on free nodes, their scale [N] (b,), the smallest J [1] (b,)."""
         internal, ratio = self.body.internal_force(u)
         external = torch.zeros_like(u)
         for contact, pose, state in zip(self.contacts, poses, states, strict=True):
@@ -110,15 +116,21 @@ class Equilibrium:
         cg_total, newton = 0, 0
         error = self._error(r, scale)
         done = torch.zeros(len(u), dtype=torch.bool, device=u.device)
+        best, best_at = float("inf"), 0
         for newton in range(1, limit.newton_limit + 1):
-            penetration = self._penetration()
-            tight = penetration <= limit.penetration * depth.clamp_min(1e-3)
+            tight = self._penetration() <= limit.penetration * depth.clamp_min(1e-3)
             done = (error <= limit.residual) & tight
             if bool(done.all()):
                 break
+            worst = float(error.max())
+            if (not worst < 0.9 * best and newton - best_at > _PATIENCE) or not math.isfinite(worst):
+                break
+            if worst < 0.9 * best:
+                best, best_at = worst, newton
             augment = (error <= 20 * limit.residual) & ~tight
             if bool(augment.any()):
                 self._augment(states, augment)
+                best, best_at = float("inf"), newton
                 r, scale, ratio = self.residual(u, poses, states)
                 error = self._error(r, scale)
             self._sharpen(float(error.max()))
@@ -151,42 +163,52 @@ class Equilibrium:
             state.multiplier[which] = contact.pressure[which]
 
     def _advance(
-        self, u: torch.Tensor, step: torch.Tensor, r: torch.Tensor, poses: list[torch.Tensor], states: list[ContactState]
+        self, u: torch.Tensor, step: torch.Tensor, r: torch.Tensor, poses: list[torch.Tensor],
+        states: list[ContactState],
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
         """Take the Newton step, halved for members whose residual would grow much or whose elements would invert."""
         before = torch.linalg.norm(r.flatten(1), dim=1)
         length = torch.ones(len(u), 1, 1, dtype=u.dtype, device=u.device)
-        for _ in range(6):
+        trial, r_new, scale, ratio = u, r, before, before
+        for _ in range(8):
             trial = u + length * step
             r_new, scale, ratio = self.residual(trial, poses, states)
             after = torch.linalg.norm(r_new.flatten(1), dim=1)
-            bad = ~(after <= 2.0 * before) | (ratio < 0.05)
+            bad = ~(after <= 2.0 * before) | ~(ratio >= _LEAST_VOLUME)
             if not bool(bad.any()):
                 break
             length[bad] *= 0.5
         return trial, r_new, scale, ratio, self._error(r_new, scale)
 
     def _cg(self, u: torch.Tensor, r: torch.Tensor, tolerance: torch.Tensor) -> tuple[torch.Tensor, int]:
-        """Solve K(u) x = r to a relative tolerance (b,) in the preconditioned norm; members stop by themselves."""
+        """Solve K(u) x = r to a relative tolerance (b,) in the preconditioned norm; members stop by themselves.
+
+        A member whose tangent turns out indefinite keeps what it has, or the preconditioned residual if it has
+        nothing.
+        """
         x = torch.zeros_like(r)
         self.preconditioner.update(self.contacts)
         z = self.preconditioner.apply(r)
         p = z.clone()
         rho = (r * z).flatten(1).sum(dim=1)
         goal = rho * tolerance**2
+        going = rho > 0
         iteration = 0
         for iteration in range(1, self.settings.cg_limit + 1):
             q = self.product(u, p)
             curvature = (p * q).flatten(1).sum(dim=1)
-            active = (rho > goal) & (curvature > 0)
-            alpha = torch.where(active, rho / curvature, torch.zeros_like(rho))[:, None, None]
-            x += alpha * p
+            if iteration == 1:
+                x = torch.where((curvature <= 0)[:, None, None], z, x)
+            going = going & (curvature > 0)
+            alpha = torch.where(going, rho / curvature, torch.zeros_like(rho))[:, None, None]
+            x = x + alpha * p
             r = r - alpha * q
             z = self.preconditioner.apply(r)
             rho_new = (r * z).flatten(1).sum(dim=1)
-            if not bool((rho_new > goal).any()):
+            going = going & (rho_new > goal)
+            if not bool(going.any()):
                 break
-            beta = torch.where(rho > 0, rho_new / rho, torch.zeros_like(rho))
+            beta = torch.where(going, rho_new / rho, torch.zeros_like(rho))
             p = z + beta[:, None, None] * p
             rho = rho_new
         return x, iteration

@@ -32,7 +32,9 @@ _SNAP_SPHERE = 0.25
 
 
 _RINGS = ((30.0, 6, 0.0), (90.0, 8, 0.5))
-"""Rings of vertices on a protrusion: polar angle from the tip [deg], vertices, turn [vertices]. The inner ring encloses the contact patch."""
+"""Rings of vertices on a protrusion: polar angle from the tip [deg], vertices, turn [vertices].
+
+The inner ring encloses the contact patch."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +92,13 @@ def surface(sensor: Sensor) -> trimesh.Trimesh:
 
 
 def _bump(radius: float, root: float) -> trimesh.Trimesh:
-    """Return a coarse hemisphere below z = 0 whose vertices lie on the sphere, with a prism of height ``root`` above it."""
+    """Return a coarse hemisphere below z = 0, vertices on the sphere, with a prism of height ``root`` above it."""
     tip = [[0.0, 0.0, -radius]]
     rings = [(np.radians(polar), count, turn) for polar, count, turn in _RINGS]
     for polar, count, turn in rings:
         angle = 2 * np.pi * (np.arange(count) + turn) / count
-        tip += [[radius * np.sin(polar) * np.cos(a), radius * np.sin(polar) * np.sin(a), -radius * np.cos(polar)] for a in angle]
+        wide, low = radius * np.sin(polar), -radius * np.cos(polar)
+        tip += [[wide * np.cos(a), wide * np.sin(a), low] for a in angle]
     tip += [[x, y, root] for x, y, _ in tip[-rings[-1][1] :]]
     return trimesh.Trimesh(tip).convex_hull
 
@@ -107,7 +110,7 @@ def _tetrahedralize(sensor: Sensor, settings: MeshSettings) -> tuple[np.ndarray,
     points, cells, size = _background(sensor, settings)
     # fTetWild leaves a file of its own in the working folder.
     with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
-        vertices, tets = pytetwild.tetrahedralize(
+        vertices, tets = pytetwild.tetrahedralize(  # pyright: ignore[reportPrivateImportUsage]
             hull.vertices, hull.faces.astype(np.int32), edge_length_abs=settings.interior, epsilon=settings.envelope,
             num_threads=1, bg_vertices=points, bg_tets=cells, bg_values=size,
         )
@@ -212,8 +215,10 @@ def _boundary(tets: np.ndarray) -> np.ndarray:
     return faces[first[count == 1]]
 
 
-def _snap(sensor: Sensor, vertices: np.ndarray, surface_vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Put surface vertices on their true faces; return positions, "lies on a sphere", and the sphere's taxel (or -1)."""
+def _snap(
+    sensor: Sensor, vertices: np.ndarray, surface_vertices: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Put surface vertices on their true faces; return positions, "lies on a sphere", the sphere's taxel (or -1)."""
     skin, moved = sensor.skin, vertices.copy()
     on_sphere = np.zeros(len(vertices), dtype=bool)
     taxel = np.full(len(vertices), -1)
@@ -268,8 +273,9 @@ def _curve(sensor: Sensor, nodes: np.ndarray, tets: np.ndarray, bumps: np.ndarra
         curved[index] = nodes[index]
     if _volume(curved, tets[:, :4]).min() <= 0:
         worst = int(_volume(curved, tets[:, :4]).argmin())
+        place = curved[tets[worst, :4]].mean(axis=0).round(2).tolist()
         raise SolveError(
-            f"element {worst} at {curved[tets[worst, :4]].mean(axis=0).round(2).tolist()} mm is flat after snapping to the surface",
+            f"element {worst} at {place} mm is flat after snapping to the surface",
             "positive volumes", "choose a smaller element size or envelope in the mesh settings",
         )
     return curved

@@ -39,7 +39,8 @@ class RestFactor:
 
     def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray) -> None:
         """Factorize. ``free``: indices of the degrees of freedom that are not held."""
-        from cholespy import CholeskySolverF, MatrixType
+        # A compiled module without type stubs.
+        from cholespy import CholeskySolverF, MatrixType  # pyright: ignore[reportAttributeAccessIssue]
 
         self.free = torch.as_tensor(free)
         reduced = stiffness[free][:, free].tocsc()

@@ -16,7 +16,7 @@ from tacdata.indenters import Indenter
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 from tacdata.skin.compliance import Compliance, ContactPreconditioner
-from tacdata.skin.contact import Contact, ContactState, board_distance, face_quadrature
+from tacdata.skin.contact import Contact, board_distance, face_quadrature
 from tacdata.skin.elasticity import Elasticity
 from tacdata.skin.equilibrium import Equilibrium, Outcome, SolverSettings
 from tacdata.skin.mesh import SkinMesh
@@ -24,10 +24,12 @@ from tacdata.skin.mesher import MeshSettings, build_mesh
 from tacdata.skin.preconditioner import RestFactor, rest_stiffness
 from tacdata.skin.raster import OuterFace
 
-
 _REACH, _MARGIN = 0.6, 0.1
 """Nodes of the outer face whose height under the indenter is below this share of the depth, and this much [mm], are
 candidates for contact: a sphere touches to half its depth (Hertz). Contact beyond costs iterations, not accuracy."""
+
+_ROWS = ("surface", "taxel_force", "taxel_closure", "force", "residual", "penetration")
+"""What a path solution tells of every state."""
 
 _TIP = 0.4
 """Height of a protrusion's tip region, over its radius, whose nodes are candidates for contact with the board [1]."""
@@ -62,10 +64,24 @@ class PressRequest:
                 f"depth {max(self.depths):g} mm in a skin {skin.thickness:g} mm thick",
                 f"less than {skin.thickness:g} mm", "reduce the depth",
             )
+        if not np.all(np.isfinite([self.x, self.y, self.yaw])):
+            raise SolveError(
+                f"press at ({self.x}, {self.y}) mm, yaw {self.yaw} deg", "finite numbers", "correct the press"
+            )
         if abs(self.x) > skin.size_x / 2 or abs(self.y) > skin.size_y / 2:
             raise SolveError(
                 f"press at ({self.x:g}, {self.y:g}) mm, the skin spans {skin.size_x:g} x {skin.size_y:g} mm",
                 "a place on the skin", "move the press",
+            )
+        reach = self.indenter.footprint(max(self.depths), self.yaw)
+        over = [abs(place) + half - size / 2 for place, half, size in
+                zip((self.x, self.y), reach, (skin.size_x, skin.size_y), strict=True)]
+        if "sides" in sensor.contact.bonded and max(over) > 0 and max(self.depths) > 0:
+            raise SolveError(
+                f"{self.indenter.shape} at ({self.x:g}, {self.y:g}) mm, {max(self.depths):g} mm deep, reaches "
+                f"{max(over):.2f} mm over the rim, which is bonded to the frame",
+                f"a footprint of {reach[0]:.2f} x {reach[1]:.2f} mm around the press inside the rim",
+                "move the press inward, press less deep, or describe another bonding in the sensor file",
             )
 
 
@@ -94,6 +110,8 @@ class State:
     """Force of the skin on the indenter [N], shape (3,)."""
     taxel_force: np.ndarray
     """Normal force on each protrusion [N], shape (taxels,)."""
+    taxel_closure: np.ndarray
+    """Mean downward displacement of each protrusion's rim [mm], shape (taxels,)."""
 
 
 class SkinModel:
@@ -112,7 +130,9 @@ class SkinModel:
         self._nodes = torch.as_tensor(self.mesh.nodes, device=device)
         self._fixed = self.mesh.fixed(sensor.contact.bonded)
         if not self._fixed.any():
-            raise SolveError("no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file")
+            raise SolveError(
+                "no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file"
+            )
         self._body = Elasticity(self.mesh, sensor.material, device)
         self._outer = torch.as_tensor(self.mesh.outer, device=device)
         self._bumps = torch.as_tensor(self.mesh.protrusions, device=device)
@@ -139,6 +159,20 @@ class SkinModel:
     def content_hash(self) -> str:
         """Hash of `identity`: the model's version."""
         return provenance.content_hash(self.identity)
+
+    def smallest_volume_ratio(self, u: torch.Tensor) -> torch.Tensor:
+        """Return the smallest det F [1], shape (b,), of displacements [mm], shape (b, n, 3)."""
+        return self._body.internal_force(u)[1]
+
+    def closure(self, u: np.ndarray) -> np.ndarray:
+        """Return the mean downward displacement of each protrusion's rim [mm], shape (taxels,), from ``u`` (n, 3)."""
+        count = self.sensor.taxels.count
+        faces = self.mesh.protrusions
+        taxel = np.repeat(self.mesh.protrusion_taxel, faces.shape[1])
+        pairs = np.unique(np.stack([faces.ravel(), taxel]), axis=1)
+        node, taxel = pairs[:, np.abs(self.mesh.nodes[pairs[0], 2]) < 1e-9]
+        total = np.bincount(taxel, weights=-u[node, 2], minlength=count)
+        return total / np.maximum(np.bincount(taxel, minlength=count), 1)
 
     def _contacts(self, indenter: Indenter) -> list[Contact]:
         modulus = self.sensor.material.youngs_modulus
@@ -184,7 +218,7 @@ class SkinModel:
         own = Compliance.of(self._factor, len(self.mesh.nodes), dofs)
         return own.join(self._board_compliance) if self.sensor.contact.board else own
 
-    def states(self, request: PressRequest):  # noqa: ANN201
+    def states(self, request: PressRequest):
         """Yield ``(depth, State)`` for each requested depth, solving the path between them in bounded steps.
 
         Raises:
@@ -208,12 +242,13 @@ class SkinModel:
         """
         began = time.perf_counter()
         grid = self.sensor.map
-        rows: dict[str, list[Any]] = {name: [] for name in ("surface", "force", "taxel", "residual", "penetration")}
+        rows: dict[str, list[Any]] = {name: [] for name in _ROWS}
         newton = cg = 0
         for _, state in self.states(request):
             rows["surface"].append(self._face.depth_map(grid.x, grid.y, state.displacement))
             rows["force"].append(state.force)
-            rows["taxel"].append(state.taxel_force)
+            rows["taxel_force"].append(state.taxel_force)
+            rows["taxel_closure"].append(state.taxel_closure)
             rows["residual"].append(float(state.outcome.residual[0]))
             rows["penetration"].append(float(state.outcome.penetration[0]))
             newton, cg = newton + state.outcome.newton, cg + state.outcome.cg
@@ -223,10 +258,9 @@ class SkinModel:
             "device": self.device, "seconds": round(time.perf_counter() - began, 3), "newton": newton, "cg": cg,
         }
         return PathSolution(
-            depth=np.array(request.depths), surface=np.stack(rows["surface"]), taxel_force=np.stack(rows["taxel"]),
-            taxel_closure=np.zeros((len(request.depths), self.sensor.taxels.count)), force=np.stack(rows["force"]),
-            residual=np.array(rows["residual"]), penetration=np.array(rows["penetration"]),
+            depth=np.array(request.depths),
             provenance=provenance.stamp("tacdata.skin", self.identity, parameters),
+            **{name: np.array(values) for name, values in rows.items()},
         )
 
 
@@ -271,6 +305,8 @@ class _Path:
         poses = model._poses(self._request, depth)[: len(self._contacts)]
         saved = [state.multiplier.clone() for state in self._states]
         start = self._u + self._rate * (depth - self._depth)
+        if float(model.smallest_volume_ratio(start)) < 0.3:
+            start = self._u
         judged = torch.tensor([max(depth, 0.1)], dtype=torch.float64, device=model.device)
         u, outcome = self._solver.solve(start, poses, self._states, judged)
         self._outcome = outcome
@@ -289,13 +325,11 @@ class _Path:
 
     def _state(self) -> State:
         model, indenter = self._model, self._contacts[0]
-        traction = indenter.weights[None, :, :, None] * indenter.shear
         force = torch.zeros_like(self._u)
         poses = model._poses(self._request, self._depth)
         history = self._states[0]
         # The accepted state's own forces: friction starts from its history with no further motion.
         indenter.add_force(self._u, poses[0], history, force)
-        del traction
         taxel_force = np.zeros(model.sensor.taxels.count)
         if len(self._contacts) > 1:
             board = self._contacts[1]
@@ -304,6 +338,5 @@ class _Path:
             taxel_force = total.index_add_(0, model._taxel, loads).cpu().numpy()
         if self._outcome is None:
             raise SolveError("no state was solved", "at least one depth", "give depths")
-        return State(
-            self._u[0].cpu().numpy().copy(), self._outcome, -force[0].sum(dim=0).cpu().numpy(), taxel_force
-        )
+        u = self._u[0].cpu().numpy().copy()
+        return State(u, self._outcome, -force[0].sum(dim=0).cpu().numpy(), taxel_force, model.closure(u))

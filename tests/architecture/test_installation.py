@@ -8,9 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = (ROOT / "pyproject.toml").read_text()
-PINS = [
-    line for line in (ROOT / ".dev" / "constraints.txt").read_text().splitlines() if not line.startswith("#")
-]
+PINS = [line for line in (ROOT / ".dev" / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
 
 
 def canonical(name):
@@ -20,26 +18,18 @@ def canonical(name):
 def test_constraints_hold_names_and_versions_only():
     """No address of any index may be written down."""
     assert len(PINS) > 50
-    assert not [
-        line for line in PINS if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*==[A-Za-z0-9.!+]+", line)
-    ]
+    assert not [line for line in PINS if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*==[A-Za-z0-9.!+]+", line)]
 
 
 def test_every_dependency_is_pinned():
-    wanted = {
-        canonical(name) for name in re.findall(r'^    "([A-Za-z0-9._-]+)(?:\[[a-z]+\])?[><=~]', PROJECT, re.M)
-    }
+    wanted = {canonical(name) for name in re.findall(r'^    "([A-Za-z0-9._-]+)(?:\[[a-z]+\])?[><=~]', PROJECT, re.M)}
     assert len(wanted) > 20
     assert not wanted - {canonical(line.split("==")[0]) for line in PINS}
 
 
 def test_one_opencv():
     """Two distributions of different releases that both write cv2/ would mix (docs/decisions/0004)."""
-    found = {
-        d.metadata["Name"]: d.version
-        for d in distributions()
-        if d.metadata["Name"].lower().startswith("opencv")
-    }
+    found = {d.metadata["Name"]: d.version for d in distributions() if d.metadata["Name"].lower().startswith("opencv")}
     assert "opencv-contrib-python-headless" in found
     assert len(set(found.values())) == 1, found
 

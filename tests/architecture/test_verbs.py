@@ -54,9 +54,7 @@ def test_help_lists_every_verb_in_the_order_of_the_pipeline():
         env={"COLUMNS": "200", "TERM": "dumb"},
     ).stdout
     listed = [
-        verb
-        for verb in re.findall(r"^[│|\s]*([a-z][a-z-]*)\s{2,}\S", shown, re.M)
-        if verb.replace("-", "_") in VERBS
+        verb for verb in re.findall(r"^[│|\s]*([a-z][a-z-]*)\s{2,}\S", shown, re.M) if verb.replace("-", "_") in VERBS
     ]
     expected = sorted(VERBS, key=lambda name: (module(name).ORDER, module(name).__name__))
     pipeline = [name.replace("_", "-") for name in expected if module(name).PANEL == PIPELINE]
@@ -73,9 +71,7 @@ def test_the_pipeline_of_the_readme_exists():
 def test_starting_the_command_line_imports_nothing_heavy():
     code = "import sys; from tacdata import cli; cli.application(); print(*sys.modules)"
     loaded = set(
-        subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True
-        ).stdout.split()
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     )
     loaded = {module.split(".")[0] for module in loaded}
     assert "typer" in loaded

@@ -42,9 +42,7 @@ def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
         )
     try:
         deadline = time.monotonic() + 120
-        while (
-            "press 1 of 8" not in log.read_text() and process.poll() is None and time.monotonic() < deadline
-        ):
+        while "press 1 of 8" not in log.read_text() and process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.05)
         time.sleep(0.4)
         process.send_signal(signal.SIGINT)

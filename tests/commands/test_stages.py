@@ -53,6 +53,13 @@ def test_a_failure_carries_the_exit_code_of_its_verb(scripts):
     assert "nothing is lost" in str(caught.value)
 
 
+def test_a_tolerated_exit_code_is_shown_and_passed_over(scripts, capfd):
+    stages.Line(1, "").run("a", ["raise SystemExit(5)"], tolerated=5)
+    assert "exit code 5: going on" in capfd.readouterr().out
+    with pytest.raises(stages.StageError):
+        stages.Line(1, "").run("a", ["raise SystemExit(4)"], tolerated=5)
+
+
 def test_a_verb_killed_by_a_signal_counts_as_failed(scripts):
     with pytest.raises(stages.StageError) as caught:
         stages.Line(1, "").run("a", ["import os; os.kill(os.getpid(), 9)"])

@@ -1,6 +1,7 @@
 """One small model of each kind for the whole room; meshes go into a folder of the test run."""
 
 import pytest
+import warp as wp
 from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata.skin.mesher import MeshSettings
@@ -9,7 +10,8 @@ from tacdata.skin.press import ModelSettings, SkinModel
 
 @pytest.fixture(scope="session", autouse=True)
 def mesh_cache(tmp_path_factory):
-    """Keep meshes of the tests apart from the user's."""
+    """Keep meshes of the tests apart from the user's; start Warp."""
+    wp.init()
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
         patch.setenv("TACDATA_CACHE", str(folder))

@@ -1,3 +1,6 @@
+# Warp kernels are Python in form only; their operators have no types that pyright knows.
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Neo-Hookean, volumetric-isochoric split: W = mu/2 (I1bar - 3) + kappa/2 (J - 1)^2."""
 
 import warp as wp
@@ -7,6 +10,10 @@ from tacdata.skin.materials.law import Law
 
 Parameters = wp.types.vector(length=8, dtype=wp.float64)
 
+# Outside the functions: Warp would divide the literals in single precision.
+_THIRD = wp.constant(wp.float64(1.0 / 3.0))
+_POWER = wp.constant(wp.float64(-2.0 / 3.0))
+
 
 @wp.func
 def _energy(F: wp.mat33d, m: Parameters):
@@ -14,7 +21,7 @@ def _energy(F: wp.mat33d, m: Parameters):
     I1 = wp.ddot(F, F)
     one = wp.float64(1.0)
     return (
-        m[0] * wp.float64(0.5) * (wp.pow(J, wp.float64(-2.0 / 3.0)) * I1 - wp.float64(3.0))
+        m[0] * wp.float64(0.5) * (wp.pow(J, _POWER) * I1 - wp.float64(3.0))
         + m[1] * wp.float64(0.5) * (J - one) * (J - one)
     )
 
@@ -24,17 +31,17 @@ def _stress(F: wp.mat33d, m: Parameters):
     J = wp.determinant(F)
     G = wp.transpose(wp.inverse(F))
     I1 = wp.ddot(F, F)
-    s = m[0] * wp.pow(J, wp.float64(-2.0 / 3.0))
+    s = m[0] * wp.pow(J, _POWER)
     return s * F + (m[1] * (J - wp.float64(1.0)) * J - s * I1 / wp.float64(3.0)) * G
 
 
 @wp.func
 def _tangent(F: wp.mat33d, dF: wp.mat33d, m: Parameters):
-    third = wp.float64(1.0 / 3.0)
+    third = _THIRD
     J = wp.determinant(F)
     G = wp.transpose(wp.inverse(F))
     I1 = wp.ddot(F, F)
-    s = m[0] * wp.pow(J, wp.float64(-2.0 / 3.0))
+    s = m[0] * wp.pow(J, _POWER)
     g = wp.ddot(G, dF)
     dG = -(G * wp.transpose(dF) * G)
     p = m[1] * (J - wp.float64(1.0)) * J

