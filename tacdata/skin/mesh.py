@@ -12,6 +12,10 @@ from tacdata.errors import SolveError
 from tacdata.skin import elements
 
 
+_FLAT = 1e-6
+"""Jacobian determinant over the cube of the element's size at which it counts as without volume [1]."""
+
+
 @dataclass(frozen=True)
 class SkinMesh:
     """Stress-free skin in the sensor's frame. Corner nodes first in every element (`tacdata.skin.elements`)."""
@@ -65,8 +69,11 @@ class SkinMesh:
         slopes = elements.tetrahedron_gradients(points)
         jacobian = np.einsum("eai,qaj->eqij", self.nodes[self.tets], slopes)
         determinant = np.linalg.det(jacobian)
-        if determinant.min() <= 0:
-            worst = int(determinant.min(axis=1).argmin())
+        # Flat is flat also where rounding leaves a volume of 1e-17.
+        size = np.ptp(self.nodes[self.tets[:, :4]], axis=1).max(axis=1) ** 3
+        relative = determinant.min(axis=1) / size
+        if relative.min() <= _FLAT:
+            worst = int(relative.argmin())
             place = self.nodes[self.tets[worst, :4]].mean(axis=0).round(2).tolist()
             raise SolveError(
                 f"element {worst} at {place} mm has a Jacobian determinant of {determinant[worst].min():.2e} mm^3",

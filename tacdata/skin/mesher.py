@@ -41,7 +41,7 @@ The inner ring encloses the contact patch."""
 class MeshSettings:
     """Target edge lengths [mm]."""
 
-    outer: float = 0.8
+    outer: float = 0.6
     """At the outer face [mm]."""
     interior: float = 2.0
     """In the middle of the slab [mm]."""

@@ -28,7 +28,7 @@ def rest_stiffness(mesh: SkinMesh, material: Material) -> sp.csr_matrix:
     rows = np.repeat(dofs, 30, axis=1).ravel()
     columns = np.tile(dofs, (1, 30)).ravel()
     size = 3 * len(mesh.nodes)
-    return sp.coo_matrix((blocks.ravel(), (rows, columns)), shape=(size, size)).tocsr()
+    return sp.csr_matrix(sp.coo_matrix((blocks.ravel(), (rows, columns)), shape=(size, size)))
 
 
 class RestFactor:

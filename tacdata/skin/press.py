@@ -187,7 +187,11 @@ class SkinModel:
         if self.sensor.contact.board and len(self._bumps):
             weights, shapes = face_quadrature(self._nodes, self._bumps, 2)
             contacts.append(
-                Contact(self._nodes, self._bumps, weights, shapes, board_distance, (), 0.0, penalty, 0.0)
+                Contact(
+                    self._nodes, self._bumps, weights, shapes,
+                    board_distance,  # pyright: ignore[reportArgumentType]
+                    (), 0.0, penalty, 0.0,
+                )
             )
         return contacts
 

@@ -44,4 +44,5 @@ def load_law(name: str) -> Law:
     Raises:
         UsageError: If there is no such file.
     """
-    return registry.load(ROOM, BASE, name, Law)()
+    kind: type[Law] = registry.load(ROOM, BASE, name, Law)
+    return kind()
