@@ -21,8 +21,9 @@ from tacdata.sensor import default_sensor
 from tacdata.skin.mesher import MeshSettings
 from tacdata.skin.press import ModelSettings, PressRequest, SkinModel
 
-RUNGS = (MeshSettings(), MeshSettings(0.65, 1.6, 1.0), MeshSettings(0.5, 1.2, 0.5))
+RUNGS = (MeshSettings(outer=0.8), MeshSettings(), MeshSettings(outer=0.5, interior=1.2))
 DEPTHS = (0.25, 0.5, 0.75, 1.0)
+WIDTHS = (7, 8, 9, 7, 5, 7, 29, 29)
 
 
 def measure(mesh: MeshSettings) -> dict:
@@ -53,15 +54,18 @@ def main() -> None:
     torch.set_num_threads(1)
     rungs = [measure(mesh) for mesh in RUNGS[: arguments.rungs]]
     finest = rungs[-1]
-    print(f"{'nodes':>7} {'build s':>8} {'s/equil.':>9} {'Newton':>7} {'CG':>5} {'misfit %':>9} {'force off % at ' + str(DEPTHS):>34} {'map rms % of depth':>30}")
+    print(f"depths {DEPTHS} mm; force and map against the finest mesh, per cent")
+    heads = ("nodes", "build s", "s/equil.", "Newton", "CG", "misfit", "force", "map rms")
+    print(" ".join(f"{head:>{width}}" for head, width in zip(heads, WIDTHS, strict=True)))
     for rung in rungs:
         force = 100 * (rung["force"] / finest["force"] - 1)
         rms = 100 * np.sqrt(((rung["surface"] - finest["surface"]) ** 2).mean(axis=(1, 2))) / np.array(DEPTHS)
         rung["force_off_percent"], rung["map_rms_percent"] = force.tolist(), rms.tolist()
-        print(
-            f"{rung['nodes']:7d} {rung['build_s']:8.1f} {rung['s_per_equilibrium']:9.2f} {rung['newton']:7d} {rung['cg']:5d}"
-            f" {rung['largest_misfit_percent']:9.2f} {np.round(force, 2)!s:>34} {np.round(rms, 3)!s:>30}"
+        values = (
+            f"{rung['nodes']}", f"{rung['build_s']:.1f}", f"{rung['s_per_equilibrium']:.2f}", f"{rung['newton']}",
+            f"{rung['cg']}", f"{rung['largest_misfit_percent']:.2f}", str(np.round(force, 2)), str(np.round(rms, 3)),
         )
+        print(" ".join(f"{value:>{width}}" for value, width in zip(values, WIDTHS, strict=True)))
     if arguments.json:
         plain = [{k: v for k, v in rung.items() if not isinstance(v, np.ndarray)} for rung in rungs]
         arguments.json.write_text(json.dumps(plain, indent=1) + "\n")

@@ -15,7 +15,7 @@ class Ladder:
 
     first_step: float = 0.05
     """Step next to zero depth [mm]: contact grows fastest there, so the map bends most."""
-    growth: float = 2.0
+    growth: float = 1.6
     """Ratio of one step to the step before [1]."""
     load_step: float = 0.25
     """Largest step while loading [mm]."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -63,7 +65,7 @@ def run(
 
 
 class _Bars:
-    """One bar a stage, with the time that remains."""
+    """One bar a stage, with the time that remains; a line a press where there is no terminal."""
 
     def __enter__(self) -> _Bars:
         from rich.progress import (
@@ -85,8 +87,10 @@ class _Bars:
             TimeRemainingColumn(elapsed_when_finished=False),
             speed_estimate_period=24 * 3600.0,
         )
-        self._progress.start()
+        if sys.stdout.isatty():
+            self._progress.start()
         self._tasks: dict = {}
+        self._began = time.monotonic()
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -98,6 +102,9 @@ class _Bars:
         if stage not in self._tasks:
             self._tasks[stage] = self._progress.add_task(names[stage], total=total)
         self._progress.update(self._tasks[stage], completed=done)
+        if not sys.stdout.isatty() and stage == "solve" and done:
+            left = (time.monotonic() - self._began) * (total - done) / done
+            print(f"  press {done} of {total} solved, about {left:.0f} s left", flush=True)
 
 
 def _report(summary: Summary, labels: Path, session: Path) -> None:

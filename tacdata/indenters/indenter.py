@@ -118,7 +118,7 @@ class Indenter(ABC):
         return x, y
 
     def footprint(self, depth: float, yaw: float) -> tuple[float, float]:
-        """Return how far the part below ``depth`` [mm] reaches from the axis along x and y [mm], turned by ``yaw`` [deg]."""
+        """Return how far the part below ``depth`` [mm] reaches along x and y [mm], turned by ``yaw`` [deg]."""
         x, y = self._grid()
         within = self.profile(x, y) <= depth
         if not within.any():

@@ -11,7 +11,6 @@ import numpy as np
 from tacdata.errors import SolveError
 from tacdata.skin import elements
 
-
 _FLAT = 1e-6
 """Jacobian determinant over the cube of the element's size at which it counts as without volume [1]."""
 

@@ -276,6 +276,7 @@ class _Path:
         self._depth, self._step = 0.0, 0.0
         self._u = torch.zeros(1, *model.mesh.nodes.shape, dtype=torch.float64, device=model.device)
         self._rate = torch.zeros_like(self._u)
+        self._loaded = [(0.0, self._u)]
         poses = model._poses(request, 0.0)
         self._states = [contact.start(pose) for contact, pose in zip(contacts, poses, strict=False)]
         for contact, state, pose in zip(contacts, self._states, poses, strict=False):
@@ -303,12 +304,26 @@ class _Path:
                 )
         return self._state()
 
+    def _guess(self, depth: float) -> torch.Tensor:
+        """Return where to start [mm], (1, n, 3): along the last rate, or on the way back where loading passed."""
+        if depth >= self._loaded[-1][0]:
+            return self._u + self._rate * (depth - self._depth)
+        return self._on_loading(depth) + (self._u - self._on_loading(self._depth))
+
+    def _on_loading(self, depth: float) -> torch.Tensor:
+        """Interpolate the states passed while loading, [mm] (1, n, 3)."""
+        depths = [passed for passed, _ in self._loaded]
+        after = min(max(int(np.searchsorted(depths, depth)), 1), len(depths) - 1)
+        (low, u_low), (high, u_high) = self._loaded[after - 1], self._loaded[after]
+        share = (depth - low) / (high - low)
+        return u_low + share * (u_high - u_low)
+
     def _try(self, depth: float) -> bool:
         """Attempt one step; keeps the history unchanged where it fails."""
         model = self._model
         poses = model._poses(self._request, depth)[: len(self._contacts)]
         saved = [state.multiplier.clone() for state in self._states]
-        start = self._u + self._rate * (depth - self._depth)
+        start = self._guess(depth)
         if float(model.smallest_volume_ratio(start)) < 0.3:
             start = self._u
         judged = torch.tensor([max(depth, 0.1)], dtype=torch.float64, device=model.device)
@@ -323,6 +338,8 @@ class _Path:
             self._rate = torch.zeros_like(u) if turning else (u - self._u) / (depth - self._depth)
             self._step = depth - self._depth
         self._u, self._depth = u, depth
+        if depth > self._loaded[-1][0]:
+            self._loaded.append((depth, u))
         for contact, state, pose in zip(self._contacts, self._states, poses, strict=True):
             contact.accept(state, pose)
         return True
