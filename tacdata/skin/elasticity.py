@@ -17,6 +17,7 @@ from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
 
 wp.config.log_level = wp.LOG_ERROR
+wp.init()
 Parameters = wp.types.vector(length=8, dtype=wp.float64)
 
 

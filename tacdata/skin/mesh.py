@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -85,8 +86,8 @@ class SkinMesh:
     def save(self, path: Path) -> None:
         """Write the mesh as an NPZ file; beside, then renamed."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.{id(self)}.npz")
-        np.savez(temporary, **{f.name: getattr(self, f.name) for f in fields(self)})
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.npz")
+        np.savez_compressed(temporary, **{f.name: getattr(self, f.name) for f in fields(self)})
         temporary.replace(path)
 
     @classmethod

@@ -21,8 +21,11 @@ from tacdata.sensor import Sensor
 from tacdata.skin import elements
 from tacdata.skin.mesh import SkinMesh
 
-RECIPE = 1
+RECIPE = 2
 """Raised when this file would make another mesh from the same settings."""
+
+PINNED = Path(__file__).parent / "meshes"
+"""Meshes that ship with the model; made by `python -m tacdata.skin.pin_mesh`."""
 
 _SNAP = 0.1
 """Distance within which a surface vertex belongs to a plane [mm]; above fTetWild's envelope."""
@@ -30,6 +33,12 @@ _SNAP = 0.1
 _SNAP_SPHERE = 0.25
 """The same for a protrusion, over its radius [1]; above the sagitta of `_RINGS`."""
 
+
+_SLIVER = 0.02
+"""Share of its volume that an element must keep when its corners go to the true faces [1]."""
+
+_VOLUME = 0.03
+"""Share of the skin's volume that a mesh may lose or gain; coarse protrusions lose 1 % of a small skin [1]."""
 
 _RINGS = ((30.0, 6, 0.0), (90.0, 8, 0.5))
 """Rings of vertices on a protrusion: polar angle from the tip [deg], vertices, turn [vertices].
@@ -54,21 +63,38 @@ class MeshSettings:
 
 
 def build_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
-    """Return the mesh of a sensor's skin, from the cache if it was made before.
+    """Return the mesh of a sensor's skin: the one that ships with the model, one made before, or a new one.
+
+    fTetWild does not give the same mesh twice. So the default sensor's mesh ships with the model, that labels are the
+    same on every machine; any other is made once for each user and kept.
 
     Raises:
         SolveError: If the geometry cannot be meshed.
     """
-    key = provenance.content_hash(
-        {"recipe": RECIPE, "skin": asdict(sensor.skin), "taxels": asdict(sensor.taxels), "settings": asdict(settings)}
-    )
-    path = _cache() / "meshes" / f"{key[:32]}.npz"
-    if path.exists():
-        return SkinMesh.load(path)
-    vertices, tets = _tetrahedralize(sensor, settings)
-    mesh = quadratic(sensor, vertices, tets)
+    key = mesh_key(sensor, settings)
+    for path in (PINNED / f"{key}.npz", _cache() / "meshes" / f"{key}.npz"):
+        if path.exists():
+            return SkinMesh.load(path)
+    mesh = make_mesh(sensor, settings)
     mesh.save(path)
-    return mesh
+    # Where two processes made it at once, the last to write decides for both.
+    return SkinMesh.load(path)
+
+
+def mesh_key(sensor: Sensor, settings: MeshSettings) -> str:
+    """Return the name under which a mesh is kept: a hash of what it is made from (32 hex digits)."""
+    centers = sensor.taxels.centers.tolist() if sensor.skin.protrusion_radius else []
+    made_from = {"recipe": RECIPE, "skin": asdict(sensor.skin), "protrusions": centers, "settings": asdict(settings)}
+    return provenance.content_hash(made_from)[:32]
+
+
+def make_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
+    """Mesh a sensor's skin anew.
+
+    Raises:
+        SolveError: If the geometry cannot be meshed.
+    """
+    return quadratic(sensor, *_tetrahedralize(sensor, settings))
 
 
 def _cache() -> Path:
@@ -169,9 +195,20 @@ def quadratic(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> SkinMes
     vertices, tets = vertices[used].copy(), tets.reshape(-1, 4)
     flip = _volume(vertices, tets) < 0
     tets[flip] = tets[flip][:, [0, 2, 1, 3]]
-    faces = _boundary(tets)
     skin = sensor.skin
-    vertices, on_sphere, taxel = _snap(sensor, vertices, np.unique(faces))
+    for _ in range(5):
+        faces = _boundary(tets)
+        surface_vertices = np.unique(faces)
+        snapped, on_sphere, taxel = _snap(sensor, vertices, surface_vertices)
+        flat = _volume(snapped, tets) < _SLIVER * _volume(vertices, tets)
+        # A tetrahedron with all corners on one true face has no volume left: the face passes under it.
+        drop = flat & np.isin(tets, surface_vertices).all(axis=1)
+        if not flat.any():
+            break
+        _center(vertices, snapped, tets, np.setdiff1d(tets[flat & ~drop], surface_vertices))
+        tets = tets[~drop]
+    vertices = snapped
+    _check_volume(sensor, float(_volume(vertices, tets).sum()))
     edges, inverse = np.unique(
         np.sort(tets[:, elements.EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True
     )
@@ -201,6 +238,27 @@ def quadratic(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> SkinMes
     flat = np.all(np.abs(z) < tolerance, axis=1)
     bottom[six(faces[flat]).ravel()] = True
     return SkinMesh(nodes, tet10, outer, bumps, bump_taxel, sides, bottom)
+
+
+def _check_volume(sensor: Sensor, found: float) -> None:
+    """Refuse a mesh that lost part of the skin; ``found`` is its volume by corners [mm^3]."""
+    skin = sensor.skin
+    true = skin.size_x * skin.size_y * skin.thickness
+    if skin.protrusion_radius:
+        true += sensor.taxels.count * 2 / 3 * np.pi * skin.protrusion_radius**3
+    if abs(found - true) > _VOLUME * true:
+        raise SolveError(
+            f"the mesh holds {found:.3g} mm^3, the skin {true:.3g} mm^3: faces closer than {_SNAP:g} mm collapsed",
+            f"a volume within {100 * _VOLUME:g} %",
+            f"check the skin's sizes (all above {2 * _SNAP:g} mm), or choose a smaller element size",
+        )
+
+
+def _center(vertices: np.ndarray, snapped: np.ndarray, tets: np.ndarray, inner: np.ndarray) -> None:
+    """Move inner vertices, whose elements the snapped surface has flattened, to the mean of their neighbours."""
+    for vertex in inner:
+        around = np.setdiff1d(tets[(tets == vertex).any(axis=1)], [vertex])
+        vertices[vertex] = snapped[around].mean(axis=0)
 
 
 def _volume(vertices: np.ndarray, tets: np.ndarray) -> np.ndarray:

@@ -8,11 +8,12 @@ import torch
 from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata.errors import SolveError
+from tacdata.sensor import default_sensor
 from tacdata.sensor.sensor import Contact, Skin
 from tacdata.skin import elements
 from tacdata.skin.contact import face_quadrature
 from tacdata.skin.mesh import SkinMesh, quality
-from tacdata.skin.mesher import MeshSettings, build_mesh, surface
+from tacdata.skin.mesher import PINNED, MeshSettings, build_mesh, make_mesh, mesh_key, surface
 from tacdata.skin.press import ModelSettings, SkinModel
 
 
@@ -124,18 +125,28 @@ def test_the_surface_given_to_the_mesher_is_closed():
     assert surface(bumps_sensor()).is_watertight
 
 
-@pytest.mark.parametrize(
-    ("skin", "complaint"),
-    [(Skin(6.0, 6.0, 0.05, 0.0), "Jacobian determinant"), (Skin(3.4, 3.4, 2.0, 0.7), "flat after snapping")],
-    ids=["thinner than an element", "protrusions touching the rim"],
-)
-def test_geometry_that_cannot_be_meshed_is_refused_with_its_place(skin, complaint):
-    sensor = replace(bumps_sensor(), skin=skin)
-    if not skin.protrusion_radius:
-        sensor = replace(slab_sensor(), skin=skin)
-    with pytest.raises(SolveError, match=complaint) as failure:
+def test_a_skin_whose_faces_collapse_is_refused_with_its_volume():
+    sensor = replace(slab_sensor(), skin=Skin(6.0, 6.0, 0.05, 0.0))
+    with pytest.raises(SolveError, match=r"the skin 1.8 mm\^3") as failure:
         SkinModel(sensor, ModelSettings(mesh=MeshSettings(outer=0.9, interior=1.5)))
-    assert "mm" in failure.value.given and "element size" in failure.value.remedy
+    assert "element size" in failure.value.remedy
+
+
+def test_protrusions_finer_than_their_rings_are_meshed_without_slivers():
+    mesh = make_mesh(bumps_sensor(), MeshSettings(outer=0.9, interior=1.2, protrusion=0.35))
+    assert quality(mesh).worst_ratio > 0.01
+    assert np.bincount(mesh.protrusion_taxel).min() > 10
+    _, weights = mesh.shape_gradients()
+    sensor = bumps_sensor()
+    true = sensor.skin.size_x * sensor.skin.size_y * sensor.skin.thickness
+    true += sensor.taxels.count * 2 / 3 * np.pi * sensor.skin.protrusion_radius**3
+    assert weights.sum() == pytest.approx(true, rel=1e-3)
+
+
+def test_the_default_mesh_ships_with_the_model():
+    key = mesh_key(default_sensor(), MeshSettings())
+    assert [path.stem for path in PINNED.glob("*.npz")] == [key]
+    assert quality(build_mesh(default_sensor(), MeshSettings())).worst_ratio > 0.1
 
 
 def test_an_inverted_element_is_named_with_its_place(slab):
