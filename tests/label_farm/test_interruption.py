@@ -71,8 +71,9 @@ def test_two_runs_on_one_store_share_the_work(tmp_path, solves, monkeypatch):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_run_that_is_stopped_goes_on_where_it_stood(tmp_path, label_all, solves, monkeypatch, how):
-    monkeypatch.setenv("FAST_MODEL_SECONDS", "0.25")
-    run = start(tmp_path, 6)
+    count = 16
+    monkeypatch.setenv("FAST_MODEL_SECONDS", "0.5")
+    run = start(tmp_path, count)
     wait_for(lambda: labels_in(tmp_path))
     workers = {int(process) for process, _ in solves()}
     run.send_signal(how)
@@ -81,9 +82,9 @@ def test_a_run_that_is_stopped_goes_on_where_it_stood(tmp_path, label_all, solve
     wait_for(lambda: not any(alive(worker) for worker in workers))
     kept = {p: p.read_bytes() for p in (tmp_path / "labels").glob("*.parquet")}
     results = len(list((tmp_path / "labels" / "store").rglob("*.npz")))
-    assert 0 < len(kept) <= results < 6
+    assert 0 < len(kept) <= results < count
     begun = len(solves())
-    summary = label_all(episodes(tmp_path, 6))
-    assert labels_in(tmp_path) == list(range(6)) and not summary.failed
-    assert len(solves()) - begun == 6 - results, "only what was not finished is computed"
+    summary = label_all(episodes(tmp_path, count))
+    assert labels_in(tmp_path) == list(range(count)) and not summary.failed
+    assert len(solves()) - begun == count - results, "only what was not finished is computed"
     assert all(path.read_bytes() == content for path, content in kept.items())
