@@ -1,4 +1,11 @@
-"""One small model of each kind for the whole room; meshes go into a folder of the test run."""
+"""One small model of each kind for the whole room; meshes go into a folder of the test run.
+
+The models' meshes lie in `meshes/`: fTetWild never gives the same one twice, and figures should not scatter. When
+`tacdata.skin.mesher.RECIPE` changes they are no longer found and are made anew at every run: replace them then.
+"""
+
+import shutil
+from pathlib import Path
 
 import pytest
 import warp as wp
@@ -14,6 +21,7 @@ def mesh_cache(tmp_path_factory):
     wp.init()
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
+        shutil.copytree(Path(__file__).parent / "meshes", folder / "meshes")
         patch.setenv("TACDATA_CACHE", str(folder))
         yield folder
 
