@@ -1,5 +1,18 @@
 """The sensor description: one versioned file says everything about a taxel skin."""
 
-from tacdata.sensor.sensor import Contact, DepthMap, Material, Sensor, Skin, Taxels, default_sensor, read_sensor
+from tacdata.sensor.material import Material, PronyTerm
+from tacdata.sensor.sensor import Contact, DepthMap, Sensor, Skin, Taxels, default_sensor, read_sensor
+from tacdata.sensor.transduction import Transduction
 
-__all__ = ["Contact", "DepthMap", "Material", "Sensor", "Skin", "Taxels", "default_sensor", "read_sensor"]
+__all__ = [
+    "Contact",
+    "DepthMap",
+    "Material",
+    "PronyTerm",
+    "Sensor",
+    "Skin",
+    "Taxels",
+    "Transduction",
+    "default_sensor",
+    "read_sensor",
+]

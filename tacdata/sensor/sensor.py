@@ -13,6 +13,9 @@ import yaml
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import FormatError
+from tacdata.sensor.material import Material
+from tacdata.sensor.skin import Skin
+from tacdata.sensor.transduction import Transduction
 
 
 @dataclass(frozen=True)
@@ -44,51 +47,25 @@ class Taxels:
 
 
 @dataclass(frozen=True)
-class Skin:
-    """Stress-free geometry: a slab from z = 0 to z = thickness, hemispheres hanging below z = 0 over the taxels."""
-
-    size_x: float
-    """Footprint along x [mm]."""
-    size_y: float
-    """Footprint along y [mm]."""
-    thickness: float
-    """Slab thickness [mm]; the outer face is z = thickness."""
-    protrusion_radius: float = 0.0
-    """Radius of the hemispheres [mm]; 0 for a plain slab."""
-
-
-@dataclass(frozen=True)
-class Material:
-    """Elastic constants and the law that they enter."""
-
-    law: str
-    """File name in tacdata/skin/materials."""
-    youngs_modulus: float
-    """Young's modulus E [MPa]."""
-    poisson_ratio: float
-    """Poisson's ratio nu [1]."""
-
-    @property
-    def shear_modulus(self) -> float:
-        """Shear modulus mu = E / 2(1 + nu) [MPa]."""
-        return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
-
-    @property
-    def bulk_modulus(self) -> float:
-        """Bulk modulus kappa = E / 3(1 - 2 nu) [MPa]."""
-        return self.youngs_modulus / (3 * (1 - 2 * self.poisson_ratio))
-
-
-@dataclass(frozen=True)
 class Contact:
     """What touches and holds the skin."""
 
     friction: float
     """Coulomb coefficient between indenter and skin [1]."""
     bonded: tuple[str, ...]
-    """Faces that are fixed to the support: "sides", "bottom"."""
+    """What is fixed to the support: "sides", "bottom" (the underside between protrusions), "rim" (its border)."""
     board: bool = False
-    """True if a rigid board at z = -protrusion_radius carries the protrusions (unilateral)."""
+    """True if a rigid board at the protrusions' tips (z = -skin.protrusion_tip) carries them (unilateral)."""
+    rim_width: float = 1.0
+    """Width of the underside's border that "rim" fixes [mm]."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The contact as its part of the sensor's document; a width that nothing uses is left out."""
+        values: dict[str, Any] = {**asdict(self), "bonded": list(self.bonded)}
+        if "rim" not in self.bonded:
+            del values["rim_width"]
+        return values
 
 
 @dataclass(frozen=True)
@@ -103,6 +80,13 @@ class DepthMap:
     """Side of a pixel [mm]."""
     depth_max: float
     """D_max of the label scaling [mm]."""
+    sampling: str = "point"
+    """How a pixel gets its value: "point" (at its centre) or "area" (mean over its square)."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The map as its part of the sensor's document; sampling is left out where it is the usual one."""
+        return {k: v for k, v in asdict(self).items() if (k, v) != ("sampling", "point")}
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -133,18 +117,24 @@ class Sensor:
     assumptions: dict[str, str]
     """Field path -> why the value is an assumption."""
     source: str = ""
+    transduction: Transduction | None = None
+    """From loads of protrusions to counts; None if the file says nothing of it."""
 
     @property
     def document(self) -> dict[str, Any]:
         """The sensor as its file's document (`schemas/sensor.schema.json`)."""
-        document = {"version": schemas.version("sensor"), **asdict(self)}
-        document["contact"]["bonded"] = list(self.contact.bonded)
+        document = {"version": schemas.version("sensor"), **asdict(self), "material": self.material.document}
+        del document["transduction"]
+        if self.transduction:
+            document["transduction"] = self.transduction.document
+        for name in ("skin", "contact", "map"):
+            document[name] = getattr(self, name).document
         return document
 
     @property
     def content_hash(self) -> str:
-        """Hash of every value that can change a result; names and remarks do not count."""
-        document = self.document
+        """Hash of every value that can change a label; names, remarks and the transduction do not count."""
+        document = {**self.document, "skin": self.skin.identity}
         return provenance.content_hash({k: document[k] for k in ("taxels", "skin", "material", "contact", "map")})
 
     @classmethod
@@ -161,11 +151,16 @@ class Sensor:
             name=document["name"],
             taxels=Taxels(**document["taxels"]),
             skin=Skin(**document["skin"]),
-            material=Material(**document["material"]),
+            material=Material.from_document(document["material"], origin),
             contact=Contact(**contact),
             map=DepthMap(**document["map"]),
             assumptions=dict(document["assumptions"]),
             source=document.get("source", ""),
+            transduction=(
+                Transduction.from_document(document["transduction"], Taxels(**document["taxels"]).count, origin)
+                if "transduction" in document
+                else None
+            ),
         )
         _check_consistency(sensor, origin)
         return sensor
@@ -190,13 +185,30 @@ def _check_consistency(sensor: Sensor, origin: str) -> None:
                 f"a radius of at most {pitch / 2:g} mm",
                 "reduce skin/protrusion_radius",
             )
-    if not sensor.contact.bonded and not sensor.contact.board:
+    skin.check(origin, sensor.contact.board)
+    _check_contact(sensor, origin)
+
+
+def _check_contact(sensor: Sensor, origin: str) -> None:
+    contact = sensor.contact
+    if not contact.bonded and not contact.board:
         raise FormatError(
             f"{origin}: nothing holds the skin (no bonded face, no board)",
             "at least one bonded face, or a board",
             "set contact/bonded or contact/board",
         )
-    if sensor.contact.board and not skin.protrusion_radius:
+    if contact.board and "bottom" in contact.bonded:
+        raise FormatError(
+            f"{origin}: contact/bonded holds the underside in place and contact/board lets the protrusions carry it",
+            "a bonded bottom or a board, not both", "take bottom out of contact/bonded, or set contact/board: false",
+        )
+    smallest = min(sensor.skin.size_x, sensor.skin.size_y) / 2
+    if "rim" in contact.bonded and contact.rim_width >= smallest:
+        raise FormatError(
+            f"{origin}: contact/rim_width {contact.rim_width:g} mm covers the whole underside",
+            f"less than {smallest:g} mm", "reduce contact/rim_width, or bond the bottom",
+        )
+    if contact.board and not sensor.skin.protrusion_radius:
         raise FormatError(
             f"{origin}: a board carries protrusions, and protrusion_radius is 0 mm",
             "a positive protrusion_radius with a board, or board: false",

@@ -1,52 +1,62 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
 # pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Neo-Hookean, coupled logarithmic form: W = mu/2 (I1 - 3) - mu ln J + lambda/2 (ln J)^2."""
+
+from dataclasses import dataclass
+from functools import cache
 
 import warp as wp
 
-from tacdata.sensor import Material
-from tacdata.skin.materials.law import Law
-
-Parameters = wp.types.vector(length=8, dtype=wp.float64)
-
-
-@wp.func
-def _energy(F: wp.mat33d, m: Parameters):
-    half = wp.float64(0.5)
-    L = wp.log(wp.determinant(F))
-    return m[0] * half * (wp.ddot(F, F) - wp.float64(3.0)) - m[0] * L + m[1] * half * L * L
+from tacdata.skin.constitutive import kinematics, scalars
+from tacdata.skin.materials.law import Law, LawFunctions
+from tacdata.skin.materials.neo_hookean import NeoHookean
 
 
-@wp.func
-def _stress(F: wp.mat33d, m: Parameters):
-    G = wp.transpose(wp.inverse(F))
-    return m[0] * (F - G) + m[1] * wp.log(wp.determinant(F)) * G
-
-
-@wp.func
-def _tangent(F: wp.mat33d, dF: wp.mat33d, m: Parameters):
-    G = wp.transpose(wp.inverse(F))
-    dG = -(G * wp.transpose(dF) * G)
-    L = wp.log(wp.determinant(F))
-    return m[0] * (dF - dG) + m[1] * (wp.ddot(G, dF) * G + L * dG)
-
-
+@dataclass(frozen=True)
 class NeoHookeanLog(Law):
-    """The textbook form (Bonet and Wood 2008, eq. 6.27)."""
+    """The textbook form (Bonet and Wood 2008, eq. 6.27); its isochoric part is that of the split form."""
 
-    def parameters(self, material: Material) -> tuple[float, ...]:
+    def numbers(self, shear_modulus: float, bulk_modulus: float) -> tuple[float, ...]:
         """Return mu and lambda = kappa - 2 mu / 3 [MPa]."""
-        return material.shear_modulus, material.bulk_modulus - 2 * material.shear_modulus / 3
+        return shear_modulus, bulk_modulus - 2 * shear_modulus / 3
 
-    def energy_function(self) -> wp.Function:
-        """Return W."""
-        return _energy
+    @staticmethod
+    @cache
+    def functions(real: type) -> LawFunctions:
+        """Return W, P = mu (F - F^-T) + lambda ln J F^-T, and dP."""
+        mat33, numbers = kinematics.matrix(real), kinematics.parameters(real)
+        volume, split = kinematics.volume(real), NeoHookean.functions(real)
+        cofactor_change, volume_change = volume.cofactor_change, volume.change
+        cross, shifted = volume.cross, volume.shifted
+        log1p_ratio, exp_excess = scalars.log1p_ratio(real), scalars.exp_excess(real)
 
-    def stress_function(self) -> wp.Function:
-        """Return P = mu (F - F^-T) + lambda ln J F^-T."""
-        return _stress
+        @wp.func
+        def energy(H: mat33, m: numbers):
+            half = real(0.5)
+            j = volume_change(H, cofactor_change(H))
+            L = j * log1p_ratio(j)
+            # (I1 - 3)/2 - ln J = tr H + H:H/2 - ln J by terms of second order: tr H = j - tr cof H - det H
+            t, sym = wp.trace(H), half * (H + wp.transpose(H))
+            minors = wp.ddot(sym, sym) - half * t * t - wp.determinant(H)
+            return m[0] * (minors + exp_excess(L)) + half * m[1] * L * L
 
-    def tangent_function(self) -> wp.Function:
-        """Return dP."""
-        return _tangent
+        @wp.func
+        def stress(H: mat33, m: numbers):
+            K = cofactor_change(H)
+            j = volume_change(H, K)
+            J = real(1.0) + j
+            # F - F^-T = (j I + J H - K) / J
+            return (m[0] * shifted(J * H - K, j) + m[1] * j * log1p_ratio(j) * shifted(K, real(1.0))) / J
+
+        @wp.func
+        def tangent(H: mat33, dF: mat33, m: numbers):
+            K = cofactor_change(H)
+            j = volume_change(H, K)
+            J = real(1.0) + j
+            G = shifted(K, real(1.0)) / J
+            g = wp.ddot(G, dF)
+            dG = cross(shifted(H, real(1.0)), dF) / J - g * G
+            return m[0] * (dF - dG) + m[1] * (g * G + j * log1p_ratio(j) * dG)
+
+        return LawFunctions(energy, stress, tangent, split.isochoric_stress, split.isochoric_tangent)

@@ -1,0 +1,135 @@
+"""The skin's stress-free geometry as data, with the few formulas that follow from it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+
+_OPTIONAL = {"protrusion_height": None, "curvature_radius_x": 0.0, "curvature_radius_y": 0.0, "underside": "bent"}
+"""Fields that a document leaves out where they say nothing, so that files and hashes of format 1.0 stay."""
+
+_LEAST = 0.2
+"""Thickness at the rim of a curved pad with a flat underside, over `thickness`, below which it is refused [1]."""
+
+
+@dataclass(frozen=True)
+class Skin:
+    """Stress-free geometry: a slab from z = 0 to z = thickness, protrusions hanging below z = 0 under the taxels.
+
+    A curved pad is that slab bent, its outer face convex; the outer face keeps its rectangle in plan.
+    """
+
+    size_x: float
+    """Footprint along x [mm]."""
+    size_y: float
+    """Footprint along y [mm]."""
+    thickness: float
+    """Slab thickness at the centre [mm]; the outer face is z = thickness there."""
+    protrusion_radius: float = 0.0
+    """Radius of a protrusion's foot [mm]; 0 for a plain slab."""
+    protrusion_height: float | None = None
+    """How far protrusions reach below z = 0 [mm]; None: the radius (hemispheres). Lower ones are spherical caps,
+    higher ones cylinders with a hemispherical end."""
+    curvature_radius_x: float = 0.0
+    """Radius of the outer face in the xz plane [mm]; 0 for straight."""
+    curvature_radius_y: float = 0.0
+    """Radius of the outer face in the yz plane [mm]; 0 for straight. Two equal radii make a sphere's cap."""
+    underside: str = "bent"
+    """Of a curved pad: "bent" (constant thickness along the normal) or "flat" (z = 0, thinner towards the rim)."""
+
+    @property
+    def protrusion_tip(self) -> float:
+        """How far the protrusions' tips lie below z = 0 [mm]; a board touches them at z = -protrusion_tip."""
+        return self.protrusion_radius if self.protrusion_height is None else self.protrusion_height
+
+    @property
+    def curved(self) -> bool:
+        """True if the outer face is no plane."""
+        return bool(self.curvature_radius_x or self.curvature_radius_y)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The skin as its part of the sensor's document."""
+        values = asdict(self)
+        return {k: v for k, v in values.items() if k not in _OPTIONAL or v != _OPTIONAL[k]}
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What of the document decides a mesh or a label."""
+        return self.document
+
+    def outer_height(self, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
+        """Return the height z of the undeformed outer face [mm] at (x, y) [mm], like the arguments in shape."""
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        rx, ry = self.curvature_radius_x, self.curvature_radius_y
+        if rx and ry:
+            return self.thickness - ry + np.sqrt(self._tube(x) ** 2 - y**2)
+        across, radius = (x, rx) if rx else (y, ry)
+        if not radius:
+            return np.full(np.broadcast(x, y).shape, self.thickness)
+        return self.thickness - radius + np.sqrt(radius**2 - across**2) + 0 * (x + y)
+
+    def outer_normal(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the unit normal of the undeformed outer face [1], shape (n, 3), at (x, y) [mm], each (n,)."""
+        rx, ry = self.curvature_radius_x, self.curvature_radius_y
+        if rx and ry:
+            sine = y / self._tube(x)
+            up = np.sqrt(rx**2 - x**2)
+            return np.stack([x, up * sine, up * np.sqrt(1 - sine**2)], axis=-1) / rx
+        if rx:
+            return np.stack([x, 0 * x, np.sqrt(rx**2 - x**2)], axis=-1) / rx
+        if ry:
+            return np.stack([0 * y, y, np.sqrt(ry**2 - y**2)], axis=-1) / ry
+        return np.broadcast_to([0.0, 0.0, 1.0], (*np.shape(x), 3)).copy()
+
+    def _tube(self, x: np.ndarray) -> np.ndarray:
+        """Distance of the outer face from the axis along x about which its arc in the xz plane is swept [mm]."""
+        return self.curvature_radius_y - self.curvature_radius_x + np.sqrt(self.curvature_radius_x**2 - x**2)
+
+    def check(self, origin: str, board: bool) -> None:
+        """Refuse geometry that contradicts itself; ``origin`` names the file.
+
+        Raises:
+            FormatError: Naming the field.
+        """
+        if self.protrusion_height is not None and not self.protrusion_radius:
+            raise FormatError(
+                f"{origin}: skin/protrusion_height {self.protrusion_height:g} mm with protrusion_radius 0 mm",
+                "a height only with a positive protrusion_radius", "set skin/protrusion_radius or remove the height",
+            )
+        if not self.curved:
+            return
+        if board and self.underside != "flat":
+            raise FormatError(
+                f"{origin}: a flat board under a pad whose underside is bent touches no more than its lowest protrusions",
+                "underside: flat with a board, or board: false", "set skin/underside: flat or contact/board: false",
+            )
+        self._check_bend(origin)
+
+    def _check_bend(self, origin: str) -> None:
+        rx, ry = self.curvature_radius_x, self.curvature_radius_y
+        for axis, radius, half in (("x", rx, self.size_x / 2), ("y", ry, self.size_y / 2)):
+            deepest = self.thickness + self.protrusion_tip if self.underside == "bent" else 0.0
+            least = max(1.05 * half, 1.25 * deepest)
+            if radius and radius < least:
+                raise FormatError(
+                    f"{origin}: skin/curvature_radius_{axis} {radius:g} mm, the skin is {2 * half:g} mm wide and "
+                    f"{self.thickness:g} mm thick", f"at least {least:g} mm, or 0 for straight",
+                    f"enlarge skin/curvature_radius_{axis}, or make the skin narrower or thinner",
+                )
+        hx, hy = self.size_x / 2, self.size_y / 2
+        if rx and ry and float(self._tube(np.array(hx))) <= 1.05 * hy:
+            raise FormatError(
+                f"{origin}: radii {rx:g} and {ry:g} mm leave no outer face over the corners of {self.size_x:g} x "
+                f"{self.size_y:g} mm", "larger radii or a smaller skin", "enlarge skin/curvature_radius_x and _y",
+            )
+        left = float(self.outer_height(hx, hy))
+        if self.underside == "flat" and left < _LEAST * self.thickness:
+            raise FormatError(
+                f"{origin}: the outer face falls to z = {left:.2f} mm at the skin's corners, the underside is flat",
+                f"at least {_LEAST * self.thickness:g} mm left", "enlarge the radii or skin/thickness, or bend the underside",
+            )
