@@ -1,0 +1,153 @@
+"""Estimate a camera's intrinsics from images of a ChArUco board, or draw the board."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+if TYPE_CHECKING:
+    from tacdata.tags.board import Board
+    from tacdata.tags.view_picker import ViewPicker
+
+ORDER = 104
+PANEL = TOOLS
+
+
+def run(
+    board: Annotated[Path, typer.Option(help="Board file (YAML); with --draw it is written and must not exist.")],
+    source: Annotated[str | None, typer.Option(help="Folder of images, video, camera index or stream URL.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Calibration to write (YAML), with a picture beside it.")] = None,
+    draw: Annotated[Path | None, typer.Option(help="Draw a board to print here (.pdf or .png) and stop.")] = None,
+    columns: Annotated[int, typer.Option(help="Squares across, with --draw.")] = 11,
+    rows: Annotated[int, typer.Option(help="Squares down, with --draw.")] = 7,
+    square: Annotated[float, typer.Option(help="Side of a square [mm], with --draw.")] = 24.0,
+    marker: Annotated[float, typer.Option(help="Side of a marker [mm], with --draw.")] = 17.0,
+    dictionary: Annotated[str, typer.Option(help="Dictionary of the markers, with --draw.")] = "5X5_100",
+    paper: Annotated[str, typer.Option(help="a4, a3 or letter, with --draw.")] = "a4",
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT [px] asked of a live camera.")] = "1280x720",
+    views: Annotated[int, typer.Option(min=8, max=200, help="Views wanted of a live camera or video.")] = 30,
+    model: Annotated[str, typer.Option(help="auto, k1k2p1p2, k1k2p1p2k3 or rational.")] = "auto",
+) -> None:
+    """Estimate a camera's intrinsics from images, a video or a live camera; --draw makes the board."""
+    from tacdata.errors import UsageError
+    from tacdata.tags.board import read_board
+
+    if draw:
+        shape = {"columns": columns, "rows": rows, "square": square, "marker": marker, "dictionary": dictionary}
+        return _draw(draw, board, shape, paper)
+    if source is None or out is None:
+        raise UsageError("neither --draw nor --source with --out", "one of them", "see tacdata calibrate-camera --help")
+    from tacdata.tags.calibration import MODELS
+
+    if model not in ("auto", *MODELS):
+        raise UsageError(f"model {model!r}", f"auto, {', '.join(MODELS)}", "choose one of them")
+    picture = out.with_suffix(".png")
+    for path in (out, picture):
+        if path.exists():
+            raise UsageError(f"{path} exists", "a new file; calibrations are not overwritten", "choose another --out")
+    pattern = read_board(board)
+    is_live = source.isdigit() or "://" in source
+    picker = _watch(source, pattern, size, views) if is_live else _look_through(Path(source), pattern, views)
+    return _calibrate(picker, pattern, source, model, out, picture)
+
+
+def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, out: Path, picture: Path) -> None:
+    import cv2
+    import yaml
+
+    from tacdata import documents, provenance
+    from tacdata.tags.calibration import calibrate
+    from tacdata.tags.calibration_picture import draw_calibration
+
+    print(f"{picker.seen} images, the board in {picker.with_board}, {len(picker.views)} views taken", flush=True)
+    found = calibrate(picker.views, board, picker.size or (0, 0), model)
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    document = found.document(board, source, provenance.code_version(), now)
+    documents.write(out, document, "camera_calibration")
+    picture.write_bytes(cv2.imencode(".png", draw_calibration(found))[1].tobytes())
+    for used in found.views:
+        if used.reason:
+            print(f"dropped {used.view.name}: {used.reason}")
+    for remark in found.remarks:
+        print(f"note: {remark}")
+    spread = found.spread
+    print(
+        f"fx {found.matrix[0, 0]:.2f} +- {spread[0]:.2f}, fy {found.matrix[1, 1]:.2f} +- {spread[1]:.2f}, "
+        f"cx {found.matrix[0, 2]:.2f} +- {spread[2]:.2f}, cy {found.matrix[1, 2]:.2f} +- {spread[3]:.2f} px"
+    )
+    kept = sum(not used.reason for used in found.views)
+    print(
+        f"{found.model}; rms {found.rms:.3f} px over {kept} views, {found.held_out_rms:.3f} px on views held out; "
+        f"corners in {found.coverage:.0%} of the image"
+    )
+    print(f"written to {out} and {picture}\nnext: put this into the camera's entry of the rig file\n")
+    print(yaml.safe_dump({"intrinsics": found.intrinsics}, sort_keys=False, default_flow_style=None), end="")
+
+
+def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper: str) -> None:
+    from PIL import Image
+
+    from tacdata import documents
+    from tacdata.errors import UsageError
+    from tacdata.tags.board import DPI, Board, draw_board, printable
+
+    if target.suffix.lower() not in (".pdf", ".png"):
+        raise UsageError(f"--draw {target}", "a file ending in .pdf or .png", "choose another name")
+    for path in (target, board):
+        if path.exists():
+            raise UsageError(f"{path} exists", "a new file", "choose another name")
+    wanted = printable(Board.from_document({"version": "1.0", **shape}, "--draw"))
+    sheet = Image.fromarray(draw_board(wanted, paper)).convert("1", dither=Image.Dither.NONE)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.suffix.lower() == ".pdf":
+        sheet.save(target, resolution=DPI)
+    else:
+        sheet.save(target, dpi=(DPI, DPI))
+    documents.write(board, wanted.document, "calibration_board")
+    print(f"{target} is to be printed at 100 %; measure its squares and correct square and marker in {board}")
+    print(f"next: tacdata calibrate-camera --board {board} --source IMAGES --out camera.yaml")
+
+
+def _look_through(source: Path, board: Board, wanted: int) -> ViewPicker:
+    """Take a folder's images all, and of a video the still ones that show something new."""
+    from tacdata.tags.view_picker import ViewPicker, images_of
+
+    picker = ViewPicker(board, still=not source.is_dir())
+    for name, image in images_of(source):
+        picker.take(image, name)
+        if picker.still and len(picker.views) >= wanted:
+            break
+    return picker
+
+
+def _watch(source: str, board: Board, size: str, wanted: int) -> ViewPicker:
+    """Watch a live camera until there are enough views, or Ctrl-C."""
+    from tacdata.clock import Clock
+    from tacdata.devices.opencv_camera import OpencvCamera
+    from tacdata.errors import UsageError
+    from tacdata.tags.calibration import coverage_of
+    from tacdata.tags.view_picker import ViewPicker
+
+    parts = size.lower().split("x")
+    if len(parts) != 2 or not all(part.isdigit() and int(part) > 0 for part in parts):
+        raise UsageError(f"size {size!r}", "WIDTHxHEIGHT, for example 1280x720", "correct --size")
+    shape = {"width": int(parts[0]), "height": int(parts[1])}
+    picker = ViewPicker(board)
+    print("Show the board to every part of the image, tilted to all sides, and hold it still. Ctrl-C ends.")
+    with OpencvCamera(Clock.start(), source, shape) as camera:
+        try:
+            while len(picker.views) < wanted:
+                images = camera.read(1.0)
+                # The two latest tell whether it is held still; older ones would only add delay.
+                for image in images[-2:]:
+                    if picker.take(image.image, f"image {image.sequence}"):
+                        share = coverage_of(picker.views, (shape["width"], shape["height"]))
+                        print(f"  view {len(picker.views)} of {wanted}, {share:.0%} of the image", flush=True)
+        except KeyboardInterrupt:
+            print()
+    return picker
