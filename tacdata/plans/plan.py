@@ -36,6 +36,21 @@ class Press:
     """Time at full depth [s]."""
     repeat: int = 0
     """Which repetition of the same configuration this is, from 0."""
+    rest: float | None = None
+    """Time without contact before the press [s]; None: as the plan's motion says."""
+    recovery: float = 0.0
+    """Time without contact after the release that still belongs to the recording [s]."""
+    approach_from: str = ""
+    """Side from which the guide comes over the site: "+x", "-x", "+y" or "-y"; empty: as it happens to come."""
+    overshoot: float = 0.0
+    """How much deeper than ``depth`` the guide goes before it comes back up to it [mm]."""
+    purpose: str = ""
+    """What the press is for, in words; presses with the same words belong together."""
+
+    @property
+    def deepest(self) -> float:
+        """Largest depth that is commanded [mm]."""
+        return self.depth + self.overshoot
 
     @property
     def document(self) -> dict[str, Any]:
@@ -67,6 +82,8 @@ class MotionSettings:
     """Time without contact before each press [s]."""
     standoff: float = 0.3
     """Height at which the approach speed gives way to the press speed [mm]."""
+    run_up: float = 1.0
+    """Sideways way over which a press with ``approach_from`` comes to its site [mm]."""
 
 
 @dataclass(frozen=True)
@@ -101,13 +118,13 @@ class Plan:
                     ", ".join(indenters),
                     "name one of them or add it under indenters",
                 )
-            presses.append(
-                Press(
-                    index=index, indenter=indenters[name], indenter_name=name, x=entry["x"], y=entry["y"],
-                    yaw=entry.get("yaw", 0.0), depth=entry["depth"], speed=entry.get("speed", motion.press_speed),
-                    hold=entry.get("hold", motion.hold), repeat=entry.get("repeat", 0),
-                )
-            )
+            if -entry["depth"] >= motion.clearance:
+                raise FormatError(
+                    f"{origin}: presses/{index}: depth {entry['depth']:g} mm flies no lower than the clearance, "
+                    f"{motion.clearance:g} mm",
+                    f"above -{motion.clearance:g} mm", "fly lower, or enlarge motion/clearance",
+                )  # fmt: skip
+            presses.append(_press(index, entry, indenters[name], motion))
         return cls(document["name"], motion, tuple(presses), document.get("purpose", ""), document)
 
     def check_against(self, sensor: Sensor) -> None:
@@ -118,9 +135,9 @@ class Plan:
         """
         for press in self.presses:
             where = f"plan {self.name}: presses/{press.index}"
-            if press.depth >= sensor.skin.thickness:
+            if press.deepest >= sensor.skin.thickness:
                 raise FormatError(
-                    f"{where}: depth {press.depth:g} mm, the skin is {sensor.skin.thickness:g} mm thick",
+                    f"{where}: depth {press.deepest:g} mm, the skin is {sensor.skin.thickness:g} mm thick",
                     f"less than {sensor.skin.thickness:g} mm",
                     "reduce the depth or use another sensor file",
                 )
@@ -131,6 +148,16 @@ class Plan:
                         f"-{size / 2:g} to {size / 2:g} mm",
                         f"move the press or enlarge skin/size_{axis}",
                     )
+
+
+def _press(index: int, entry: dict[str, Any], indenter: Indenter, motion: MotionSettings) -> Press:
+    return Press(
+        index=index, indenter=indenter, indenter_name=entry["indenter"], x=entry["x"], y=entry["y"],
+        yaw=entry.get("yaw", 0.0), depth=entry["depth"], speed=entry.get("speed", motion.press_speed),
+        hold=entry.get("hold", motion.hold), repeat=entry.get("repeat", 0), rest=entry.get("rest"),
+        recovery=entry.get("recovery", 0.0), approach_from=entry.get("approach_from", ""),
+        overshoot=entry.get("overshoot", 0.0), purpose=entry.get("purpose", ""),
+    )  # fmt: skip
 
 
 def read_plan(path: Path) -> Plan:

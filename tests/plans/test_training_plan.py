@@ -7,7 +7,8 @@ from typer.testing import CliRunner
 from tacdata.cli import application
 from tacdata.errors import UsageError
 from tacdata.plans import Plan, read_plan
-from tacdata.plans.training_plan import DEPTHS, STANDARD, USUAL, training_plan
+from tacdata.plans.shipped.training import DEPTHS, USUAL, training_plan
+from tacdata.plans.specimens import STANDARD
 from tacdata.sensor import default_sensor
 
 SENSOR = default_sensor()

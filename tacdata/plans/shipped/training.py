@@ -7,24 +7,13 @@ from typing import Any
 import numpy as np
 
 import schemas
-from tacdata import documents, registry
+from tacdata import documents
 from tacdata.errors import UsageError
 from tacdata.indenters import from_document
-from tacdata.indenters.indenter import BASE, ROOM
+from tacdata.plans.shipped.shipped_plan import ShippedPlan, Wishes
+from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
 
-STANDARD: dict[str, dict[str, Any]] = {
-    "sphere_2": {"shape": "sphere", "radius": 2.0},
-    "sphere_4": {"shape": "sphere", "radius": 4.0},
-    "punch": {"shape": "flat_punch", "radius": 1.5, "edge_radius": 0.3},
-    "pin": {"shape": "cylinder", "radius": 1.5, "length": 5.0, "edge_radius": 0.5},
-    "ellipsoid": {"shape": "ellipsoid", "a": 3.0, "b": 1.8, "c": 2.0},
-    "square": {"shape": "square_punch", "side": 2.5, "edge_radius": 0.3},
-    "ring": {"shape": "ring", "ring_radius": 1.8, "tube_radius": 0.7},
-    "cone": {"shape": "cone", "half_angle": 60.0, "tip_radius": 0.6, "radius": 2.5},
-    "prism": {"shape": "prism", "angle": 120.0, "edge_radius": 0.5, "length": 5.0, "width": 4.0},
-}
-"""Specimens that a lab can print; lengths in mm, angles in deg."""
 USUAL = ("sphere_2", "sphere_4", "punch", "pin", "ellipsoid")
 """Those of a plan that names none."""
 YAWS: dict[str, tuple[float, ...]] = {
@@ -46,6 +35,19 @@ MOTION = {
 }  # fmt: skip
 
 
+class Training(ShippedPlan):
+    """The standard plan to train on."""
+
+    usual = USUAL
+    adjustable = True
+
+    def document(self, sensor: Sensor, wishes: Wishes) -> dict[str, Any]:
+        """Return the plan; 24 presses if no number is wished for."""
+        return training_plan(
+            sensor, 24 if wishes.presses is None else wishes.presses, wishes.seed, self.specimen_names(wishes)
+        )
+
+
 def training_plan(
     sensor: Sensor, presses: int = 24, seed: int = 0, indenters: tuple[str, ...] = USUAL
 ) -> dict[str, Any]:
@@ -59,33 +61,24 @@ def training_plan(
         sensor: The skin that will be pressed.
         presses: How many [count].
         seed: Same seed, same plan.
-        indenters: Names in `STANDARD`.
+        indenters: Names in `tacdata.plans.specimens.STANDARD`.
 
     Raises:
         UsageError: If an indenter is unknown or there are no presses.
     """
     if presses < 1:
         raise UsageError(f"{presses} presses", "1 or more", "ask for some")
-    known = [name for name, shape in STANDARD.items() if shape["shape"] in registry.names(ROOM, BASE)]
-    unknown = [name for name in indenters if name not in known]
-    if unknown or not indenters:
-        raise UsageError(
-            f"indenter {', '.join(unknown) or 'none'}",
-            ", ".join(known),
-            "choose among them, or write a plan by hand",
-        )
+    shapes = specimens(indenters)
     rng = np.random.default_rng(seed)
-    mountings = [(name, yaw) for name in indenters for yaw in YAWS.get(STANDARD[name]["shape"], (0.0,))]
-    depths = rng.permutation(
-        DEPTHS[0] + (DEPTHS[1] - DEPTHS[0]) * (np.arange(presses) + rng.random(presses)) / presses
-    )
+    mountings = [(name, yaw) for name in indenters for yaw in YAWS.get(shapes[name]["shape"], (0.0,))]
+    depths = rng.permutation(DEPTHS[0] + (DEPTHS[1] - DEPTHS[0]) * (np.arange(presses) + rng.random(presses)) / presses)
     # Depth and kind of site must not follow the mounting: both are dealt out in random order.
     kinds = rng.permutation([KINDS[k % len(KINDS)] for k in range(presses)])
     entries = []
     for k in range(presses):
         name, yaw = mountings[k % len(mountings)]
         depth = round(float(depths[k]), 3)
-        x, y = _site(sensor, str(kinds[k]), rng, from_document(STANDARD[name]).footprint(depth, yaw))
+        x, y = _site(sensor, str(kinds[k]), rng, from_document(shapes[name]).footprint(depth, yaw))
         entries.append(
             {
                 "indenter": name,
@@ -102,7 +95,7 @@ def training_plan(
     document = {
         "version": schemas.version("plan"), "name": f"training-{presses}-{seed}",
         "purpose": "random presses to train on",
-        "indenters": {name: dict(STANDARD[name]) for name in used},
+        "indenters": {name: shapes[name] for name in used},
         "motion": dict(MOTION), "presses": entries,
     }  # fmt: skip
     for name in used:
@@ -111,9 +104,7 @@ def training_plan(
     return document
 
 
-def _site(
-    sensor: Sensor, kind: str, rng: np.random.Generator, footprint: tuple[float, float]
-) -> tuple[float, float]:
+def _site(sensor: Sensor, kind: str, rng: np.random.Generator, footprint: tuple[float, float]) -> tuple[float, float]:
     """Return a site [mm, sensor frame] at which the whole footprint [mm] lies inside the skin's rim by `CLEARANCE`."""
     taxels, centers = sensor.taxels, sensor.taxels.centers
     half = np.array([taxels.pitch_x * (taxels.columns - 1), taxels.pitch_y * (taxels.rows - 1)]) / 2

@@ -1,0 +1,63 @@
+"""Bring foreign recordings in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import PIPELINE
+
+ORDER = 15
+PANEL = PIPELINE
+
+
+def run(
+    source: Annotated[Path, typer.Argument(help="A folder or file of measured data: CSV, NPZ, Parquet, MATLAB.")],
+    mapping: Annotated[
+        Path | None, typer.Option(help="Mapping file: columns, units, clocks. Left out: says what is in the source.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Session folder to create.")] = None,
+    propose: Annotated[
+        Path | None, typer.Option(help="Without --mapping: a mapping to start from, to be written here.")
+    ] = None,
+) -> None:
+    """Turn measured data of another rig into recordings that every other verb reads, by a mapping file."""
+    from tacdata.errors import UsageError
+    from tacdata.importing.imported_session import import_session
+
+    if mapping is None:
+        _inspect(source, propose)
+        return
+    if out is None or propose is not None:
+        raise UsageError(
+            "--mapping without --out" if out is None else "--mapping with --propose",
+            "--mapping FILE --out SESSION, or --propose FILE alone", "add --out, or leave --propose out",
+        )  # fmt: skip
+    made = import_session(source, mapping, out, progress=lambda text: print(text, flush=True))
+    for note in made.notes:
+        print(f"note: {note}")
+    for text in made.refused:
+        print(f"left out: {text}")
+    print(f"{made.recordings} recordings in {made.folder}" + f", {len(made.refused)} left out" * bool(made.refused))
+    print(f"next: tacdata check {made.folder}")
+    if made.refused:
+        raise typer.Exit(3)
+
+
+def _inspect(source: Path, propose: Path | None) -> None:
+    from tacdata import documents
+    from tacdata.errors import UsageError
+    from tacdata.importing.proposal import described, proposed_mapping
+
+    if propose is not None and propose.exists():
+        raise UsageError(f"{propose} exists", "a new file; nothing is overwritten", "choose another --propose")
+    tables, text = described(source)
+    print(text)
+    if propose is None:
+        print(f"next: tacdata import {source} --propose mapping.yaml")
+        return
+    documents.write(propose, proposed_mapping(source, tables), "import_mapping")
+    print(f"a mapping to start from is in {propose}; correct it by hand, its guesses are guesses")
+    print(f"next: tacdata import {source} --mapping {propose} --out SESSION")

@@ -1,0 +1,141 @@
+"""Find where the sensor lies in the guide's frame."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tacdata.commands.command import PIPELINE
+
+if TYPE_CHECKING:
+    from tacdata.registration import Settings
+    from tacdata.rig import Rig
+    from tacdata.sensor import Sensor
+
+ORDER = 5
+PANEL = PIPELINE
+
+
+def run(
+    rig: Annotated[Path, typer.Option(help="Rig file; its registration is where the search begins.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Registration file to write; default: registration.yaml beside the rig file.")
+    ] = None,
+    sensor: Annotated[Path | None, typer.Option(help="Sensor file; default: the paper's.")] = None,
+    indenter: Annotated[str, typer.Option(help="Spherical specimen that touches.")] = "sphere_2",
+    above: Annotated[
+        float, typer.Option(min=0.2, max=10.0, help="Height above the expected skin to begin at [mm].")
+    ] = 1.0,
+    limit: Annotated[
+        float, typer.Option(min=0.1, max=5.0, help="How far below the expected skin to search [mm].")
+    ] = 1.0,
+    depth: Annotated[float, typer.Option(min=0.1, max=1.5, help="Depth of the cross scan's presses [mm].")] = 0.4,
+    repeats: Annotated[int, typer.Option(min=1, max=10, help="Slow approaches at each place.")] = 2,
+    taxel: Annotated[list[int] | None, typer.Option(help="Taxel of the cross scan; repeat for two or more.")] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the first move.")] = False,
+) -> None:
+    """Touch the sensor and find its origin, yaw and tilt in the guide's frame, with uncertainties, into a file."""
+    from tacdata.registration import Settings
+    from tacdata.rig import read_rig
+    from tacdata.sensor import default_sensor, read_sensor
+
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop from outside is a Ctrl-C
+    bench, skin = read_rig(rig), read_sensor(sensor) if sensor else default_sensor()
+    target = out or rig.with_name("registration.yaml")
+    settings = Settings(above, limit, depth, repeats, tuple(taxel or ()))
+    specimen = _specimen(indenter)
+    _check(settings, skin, target)
+    try:
+        document, text = _measure(bench, skin, settings, specimen, yes)
+    except KeyboardInterrupt:
+        print("interrupted: motion stopped, nothing was written", file=sys.stderr)
+        raise typer.Exit(130) from None
+    from tacdata import documents
+
+    documents.write(target, document, "registration")
+    print(f"{text}\nwritten to {target}")
+    print(f"next: tacdata record --rig {rig} --registration {target} --plan PLAN --out SESSION")
+
+
+def _specimen(name: str) -> dict[str, Any]:
+    from tacdata.errors import UsageError
+    from tacdata.plans.specimens import specimens
+
+    document = specimens((name,))[name]
+    if document["shape"] != "sphere":
+        raise UsageError(f"indenter {name} ({document['shape']})", "a sphere: it touches a tilted skin with one point",
+                         "choose sphere_2 or sphere_4")  # fmt: skip
+    return document
+
+
+def _check(settings: Settings, sensor: Sensor, target: Path) -> None:
+    from tacdata.errors import UsageError
+
+    if target.exists():
+        raise UsageError(
+            f"{target} exists", "a new file; nothing is overwritten", "move it away, or choose another --out"
+        )
+    half = sensor.skin.thickness / 2
+    if max(settings.limit, settings.depth) > half:
+        raise UsageError(
+            f"--limit {settings.limit:g} mm, --depth {settings.depth:g} mm on a skin of {sensor.skin.thickness:g} mm",
+            f"at most {half:g} mm", "search less deep",
+        )  # fmt: skip
+    wrong = [k for k in settings.taxels if not 0 <= k < sensor.taxels.count]
+    if wrong or len(settings.taxels) == 1:
+        raise UsageError(
+            f"--taxel {', '.join(map(str, settings.taxels))}", f"two or more of 0 to {sensor.taxels.count - 1}",
+            "choose taxels that lie apart",
+        )  # fmt: skip
+
+
+def _measure(
+    rig: Rig, sensor: Sensor, settings: Settings, specimen: dict[str, Any], yes: bool
+) -> tuple[dict[str, Any], str]:
+    """Open the devices, ask, and carry the procedure out; return the file's document and the result in words."""
+    from tacdata.errors import UsageError
+    from tacdata.recording.rig_devices import RigDevices
+    from tacdata.registration.guarded_probe import guarded_probe
+    from tacdata.registration.procedure import described, register
+    from tacdata.registration.result import document_of
+    from tacdata.registration.touch_off import LIFT_SPEED
+
+    with RigDevices.of(rig).opened() as devices:
+        controller = devices.cnc.settings()
+        print(described(sensor, rig.registration, settings))
+        if controller.get("$22") == "0":
+            print(
+                "caution: homing is switched off ($22=0): the registration holds until the controller is switched off"
+            )
+        if not yes and _answer("Move now? [y/N] ").lower() not in ("y", "yes"):
+            raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
+        _mount(rig, specimen)
+        safe = rig.registration.origin[2] + max(3.0, settings.above + 1.0)
+        with guarded_probe(rig, devices, safe, LIFT_SPEED) as probe:
+            found = register(probe, sensor, rig.registration, settings, say=lambda text: print(f"  {text}", flush=True))
+    return document_of(found, rig, sensor, specimen, controller), found.text
+
+
+def _mount(rig: Rig, specimen: dict[str, Any]) -> None:
+    if "mounting" in rig.document:
+        from tacdata.virtual_rig.mounting import mount
+
+        mount(rig.document, specimen)
+        return
+    from tacdata.errors import UsageError
+
+    if _answer(f"Mounted: a sphere of radius {specimen['radius']:g} mm? [y/N] ").lower() not in ("y", "yes"):
+        raise UsageError("the indenter was not mounted", "yes", "nothing was moved; start again when it sits")
+
+
+def _answer(question: str) -> str:
+    """Ask on the terminal; no answer (the input is closed) is an empty one."""
+    try:
+        return input(question).strip()
+    except EOFError:
+        print()
+        return ""

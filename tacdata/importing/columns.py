@@ -1,0 +1,99 @@
+"""Columns of a table as a mapping names them, as numbers in our units."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.formats.source_format import Table
+from tacdata.importing.units import factor, split_unit
+
+Selector = str | int | list[Any]
+
+
+def select(table: Table, selector: Selector, where: str) -> list[str]:
+    """Return the names of the columns that a mapping means, in its order.
+
+    Args:
+        table: The file's columns.
+        selector: A name, a number from 0, a range "1-15", a pattern "cap*", or a list of these.
+        where: Names the place in the mapping in errors.
+
+    Raises:
+        FormatError: If there is no such column.
+    """
+    if isinstance(selector, list):
+        found = [name for entry in selector for name in select(table, entry, where)]
+        return list(dict.fromkeys(found))
+    names = list(table.columns)
+    plain = {name: split_unit(name)[0] for name in names}
+    if isinstance(selector, str):
+        for known in (names, list(plain.values())):
+            if selector in known:
+                return [names[known.index(selector)]]
+        if match := re.fullmatch(r"(\d+)\s*-\s*(\d+)", selector):
+            return [name for k in range(int(match[1]), int(match[2]) + 1) for name in select(table, k, where)]
+        if chosen := [name for name in names if fnmatch.fnmatchcase(name, selector)]:
+            return chosen
+    elif 0 <= selector < len(names):
+        return [names[selector]]
+    raise FormatError(
+        f"{where}: column {selector!r} is not in {table.path.name}",
+        ", ".join(names[:40]) + (f" and {len(names) - 40} more" if len(names) > 40 else ""),
+        "correct the column in the mapping (columns count from 0)",
+    )
+
+
+def single(table: Table, selector: Selector, where: str) -> str:
+    """Return the one column that a mapping means; raises FormatError if there are none or several."""
+    names = select(table, selector, where)
+    if len(names) != 1 or table.columns[names[0]].ndim != 1:
+        raise FormatError(f"{where}: {selector!r} means {len(names)} columns or a table", "one column", "name one")
+    return names[0]
+
+
+def numbers(table: Table, names: list[str], missing: list[float], where: str) -> np.ndarray:
+    """Return columns as numbers [as in the file], shape (rows, n), NaN where a value is missing.
+
+    Raises:
+        FormatError: If a column holds text.
+    """
+    parts = []
+    for name in names:
+        values = table.columns[name]
+        if values.dtype == object:
+            raise FormatError(
+                f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}",
+                "numbers", "name another column, or add the texts that stand for no value to the file's missing",
+            )  # fmt: skip
+        values = values.astype(float)
+        parts.append(values[:, None] if values.ndim == 1 else values)
+    joined = np.concatenate(parts, axis=1) if parts else np.empty((table.rows, 0))
+    joined[~np.isfinite(joined)] = np.nan  # "inf" is how some loggers write an overload: no value either
+    for sentinel in missing:
+        joined[joined == float(sentinel)] = np.nan
+    return joined
+
+
+def axis(table: Table | None, entry: float | dict[str, Any], unit: str, missing: list[float], where: str) -> np.ndarray:
+    """Return one quantity in ``unit``, shape (rows,), or shape () if the mapping gives a number.
+
+    Raises:
+        FormatError: If the column or its unit is not known.
+    """
+    if isinstance(entry, int | float):
+        return np.array(float(entry))
+    if table is None:
+        raise FormatError(f"{where}: a column without a file", "a number, or a file for the column", "add file: NAME")
+    name = single(table, entry["column"], where)
+    given = entry.get("unit") or table.units.get(name) or split_unit(name)[1] or unit
+    values = numbers(table, [name], missing, where)[:, 0]
+    return values * factor(given, unit, where) * entry.get("scale", 1.0) + entry.get("offset", 0.0)
+
+
+def _example(values: np.ndarray) -> Any:
+    return next((value for value in values.tolist() if value is not None), None)

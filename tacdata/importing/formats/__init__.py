@@ -1,0 +1,1 @@
+"""File formats that foreign recordings may come in, one file each."""

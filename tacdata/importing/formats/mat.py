@@ -1,0 +1,76 @@
+"""MATLAB files up to version 7: variables, structures and arrays of structures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.formats.npz import rows_of
+from tacdata.importing.formats.source_format import SourceFormat, Table
+
+
+class Mat(SourceFormat):
+    """Variables by name; a structure's fields as ``structure.field``.
+
+    An array of structures becomes one table: its elements below each other, with a column ``element`` that counts
+    them from 0, to be named under ``trials`` in the mapping.
+    """
+
+    endings = (".mat",)
+
+    def read(self, path: Path, options: dict[str, Any]) -> Table:
+        """Read the variables; ``table`` in the options names a variable to take alone. See the base."""
+        from scipy.io import loadmat
+        from scipy.io.matlab import MatReadError
+
+        try:
+            loaded = loadmat(path, simplify_cells=True)
+        except NotImplementedError:
+            raise FormatError(
+                f"{path} is a MATLAB 7.3 file (HDF5)",
+                "a MATLAB file of version 7 or older",
+                "in MATLAB: save('new.mat', ..., '-v7')",
+            ) from None
+        except (MatReadError, ValueError, TypeError, OSError) as error:
+            raise FormatError(f"{path} cannot be read as MATLAB: {error}", "a .mat file", "save it again") from None
+        variables = {name: value for name, value in loaded.items() if not name.startswith("__")}
+        if wanted := options.get("table"):
+            if wanted not in variables:
+                raise FormatError(f"{path}: no variable {wanted}", ", ".join(variables), "correct table in the mapping")
+            variables = {wanted: variables[wanted]}
+        arrays: dict[str, np.ndarray] = {}
+        for name, value in variables.items():
+            arrays |= _flatten(name if len(variables) > 1 else "", value)
+        return rows_of(path, arrays)
+
+
+def _flatten(name: str, value: Any) -> dict[str, np.ndarray]:
+    if isinstance(value, dict):
+        found: dict[str, np.ndarray] = {}
+        for key, inner in value.items():
+            found |= _flatten(f"{name}.{key}" if name else key, inner)
+        return found
+    if isinstance(value, (list, np.ndarray)) and len(value) and all(isinstance(entry, dict) for entry in value):
+        return _stacked(name, list(value))
+    array = np.asarray(value)
+    return {name or "array": array} if array.dtype.kind in "biufMSU" else {}
+
+
+def _stacked(name: str, elements: list[dict[str, Any]]) -> dict[str, np.ndarray]:
+    tables = [_flatten("", element) for element in elements]
+    rows = [max((len(np.atleast_1d(a)) for a in table.values()), default=0) for table in tables]
+    shared = [key for key in tables[0] if all(key in table for table in tables)]
+    prefix = f"{name}." if name else ""
+    stacked = {}
+    for key in shared:
+        parts = []
+        for table, count in zip(tables, rows, strict=True):
+            part = np.squeeze(table[key])
+            # A single value of an element (its speed, its label) holds for all of its rows.
+            parts.append(np.repeat(part[None], count, axis=0) if part.ndim == 0 else part)
+        if len({part.shape[1:] for part in parts}) == 1 and all(len(p) == n for p, n in zip(parts, rows, strict=True)):
+            stacked[prefix + key] = np.concatenate(parts)
+    return {**stacked, f"{prefix}element": np.repeat(np.arange(len(elements)), rows)}

@@ -1,0 +1,89 @@
+"""What a source format's file holds.
+
+``tacdata/importing/formats/my_format.py`` defines one class derived from `SourceFormat`. It says which endings are its
+own and reads a file into a `Table`: named columns as they stand in the file, nothing converted, nothing filled in.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tacdata import registry
+from tacdata.errors import FormatError, UsageError
+
+ROOM, BASE = "tacdata.importing.formats", "source_format"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A file's columns."""
+
+    path: Path
+    columns: dict[str, np.ndarray]
+    """Name -> values as in the file [any], shape (rows,) or (rows, k): float64, int64, or text."""
+    units: dict[str, str] = field(default_factory=dict)
+    """Name -> unit as the file says it, where it does."""
+    notes: tuple[str, ...] = ()
+    """What a person should know of the reading, in words."""
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return max((len(values) for values in self.columns.values()), default=0)
+
+
+class SourceFormat(ABC):
+    """Reads files of one kind."""
+
+    endings: ClassVar[tuple[str, ...]]
+    """File name endings, lower case, with the dot."""
+
+    @abstractmethod
+    def read(self, path: Path, options: dict[str, Any]) -> Table:
+        """Read a file.
+
+        Args:
+            path: The file.
+            options: What the mapping says of it: ``header``, ``delimiter``, ``decimal``, ``skip``, ``encoding``,
+                ``missing`` (texts), ``table`` (name inside the file); a format takes what it knows.
+
+        Raises:
+            FormatError: If the file is not of this kind, or damaged.
+        """
+
+
+def read_table(path: Path, options: dict[str, Any]) -> Table:
+    """Read a file by the format that its mapping names, or that its ending says.
+
+    Raises:
+        UsageError: If it does not exist or its kind is not known.
+        FormatError: If it cannot be read, or holds no rows.
+    """
+    if not path.is_file():
+        raise UsageError(f"no file {path}", "a file of measured data", "check the path and the mapping's files")
+    name = options.get("format") or _by_ending(path)
+    kind: type[Any] = registry.load(ROOM, BASE, name, SourceFormat)
+    table: Table = kind().read(path, options)
+    if not table.rows:
+        raise FormatError(f"{path} holds no rows of data", "one row or more", "leave it out, or correct the mapping")
+    return table
+
+
+def _by_ending(path: Path) -> str:
+    known = {}
+    for name in registry.names(ROOM, BASE):
+        for ending in registry.load(ROOM, BASE, name, SourceFormat).endings:
+            known[ending] = name
+    found = [ending for ending in known if path.name.lower().endswith(ending)]
+    if not found:
+        raise UsageError(
+            f"{path}: the ending {path.suffix or '(none)'} is of no known format",
+            ", ".join(sorted(known)),
+            "name the format in the mapping (format: csv), or save the file as one of these",
+        )
+    return known[max(found, key=len)]

@@ -1,0 +1,160 @@
+"""Foreign files into a session folder, by a mapping."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+import schemas
+from tacdata import documents, provenance
+from tacdata.errors import TacdataError, UsageError
+from tacdata.importing import recording_file
+from tacdata.importing.formats.source_format import Table, read_table
+from tacdata.importing.presses import presses_of
+from tacdata.importing.recording_file import ImportedPress
+from tacdata.importing.source_files import FileSet, file_sets
+from tacdata.importing.trials import split_tables
+from tacdata.recording import file_names, session
+from tacdata.recording.session import FILE
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What an import made."""
+
+    folder: Path
+    """The session."""
+    recordings: int
+    notes: tuple[str, ...]
+    """What a person should know, in words; each once."""
+    refused: tuple[str, ...]
+    """Trials that could not be imported, and why."""
+
+
+def import_session(
+    source: Path, mapping: Path, out: Path, progress: Callable[[str], None] = lambda text: None
+) -> Imported:
+    """Import everything that a mapping finds in a source.
+
+    Args:
+        source: A folder or a file.
+        mapping: The mapping's file (`schemas/import_mapping.schema.json`).
+        out: Session folder to create.
+        progress: Is told of every recording.
+
+    Raises:
+        UsageError: If ``out`` exists, or a file is missing.
+        FormatError: If nothing could be imported; the first reason.
+    """
+    document = documents.read(mapping, "import_mapping")
+    if out.exists():
+        raise UsageError(f"{out} exists", "a new session folder", "choose another --out")
+    sets = file_sets(source, document["files"])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    work = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    try:
+        run = _Import(document, mapping.parent, source, work, progress)
+        for files in sets:
+            run.add(files)
+        if not run.presses:
+            raise run.failures[0][1]
+        run.finish()
+        work.chmod(0o755)
+        work.rename(out)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    refused = tuple(f"{label}: {error.given}" for label, error in run.failures)
+    return Imported(out, len(run.presses), tuple(dict.fromkeys(run.notes)), refused)
+
+
+class _Import:
+    """One import under way."""
+
+    def __init__(
+        self, mapping: dict[str, Any], beside: Path, source: Path, work: Path, progress: Callable[[str], None]
+    ) -> None:
+        self.mapping, self.beside, self.source, self.work, self.progress = mapping, beside, source, work, progress
+        self.hash = provenance.content_hash(mapping)
+        self.presses: list[ImportedPress] = []
+        self.failures: list[tuple[str, TacdataError]] = []
+        self.notes: list[str] = []
+
+    def add(self, files: FileSet) -> None:
+        """Import one set of files."""
+        try:
+            tables = {name: read_table(path, self.mapping["files"][name]) for name, path in files.paths.items()}
+        except TacdataError as error:
+            self.failures.append((files.label or self.source.name, error))
+            return
+        for label, rows in split_tables(tables, self.mapping.get("trials", {})):
+            named = " ".join(part for part in (files.label, label) if part)
+            try:
+                for imported in self._presses(files, named, tables, rows):
+                    self._write(imported)
+            except TacdataError as error:
+                self.failures.append((named or self.source.name, error))
+
+    def _presses(
+        self, files: FileSet, label: str, whole: dict[str, Table], rows: dict[str, Table]
+    ) -> Iterator[ImportedPress]:
+        below = self.source if self.source.is_dir() else self.source.parent
+        record = {
+            "version": schemas.version("import_record"), "name": self.mapping["name"],
+            "source": self.mapping.get("source", ""), "trial": label,
+            "files": [
+                {"path": path.relative_to(below).as_posix(), "sha256": provenance.file_hash(path),
+                 "rows": whole[name].rows}
+                for name, path in files.paths.items()
+            ],
+            "mapping": self.mapping, "mapping_hash": self.hash, "code_version": provenance.code_version(),
+        }  # fmt: skip
+        yield from presses_of(self.mapping, self.beside, rows, files.parts, record)
+
+    def _write(self, imported: ImportedPress) -> None:
+        number = len(self.presses)
+        press = replace(imported.press, index=number)
+        plan = plan_of(self.mapping["name"], [press])
+        imported = replace(imported, press=press, plan=plan)
+        documents.check(imported.record, "import_record", "import record")
+        path = file_names.episode(self.work, number)
+        recording_file.write(path, imported)
+        trial = imported.record["trial"]
+        self.notes += imported.record["notes"]
+        self.presses.append(replace(imported, taxels=None, position=None, measured=()))  # type: ignore[arg-type]
+        rows = len(imported.taxels.time_ns)
+        self.progress(f"  {path.name}  {trial or self.mapping['name']}: {rows} rows, {press.depth:.2f} mm deep")
+
+    def finish(self) -> None:
+        """Write the session's document."""
+        first = self.presses[0]
+        plan = plan_of(self.mapping["name"], [imported.press for imported in self.presses])
+        document = {
+            "version": "1.0", "code_version": provenance.code_version(),
+            "started": datetime.now(UTC).isoformat(timespec="seconds"), "rig": first.rig, "plan": plan,
+            "plan_hash": provenance.content_hash(plan), "sensor": first.sensor.document,
+            "sensor_hash": first.sensor.content_hash, "episodes": [],
+        }  # fmt: skip
+        documents.write(self.work / FILE, document, "session")
+        session.refresh(session.read_session(self.work))
+
+
+def plan_of(name: str, presses: list[Any]) -> dict[str, Any]:
+    """Return a plan's document that says what was pressed; it was never driven by us."""
+    slowest = min(press.speed for press in presses)
+    motion = {"clearance": 1.0, "travel_speed": slowest, "approach_speed": slowest, "press_speed": slowest,
+              "hold": 0.0, "rest": 0.0}  # fmt: skip
+    entries = [
+        {"indenter": p.indenter_name, "x": p.x, "y": p.y, "yaw": p.yaw, "depth": p.depth, "speed": p.speed,
+         "hold": p.hold}
+        for p in presses
+    ]  # fmt: skip
+    indenters = {press.indenter_name: press.indenter.document for press in presses}
+    return {
+        "version": schemas.version("plan"), "name": name, "purpose": "told from imported data, not driven",
+        "indenters": indenters, "motion": motion, "presses": entries,
+    }  # fmt: skip

@@ -1,0 +1,217 @@
+"""The presses in the rows of one trial: streams cut into recordings, each with its path and what is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.columns import axis, single
+from tacdata.importing.foreign_sensor import foreign_sensor
+from tacdata.importing.formats.source_format import Table
+from tacdata.importing.press_path import PressPath, press_path
+from tacdata.importing.recording_file import ImportedPress
+from tacdata.importing.schedule import ScheduledPress, read_schedule
+from tacdata.importing.streams import Stream, Streams, read_streams
+from tacdata.importing.trials import windows
+from tacdata.indenters import Indenter, from_document
+from tacdata.plans import Press
+from tacdata.rig import Registration
+
+NO_INDENTER = {"shape": "sphere", "radius": 2.0}
+"""What stands in for an indenter that is not known."""
+SLOWEST = 1e-4
+"""Least speed that a press is given [mm/s]."""
+UNITS = {"x": "mm", "y": "mm", "yaw": "deg", "depth": "mm", "speed": "mm/s", "hold": "s"}
+
+
+def presses_of(
+    mapping: dict[str, Any], beside: Path, tables: dict[str, Table], parts: dict[str, str], record: dict[str, Any]
+) -> Iterator[ImportedPress]:
+    """Yield the recordings that the rows of a trial hold.
+
+    Args:
+        mapping: The mapping's document.
+        beside: Folder of the mapping, where its sensor file lies.
+        tables: Name under ``files`` -> rows.
+        parts: {part} of the paths -> its text.
+        record: The import record so far.
+
+    Raises:
+        FormatError: If columns, units or clocks are wrong, or there is neither position nor schedule.
+    """
+    streams = read_streams(mapping, tables)
+    scheduled = read_schedule(mapping, tables, streams.taxels)
+    if streams.position is None and not scheduled:
+        raise FormatError(
+            "neither a position nor a press schedule", "one of them: without it nobody knows what was pressed",
+            "add position or schedule to the mapping; for a sensor left alone: position: {file: ..., depth: -1}",
+        )  # fmt: skip
+    shift = max(-min(int(stream.time_ns[0]) for stream in streams.all if len(stream.time_ns)), 0)
+    streams, scheduled = _shifted(streams, shift), [replace(s, start_ns=s.start_ns + shift) for s in scheduled]
+    place, unsaid = _registration(mapping, streams)
+    cuts = _cuts(mapping, streams, scheduled, place)
+    for number, (begin, end, planned) in enumerate(cuts):
+        trial = record["trial"] + (f" #{number}" if len(cuts) > 1 else "")
+        part = streams.within(begin, end)
+        if len(part.taxels.time_ns) < 2:
+            continue
+        if planned:
+            part = replace(part, position=_commanded(planned, begin, end))
+        if part.position is None or not len(part.position.time_ns):
+            raise FormatError(f"trial {trial or 'without a name'}: no position in it", "a position", "split otherwise")
+        known = _known(mapping, tables, parts)
+        yield _imported(mapping, beside, part, place, planned, known, [*unsaid], {
+            **record, "trial": trial.strip(), "time_shift_ns": shift, "notes": list(streams.notes),
+        })  # fmt: skip
+
+
+def _imported(
+    mapping: dict[str, Any], beside: Path, streams: Streams, place: Registration, planned: ScheduledPress | None,
+    known: dict[str, float], stand_ins: list[str], record: dict[str, Any],
+) -> ImportedPress:  # fmt: skip
+    taxels, lost = _without_counter(streams)
+    spans = np.diff(taxels.time_ns)
+    rate = float(1e9 / np.median(spans[spans > 0])) if (spans > 0).any() else 1.0
+    sensor, unknown = foreign_sensor(mapping["sensor"], beside, len(taxels.names), round(rate, 3))
+    position = streams.position
+    if position is None:
+        raise FormatError("no position", "a position", "add it to the mapping")
+    tip = place.to_sensor(position.values)
+    path = press_path(position.time_ns, tip)
+    indenter, name = _indenter(mapping)
+    if name == "unknown":
+        stand_ins.append("indenter: not said by the source; a sphere of 2 mm stands in")
+    if path.speed is None and "speed" not in known:
+        stand_ins.append("speed: the indenter does not move; 1 mm/s stands in")
+    values = {"x": path.x, "y": path.y, "yaw": 0.0, "depth": path.depth, "speed": path.speed or 1.0, "hold": path.hold}
+    values = {key: round(value, 4) for key, value in {**values, **known}.items()}
+    press = Press(
+        index=0, indenter=indenter, indenter_name=name, x=values["x"], y=values["y"], yaw=values["yaw"],
+        depth=values["depth"], speed=max(values["speed"], SLOWEST), hold=values["hold"],
+    )  # fmt: skip
+    phases = planned.phases(int(taxels.time_ns[0])) if planned else path.phases
+    notes = [*record["notes"], *_remarks(taxels, planned, path, lost), *stand_ins]
+    registration = {
+        "origin": list(place.origin), "yaw": place.yaw, "tilt": list(place.tilt),
+        "method": f"import: {mapping.get('contact', {}).get('known_from', 'as the mapping says')}",
+        "date": datetime.now(UTC).date().isoformat(),
+    }  # fmt: skip
+    record = {**record, "stand_ins": [*stand_ins, *unknown], "notes": notes}
+    return ImportedPress(press, sensor, registration, taxels, position, streams.measured, phases, {}, record, lost)
+
+
+def _remarks(taxels: Stream, planned: ScheduledPress | None, path: PressPath, lost: int) -> list[str]:
+    notes = []
+    missing = np.isnan(taxels.values).mean()
+    if missing > 0:
+        notes.append(f"{100 * missing:.1f} % of the channels' values are missing and stay so")
+    if lost > 0:
+        notes.append(f"{lost} frames are missing by the device's counter")
+    if planned:
+        notes.append("the position is the schedule's; it was not measured")
+    elif not path.phases:
+        notes.append("no single press in the path: no phases are marked")
+    return notes
+
+
+def _without_counter(streams: Streams) -> tuple[Stream, int]:
+    taxels = streams.taxels
+    if not streams.counted:
+        return taxels, -1
+    counter = taxels.values[:, -1]
+    steps = np.diff(counter[np.isfinite(counter)])
+    lost = int(np.maximum(steps[steps > 0] - 1, 0).sum())
+    return replace(taxels, values=taxels.values[:, :-1]), lost
+
+
+def _indenter(mapping: dict[str, Any]) -> tuple[Indenter, str]:
+    if "indenter" not in mapping:
+        return from_document(NO_INDENTER), "unknown"
+    return from_document(mapping["indenter"], "indenter"), mapping["indenter"]["shape"]
+
+
+def _registration(mapping: dict[str, Any], streams: Streams) -> tuple[Registration, list[str]]:
+    """Return where the skin lies in the machine's frame, and what of it nobody said."""
+    contact, position = mapping.get("contact", {}), streams.position
+    if position is None or streams.depth_given:
+        return Registration((0.0, 0.0, 0.0), contact.get("yaw", 0.0)), []
+    values = position.values
+    origin = (
+        contact.get("x", float(np.median(values[:, 0]))), contact.get("y", float(np.median(values[:, 1]))),
+        contact.get("z", float(values[:, 2].max())),
+    )  # fmt: skip
+    unsaid = []
+    if "z" not in contact:
+        unsaid.append("contact/z: not said by the source; depth is counted from the highest position")
+    if "x" not in contact or "y" not in contact:
+        unsaid.append("contact/x, y: not said by the source; the median position is taken for the array's centre")
+    return Registration(origin, contact.get("yaw", 0.0)), unsaid
+
+
+def _cuts(
+    mapping: dict[str, Any], streams: Streams, scheduled: list[ScheduledPress], place: Registration
+) -> list[tuple[int, int, ScheduledPress | None]]:
+    begin, end = int(streams.taxels.time_ns[0]), int(streams.taxels.time_ns[-1]) + 1
+    if scheduled:
+        knots = [press.knots[0] for press in scheduled]
+        middles = [int(a[-1] + b[0]) // 2 for a, b in pairwise(knots)]
+        edges = [min(begin, int(knots[0][0])), *middles, max(end, int(knots[-1][-1]) + 1)]
+        return list(zip(edges[:-1], edges[1:], scheduled, strict=True))
+    position = streams.position
+    depth = (position.time_ns, place.to_sensor(position.values)[:, 2]) if position else None
+    return [(a, b, None) for a, b in windows(mapping.get("trials", {}), streams.taxels.time_ns, depth)]
+
+
+def _commanded(planned: ScheduledPress, begin_ns: int, end_ns: int) -> Stream:
+    time_ns, position = planned.knots
+    time_ns = np.concatenate([[min(begin_ns, time_ns[0] - 1)], time_ns, [max(end_ns, time_ns[-1] + 1)]])
+    return Stream("position", time_ns, position[[0, 0, 1, 2, 3, 3]], ("x", "y", "z"), "mm", "aligned")
+
+
+def _shifted(streams: Streams, shift_ns: int) -> Streams:
+    if not shift_ns:
+        return streams
+
+    def moved(stream: Stream) -> Stream:
+        return replace(stream, time_ns=stream.time_ns + shift_ns)
+
+    position = moved(streams.position) if streams.position else None
+    return replace(
+        streams, taxels=moved(streams.taxels), position=position, measured=tuple(map(moved, streams.measured))
+    )
+
+
+def _known(mapping: dict[str, Any], tables: dict[str, Table], parts: dict[str, str]) -> dict[str, float]:
+    """Return what the mapping knows of a trial's press beyond its path."""
+    found = {}
+    for name, entry in mapping.get("press", {}).items():
+        where = f"press: {name}"
+        if isinstance(entry, int | float):
+            found[name] = float(entry)
+        elif "part" in entry:
+            found[name] = _part(parts, entry["part"], where)
+        else:
+            table = tables.get(entry.get("file", next(iter(tables))))
+            if table is None:
+                raise FormatError(f"{where}: file {entry.get('file')!r}", ", ".join(tables), "name one under files")
+            single(table, entry.get("column", ""), where)
+            found[name] = float(np.nanmedian(axis(table, entry, UNITS[name], [], where)))
+    return found
+
+
+def _part(parts: dict[str, str], name: str, where: str) -> float:
+    if name not in parts:
+        raise FormatError(f"{where}: part {name!r}", ", ".join(parts) or "none: no path has a {part}", "correct part")
+    text = parts[name].replace("p", ".").replace(",", ".")
+    digits = "".join(c for c in text if c.isdigit() or c in ".-")
+    try:
+        return float(digits)
+    except ValueError:
+        raise FormatError(f"{where}: {parts[name]!r} in the path is no number", "a number", "correct part") from None

@@ -1,0 +1,152 @@
+"""What is in foreign files, and a mapping to start from: guesses by the columns' names, for a person to correct."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata.errors import UsageError
+from tacdata.importing.formats.source_format import Table, read_table
+from tacdata.importing.units import FACTORS, plain, quantity_of, split_unit
+
+GUESSES = {
+    "time": r"(time|t|timestamp|stamp|zeit|clock|datetime|date)",
+    "depth": r"(depth|indentation|displacement|disp|travel|stroke|weg|eindringtiefe|d)",
+    "x": r"(x|pos_?x|x_?pos(ition)?|stage_?x)",
+    "y": r"(y|pos_?y|y_?pos(ition)?|stage_?y)",
+    "z": r"(z|pos_?z|z_?pos(ition)?|stage_?z|height)",
+    "force": r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy])",
+    "temperature": r"(temp(erature)?|t_?amb)",
+    "trial": r"(trial|run|cycle|episode|press|repeat|rep|test|versuch|element)(_?(id|no|nr|number))?",
+    "counter": r"(counter|frame|seq(uence)?|sample|index|n)",
+}
+"""What a column's name, without its unit, says of it."""
+SHOWN = 30
+"""Columns that are listed of each file."""
+
+
+def described(source: Path) -> tuple[dict[str, Table], str]:
+    """Return one table of each kind of file in a source, and what is in them in words.
+
+    Raises:
+        UsageError: If nothing there can be read.
+    """
+    if not source.exists():
+        raise UsageError(f"no file or folder {source}", "measured data", "check the path")
+    paths = [source] if source.is_file() else sorted(p for p in source.rglob("*") if p.is_file())
+    tables: dict[str, Table] = {}
+    count: dict[str, int] = {}
+    refused = []
+    for path in paths:
+        kind = re.sub(r"\d+", "#", path.relative_to(source).as_posix() if path != source else path.name)
+        count[kind] = count.get(kind, 0) + 1
+        if count[kind] > 1:
+            continue
+        try:
+            tables[kind] = read_table(path, {})
+        except Exception as error:  # a README beside the data is no fault
+            refused.append(f"{kind}: {type(error).__name__}")
+    if not tables:
+        raise UsageError(
+            f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
+            "CSV, NPZ, Parquet or MATLAB files", "check the path, or convert the files",
+        )  # fmt: skip
+    lines = []
+    for kind, table in tables.items():
+        lines.append(f"{kind} ({count[kind]} file{'s' * (count[kind] > 1)}): {table.rows} rows")
+        lines += [_line(table, name) for name in list(table.columns)[:SHOWN]]
+        if len(table.columns) > SHOWN:
+            lines.append(f"    and {len(table.columns) - SHOWN} more columns")
+        lines += [f"    {note}" for note in table.notes]
+    return tables, "\n".join(lines)
+
+
+def _line(table: Table, name: str) -> str:
+    values = table.columns[name]
+    unit = f" [{table.units[name]}]" if table.units.get(name) and f"[{table.units[name]}]" not in name else ""
+    if values.dtype == object:
+        known = sorted({str(value) for value in values.tolist() if value is not None})
+        return f"    {name}{unit}: text, {len(known)} different, for example {', '.join(known[:3])}"
+    numbers = values.astype(float)
+    missing = np.isnan(numbers).mean()
+    shape = f" x {values.shape[1]}" if values.ndim > 1 else ""
+    if missing == 1:
+        return f"    {name}{unit}{shape}: no value"
+    common, times = np.unique(numbers[np.isfinite(numbers)], return_counts=True)
+    often = times.max() / numbers.size
+    remark = f", {100 * missing:.0f} % missing" * bool(missing)
+    if often > 0.2 and len(common) > 10 and common[times.argmax()] in (-1, 0, -999, -9999, 9999, 65535):
+        remark += f", {100 * often:.0f} % are {common[times.argmax()]:g}: missing?"
+    return f"    {name}{unit}{shape}: {np.nanmin(numbers):.9g} to {np.nanmax(numbers):.9g}{remark}"
+
+
+def proposed_mapping(source: Path, tables: dict[str, Table]) -> dict[str, Any]:
+    """Return a mapping's document that fits the tables as far as their names tell."""
+    aliases: dict[str, str] = {}
+    for kind in tables:
+        alias = re.sub(r"\W+", "_", Path(kind).stem.lower()).strip("_") or "data"
+        while alias in aliases:
+            alias += "_"
+        aliases[alias] = kind
+    roles = {alias: _roles(tables[kind]) for alias, kind in aliases.items()}
+    wide = max(aliases, key=lambda alias: len(roles[alias]["channels"]))
+    document: dict[str, Any] = {
+        "version": schemas.version("import_mapping"), "name": source.stem, "source": "say where the data come from",
+        "files": {alias: _file(kind, tables[kind], roles[alias]) for alias, kind in aliases.items()},
+        "sensor": {"name": source.stem},
+        "taxels": {"file": wide, "columns": roles[wide]["channels"] or [0]},
+    }  # fmt: skip
+    for alias, found in roles.items():
+        if "position" not in document and ("depth" in found or "z" in found):
+            chosen = ("x", "y", "depth") if "depth" in found else ("x", "y", "z")
+            document["position"] = {"file": alias} | {
+                key: _axis(tables[aliases[alias]], found[key][0]) for key in chosen if key in found
+            }
+        for key in ("force", "temperature"):
+            if key in found and key not in document.get("measured", {}):
+                unit = tables[aliases[alias]].units.get(found[key][0])
+                entry = {"file": alias, "columns": found[key], **({"unit": plain(unit)} if unit else {})}
+                document.setdefault("measured", {})[key] = entry
+        if "trial" in found:
+            document["trials"] = {"column": found["trial"][0]}
+    return document
+
+
+def _roles(table: Table) -> dict[str, list[str]]:
+    roles: dict[str, list[str]] = {"channels": []}
+    for name, values in table.columns.items():
+        bare = split_unit(name.rsplit(".", 1)[-1])[0].lower()
+        role = next((role for role, pattern in GUESSES.items() if re.fullmatch(pattern, bare)), None)
+        unit = quantity_of(table.units.get(name, ""))
+        role = {"N": "force", "s": "time"}.get(unit or "", role)
+        role = "depth" if role is None and unit == "mm" else role
+        if role is None and values.dtype != object:
+            roles["channels"].append(name)
+        elif role:
+            roles.setdefault(role, []).append(name)
+    if "time" not in roles and table.columns and not any(re.search(r"[A-Za-z]", name) for name in table.columns):
+        # Without a header the first column that only grows is most likely the time.
+        for name in list(roles["channels"]):
+            if (np.diff(table.columns[name]) >= 0).all():
+                roles["time"] = [name]
+                roles["channels"].remove(name)
+                break
+    return roles
+
+
+def _file(kind: str, table: Table, roles: dict[str, list[str]]) -> dict[str, Any]:
+    path = kind
+    for k in range(kind.count("#")):
+        path = path.replace("#", f"{{part{k}}}", 1)
+    if "time" not in roles:
+        return {"path": path, "time": {"rate": 100.0}}
+    unit = plain(table.units.get(roles["time"][0], ""))
+    return {"path": path, "time": {"column": roles["time"][0], **({"unit": unit} if unit in FACTORS["s"] else {})}}
+
+
+def _axis(table: Table, name: str) -> dict[str, Any]:
+    return {"column": name, **({} if name in table.units else {"unit": "mm"})}

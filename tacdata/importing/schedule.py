@@ -1,0 +1,118 @@
+"""A press schedule in place of a position: the path as it was commanded, from times, depths and speeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.columns import axis
+from tacdata.importing.formats.source_format import Table
+from tacdata.importing.streams import Stream
+from tacdata.importing.times import times
+from tacdata.recording.episode import Phase
+
+
+@dataclass(frozen=True)
+class ScheduledPress:
+    """One press of a schedule."""
+
+    start_ns: int
+    """Beginning of the motion down [ns]."""
+    depth: float
+    """Full depth [mm]."""
+    speed: float
+    """Speed down and up [mm/s]."""
+    hold: float
+    """Time at full depth [s]."""
+    height: float
+    """Height above the skin at the start [mm]."""
+    x: float
+    y: float
+
+    @property
+    def knots(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times [ns], shape (4,), and positions with -depth as z [mm], shape (4, 3), linear in between."""
+        way = round((self.depth + self.height) / self.speed * 1e9)
+        hold = round(self.hold * 1e9)
+        time_ns = self.start_ns + np.array([0, way, way + hold, 2 * way + hold], dtype=np.int64)
+        z = np.array([self.height, -self.depth, -self.depth, self.height])
+        return time_ns, np.stack([np.full(4, self.x), np.full(4, self.y), z], axis=1)
+
+    def phases(self, begin_ns: int) -> tuple[Phase, ...]:
+        """Return its phases, with a rest from a time [ns] on."""
+        down, full, up, end = self.knots[0].tolist()
+        marks = (("rest", begin_ns, down), ("press", down, full), ("hold", full, up), ("release", up, end))
+        return tuple(Phase(*mark) for mark in marks if mark[2] > mark[1])
+
+
+def read_schedule(mapping: dict[str, Any], tables: dict[str, Table], taxels: Stream) -> list[ScheduledPress]:
+    """Return the presses of a mapping's schedule in the order of time; [] if it has none.
+
+    A list of presses counts its times from the zero of the channels' clock; from their first row if that clock
+    is Unix time and the list's is not.
+
+    Raises:
+        FormatError: If a column is missing, presses overlap or lie outside the recorded time.
+    """
+    entry = mapping.get("schedule")
+    if not entry:
+        return []
+    presses = _listed(entry, taxels) if "presses" in entry else _tabled(mapping, entry, tables)
+    presses.sort(key=lambda press: press.start_ns)
+    for before, after in pairwise(presses):
+        if before.knots[0][-1] > after.start_ns:
+            raise FormatError(
+                f"schedule: the press at {after.start_ns / 1e9:.3f} s begins before the one before it ends",
+                "presses one after the other", "correct start, speed or hold",
+            )  # fmt: skip
+    inside = [p for p in presses if p.start_ns <= taxels.time_ns[-1] and p.knots[0][-1] >= taxels.time_ns[0]]
+    if not inside:
+        raise FormatError(
+            "schedule: no press lies within the time of the channels, "
+            f"{taxels.time_ns[0] / 1e9:.3f} to {taxels.time_ns[-1] / 1e9:.3f} s",
+            "presses within it", "correct start, or the schedule's time: {offset: SECONDS}",
+        )  # fmt: skip
+    return inside
+
+
+def _listed(entry: dict[str, Any], taxels: Stream) -> list[ScheduledPress]:
+    from tacdata.importing.times import YEAR_2000
+
+    zero = round(entry.get("time", {}).get("offset", 0.0) * 1e9)
+    if taxels.zero == "unix" and entry["presses"][0]["start"] < YEAR_2000:
+        zero += int(taxels.time_ns[0])
+    return [
+        ScheduledPress(
+            zero + round(p["start"] * 1e9), p["depth"], p["speed"], p.get("hold", 0.0), p.get("height", 0.0),
+            p.get("x", 0.0), p.get("y", 0.0),
+        )
+        for p in entry["presses"]
+    ]  # fmt: skip
+
+
+def _tabled(mapping: dict[str, Any], entry: dict[str, Any], tables: dict[str, Table]) -> list[ScheduledPress]:
+    if "file" not in entry or entry["file"] not in tables or "start" not in entry:
+        raise FormatError(
+            "schedule without presses, or without file and start",
+            "presses: a list, or file: NAME with start, depth and speed as columns", "complete the schedule",
+        )  # fmt: skip
+    table = tables[entry["file"]]
+    start = entry["start"]
+    clock = {**entry.get("time", {}), **({"column": start["column"]} if isinstance(start, dict) else {})}
+    if isinstance(start, dict) and "unit" in start:
+        clock["unit"] = start["unit"]
+    start_ns, _ = times(table, clock, "schedule: start")
+    units = {"depth": "mm", "speed": "mm/s", "hold": "s", "height": "mm", "x": "mm", "y": "mm"}
+    values = {
+        name: np.broadcast_to(axis(table, entry.get(name, 0.0), unit, [], f"schedule: {name}"), (table.rows,))
+        for name, unit in units.items()
+    }
+    if not (np.isfinite(values["speed"]) & (values["speed"] > 0)).all():
+        raise FormatError("schedule: a speed that is not above 0 mm/s", "above 0 mm/s", "correct the speed")
+    return [
+        ScheduledPress(int(t), *(float(values[name][row]) for name in units)) for row, t in enumerate(start_ns.tolist())
+    ]

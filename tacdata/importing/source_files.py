@@ -1,0 +1,105 @@
+"""Which files belong together: paths with {parts} that differ from trial to trial."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tacdata.errors import FormatError, UsageError
+
+
+@dataclass(frozen=True)
+class FileSet:
+    """Files of one trial, or of several that lie in them."""
+
+    parts: dict[str, str]
+    """Value of each {part} of the paths."""
+    paths: dict[str, Path] = field(default_factory=dict)
+    """Name under ``files`` -> path."""
+
+    @property
+    def label(self) -> str:
+        """The parts' values, in words."""
+        return " ".join(self.parts.values())
+
+
+def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
+    """Return every set of files below a folder, or the one file that was given.
+
+    Args:
+        source: A folder, or a file if the mapping names one kind of file only.
+        files: ``files`` of the mapping.
+
+    Raises:
+        UsageError: If the source does not exist or no file fits.
+        FormatError: If a trial lacks one of its files.
+    """
+    if not source.exists():
+        raise UsageError(f"no file or folder {source}", "measured data", "check the path")
+    if source.is_file():
+        if len(files) != 1:
+            raise UsageError(
+                f"{source} is one file, the mapping names {len(files)} ({', '.join(files)})",
+                "the folder that holds them", "give the folder",
+            )  # fmt: skip
+        return [FileSet({}, {next(iter(files)): source})]
+    matches = {name: _matches(source, entry["path"]) for name, entry in files.items()}
+    for name, found in matches.items():
+        if not found:
+            raise UsageError(
+                f"no file fits {files[name]['path']} below {source}", "one or more",
+                f"correct files/{name}/path in the mapping; there is {_listing(source)}",
+            )  # fmt: skip
+    keys = {name: tuple(re.findall(r"\{(\w+)\}", entry["path"])) for name, entry in files.items()}
+    # The kind of file with the most parts tells the trials; others are shared by those whose parts agree.
+    leading = max(keys, key=lambda name: len(keys[name]))
+    sets = []
+    for parts, _ in matches[leading]:
+        paths = {}
+        for name in files:
+            fitting = [
+                p for own, p in matches[name] if all(parts.get(key, value) == value for key, value in own.items())
+            ]
+            if len(fitting) != 1:
+                raise FormatError(
+                    f"{len(fitting)} files {files[name]['path']} for {parts or 'the source'}", "exactly one",
+                    "complete the source, or narrow the path with a {part} in the mapping",
+                )  # fmt: skip
+            paths[name] = fitting[0]
+        sets.append(FileSet(parts, paths))
+    return sets
+
+
+def _matches(source: Path, pattern: str) -> list[tuple[dict[str, str], Path]]:
+    seen: set[str] = set()
+
+    def part(match: re.Match[str]) -> str:
+        text = match[0]
+        if text == "**/":
+            return "(?:.*/)?"
+        if text == "*":
+            return "[^/]*"
+        name = text[1:-1]
+        if name in seen:
+            return f"(?P={name})"
+        seen.add(name)
+        return f"(?P<{name}>[^/]+?)"
+
+    tokens = re.split(r"(\*\*/|\*|\{\w+\})", pattern)
+    regex = "".join(re.sub(r"^(\*\*/|\*|\{\w+\})$", part, t) if k % 2 else re.escape(t) for k, t in enumerate(tokens))
+    found = []
+    for path in sorted(p for p in source.rglob("*") if p.is_file()):
+        if match := re.fullmatch(regex, path.relative_to(source).as_posix()):
+            found.append((match.groupdict(), path))
+    return sorted(found, key=lambda item: [_natural(value) for value in item[0].values()])
+
+
+def _natural(text: str) -> list[tuple[int, int, str]]:
+    return [(1, int(t), "") if t.isdigit() else (0, 0, t) for t in re.split(r"(\d+)", text) if t]
+
+
+def _listing(source: Path) -> str:
+    names = sorted(p.relative_to(source).as_posix() for p in source.rglob("*") if p.is_file())
+    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "") or "nothing"

@@ -1,0 +1,228 @@
+"""The streams of one set of files: channels, position and further quantities, each with its own clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.columns import axis, numbers, select, single
+from tacdata.importing.formats.source_format import Table
+from tacdata.importing.times import NEVER, times
+from tacdata.importing.units import factor, plain, quantity_of, split_unit
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Rows of one quantity in the order of time."""
+
+    name: str
+    time_ns: np.ndarray
+    """Time of each row [ns], shape (n,), int64, not decreasing."""
+    values: np.ndarray
+    """Values [`unit`], shape (n, k); NaN where one is missing."""
+    names: tuple[str, ...]
+    """Name of each column of `values`."""
+    unit: str
+    zero: str
+    """What the clock counts from; streams with the same zero share it, "aligned" fits all."""
+    notes: tuple[str, ...] = ()
+
+    def within(self, begin_ns: int, end_ns: int) -> Stream:
+        """Return the rows from a time [ns] to before another."""
+        rows = slice(*np.searchsorted(self.time_ns, (begin_ns, end_ns)))
+        return replace(self, time_ns=self.time_ns[rows], values=self.values[rows])
+
+
+@dataclass(frozen=True)
+class Streams:
+    """What a set of files holds."""
+
+    taxels: Stream
+    """The channels; its last column is the counter if `counted`."""
+    position: Stream | None
+    """x, y, z of the machine [mm], or the depth below the skin as -z."""
+    measured: tuple[Stream, ...] = ()
+    counted: bool = False
+    depth_given: bool = False
+    """Whether the position is a depth, so that its zero is the skin."""
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def all(self) -> tuple[Stream, ...]:
+        """Every stream."""
+        return (self.taxels, *((self.position,) if self.position else ()), *self.measured)
+
+    def within(self, begin_ns: int, end_ns: int) -> Streams:
+        """Return the rows from a time [ns] to before another."""
+        position = self.position.within(begin_ns, end_ns) if self.position else None
+        measured = tuple(stream.within(begin_ns, end_ns) for stream in self.measured)
+        return replace(self, taxels=self.taxels.within(begin_ns, end_ns), position=position, measured=measured)
+
+
+def read_streams(mapping: dict[str, Any], tables: dict[str, Table]) -> Streams:
+    """Return the streams that a mapping describes.
+
+    Args:
+        mapping: The mapping's document.
+        tables: Name under ``files`` -> what was read of it.
+
+    Raises:
+        FormatError: If a column, unit or clock is wrong, or clocks have no zero in common.
+    """
+    taxels, counted = _taxels(mapping, tables)
+    position, depth_given = _position(mapping, tables)
+    measured = tuple(_measured(mapping, name, entry, tables) for name, entry in mapping.get("measured", {}).items())
+    streams = Streams(taxels, position, measured, counted, depth_given)
+    _check_zeros(streams)
+    _check_overlap(streams)
+    return replace(streams, notes=tuple(note for stream in streams.all for note in stream.notes))
+
+
+def _clock(mapping: dict[str, Any], entry: dict[str, Any]) -> dict[str, Any]:
+    clock = entry.get("time") or mapping["files"][entry["file"]].get("time")
+    if not clock:
+        raise FormatError(
+            f"no clock for {entry['file']}", "time: {column: NAME} or time: {rate: HZ}",
+            f"add time under files/{entry['file']} in the mapping",
+        )  # fmt: skip
+    return clock
+
+
+def _table(mapping: dict[str, Any], tables: dict[str, Table], alias: str, where: str) -> Table:
+    if alias not in tables:
+        raise FormatError(f"{where}: file {alias!r}", ", ".join(mapping["files"]), "name one under files")
+    return tables[alias]
+
+
+def _missing(mapping: dict[str, Any], entry: dict[str, Any]) -> list[float]:
+    common = mapping["files"][entry["file"]].get("missing", [])
+    return [value for value in (*common, *entry.get("missing", [])) if not isinstance(value, str)]
+
+
+def _timed(
+    mapping: dict[str, Any], entry: dict[str, Any], table: Table, name: str, values: np.ndarray,
+    names: tuple[str, ...], unit: str,
+) -> Stream:  # fmt: skip
+    clock = _clock(mapping, entry)
+    time_ns, zero = times(table, clock, f"{name}: time")
+    zero = "aligned" if "offset" in clock else f"own: {entry['file']}" if zero == "own" else zero
+    known = time_ns != NEVER
+    notes = []
+    if not known.all():
+        notes.append(f"{name}: {(~known).sum()} rows without a time are left out")
+    time_ns, values = time_ns[known], values[known]
+    if back := int((np.diff(time_ns) < 0).sum()):
+        notes.append(f"{name}: time runs backwards {back} times; rows are put in the order of time")
+        order = np.argsort(time_ns, kind="stable")
+        time_ns, values = time_ns[order], values[order]
+    return Stream(name, time_ns, values, names, unit, zero, (*table.notes, *notes))
+
+
+def _taxels(mapping: dict[str, Any], tables: dict[str, Table]) -> tuple[Stream, bool]:
+    entry = mapping["taxels"]
+    table = _table(mapping, tables, entry["file"], "taxels")
+    if ("long" in entry) == ("columns" in entry):
+        raise FormatError("taxels with both or neither of columns and long", "one of them", "correct the mapping")
+    if "long" in entry:
+        table, names = _widened(mapping, table, entry)
+    else:
+        names = select(table, entry["columns"], "taxels: columns")
+    unit = entry.get("unit") or next((table.units[n] for n in names if n in table.units), "") or "as in the source"
+    values = numbers(table, names, _missing(mapping, entry), "taxels") * entry.get("scale", 1.0)
+    labels = [n for n in names for _ in range(table.columns[n].shape[1] if table.columns[n].ndim > 1 else 1)]
+    if counted := "counter" in entry:
+        name = single(table, entry["counter"], "taxels: counter")
+        values = np.concatenate([values, numbers(table, [name], [], "taxels: counter")], axis=1)
+    return _timed(mapping, entry, table, "taxels", values, tuple(split_unit(n)[0] for n in labels), unit), counted
+
+
+def _widened(mapping: dict[str, Any], table: Table, entry: dict[str, Any]) -> tuple[Table, list[str]]:
+    """Return a table with a column a channel of one with a row a channel; what was not read stays NaN."""
+    clock = _clock(mapping, entry)
+    time = single(table, clock["column"], "taxels: time") if "column" in clock else None
+    if time is None:
+        raise FormatError("taxels: long without a time column", "time: {column: NAME}", "add it to the mapping")
+    channel = table.columns[single(table, entry["long"]["channel"], "taxels: long: channel")]
+    value = numbers(table, [single(table, entry["long"]["value"], "taxels: long: value")], [], "taxels: long")[:, 0]
+    moments, row = np.unique(table.columns[time].astype(str) if table.columns[time].dtype == object
+                             else table.columns[time], return_inverse=True)  # fmt: skip
+    known, column = np.unique(channel.astype(str) if channel.dtype == object else channel, return_inverse=True)
+    wide = np.full((len(moments), len(known)), np.nan)
+    wide[row, column] = value
+    labels = [f"{k:g}" if isinstance(k, float) else str(k) for k in known.tolist()]
+    moments = moments.astype(object) if moments.dtype.kind == "U" else moments
+    columns = {time: moments, **{f"channel {label}": wide[:, k] for k, label in enumerate(labels)}}
+    unit = {time: table.units[time]} if time in table.units else {}
+    return Table(table.path, columns, unit, table.notes), [f"channel {label}" for label in labels]
+
+
+def _position(mapping: dict[str, Any], tables: dict[str, Table]) -> tuple[Stream | None, bool]:
+    entry = mapping.get("position")
+    if entry is None:
+        return None, False
+    if ("depth" in entry) == ("z" in entry):
+        raise FormatError("position with both or neither of z and depth", "one of them", "correct the mapping")
+    table = _table(mapping, tables, entry["file"], "position")
+    missing, known = _missing(mapping, entry), mapping.get("press", {})
+    depth_given = "depth" in entry
+    columns = []
+    for name in ("x", "y"):
+        fallback = known.get(name, 0.0)
+        value = entry.get(name, fallback if isinstance(fallback, int | float) else 0.0)
+        columns.append(axis(table, value, "mm", missing, f"position: {name}"))
+    down = axis(table, entry["depth" if depth_given else "z"], "mm", missing, "position: depth or z")
+    columns.append(-down if depth_given else down)
+    values = np.stack(np.broadcast_arrays(*columns, np.zeros(table.rows))[:3], axis=1)
+    whole = np.isfinite(values).all(axis=1)
+    stream = _timed(mapping, entry, table, "position", values, ("x", "y", "z"), "mm")
+    if not whole.any():
+        raise FormatError("position: no row has all of its numbers", "a position", "correct the columns or missing")
+    kept = np.isfinite(stream.values).all(axis=1)
+    return replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept]), depth_given
+
+
+def _measured(mapping: dict[str, Any], name: str, entry: dict[str, Any], tables: dict[str, Table]) -> Stream:
+    table = _table(mapping, tables, entry["file"], f"measured: {name}")
+    names = select(table, entry["columns"], f"measured: {name}")
+    given = plain(entry.get("unit") or next((table.units[n] for n in names if n in table.units), ""))
+    ours = quantity_of(given) if given else None
+    values = numbers(table, names, _missing(mapping, entry), f"measured: {name}") * entry.get("scale", 1.0)
+    if ours in ("N", "mm"):
+        values, unit = values * factor(given, ours, f"measured: {name}"), ours
+    else:
+        unit = given
+    labels = tuple(split_unit(n)[0] for n in names) if len(names) == values.shape[1] else None
+    stream = _timed(mapping, entry, table, name, values, labels or tuple(str(k) for k in range(values.shape[1])), unit)
+    kept = np.isfinite(stream.values).any(axis=1)
+    return replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept])
+
+
+def _check_zeros(streams: Streams) -> None:
+    zeros = {stream.name: stream.zero for stream in streams.all if stream.zero != "aligned"}
+    if len(set(zeros.values())) > 1:
+        listed = ", ".join(f"{name}: {zero}" for name, zero in zeros.items())
+        raise FormatError(
+            f"clocks without a common zero ({listed})",
+            "one zero for all streams, or an offset [s] that brings a clock to the others",
+            "give time: {zero: ...} or time: {offset: SECONDS} in the mapping",
+        )
+
+
+def _check_overlap(streams: Streams) -> None:
+    taxels = streams.taxels
+    for stream in streams.all:
+        if not len(stream.time_ns):
+            if stream is taxels or stream is streams.position:
+                raise FormatError(f"{stream.name}: no row", "one row or more", "correct the mapping")
+            continue
+        if stream.time_ns[-1] < taxels.time_ns[0] or stream.time_ns[0] > taxels.time_ns[-1]:
+            spans = " and ".join(
+                f"{s.name} {s.time_ns[0] / 1e9:.3f} to {s.time_ns[-1] / 1e9:.3f} s" for s in (taxels, stream)
+            )
+            raise FormatError(
+                f"streams that do not overlap in time: {spans}",
+                "streams of the same time", "correct the clocks' unit, zero or offset in the mapping",
+            )  # fmt: skip

@@ -1,0 +1,153 @@
+"""How a text file of numbers is laid out: delimiter, decimal sign, header and units, told from its first lines."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from tacdata.errors import FormatError
+from tacdata.importing.units import split_unit
+
+COMMENTS = ("#", "%", "//")
+MISSING = (
+    "", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---", "?",
+)  # fmt: skip
+"""Texts that stand for a missing value in any file."""
+DELIMITERS = ("\t", ";", ",", "|", " ")
+SAMPLE = 400
+"""Lines that are looked at."""
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """The layout of a text file."""
+
+    delimiter: str
+    """The delimiter; a blank stands for any white space."""
+    decimal: str
+    """Decimal sign: a point or a comma."""
+    skip: int
+    """Lines before the first row of data."""
+    names: tuple[str, ...]
+    """Column names, one a column; "0", "1", ... in a file without a header."""
+    units: dict[str, str]
+    """Unit of each column that the header gives one."""
+    kinds: tuple[str, ...]
+    """``float``, ``int`` (too long for a float) or ``text`` of each column."""
+
+
+def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
+    """Tell the layout from a file's beginning; ``options`` (of the mapping) overrule what is found.
+
+    Raises:
+        FormatError: If there are no rows of one and the same number of columns.
+    """
+    lines = text.splitlines()[:SAMPLE]
+    skip = int(options.get("skip", 0))
+    lines_of_data = [line for line in lines[skip:] if line.strip() and not line.lstrip().startswith(COMMENTS)]
+    delimiter = {"tab": "\t", "space": " "}.get(options.get("delimiter", ""), options.get("delimiter"))
+    delimiter = delimiter or _delimiter(lines_of_data)
+    rows = [split(line, delimiter) for line in lines_of_data]
+    width = Counter(len(row) for row in rows[-max(len(rows) // 2, 1) :]).most_common(1)[0][0] if rows else 0
+    decimal = options.get("decimal") or _decimal(rows, delimiter)
+    first = next((k for k, row in enumerate(rows) if len(row) == width and _is_data(row, decimal)), None)
+    if first is None:
+        raise FormatError(
+            f"{origin}: no row of numbers among its first {len(lines)} lines",
+            "a text file of columns, with or without a header",
+            "give delimiter, decimal, skip or header under files in the mapping",
+        )
+    header = [row for row in rows[:first] if len(row) in (width, width - 1, width + 1) and any(row)]
+    header = header or _commented_header(lines[skip:], lines_of_data[first], delimiter, width)
+    if options.get("header") is False:
+        header, first = [], next(k for k, row in enumerate(rows) if len(row) == width)
+    names, units = _names(header, width)
+    start = _line_of(lines, lines_of_data[first], skip)
+    sample = [row for row in rows[first:] if len(row) == width]
+    kinds = tuple(_kind([row[k] for row in sample], decimal) for k in range(width))
+    return TextLayout(delimiter, decimal, start, names, units, kinds)
+
+
+def _commented_header(lines: list[str], first: str, delimiter: str, width: int) -> list[list[str]]:
+    """Return the last comment before the data as a header if it has as many fields, as NumPy writes it."""
+    before = [line.lstrip().lstrip("#%/").strip() for line in lines[: lines.index(first)] if line.strip()]
+    fields = split(before[-1], delimiter) if before else []
+    return [fields] if len(fields) == width else []
+
+
+def split(line: str, delimiter: str) -> list[str]:
+    """Return the fields of a line, without quotes and blanks around them."""
+    if delimiter == " ":
+        return line.split()
+    return [field.strip() for field in next(csv.reader([line], delimiter=delimiter))]
+
+
+def is_number(field: str, decimal: str) -> bool:
+    """Say whether a field is a number or stands for a missing one."""
+    if field in MISSING:
+        return True
+    try:
+        float(field.replace(",", ".") if decimal == "," else field)
+    except ValueError:
+        return False
+    return "_" not in field
+
+
+def _delimiter(lines: list[str]) -> str:
+    tail = lines[-max(len(lines) // 2, 1) :]
+    for delimiter in DELIMITERS:
+        widths = Counter(len(split(line, delimiter)) for line in tail)
+        width, count = widths.most_common(1)[0] if widths else (1, 0)
+        if width > 1 and count >= 0.8 * len(tail):
+            return delimiter
+    return ","
+
+
+def _decimal(rows: list[list[str]], delimiter: str) -> str:
+    if delimiter == ",":
+        return "."
+    fields = [field for row in rows for field in row]
+    commas = sum(bool(re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", field)) for field in fields)
+    points = sum(bool(re.fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", field)) for field in fields)
+    return "," if commas > points else "."
+
+
+def _is_data(row: list[str], decimal: str) -> bool:
+    numbers = sum(is_number(field, decimal) and field not in MISSING for field in row)
+    return numbers > 0 and 2 * sum(is_number(field, decimal) for field in row) >= len(row)
+
+
+def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[str, str]]:
+    if not header:
+        return tuple(str(k) for k in range(width)), {}
+    rows = [[*row, *[""] * (width - len(row))][:width] for row in header[-2:]]
+    units: dict[str, str] = {}
+    # Two header lines: names, then units, if the second one looks like units throughout.
+    looks_like_units = len(rows) == 2 and all(len(field.strip("[]() ")) <= 8 for field in rows[1])
+    titles = rows[0] if looks_like_units else rows[-1]
+    names: list[str] = []
+    for k, title in enumerate(titles):
+        name = title.lstrip("\ufeff").strip() or str(k)
+        while name in names:
+            name += "'"
+        names.append(name)
+        unit = rows[1][k].strip("[]() ") if looks_like_units else split_unit(name)[1]
+        if unit:
+            units[name] = unit
+    return tuple(names), units
+
+
+def _kind(fields: list[str], decimal: str) -> str:
+    known = [field for field in fields if field not in MISSING]
+    numbers = [is_number(field, decimal) for field in known]
+    if not known or (2 * sum(numbers) >= len(known) and any(numbers)):
+        long = known and all(re.fullmatch(r"[-+]?\d{16,}", field) for field in known)
+        return "int" if long else "float"
+    return "text"
+
+
+def _line_of(lines: list[str], line: str, skip: int) -> int:
+    return next(k for k, other in enumerate(lines) if k >= skip and other == line)

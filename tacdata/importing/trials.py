@@ -1,0 +1,94 @@
+"""What makes several recordings of one set of files: a column, a pause, or each press."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.columns import single
+from tacdata.importing.formats.source_format import Table
+
+
+def split_tables(tables: dict[str, Table], trials: dict[str, Any]) -> Iterator[tuple[str, dict[str, Table]]]:
+    """Yield the label and the rows of each trial that a column tells; all rows under "" without such a column.
+
+    Raises:
+        FormatError: If no file has the column.
+    """
+    if "column" not in trials:
+        yield "", tables
+        return
+    named: dict[str, np.ndarray] = {}
+    refused = FormatError("no file to split by a column", "one or more", "correct the mapping")
+    for alias, table in tables.items():
+        try:
+            named[alias] = _labels(table, trials["column"])
+        except FormatError as error:  # another file may have it
+            refused = error
+    if not named:
+        raise refused
+    longest = max(named.values(), key=lambda labels: len(set(labels.tolist())))
+    for label in dict.fromkeys(longest.tolist()):
+        rows = {alias: labels == label for alias, labels in named.items()}
+        if all(mask.any() for mask in rows.values()):
+            yield (
+                f"{label}",
+                {
+                    alias: replace(table, columns={n: v[rows[alias]] for n, v in table.columns.items()})
+                    if alias in rows
+                    else table
+                    for alias, table in tables.items()
+                },
+            )
+
+
+def _labels(table: Table, column: str | int) -> np.ndarray:
+    values = table.columns[single(table, column, "trials: column")]
+    if values.dtype == object:
+        return np.array(["" if value is None else str(value) for value in values.tolist()], dtype=object)
+    return np.array([f"{value:g}" if np.isfinite(value) else "" for value in values.astype(float)], dtype=object)
+
+
+def windows(
+    trials: dict[str, Any], taxels_ns: np.ndarray, path: tuple[np.ndarray, np.ndarray] | None
+) -> list[tuple[int, int]]:
+    """Return the stretches of time that are trials.
+
+    Args:
+        trials: ``trials`` of the mapping.
+        taxels_ns: Times of the channels [ns], shape (n,).
+        path: Times [ns], shape (m,), and depths [mm], shape (m,), if they are known.
+
+    Returns:
+        First time and the one after the last [ns] of each trial.
+
+    Raises:
+        FormatError: If nothing is deeper than ``press_above``.
+    """
+    ends = [int(taxels_ns[0]), int(taxels_ns[-1]) + 1]
+    if "gap" in trials:
+        pauses = np.flatnonzero(np.diff(taxels_ns) > trials["gap"] * 1e9)
+        ends[1:1] = [int(taxels_ns[k + 1]) for k in pauses]
+    if "press_above" in trials:
+        if path is None:
+            raise FormatError("trials: press_above without a position", "a position", "add position, or split by gap")
+        time_ns, depth = path
+        begins, stops = _excursions(depth > trials["press_above"])
+        if not len(begins):
+            raise FormatError(
+                f"trials: press_above {trials['press_above']:g} mm, the deepest is {depth.max():.3f} mm",
+                f"less than {depth.max():.3f} mm", "correct press_above or the position's zero",
+            )  # fmt: skip
+        ends[1:1] = [(int(time_ns[b]) + int(time_ns[e])) // 2 for e, b in zip(stops[:-1], begins[1:], strict=True)]
+    return [(a, b) for a, b in pairwise(ends) if b > a]
+
+
+def _excursions(deep: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first and the last row of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], deep, [False]]).astype(np.int8)))
+    return edges[::2], edges[1::2] - 1

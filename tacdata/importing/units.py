@@ -1,0 +1,63 @@
+"""Units of foreign files and what they are in ours: mm, N, s. Taxel readings keep their unit."""
+
+from __future__ import annotations
+
+import re
+
+from tacdata.errors import FormatError
+
+GRAVITY = 9.80665
+"""Standard gravity [m/s^2]: a load cell in grams was calibrated with weights (CGPM 1901)."""
+FACTORS: dict[str, dict[str, float]] = {
+    "mm": {
+        "m": 1e3, "dm": 100.0, "cm": 10.0, "mm": 1.0, "um": 1e-3, "micron": 1e-3, "microns": 1e-3, "nm": 1e-6,
+        "in": 25.4, "inch": 25.4, "mil": 0.0254,
+    },
+    "N": {
+        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "g": GRAVITY * 1e-3, "gf": GRAVITY * 1e-3, "kg": GRAVITY,
+        "kgf": GRAVITY, "lbf": 4.4482216152605, "lb": 4.4482216152605, "cN": 1e-2,
+    },
+    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "mm/s": {"mm/s": 1.0, "mm/min": 1 / 60, "um/s": 1e-3, "m/s": 1e3, "cm/s": 10.0},
+    "deg": {"deg": 1.0, "rad": 57.29577951308232},
+}  # fmt: skip
+"""Our unit -> the units that can be converted to it, and the factor."""
+OTHERS = {"pf", "ff", "nf", "v", "mv", "uv", "count", "counts", "lsb", "adc", "ut", "mt", "gauss", "kpa", "pa", "mpa",
+          "degc", "c", "k", "ohm", "kohm", "a", "ma", "hz", "1", "raw", "%"}  # fmt: skip
+"""Units that are recognized behind a column's name though nothing is converted to them."""
+
+
+def plain(unit: str) -> str:
+    """Return a unit's name in ASCII, as the tables have it."""
+    return unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg").replace("seconds", "s")
+
+
+def factor(unit: str, wanted: str, origin: str) -> float:
+    """Return by what a value in ``unit`` is multiplied to be in ``wanted``.
+
+    Raises:
+        FormatError: If the unit is none of those that can be converted to it.
+    """
+    table = FACTORS[wanted]
+    name = plain(unit)
+    if name in table:
+        return table[name]
+    lowered = {key.lower(): value for key, value in table.items() if key != "mN"}
+    if name.lower() in lowered and wanted != "N":
+        return lowered[name.lower()]
+    raise FormatError(f"{origin}: unit {unit!r}", ", ".join(table), "correct the unit in the mapping")
+
+
+def quantity_of(unit: str) -> str | None:
+    """Return our unit that ``unit`` converts to, or None."""
+    return next((ours for ours, table in FACTORS.items() if plain(unit) in table), None)
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Return a column's name without its unit, and the unit, as in "Fz [N]", "Fz (N)", "Fz / N" or "fz_N"."""
+    if match := re.fullmatch(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*", name):
+        return match[1].strip(), (match[2] or match[3] or "").strip()
+    match = re.fullmatch(r"(.+?)\s*[/_ ]\s*([A-Za-z\u00b5\u03bc%]+)", name)
+    if match and (quantity_of(match[2]) or plain(match[2]).lower() in OTHERS - {"c", "k", "a", "v", "1"}):
+        return match[1].strip(), match[2]
+    return name, ""

@@ -1,0 +1,83 @@
+"""A plan in short: blocks of sites x depths x speeds x holds x repeats, written out to presses."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata import documents
+from tacdata.errors import FormatError
+from tacdata.plans.plan import Plan
+from tacdata.plans.sites import sites
+from tacdata.sensor import Sensor
+
+COPIED = ("rest", "recovery", "overshoot", "purpose")
+"""What a block says for all of its presses."""
+
+
+def write_out(recipe: dict[str, Any], sensor: Sensor, origin: str, seed: int = 0) -> dict[str, Any]:
+    """Return the plan's document (`schemas/plan.schema.json`) of a recipe (`plan_recipe.schema.json`).
+
+    Within a block the repeats of one press follow each other; holds vary fastest next, then speeds, depths,
+    approach directions and sites. ``order: random`` shuffles the block. Blocks keep their order, except that
+    presses of one indenter and yaw are brought together, so that each is mounted once, unless the recipe says
+    ``grouped: false``.
+
+    Args:
+        recipe: The recipe's document.
+        sensor: The skin.
+        origin: Names the recipe in errors.
+        seed: Decides random sites and orders.
+
+    Raises:
+        FormatError: If the recipe breaks its schema, or a press misses the skin or pierces it.
+    """
+    documents.check(recipe, "plan_recipe", origin)
+    rng = np.random.default_rng([seed, 11])
+    presses: list[dict[str, Any]] = []
+    for number, block in enumerate(recipe["blocks"]):
+        presses += _block(block, sensor, rng, f"{origin}: blocks/{number}")
+    if recipe.get("grouped", True):
+        mountings = list(dict.fromkeys((p["indenter"], p.get("yaw", 0.0)) for p in presses))
+        presses.sort(key=lambda p: mountings.index((p["indenter"], p.get("yaw", 0.0))))
+    document = {
+        "version": schemas.version("plan"), "name": recipe["name"], "purpose": recipe.get("purpose", ""),
+        "indenters": recipe["indenters"], "motion": recipe["motion"], "presses": presses,
+    }  # fmt: skip
+    Plan.from_document(document, origin).check_against(sensor)
+    return document
+
+
+def read_recipe(path: Path) -> dict[str, Any]:
+    """Read a recipe file.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: If it is damaged.
+    """
+    return documents.read(path, "plan_recipe")
+
+
+def _block(block: dict[str, Any], sensor: Sensor, rng: np.random.Generator, origin: str) -> list[dict[str, Any]]:
+    places = sites(block["at"], sensor, rng, origin)
+    if not len(places):
+        raise FormatError(f"{origin}: at: no site", "one or more", "correct the block's at")
+    indenters = [block["indenter"]] if isinstance(block["indenter"], str) else block["indenter"]
+    copied = {key: block[key] for key in COPIED if key in block}
+    entries = []
+    for indenter, yaw, place, side, depth, speed, hold in product(
+        indenters, block.get("yaws", [0.0]), places.tolist(), block.get("approach_from", [None]),
+        block["depths"], block.get("speeds", [None]), block.get("holds", [None]),
+    ):  # fmt: skip
+        x, y = (round(float(value), 3) for value in place)
+        entry = {"indenter": indenter, "x": x, "y": y, "yaw": float(yaw)}
+        optional = {"approach_from": side, "speed": speed, "hold": hold}
+        entry |= {"depth": depth, **{k: v for k, v in optional.items() if v is not None}, **copied}
+        entries += [{**entry, "repeat": repeat} for repeat in range(block.get("repeats", 1))]
+    if block.get("order") == "random":
+        entries = [entries[k] for k in rng.permutation(len(entries))]
+    return entries

@@ -1,0 +1,1 @@
+"""Plans that come with tacdata, one file each; `tacdata plan NAME` writes them out."""

@@ -1,0 +1,137 @@
+"""A short plan whose presses tell physical effects apart.
+
+Each block excites what splits one group of effects that look alike in ordinary presses:
+
+- idle stretch: drift, noise, warm-up of the electronics, without anything near the skin;
+- fly-over: what moves with the carriage or answers to an indenter near the skin without touching it;
+- onset map: slow first contacts at three corners and the centre: zero error (constant), tilt (a plane), air gaps
+  (each taxel its own), a seating gap (a dome);
+- virgin site: repeats at a place never pressed before, then deeper, then as before: softening, set, wear-in;
+- rates: three speeds over a decade at two sites, three depths: delay, filter, viscosity, rate-free hysteresis;
+- long hold: a hold and a recovery of several time constants at two depths: relaxation to a plateau against baseline
+  tracking to zero;
+- sides: the same place approached from +x, -x, +y, -y, and from below (overshoot): backlash against hysteresis;
+- taxels: on and between taxels: gain of a channel against a property of the place;
+- reference: the same press again and again through the session: everything that follows the clock;
+- a second radius: rates and depths again: frame compliance, stiffening, poroelasticity, indenter shape;
+- the first indenter turned by 180 deg: a tilted indenter against a shifted or tilted sensor.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from tacdata.plans.recipe import write_out
+from tacdata.plans.shipped.shipped_plan import ShippedPlan, Wishes
+from tacdata.plans.sites import clear_of_rim, half_box
+from tacdata.plans.specimens import specimens
+from tacdata.sensor import Sensor
+
+DEPTHS = [0.4, 0.7, 1.0]
+"""Depths of the rate presses [mm]."""
+SPEEDS = [0.1, 0.5, 2.0]
+"""Speeds of the rate presses [mm/s]: more than a decade."""
+IDLE = 60.0
+"""Length of the idle stretch [s]."""
+HOLD, RECOVERY = 60.0, 60.0
+"""Length of the long holds and of the recoveries after them [s]."""
+ONSET_SPEED = 0.1
+"""Speed of the slow first contacts [mm/s]."""
+CLEARANCE = 0.5
+"""Least distance of an indenter at full depth from the skin's rim [mm]."""
+MOTION = {
+    "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.5,
+    "hold": 1.0, "rest": 1.0, "run_up": 1.0,
+}  # fmt: skip
+
+
+class Diagnostic(ShippedPlan):
+    """Rates, holds, repeats, sides, radii, idle and fly-over."""
+
+    usual = ("sphere_4", "sphere_2")
+
+    def document(self, sensor: Sensor, wishes: Wishes) -> dict[str, Any]:
+        """Return the plan; ``purpose`` of each press names its block."""
+        names = self.specimen_names(wishes)
+        if len(names) != 2:
+            raise UsageError(
+                f"{len(names)} indenters for the diagnostic plan", "two of one shape and different radius",
+                "name --indenter twice, for example sphere_4 and sphere_2",
+            )  # fmt: skip
+        first, second = names
+        half, pitch = half_box(sensor), np.array([sensor.taxels.pitch_x, sensor.taxels.pitch_y])
+        on = _nearest(sensor, -0.3 * half)
+        between = _nearest(sensor, 0.3 * half) + pitch / 2 * (np.array([sensor.taxels.columns, sensor.taxels.rows]) > 1)
+        virgin = half * [-0.8, 0.8]
+        corners = half * [[0, 0], [-1, -1], [1, -1], [1, 1]]  # the fourth is the virgin site's
+        reference = {"indenter": first, "at": _points(on), "depths": [0.7], "purpose": "reference"}
+        recipe = {
+            "version": "1.0", "name": f"diagnostic-{first}-{second}",
+            "purpose": "presses that tell physical effects apart", "indenters": specimens(names),
+            "motion": dict(MOTION), "grouped": False,
+            "blocks": [
+                {"indenter": first, "at": _points(on), "depths": [-MOTION["clearance"] / 2], "holds": [IDLE],
+                 "purpose": "idle stretch"},
+                *_light(first, corners),
+                {"indenter": first, "at": _points(virgin), "depths": [0.6], "repeats": 6, "purpose": "virgin site"},
+                {"indenter": first, "at": _points(virgin), "depths": [0.9, 0.6], "purpose": "virgin site, then deeper"},
+                reference,
+                *_rates(first, np.array([on, between])),
+                reference,
+                {"indenter": first, "at": _points(between), "depths": [DEPTHS[0], DEPTHS[-1]], "holds": [HOLD],
+                 "recovery": RECOVERY, "purpose": "long hold and recovery"},
+                reference,
+                {"indenter": first, "at": _points(between), "depths": [0.7],
+                 "approach_from": ["+x", "-x", "+y", "-y"], "repeats": 2, "purpose": "approach direction"},
+                {"indenter": first, "at": _points(on), "depths": [0.7], "overshoot": 0.3, "repeats": 2,
+                 "purpose": "approach from below"},
+                {"indenter": first, "at": {"kind": "taxels", "only": _every(sensor, 12)}, "depths": [0.4],
+                 "order": "random", "purpose": "on taxels"},
+                {"indenter": first, "at": {"kind": "between", "count": 8} if sensor.taxels.count > 1
+                 else {"kind": "center"}, "depths": [0.4], "purpose": "between taxels"},
+                {"indenter": first, "at": _points(virgin), "depths": [0.6], "purpose": "virgin site, after a rest"},
+                reference,
+                *_light(second, corners[:1]),
+                *_rates(second, np.array([on])),
+                {"indenter": second, "at": _points(between), "depths": [DEPTHS[-1]], "holds": [HOLD],
+                 "recovery": RECOVERY, "purpose": "long hold and recovery"},
+                {**reference, "yaws": [180.0], "repeats": 2, "purpose": "turned indenter"},
+            ],
+        }  # fmt: skip
+        document = write_out(recipe, sensor, "diagnostic plan", wishes.seed)
+        clear_of_rim(document["presses"], document["indenters"], sensor, CLEARANCE)
+        return document
+
+
+def _light(name: str, places: np.ndarray) -> list[dict[str, Any]]:
+    return [
+        {"indenter": name, "at": _points(places), "depths": [-0.2], "purpose": "fly-over"},
+        {"indenter": name, "at": _points(places), "depths": [0.3], "speeds": [ONSET_SPEED], "purpose": "onset map"},
+    ]
+
+
+def _rates(name: str, places: np.ndarray) -> list[dict[str, Any]]:
+    return [
+        {"indenter": name, "at": _points(places), "depths": DEPTHS, "speeds": SPEEDS, "order": "random", "rest": 3.0,
+         "purpose": "rates"}
+    ]  # fmt: skip
+
+
+def _nearest(sensor: Sensor, place: np.ndarray) -> np.ndarray:
+    """Return the centre of the taxel nearest to a place [mm], shape (2,)."""
+    centers = sensor.taxels.centers
+    return centers[np.argmin(np.linalg.norm(centers - place, axis=1))]
+
+
+def _every(sensor: Sensor, count: int) -> list[int]:
+    """Return at most ``count`` taxels, spread over the array."""
+    return (
+        np.unique(np.linspace(0, sensor.taxels.count - 1, min(count, sensor.taxels.count)).round()).astype(int).tolist()
+    )
+
+
+def _points(places: np.ndarray) -> dict[str, Any]:
+    return {"kind": "points", "points": np.round(np.atleast_2d(places), 3).tolist()}

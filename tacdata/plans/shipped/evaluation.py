@@ -1,0 +1,92 @@
+"""The paper's evaluation: 78 depth trials and 40 contact-position trials.
+
+Liu et al., TacPrint, section "Simulation-Generated Depth Labels" and Exp. 1: the depth at the contact centre is
+compared over 78 trials, the centroid of the region above a threshold over 40, three of which are cut by the sensing
+boundary. The paper prints neither depths, places nor indenters; what stands here is an assumption that gives the
+same numbers of trials: 13 depths at 6 places, and 37 places spread over the interior with 3 at the edge.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from tacdata.plans.recipe import write_out
+from tacdata.plans.shipped.shipped_plan import ShippedPlan, Wishes
+from tacdata.plans.sites import clear_of_rim, half_box
+from tacdata.plans.specimens import specimens
+from tacdata.sensor import Sensor
+
+DEPTHS = [round(0.3 + 0.1 * k, 1) for k in range(13)]
+"""Depths of the depth trials [mm]."""
+PLACES = 6
+"""Places at which each depth is pressed."""
+INTERIOR, EDGE = 37, 3
+"""Position trials whose contact region lies within the sensing area, and those that its boundary cuts."""
+POSITION_DEPTH = 0.8
+"""Depth of the position trials [mm]."""
+CLEARANCE = 0.1
+"""Least distance of the indenter at full depth from the skin's rim [mm]; more would keep every region whole."""
+MOTION = {
+    "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.7,
+    "hold": 1.0, "rest": 1.0,
+}  # fmt: skip
+
+
+class Evaluation(ShippedPlan):
+    """78 depth trials and 40 contact-position trials with one indenter."""
+
+    usual = ("sphere_4",)
+
+    def document(self, sensor: Sensor, wishes: Wishes) -> dict[str, Any]:
+        """Return the plan; ``purpose`` of each press says which kind of trial it is."""
+        names = self.specimen_names(wishes)
+        if len(names) != 1:
+            raise UsageError(
+                f"{len(names)} indenters for the evaluation plan",
+                "one",
+                "name one --indenter, or write one plan for each",
+            )
+        half = half_box(sensor)
+        edge = half + np.array([sensor.taxels.pitch_x / 2, sensor.taxels.pitch_y / 4])
+        interior = np.vstack([[0.0, 0.0], _spread(INTERIOR - 1) * (half - _margin(half))])
+        cut = np.array([[edge[0], 0.3 * half[1]], [-edge[0], -0.3 * half[1]], [0.3 * half[0], edge[1]]])[:EDGE]
+        places = np.vstack([[0.0, 0.0], _spread(PLACES - 1) * (half - _margin(half))])
+        recipe = {
+            "version": "1.0", "name": f"evaluation-{names[0]}",
+            "purpose": "the paper's evaluation: 78 depth trials, 40 contact-position trials",
+            "indenters": specimens(names), "motion": dict(MOTION),
+            "blocks": [
+                {"indenter": names[0], "at": _points(places), "depths": DEPTHS, "order": "random",
+                 "purpose": "depth trial"},
+                {"indenter": names[0], "at": _points(np.vstack([interior, cut])), "depths": [POSITION_DEPTH],
+                 "order": "random", "purpose": "position trial"},
+            ],
+        }  # fmt: skip
+        document = write_out(recipe, sensor, "evaluation plan", wishes.seed)
+        clear_of_rim(document["presses"], document["indenters"], sensor, CLEARANCE)
+        return document
+
+
+def _margin(half: np.ndarray) -> np.ndarray:
+    """Return how far interior places stay inside the array's box [mm], shape (2,): a fifth of its half sides."""
+    return 0.2 * half
+
+
+def _spread(count: int) -> np.ndarray:
+    """Return points spread evenly over [-1, 1]^2, shape (count, 2): Halton's sequence in bases 2 and 3."""
+    return np.array([[2 * _radical_inverse(k, base) - 1 for base in (2, 3)] for k in range(1, count + 1)])
+
+
+def _radical_inverse(number: int, base: int) -> float:
+    result, share = 0.0, 1.0 / base
+    while number:
+        number, digit = divmod(number, base)
+        result, share = result + digit * share, share / base
+    return result
+
+
+def _points(places: np.ndarray) -> dict[str, Any]:
+    return {"kind": "points", "points": np.round(places, 3).tolist()}

@@ -1,0 +1,68 @@
+"""What a shipped plan's file holds.
+
+``tacdata/plans/shipped/my_plan.py`` defines one class derived from `ShippedPlan`. Its name is the file's name, and
+`tacdata plan my_plan` writes it out for a sensor. Most are easiest said as a recipe (`tacdata.plans.recipe`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from tacdata import registry
+from tacdata.errors import UsageError
+from tacdata.sensor import Sensor
+
+ROOM, BASE = "tacdata.plans.shipped", "shipped_plan"
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the person asked for; None where they left it open."""
+
+    presses: int | None = None
+    """How many presses [count]."""
+    indenters: tuple[str, ...] | None = None
+    """Names in `tacdata.plans.specimens.STANDARD`."""
+    seed: int = 0
+    """Same seed, same plan."""
+
+
+class ShippedPlan(ABC):
+    """A plan that can be written out for any sensor."""
+
+    usual: ClassVar[tuple[str, ...]]
+    """Specimens that are used if none are wished for."""
+    adjustable: ClassVar[bool] = False
+    """Whether the number of presses may be chosen."""
+
+    @abstractmethod
+    def document(self, sensor: Sensor, wishes: Wishes) -> dict[str, Any]:
+        """Return the plan's document (`schemas/plan.schema.json`).
+
+        Raises:
+            UsageError: If a wish cannot be met.
+            FormatError: If the sensor is too small or too thin for the plan.
+        """
+
+    def specimen_names(self, wishes: Wishes) -> tuple[str, ...]:
+        """Return the names of the specimens to use."""
+        return wishes.indenters or self.usual
+
+
+def shipped_plan(name: str, sensor: Sensor, wishes: Wishes | None = None) -> dict[str, Any]:
+    """Return the document of a shipped plan.
+
+    Raises:
+        UsageError: If there is none of that name, or a wish cannot be met.
+    """
+    kind: type[Any] = registry.load(ROOM, BASE, name, ShippedPlan)
+    plan: ShippedPlan = kind()
+    wishes = wishes or Wishes()
+    if wishes.presses is not None and not plan.adjustable:
+        raise UsageError(
+            f"{wishes.presses} presses of the plan {name}", "the number that the plan has",
+            "leave --presses out, or take the plan training",
+        )  # fmt: skip
+    return plan.document(sensor, wishes)

@@ -1,0 +1,171 @@
+"""The probe of a real rig: guarded motion within the envelope, readings from the board's stream."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+
+from tacdata.devices.device import CncStatus, TaxelFrame
+from tacdata.errors import DeviceError, FormatError, TacdataError
+from tacdata.recording.guarded_motion import GuardedMotion
+from tacdata.recording.press_steps import Step
+from tacdata.recording.rig_devices import RigDevices
+from tacdata.recording.streams import Streams
+from tacdata.registration.probe import Position, Probe, Reading
+from tacdata.rig import Rig
+
+PATIENCE = 5.0
+"""How long the first frames and a reading may take [s of real time, and of the rig's clock]."""
+SIDEWAYS = 0.01
+"""A move of less in x and y is straight up or down [mm]."""
+LOOK = 0.002
+"""How often arriving frames are looked for [s of real time]."""
+
+
+class _Sink:
+    """Takes what the streams deliver; stands where a recording's writer would."""
+
+    failure: Exception | None = None
+
+    def __init__(self) -> None:
+        self.begun_ns = 0
+        self.frames: list[tuple[int, np.ndarray]] = []
+
+    def taxels(self, frame: TaxelFrame, sample_ns: int) -> None:
+        """Keep a frame with its sample time [ns]."""
+        self.frames.append((sample_ns, frame.counts))
+
+    def status(self, status: CncStatus) -> None:
+        """Reports are of no interest here."""
+
+
+class GuardedProbe(Probe):
+    """Drives the devices of a rig; made by `guarded_probe`."""
+
+    def __init__(self, rig: Rig, devices: RigDevices, streams: Streams, motion: GuardedMotion, height: float) -> None:
+        """Take over devices that are open and streams that run; ``height`` [mm, machine] is safe to rise to."""
+        self._rig, self._devices, self._streams, self._motion = rig, devices, streams, motion
+        self._height, self._sink = height, _Sink()
+        streams.record_into(cast(Any, self._sink))
+        self._position = self._begin()
+        self._rested_ns = rig.clock.now_ns()
+        self.lowest = self._position[2]
+        """Lowest machine height so far [mm]."""
+        self.stopped = False
+        """Whether a motion was broken off."""
+
+    @property
+    def position(self) -> Position:
+        """Where the guide was last sent [mm, machine]."""
+        return self._position
+
+    def _begin(self) -> Position:
+        end = time.monotonic() + PATIENCE
+        while self._streams.position is None or len(self._sink.frames) < 2:
+            if self._streams.fault:
+                raise self._streams.fault
+            if time.monotonic() > end:
+                silent = "the motion controller" if self._streams.position is None else "the taxel board"
+                raise DeviceError(
+                    f"nothing received from {silent} within {PATIENCE:g} s", "a running stream", "check cable and power"
+                )
+            time.sleep(LOOK)
+        return self._streams.position
+
+    def go(self, position: Position, speed: float) -> None:
+        """Go there through guarded motion; see the base."""
+        if not self._rig.envelope.contains(position):
+            where = ", ".join(f"{value:.2f}" for value in position)
+            raise FormatError(
+                f"the registration needs machine position ({where}) mm",
+                f"{self._rig.envelope.min} to {self._rig.envelope.max} mm (the rig's envelope)",
+                "correct registration/origin or the envelope in the rig file",
+            )
+        if np.allclose(position, self._position, atol=1e-9):
+            return
+        try:
+            self._position = self._motion.drive(self._way(position, speed), self._position, self._streams, None)
+        except BaseException:
+            self.stopped = True
+            raise
+        self._rested_ns = self._rig.clock.now_ns()
+        self.lowest = min(self.lowest, position[2])
+
+    def _way(self, position: Position, speed: float) -> tuple[Step, ...]:
+        """Return the steps there: sideways only at the higher of the two heights, so that nothing is hit on the way."""
+        x, y, z = self._position
+        if np.hypot(position[0] - x, position[1] - y) < SIDEWAYS or abs(position[2] - z) < SIDEWAYS:
+            return (Step("", position, speed),)
+        corner = (position[0], position[1], z) if position[2] < z else (x, y, position[2])
+        return Step("", corner, speed), Step("", position, speed)
+
+    def rise(self, speed: float) -> None:
+        """Go straight up to the safe height."""
+        x, y, z = self._position
+        self.go((x, y, max(z, self._height)), speed)
+
+    def read(self, frames: int) -> Reading:
+        """Collect frames sampled since the guide came to rest; see the base."""
+        end = time.monotonic() + PATIENCE + PATIENCE * frames / 30 / self._rig.clock.rate
+        while True:
+            rows = [counts for sample_ns, counts in list(self._sink.frames) if sample_ns >= self._rested_ns]
+            if len(rows) >= frames:
+                break
+            if self._streams.fault:
+                raise self._streams.fault
+            if time.monotonic() > end:
+                raise DeviceError(
+                    f"{len(rows)} of {frames} frames within the time", "a board that keeps its rate", "check the board"
+                )
+            time.sleep(LOOK)
+        taken = np.array(rows[:frames])
+        self._sink.frames.clear()
+        spread = taken.std(axis=0, ddof=1) if frames > 1 else np.zeros(taken.shape[1])
+        return Reading(taken.mean(axis=0), spread, frames)
+
+    def wait(self, seconds: float) -> None:
+        """Wait on the rig's clock, watching for faults; see the base."""
+        until = self._rig.clock.now_ns() + round(seconds * 1e9)
+        while self._rig.clock.now_ns() < until:
+            if self._streams.fault:
+                raise self._streams.fault
+            time.sleep(LOOK)
+
+
+@contextmanager
+def guarded_probe(rig: Rig, devices: RigDevices, height: float, speed: float) -> Iterator[GuardedProbe]:
+    """Open streams on devices that are open and yield a probe, risen to ``height`` [mm, machine] at ``speed`` [mm/s].
+
+    Whatever goes wrong, the motion stops first; then the indenter is lifted straight up.
+    """
+    motion = GuardedMotion(devices.cnc, rig.clock)
+    without_cameras = replace(devices, cameras={})
+    with Streams(without_cameras, {}, motion.stop) as streams:
+        probe = GuardedProbe(rig, devices, streams, motion, height)
+        try:
+            probe.rise(speed)
+            yield probe
+            probe.rise(speed)
+        except BaseException:
+            _free(probe, motion, streams, height, speed)
+            raise
+        finally:
+            streams.record_into(None)
+
+
+def _free(probe: GuardedProbe, motion: GuardedMotion, streams: Streams, height: float, speed: float) -> None:
+    """Lift the indenter after whatever went wrong; never raises."""
+    if streams.fault is None and not probe.stopped:
+        with suppress(TacdataError):
+            probe.rise(speed)
+        return
+    if not probe.stopped:  # a fault while the guide stood still: what the hold left has to be let go first
+        with suppress(TacdataError):
+            motion.drive((), probe.position, streams, None)
+    print(motion.lift(height, speed), file=sys.stderr)

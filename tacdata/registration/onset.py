@@ -1,0 +1,147 @@
+"""The height of first contact, from a slow approach: a hinge b + A (z0 - z)^p for z < z0 fitted to the answer.
+
+A threshold on the answer finds contact too late by what the noise demands, on soft skins by far more than the
+guide's resolution. Fitting the curve's foot has no such bias, if the power p is free: 1 for a spring that is met
+squarely, 3/2 for a sphere on a half space (K. L. Johnson, Contact Mechanics, eq. 4.23), up to 2 for a sphere on a
+bed of springs. For each z0 and p the rest is linear and solved with Huber's weights, so that single bad readings
+do not pull; z0's uncertainty is where the misfit grows by one unit of the noise, p being free (profile likelihood).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+POWERS = np.linspace(1.0, 2.4, 29)
+"""Powers that are tried [1]."""
+GRID = 161
+"""Heights that are tried."""
+HUBER = 1.5
+"""Residual beyond which a reading counts less [standard deviations]."""
+FLOOR = 0.003
+"""Least uncertainty that is claimed [mm]: three decimals of a report and a micro-step of the guide."""
+FOOT = 0.08
+"""Depth to which the answer's shape is trusted to be a power [mm]."""
+CLEAR = 8.0
+"""Answer at the lowest point that a fit needs [standard deviations of a reading]."""
+
+
+@dataclass(frozen=True)
+class Onset:
+    """First contact in one approach."""
+
+    height: float
+    """Machine height of first contact [mm]."""
+    uncertainty: float
+    """Its standard uncertainty [mm]."""
+    power: float
+    """Power of the answer in depth [1]."""
+    strength: float
+    """Answer at the lowest point [standard deviations of a reading]."""
+    model: float
+    """What the answer's unknown shape and the approach's steps may do to the height [mm]; the same everywhere."""
+
+
+def combined(readings: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Return the channels' answers as one, with unit noise.
+
+    The weights are the answer at the deepest readings over the noise squared (matched filter).
+
+    Args:
+        readings: Mean readings [counts], shape (n, channels), from the highest to the lowest.
+        noise: Standard deviation of such a mean [counts], shape (channels,).
+    """
+    rise = readings[-3:].mean(axis=0) - readings[:3].mean(axis=0)
+    weight = rise / noise**2
+    scale = np.sqrt(((weight * noise) ** 2).sum())
+    return (readings - readings[:3].mean(axis=0)) @ weight / max(scale, 1e-12)
+
+
+def onset(height: np.ndarray, answer: np.ndarray, power: float | None = None) -> Onset | None:
+    """Fit the height of first contact.
+
+    The curve is fitted twice: whole, and down to `FOOT` below the first fit's contact only. Where the two contradict
+    each other the answer's shape further down (a gap that closes, a layer that ends) is none of the hinge's, and the
+    foot alone is believed.
+
+    Args:
+        height: Machine heights [mm], shape (n,), falling.
+        answer: Answers with unit noise [standard deviations], shape (n,).
+        power: Power of the answer in depth, if it is known [1].
+
+    Returns:
+        The onset, or None if the answer is too weak or the approach began in contact.
+    """
+    strength = float(answer[-3:].mean() - answer[:3].mean())
+    if len(height) < 8 or strength < CLEAR:
+        return None
+    powers = POWERS if power is None else np.array([power])
+    whole = _fit(height, answer, powers)
+    if whole is None:
+        return None
+    place, width, best = whole
+    foot = height >= place - FOOT
+    near = _fit(height[foot], answer[foot], powers) if foot.sum() >= 8 and answer[foot][-1] > CLEAR else None
+    model = float(np.median(-np.diff(height))) / np.sqrt(12)
+    if near is not None and abs(near[0] - place) > 2 * np.hypot(near[1], width):
+        model = float(np.hypot(model, near[0] - place))
+        place, width, best = near
+    return Onset(place, max(width, FLOOR), best, strength, model)
+
+
+def shared_power(curves: list[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
+    """Return the power that fits all approaches best, and its standard uncertainty [1].
+
+    Indenter and skin are the same everywhere, so the power is; where it is fitted to each approach alone, its error
+    moves the heights by different amounts and tilts the plane.
+
+    Args:
+        curves: Heights [mm] and answers [standard deviations] of each approach.
+    """
+    total, scale = np.zeros(len(POWERS)), 0.0
+    for height, answer in curves:
+        best = _misfits(height, answer, _trial(height), POWERS).min(axis=0)
+        total += best
+        scale += max(float(best.min()) / max(len(height) - 4, 1), 1.0) / len(curves)
+    within = POWERS[total <= total.min() + scale]
+    return float(POWERS[int(np.argmin(total))]), max(float(np.ptp(within)) / 2, float(POWERS[1] - POWERS[0]) / 2)
+
+
+def _trial(height: np.ndarray) -> np.ndarray:
+    step = float(np.median(-np.diff(height)))
+    return np.linspace(height[-1] + 2 * step, height[0], GRID)
+
+
+def _fit(height: np.ndarray, answer: np.ndarray, powers: np.ndarray) -> tuple[float, float, float] | None:
+    """Return z0 [mm], its uncertainty [mm] and the power; None if contact came before the first reading."""
+    trial = _trial(height)
+    misfit = _misfits(height, answer, trial, powers)
+    profile = misfit.min(axis=1)
+    best = int(np.argmin(profile))
+    if best >= GRID - 2:
+        return None
+    # Noise as the fit itself shows it, never less than what the idle readings show.
+    scale = max(profile[best] / max(len(height) - 4, 1), 1.0)
+    within = trial[profile <= profile[best] + scale]
+    width = max(float(within.max() - within.min()) / 2, float(trial[1] - trial[0]) / 2)
+    power = float(powers[int(np.argmin(misfit[best]))])
+    return float(within.max() + within.min()) / 2, width, power
+
+
+def _misfits(height: np.ndarray, answer: np.ndarray, trial: np.ndarray, powers: np.ndarray) -> np.ndarray:
+    """Return the robust misfit of every height and power, shape (heights, powers), b and A being solved for."""
+    hinge = np.maximum(trial[:, None, None] - height, 0.0) ** powers[None, :, None]
+    weight = np.ones_like(hinge)
+    residual = np.broadcast_to(answer, hinge.shape)
+    for _ in range(4):
+        total = weight.sum(axis=-1)
+        mean_h, mean_y = (weight * hinge).sum(axis=-1) / total, (weight * answer).sum(axis=-1) / total
+        off_h, off_y = hinge - mean_h[..., None], answer - mean_y[..., None]
+        slope = (weight * off_h * off_y).sum(axis=-1) / np.maximum((weight * off_h**2).sum(axis=-1), 1e-30)
+        residual = off_y - slope[..., None] * off_h
+        spread = np.maximum(1.0, 1.4826 * np.median(np.abs(residual), axis=-1))[..., None]
+        weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(residual), 1e-12))
+    size = np.abs(residual)
+    # A wild reading counts as one of three deviations and hardly more, however wild it is.
+    return np.where(size <= 3.0, size**2, 9.0 + np.log1p(np.maximum(size - 3.0, 0.0))).sum(axis=-1)

@@ -1,0 +1,211 @@
+"""The procedure: noise, four touches, a plane; crosses over three taxels, a rigid motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.errors import DeviceError
+from tacdata.registration.cross_scan import Cross, cross_scan
+from tacdata.registration.onset import POWERS, onset, shared_power
+from tacdata.registration.probe import Probe
+from tacdata.registration.result import Found
+from tacdata.registration.solution import Plane, fit_plane, fit_rigid_motion
+from tacdata.registration.touch_off import LIFT_SPEED, Touch, touch_off
+from tacdata.rig import Registration
+from tacdata.sensor import Sensor
+
+IDLE_FRAMES = 40
+"""Readings from which the noise is taken."""
+QUIET_RISE = 0.4
+"""How far above the first touch the search at the other places begins [mm], tilt not counted."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How far and how carefully."""
+
+    above: float = 1.0
+    """Height above the expected skin from which the first search begins [mm]."""
+    limit: float = 1.0
+    """How far below the expected skin the indenter may search [mm]."""
+    depth: float = 0.4
+    """Depth of the presses of the cross scan [mm]."""
+    repeats: int = 2
+    """Slow approaches at each place."""
+    taxels: tuple[int, ...] = ()
+    """Taxels of the cross scan; none: three that lie apart, away from the rim where there is room."""
+    most_tilt: float = 3.0
+    """Tilt that is still accepted [deg]."""
+    flatness: float = 0.05
+    """How far the touches may lie off their plane [mm]."""
+    tolerance: float = 0.02
+    """Largest uncertainty of the height that is accepted [mm]."""
+
+
+def reference_taxels(sensor: Sensor) -> tuple[int, ...]:
+    """Return two opposite taxels and one between them, of the inner array if there is one."""
+    columns, rows = sensor.taxels.columns, sensor.taxels.rows
+    i = (1, columns - 2) if columns >= 4 else (0, columns - 1)
+    j = (1, rows - 2) if rows >= 4 else (0, rows - 1)
+    corners = [(i[0], j[0]), (i[1], j[1]), ((i[0] + i[1]) // 2, j[1])]
+    return tuple(dict.fromkeys(a + columns * b for a, b in corners))
+
+
+def touch_sites(sensor: Sensor) -> dict[str, tuple[float, float]]:
+    """Return the centre and three corners of the taxel array [mm, sensor frame] by their names."""
+    a, b = np.abs(sensor.taxels.centers).max(axis=0).tolist()
+    return {"the centre": (0.0, 0.0), "the corner -x -y": (-a, -b), "the corner +x -y": (a, -b),
+            "the corner +x +y": (a, b)}  # fmt: skip
+
+
+def described(sensor: Sensor, guess: Registration, settings: Settings) -> str:
+    """Return in words what the procedure is going to do."""
+    half = np.abs(sensor.taxels.centers).max(axis=0)
+    x, y, z = guess.origin
+    taxels = settings.taxels or reference_taxels(sensor)
+    return (
+        f"registration of {sensor.name}: slow touches at the centre and three corners of the taxels, "
+        f"then crosses of small presses over taxels {', '.join(map(str, taxels))}\n"
+        f"expected skin at machine ({x:.2f}, {y:.2f}, {z:.2f}) mm, the taxels within {half[0]:.1f} x {half[1]:.1f} mm "
+        f"of it\n"
+        f"the search stops at the first answer, at the latest {settings.limit:g} mm below the expected skin, at "
+        f"machine height {z - settings.limit:.2f} mm; later presses are {settings.depth:g} mm deep\n"
+        "time: about 5 min"
+    )
+
+
+def register(
+    probe: Probe, sensor: Sensor, guess: Registration, settings: Settings, say: Callable[[str], None] = lambda t: None
+) -> Found:
+    """Find where the sensor lies.
+
+    Args:
+        probe: A spherical indenter, somewhere above the sensor.
+        sensor: The sensor.
+        guess: Where it is believed to lie, within about a pitch, a few degrees and ``settings.limit``.
+        settings: How far and how carefully.
+        say: Is told what goes on.
+
+    Raises:
+        DeviceError: If the sensor does not answer, is too noisy, not flat, too tilted, or not what its file says.
+    """
+    noise = _noise(probe, guess, settings)
+    say(f"noise without contact: {np.median(noise):.1f} counts (median of {len(noise)} channels)")
+    touches = _with_one_power(_touches(probe, sensor, guess, settings, noise, say))
+    plane = fit_plane(
+        np.array([(t.x, t.y) for t in touches]), np.array([t.onset.height for t in touches]),
+        np.array([t.onset.uncertainty for t in touches]),
+    )  # fmt: skip
+    _check_plane(plane, touches, settings)
+    say(f"plane: tilted {np.degrees(np.hypot(*plane.slope)):.2f} deg, touches within "
+        f"{1000 * np.abs(plane.residual).max():.0f} um of it")  # fmt: skip
+    crosses = _crosses(probe, sensor, guess, settings, plane, noise, say)
+    centers = sensor.taxels.centers[[cross.taxel for cross in crosses]]
+    motion = fit_rigid_motion(
+        centers, np.array([(c.x, c.y) for c in crosses]), np.array([c.uncertainty for c in crosses])
+    )
+    _check_scale(motion.scale, centers)
+    return Found(plane, motion, tuple(touches), tuple(crosses), noise, settings)
+
+
+def _noise(probe: Probe, guess: Registration, settings: Settings) -> np.ndarray:
+    probe.go(guess.to_machine(0.0, 0.0, -settings.above), LIFT_SPEED)
+    probe.wait(1.0)
+    reading = probe.read(IDLE_FRAMES)
+    if not (reading.spread > 0).any():
+        raise DeviceError(
+            "no channel changes at all while nothing is touched", "live channels with some noise",
+            "check that the board sends fresh readings",
+        )  # fmt: skip
+    # A quiet channel may stand still between two counts; rounding alone is worth 0.3 counts.
+    return np.maximum(reading.spread, 0.3)
+
+
+def _touches(
+    probe: Probe, sensor: Sensor, guess: Registration, settings: Settings, noise: np.ndarray,
+    say: Callable[[str], None],
+) -> list[Touch]:  # fmt: skip
+    touches: list[Touch] = []
+    for name, (x, y) in touch_sites(sensor).items():
+        mx, my, expected = guess.to_machine(x, y, 0.0)
+        top, lowest = expected + settings.above, expected - settings.limit
+        if touches:
+            rise = float(np.hypot(x, y)) * np.tan(np.radians(settings.most_tilt + 1.0))
+            top = min(top, touches[0].onset.height + expected - guess.origin[2] + QUIET_RISE + rise)
+        above = max(top, touches[-1].onset.height + settings.above if touches else top)
+        probe.go((touches[-1].x, touches[-1].y, above) if touches else (mx, my, above), LIFT_SPEED)
+        probe.go((mx, my, above), LIFT_SPEED)
+        touches += touch_off(probe, name, (mx, my), top, lowest, noise, settings.repeats)
+        last = touches[-settings.repeats :]
+        heights = ", ".join(f"{t.onset.height:.3f} +- {t.onset.uncertainty:.3f}" for t in last)
+        say(f"{name}: first contact at machine height {heights} mm")
+    return touches
+
+
+def _with_one_power(touches: list[Touch]) -> list[Touch]:
+    """Fit the onsets again with one power for all; what the power may be off moves all heights alike (`model`)."""
+    power, doubt = shared_power([(t.height, t.answer) for t in touches])
+    powers = np.clip([power, power - doubt, power + doubt], POWERS[0], POWERS[-1]).tolist()
+    fits = [[onset(t.height, t.answer, p) for p in powers] for t in touches]
+    moved = [abs(a.height - b.height) / 2 for _, a, b in fits if a and b]
+    common = float(np.median(moved)) if moved else 0.0
+    return [
+        replace(t, onset=replace(fit[0], model=float(np.hypot(fit[0].model, common)))) if fit[0] else t
+        for t, fit in zip(touches, fits, strict=True)
+    ]
+
+
+def _check_plane(plane: Plane, touches: list[Touch], settings: Settings) -> None:
+    tilt = float(np.degrees(np.arctan(np.hypot(*plane.slope))))
+    if tilt > settings.most_tilt:
+        raise DeviceError(
+            f"the sensor is tilted by {tilt:.2f} deg against the guide", f"at most {settings.most_tilt:g} deg",
+            "mount it flatter, then register again",
+        )  # fmt: skip
+    worst = int(np.argmax(np.abs(plane.residual)))
+    if abs(plane.residual[worst]) > settings.flatness:
+        raise DeviceError(
+            f"the sensor is not flat: {touches[worst].site} lies {1000 * plane.residual[worst]:+.0f} um off the plane "
+            "of the touches", f"at most {1000 * settings.flatness:g} um",
+            "look for dirt, a lifted skin or a loose mount; a curved sensor cannot be registered to a plane",
+        )  # fmt: skip
+    model = float(np.mean([touch.onset.model for touch in touches]))
+    uncertainty = float(np.hypot(np.sqrt(plane.covariance[0, 0]), model))
+    if uncertainty > settings.tolerance:
+        raise DeviceError(
+            f"the skin's height is known to {1000 * uncertainty:.0f} um only", f"{1000 * settings.tolerance:g} um",
+            "reduce the noise, or touch more often with --repeats",
+        )  # fmt: skip
+
+
+def _crosses(
+    probe: Probe, sensor: Sensor, guess: Registration, settings: Settings, plane: Plane, noise: np.ndarray,
+    say: Callable[[str], None],
+) -> list[Cross]:  # fmt: skip
+    taxels = settings.taxels or reference_taxels(sensor)
+    angle = np.radians(guess.yaw)
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    pitch = sensor.taxels.pitch_x, sensor.taxels.pitch_y
+    centers = [(float(cx), float(cy)) for cx, cy in sensor.taxels.centers]
+    crosses: list[Cross] = []
+    for taxel in taxels:
+        x, y, _ = guess.to_machine(*centers[taxel], 0.0)
+        # What the first taxel was off, the others will be off by about as much.
+        if crosses:
+            known = guess.to_machine(*centers[crosses[0].taxel], 0.0)
+            x, y = x + crosses[0].x - known[0], y + crosses[0].y - known[1]
+        crosses.append(cross_scan(probe, taxel, (x, y), axes, pitch, plane.at, settings.depth, noise))
+        say(f"taxel {taxel}: centre at machine ({crosses[-1].x:.3f}, {crosses[-1].y:.3f}) mm")
+    return crosses
+
+
+def _check_scale(scale: float, centers: np.ndarray) -> None:
+    span = float(np.linalg.norm(centers - centers.mean(axis=0), axis=1).max())
+    if span > 1.0 and abs(scale - 1) > 0.05:
+        raise DeviceError(
+            f"the taxels lie {scale:.3f} times as far apart as the sensor file says", "0.95 to 1.05",
+            "check the sensor file's pitch and the guide's steps per millimetre ($100, $101)",
+        )  # fmt: skip

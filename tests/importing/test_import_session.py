@@ -1,0 +1,334 @@
+import json
+import sys
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+import yaml
+from foreign import T0, mapping, press_data, wide_csv
+
+from tacdata import cli, provenance
+from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.importing.imported_session import import_session
+from tacdata.recording import read_session
+from tacdata.recording.check import check
+from tacdata.recording.mcap_records import read_records
+from tacdata.recording.reader import read_episode
+
+
+def imported(tmp_path, mapping_path, source=None):
+    made = import_session(source or tmp_path, mapping_path, tmp_path / "session")
+    return made, [read_episode(path) for path in read_session(made.folder).episodes]
+
+
+def test_a_press_comes_back_with_its_own_units_rows_and_times(tmp_path):
+    time, depth, force, signals = data = press_data()
+    wide_csv(tmp_path / "wide.csv", data)
+    made, (episode,) = imported(tmp_path, mapping(tmp_path))
+    assert made.recordings == 1
+    assert made.refused == ()
+    np.testing.assert_allclose(episode.taxels.counts, signals, atol=1e-9)
+    np.testing.assert_allclose(episode.taxels.sample_ns / 1e9, time, atol=1e-9)
+    np.testing.assert_allclose(episode.tip_at(episode.taxels.sample_ns)[:, 2], depth, atol=1e-4)
+    (stream,) = episode.measured
+    assert (stream.name, stream.unit) == ("force", "N")
+    np.testing.assert_allclose(stream.values[:, 0], force, atol=1e-5)
+    assert episode.press.depth == pytest.approx(1.5, abs=1e-3)
+    assert episode.press.speed == pytest.approx(1.333, rel=0.02)
+    assert episode.press.hold == pytest.approx(1.0, abs=0.06)
+    assert [p.name for p in episode.phases] == ["rest", "press", "hold", "release"]
+    assert episode.press.indenter.document == {"shape": "sphere", "radius": 3.0}
+    assert episode.complete
+    assert (episode.taxels.counter == -1).all()
+
+
+def test_semicolons_decimal_commas_and_latin_1_are_read_alike(tmp_path):
+    data = press_data()
+    wide_csv(tmp_path / "wide.csv", data)
+    _, (plain,) = imported(tmp_path, mapping(tmp_path))
+    wide_csv(tmp_path / "wide.csv", data, ";", ",", "Prüfstand 3;;;\nt [ms]{0}disp [µm]{0}Fz [g]{0}{1}")
+    text = (tmp_path / "wide.csv").read_text()
+    (tmp_path / "wide.csv").write_bytes(text.encode("latin-1"))
+    made = import_session(tmp_path, tmp_path / "mapping.yaml", tmp_path / "german")
+    german = read_episode(made.folder / "episode-000000.mcap")
+    np.testing.assert_array_equal(plain.taxels.counts, german.taxels.counts)
+    np.testing.assert_allclose(plain.tip, german.tip, atol=1e-12)
+    assert any("Latin-1" in note for note in made.notes)
+
+
+def test_missing_values_stay_missing_and_streams_keep_their_rates(tmp_path):
+    time, depth, force, signals = press_data(channels=3)
+    missing = np.arange(len(time)) % 2 == 1
+    rows = ["t,force,c0,c1,c2"]
+    for k, t in enumerate(time):
+        c1 = "" if k % 5 == 0 else f"{signals[k, 1]:.4f}"
+        rows.append(f"{T0 + t:.6f},{-1 if missing[k] else force[k]:.6f},{signals[k, 0]:.4f},{c1},{signals[k, 2]:.4f}")
+    (tmp_path / "wide.csv").write_text("\n".join(rows))
+    slow = slice(None, None, 7)
+    stage = "\n".join(f"{T0 + t:.6f} {-d:.5f}" for t, d in zip(time[slow], depth[slow], strict=True))
+    (tmp_path / "stage.txt").write_text(stage)
+    path = mapping(
+        tmp_path,
+        files={
+            "data": {"path": "wide.csv", "time": {"column": "t", "zero": "unix"}},
+            "stage": {"path": "stage.txt", "header": False, "time": {"column": 0}},
+        },
+        taxels={"file": "data", "columns": ["c0", "c1", "c2"], "unit": "pF"},
+        position={"file": "stage", "z": {"column": 1, "unit": "mm"}},
+        contact={"x": 0.0, "y": 0.0, "z": 0.0, "known_from": "the program's zero"},
+        measured={"force": {"file": "data", "columns": "force", "unit": "N", "missing": [-1]}},
+    )
+    _, (episode,) = imported(tmp_path, path)
+    assert np.isnan(episode.taxels.counts[::5, 1]).all()
+    assert np.isnan(episode.taxels.counts).sum() == len(time[::5])
+    force_stream = episode.measured[0]
+    assert len(force_stream.sample_ns) == (~missing).sum(), "a missing force has no row"
+    np.testing.assert_allclose(force_stream.values[:, 0], force[~missing], atol=1e-6)
+    assert len(episode.cnc.sample_ns) == len(time[slow])
+    np.testing.assert_allclose((episode.taxels.sample_ns - episode.taxels.sample_ns[0]) / 1e9, time, atol=2e-6)
+    assert abs(episode.taxels.sample_ns[0] / 1e9 - T0) < 1e-3
+    assert not any(name.startswith("contact/") for name in episode.rig["imported"]["stand_ins"])
+
+
+def test_provenance_and_stand_ins_are_in_every_file(tmp_path):
+    wide_csv(tmp_path / "wide.csv", press_data())
+    path = mapping(tmp_path, indenter=None)
+    made, (episode,) = imported(tmp_path, path)
+    record = json.loads(read_records(episode.path).attachments["import.json"].data)
+    assert record["files"] == [
+        {"path": "wide.csv", "sha256": provenance.file_hash(tmp_path / "wide.csv"), "rows": len(press_data()[0])}
+    ]
+    assert record["mapping_hash"] == provenance.content_hash(yaml.safe_load(path.read_text()))
+    assert any(text.startswith("indenter") for text in record["stand_ins"])
+    assert any(text.startswith("skin/thickness") for text in record["stand_ins"])
+    report = check(made.folder)
+    assert report.usable
+    assert "indenter" in report.text
+
+
+def test_every_trial_of_a_column_a_path_a_pause_and_a_press(tmp_path):
+    presses = [press_data(seed, depth=1.0 + 0.2 * seed) for seed in range(3)]
+    begin, rows = 0.0, ["trial,t,disp,Fz,cap0,cap1,cap2,cap3,cap4"]
+    for number, (time, depth, force, signals) in enumerate(presses):
+        for k, t in enumerate(time):
+            values = [t + begin, depth[k], force[k], *signals[k]]
+            rows.append(f"A{number}," + ",".join(f"{value:.5f}" for value in values))
+        begin += time[-1] + 2.5
+    (tmp_path / "wide.csv").write_text("\n".join(rows))
+    units = {
+        "position": {"file": "data", "depth": {"column": "disp", "unit": "mm"}},
+        "measured": {"force": {"file": "data", "columns": "Fz", "unit": "N"}},
+        "files": {"data": {"path": "wide.csv", "time": {"column": "t", "unit": "s"}}},
+    }
+    for trials in ({"column": "trial"}, {"gap": 1.0}, {"press_above": 0.5}):
+        made = import_session(tmp_path, mapping(tmp_path, trials=trials, **units), tmp_path / "-".join(trials))
+        episodes = [read_episode(p) for p in read_session(made.folder).episodes]
+        assert [round(e.press.depth, 2) for e in episodes] == [1.0, 1.2, 1.4], trials
+        assert sum(len(e.taxels.counts) for e in episodes) == len(rows) - 1
+    (tmp_path / "runs").mkdir()
+    for number, data in enumerate(presses):
+        folder = tmp_path / "runs" / f"sphere_{2 + number}mms_rep{number}"
+        folder.mkdir()
+        wide_csv(folder / "wide.csv", data)
+    files = {"data": {"path": "sphere_{speed}mms_{rep}/wide.csv", "time": {"column": "t"}}}
+    path = mapping(tmp_path, files=files, press={"speed": {"part": "speed"}})
+    made = import_session(tmp_path / "runs", path, tmp_path / "by-path")
+    episodes = [read_episode(p) for p in read_session(made.folder).episodes]
+    assert [e.press.speed for e in episodes] == [2.0, 3.0, 4.0]
+    assert [e.number for e in episodes] == [0, 1, 2]
+
+
+def test_a_long_table_becomes_wide_without_inventing_anything(tmp_path):
+    time, depth, _, signals = press_data(channels=4)
+    rows = ["time,channel,value,depth"]
+    for k, t in enumerate(time):
+        for c in range(4):
+            if (k + c) % 11:
+                rows.append(f"{t:.4f},c{c},{signals[k, c]:.4f},{depth[k]:.5f}")
+    (tmp_path / "wide.csv").write_text("\n".join(rows))
+    path = mapping(
+        tmp_path,
+        files={"data": {"path": "wide.csv", "time": {"column": "time", "unit": "s", "zero": "shared"}}},
+        taxels={"file": "data", "long": {"channel": "channel", "value": "value"}, "unit": "pF"},
+        position={"file": "data", "depth": {"column": "depth", "unit": "mm"}},
+        measured=None,
+    )
+    _, (episode,) = imported(tmp_path, path)
+    want = signals.copy()
+    k, c = np.meshgrid(np.arange(len(time)), np.arange(4), indexing="ij")
+    want[(k + c) % 11 == 0] = np.nan
+    np.testing.assert_allclose(episode.taxels.counts, want, atol=1e-9)
+
+
+def test_a_schedule_stands_in_for_a_position(tmp_path):
+    time, _, _, signals = press_data(channels=5)
+    both = np.concatenate([time, time + 8.0])
+    np.savez(tmp_path / "data.npz", stamp=both, cap=np.concatenate([signals, signals]))
+    path = mapping(
+        tmp_path,
+        files={"data": {"path": "data.npz", "time": {"column": "stamp", "unit": "s"}}},
+        taxels={"file": "data", "columns": "cap", "unit": "pF"},
+        position=None,
+        measured=None,
+        schedule={
+            "presses": [
+                {"start": 1.0, "depth": 1.5, "speed": 1.0, "hold": 1.0, "x": 0.5},
+                {"start": 9.0, "depth": 1.2, "speed": 2.0, "hold": 0.5},
+            ]
+        },
+    )
+    _, episodes = imported(tmp_path, path)
+    assert [e.press.depth for e in episodes] == [1.5, 1.2]
+    assert [p.name for p in episodes[0].phases] == ["rest", "press", "hold", "release"]
+    tip = episodes[0].tip_at(np.array([1_000_000_000, 1_750_000_000, 3_000_000_000, 4_750_000_000]))
+    np.testing.assert_allclose(tip[:, 2], [0.0, 0.75, 1.5, 0.25], atol=1e-6)
+    assert tip[0, 0] == pytest.approx(0.5)
+    assert any("not measured" in note for note in episodes[0].notes)
+
+
+def test_matlab_and_parquet_hold_the_same(tmp_path):
+    import pyarrow as pa
+    from pyarrow import parquet
+    from scipy.io import savemat
+
+    time, depth, force, signals = press_data()
+    names = {f"cap{k}": signals[:, k] for k in range(5)}
+    table = pa.table({"t": 1000 * time, "disp": depth, "Fz": force, **names})
+    parquet.write_table(table, tmp_path / "wide.parquet")
+    elements = [{"t": 1000 * time, "disp": depth, "Fz": force, "speed": 1.0 + k, **names} for k in range(2)]
+    savemat(tmp_path / "wide.mat", {"trial": elements})
+    common = {
+        "position": {"file": "data", "depth": {"column": "disp", "unit": "mm"}},
+        "measured": {"force": {"file": "data", "columns": "Fz", "unit": "N"}},
+    }
+    clock = {"column": "t", "unit": "ms"}
+    path = mapping(tmp_path, files={"data": {"path": "wide.parquet", "time": clock}}, **common)
+    first = import_session(tmp_path, path, tmp_path / "a")
+    path = mapping(
+        tmp_path, files={"data": {"path": "wide.mat", "time": clock}}, trials={"column": "element"},
+        press={"speed": {"column": "speed", "file": "data"}}, **common,
+    )  # fmt: skip
+    second = import_session(tmp_path, path, tmp_path / "b")
+    assert (first.recordings, second.recordings) == (1, 2)
+    episodes = [read_episode(p) for m in (first, second) for p in read_session(m.folder).episodes]
+    for episode in episodes:
+        np.testing.assert_allclose(episode.taxels.counts, signals, atol=1e-9)
+    assert [e.press.speed for e in episodes[1:]] == [1.0, 2.0]
+
+
+def refused(tmp_path, **changes):
+    if not (tmp_path / "wide.csv").exists():
+        wide_csv(tmp_path / "wide.csv", press_data())
+    with pytest.raises(TacdataError) as caught:
+        import_session(tmp_path, mapping(tmp_path, **changes), tmp_path / "session")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mapping.yaml", "wide.csv"], "nothing is left behind"
+    return str(caught.value)
+
+
+def test_what_does_not_fit_is_said_in_words(tmp_path):
+    clock = {"column": "t"}
+    assert "'kap0'" in refused(tmp_path, taxels={"file": "data", "columns": ["kap0"]})
+    assert "furlong" in refused(tmp_path, position={"file": "data", "depth": {"column": "disp", "unit": "furlong"}})
+    assert "neither a position nor" in refused(tmp_path, position=None)
+    assert "no file fits nothing.csv" in refused(tmp_path, files={"data": {"path": "nothing.csv", "time": clock}})
+    assert "no clock" in refused(tmp_path, files={"data": {"path": "wide.csv"}})
+    unix = {"data": {"path": "wide.csv", "time": {"column": "t", "zero": "unix"}}}
+    assert "no Unix time" in refused(tmp_path, files=unix)
+    assert "the deepest is" in refused(tmp_path, trials={"press_above": 9.0})
+    assert "columns times rows" in refused(tmp_path, sensor={"name": "five", "columns": 2, "rows": 2})
+    assert "is not among the indenters" in refused(tmp_path, indenter={"shape": "thumb"})
+    later = {"presses": [{"start": 500.0, "depth": 1.0, "speed": 1.0}]}
+    assert "no press lies within" in refused(tmp_path, position=None, schedule=later)
+
+
+def test_clocks_without_a_common_zero_or_time_are_refused(tmp_path):
+    time, depth, _, _ = press_data()
+    wide_csv(tmp_path / "wide.csv", press_data())
+    stage = "t,d\n" + "\n".join(f"{T0 + t:.4f},{d:.4f}" for t, d in zip(time, depth, strict=True))
+    (tmp_path / "stage.csv").write_text(stage)
+
+    def attempt(clock):
+        path = mapping(
+            tmp_path,
+            files={
+                "data": {"path": "wide.csv", "time": {"column": "t"}},
+                "stage": {"path": "stage.csv", "time": {"column": "t", **clock}},
+            },
+            position={"file": "stage", "depth": {"column": "d", "unit": "mm"}},
+        )
+        return imported(tmp_path, path)
+
+    with pytest.raises(FormatError, match="common zero"):
+        attempt({})
+    with pytest.raises(FormatError, match="do not overlap"):
+        attempt({"offset": -5.0})
+    _, (episode,) = attempt({"offset": -T0})
+    np.testing.assert_allclose(episode.tip_at(episode.taxels.sample_ns)[:, 2], depth, atol=1e-3)
+
+
+def test_a_broken_trial_does_not_take_the_others_with_it(tmp_path, monkeypatch, capfd):
+    for number in range(3):
+        wide_csv(tmp_path / f"run{number}.csv", press_data(number))
+    text = (tmp_path / "run1.csv").read_text().splitlines()
+    text[40] = text[40].replace(text[40].split(",")[1], "OVERLOAD")
+    (tmp_path / "run1.csv").write_text("\n".join(text))
+    path = mapping(tmp_path, files={"data": {"path": "run{n}.csv", "time": {"column": "t"}}})
+    out = tmp_path / "session"
+    monkeypatch.setattr(sys, "argv", ["tacdata", "import", str(tmp_path), "--mapping", str(path), "--out", str(out)])
+    with pytest.raises(SystemExit) as caught:
+        cli.main()
+    said = capfd.readouterr().out
+    assert caught.value.code == 3
+    assert "2 recordings" in said
+    assert "OVERLOAD" in said
+    assert "row 40" in said
+    assert len(read_session(out).episodes) == 2
+    with pytest.raises(UsageError, match="exists"):
+        import_session(tmp_path, path, out)
+
+
+def test_looking_first_proposes_a_mapping_that_works(tmp_path, monkeypatch, capfd):
+    wide_csv(tmp_path / "wide.csv", press_data())
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["tacdata", "import", *map(str, arguments)])
+        try:
+            cli.main()
+        except SystemExit as caught:
+            assert not caught.code, capfd.readouterr().err
+        return capfd.readouterr().out
+
+    assert "cap4 (pF)" in run(tmp_path)
+    proposal = tmp_path / "proposal.yaml"
+    run(tmp_path, "--propose", proposal)
+    found = yaml.safe_load(proposal.read_text())
+    assert found["position"]["depth"] == {"column": "disp [um]"}
+    assert found["taxels"]["columns"] == [f"cap{k} (pF)" for k in range(5)]
+    assert found["measured"]["force"]["columns"] == ["Fz [g]"]
+    run(tmp_path, "--mapping", proposal, "--out", tmp_path / "session")
+    assert read_episode(tmp_path / "session" / "episode-000000.mcap").press.depth == pytest.approx(1.5, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("write", "zero"),
+    [
+        (lambda t: f"{1000 * (T0 + t):.1f}", T0),
+        (lambda t: f"{round((T0 + t) * 1e9)}", T0),
+        (lambda t: datetime.fromtimestamp(T0 + t, UTC).isoformat(), T0),
+        (lambda t: f"23:59:{58.5 + t:06.3f}" if t < 1.5 else f"00:00:{t - 1.5:06.3f}", 86398.5),
+        (lambda t: f"{t - 3.0:.4f}", 0.0),
+    ],
+    ids=["unix ms", "unix ns", "iso", "time of day", "negative"],
+)
+def test_clocks_of_every_kind_give_the_same_times(write, zero, tmp_path):
+    time, depth, _, signals = press_data(channels=1)
+    rows = ["stamp,d,c", *(f"{write(t)},{d:.5f},{c[0]:.4f}" for t, d, c in zip(time, depth, signals, strict=True))]
+    (tmp_path / "wide.csv").write_text("\n".join(rows))
+    path = mapping(
+        tmp_path, files={"data": {"path": "wide.csv", "time": {"column": "stamp"}}}, measured=None,
+        taxels={"file": "data", "columns": "c"}, position={"file": "data", "depth": {"column": "d", "unit": "mm"}},
+    )  # fmt: skip
+    _, (episode,) = imported(tmp_path, path)
+    assert episode.taxels.sample_ns[0] / 1e9 == pytest.approx(zero, abs=1e-3)
+    step = 1e-3 if zero == T0 else 1e-4
+    np.testing.assert_allclose((episode.taxels.sample_ns - episode.taxels.sample_ns[0]) / 1e9, time, atol=step)
