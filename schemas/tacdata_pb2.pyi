@@ -85,3 +85,13 @@ class CubeView(_message.Message):
     faces: int
     reprojection: float
     def __init__(self, arrival_ns: _Optional[int] = ..., sample_ns: _Optional[int] = ..., sequence: _Optional[int] = ..., faces: _Optional[int] = ..., reprojection: _Optional[float] = ...) -> None: ...
+
+class Measured(_message.Message):
+    __slots__ = ("arrival_ns", "sample_ns", "values")
+    ARRIVAL_NS_FIELD_NUMBER: _ClassVar[int]
+    SAMPLE_NS_FIELD_NUMBER: _ClassVar[int]
+    VALUES_FIELD_NUMBER: _ClassVar[int]
+    arrival_ns: int
+    sample_ns: int
+    values: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, arrival_ns: _Optional[int] = ..., sample_ns: _Optional[int] = ..., values: _Optional[_Iterable[float]] = ...) -> None: ...

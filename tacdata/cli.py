@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import typer
 
@@ -25,8 +28,23 @@ def application() -> typer.Typer:
     modules = [registry.load_module(ROOM, BASE, name) for name in registry.names(ROOM, BASE)]
     for module in sorted(modules, key=lambda m: (m.ORDER, m.__name__)):
         name = module.__name__.rsplit(".", 1)[-1].replace("_", "-")
-        app.command(name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)(module.run)
+        verb = interruptible(module.run)
+        app.command(name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)(verb)
     return app
+
+
+def interruptible(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the verb with an answer to Ctrl-C; Typer would end it without a word."""
+
+    @functools.wraps(verb)
+    def run(*arguments: Any, **options: Any) -> Any:
+        try:
+            return verb(*arguments, **options)
+        except KeyboardInterrupt:
+            print("interrupted: what was finished is kept", file=sys.stderr)
+            raise typer.Exit(130) from None
+
+    return run
 
 
 def main() -> None:
@@ -37,7 +55,6 @@ def main() -> None:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None
     except KeyboardInterrupt:
-        print("interrupted: what was finished is kept", file=sys.stderr)
         raise SystemExit(130) from None
 
 

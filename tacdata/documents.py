@@ -12,7 +12,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 import schemas
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import DeviceError, FormatError, UsageError
 
 
 def read(path: Path, schema: str) -> dict[str, Any]:
@@ -61,15 +61,28 @@ def check(document: Any, schema: str, origin: str) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file so that a crash leaves either the old one or the new one, never a half."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    with os.fdopen(handle, "w") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
-    os.chmod(temporary, 0o644)
-    os.replace(temporary, path)
+    """Write a file so that a crash leaves either the old one or the new one, never a half.
+
+    Raises:
+        DeviceError: If the disk refuses it.
+    """
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "w") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        raise DeviceError(
+            f"writing {path} failed: {error}", "a folder that may be written, on a disk with room",
+            "make room or choose another folder",
+        ) from error  # fmt: skip
 
 
 def write(path: Path, document: dict[str, Any], schema: str) -> None:

@@ -15,7 +15,7 @@ def moments(scene: Scene) -> tuple[tuple[str, int], ...]:
     """
     shown = scene.map_named("label") or scene.map_named("prediction")
     time = shown.time_ns if shown else scene.taxels.time_ns
-    values = shown.values if shown else np.abs(scene.taxels.values)
+    values = shown.values if shown else np.nan_to_num(np.abs(scene.taxels.values))
     strength = values.reshape(len(values), -1).max(axis=1)
     top = np.flatnonzero(strength >= 0.98 * strength.max())
     deepest = int(top[len(top) // 2])

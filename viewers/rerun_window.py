@@ -135,6 +135,13 @@ def web_server(file: Path) -> Iterator[tuple[subprocess.Popen, str]]:
 
 
 @contextmanager
+def running(arguments: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen]:
+    """Run the viewer that rerun-sdk ships while the context lasts."""
+    with _running([executable(), *arguments], environment) as process:
+        yield process
+
+
+@contextmanager
 def _running(command: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen]:
     process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:

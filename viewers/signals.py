@@ -25,7 +25,14 @@ def signal_change(counts: np.ndarray, resting: np.ndarray) -> np.ndarray:
         resting: Which frames lie in the rest phase, shape (n,), bool; if none does, the first few are taken.
     """
     reference = counts[resting] if resting.any() else counts[:FRAMES_WITHOUT_REST]
-    return counts - np.median(reference, axis=0)
+    if not np.isnan(reference).any():
+        return counts - np.median(reference, axis=0)
+    # Imported readings may be missing; a channel without any has no rest.
+    read = np.isfinite(reference)
+    middle = [
+        np.median(column[mask]) if mask.any() else np.nan for column, mask in zip(reference.T, read.T, strict=True)
+    ]
+    return counts - np.array(middle)
 
 
 def taxel_labels(sensor: Sensor) -> tuple[str, ...]:
@@ -50,7 +57,8 @@ def taxel_array(sensor: Sensor, time_ns: np.ndarray, change: np.ndarray) -> Taxe
 
 def _signal_scale(change: np.ndarray) -> ColorScale:
     # A board whose readings fall under pressure, or fall as much as they rise, needs the scale with a middle.
-    falls = -change.min(initial=0.0) > 0.2 * change.max(initial=0.0)
+    known = change[np.isfinite(change)]
+    falls = -known.min(initial=0.0) > 0.2 * known.max(initial=0.0)
     return scale_of(change, "counts", signed=bool(falls))
 
 
@@ -76,11 +84,11 @@ def episode_curves(episode: Episode) -> tuple[Curves, ...]:
         ),
     ]
     if len(episode.cnc.sample_ns) and "registration" in episode.rig:
-        frame = episode.rig["registration"]
-        reported = Registration(tuple(frame["origin"]), frame["yaw"]).to_sensor(episode.cnc.position)
+        reported = Registration.from_document(episode.rig["registration"]).to_sensor(episode.cnc.position)
         curves.append(tip_curves("reported", episode.cnc.sample_ns, reported))
     for tags in episode.tags:
         curves += tag_curves(tags)
+    curves += [Curves(f"measured/{m.name}", m.unit, m.names, m.sample_ns, m.values) for m in episode.measured]
     return tuple(curves)
 
 

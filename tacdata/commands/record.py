@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,35 +27,60 @@ def run(
     plan: Annotated[Path, typer.Option(help="Plan file: what to press.")],
     out: Annotated[Path, typer.Option(help="Session folder to create, or to continue with --resume.")],
     sensor: Annotated[Path | None, typer.Option(help="Sensor file; default: the paper's.")] = None,
+    registration: Annotated[
+        Path | None, typer.Option(help="Registration file; default: registration.yaml beside the rig file.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the next press not yet done.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the first move.")] = False,
+    sync_tap: Annotated[
+        bool, typer.Option("--sync-tap", help="First touch a taxel a few times to measure the streams' delays.")
+    ] = False,
+    live: Annotated[
+        str | None, typer.Option(metavar="WHERE", help="Watch in Rerun: window, web, or a file name (.rrd).")
+    ] = None,
 ) -> None:
     """Press the sensor as the plan says and record every press to its own MCAP file."""
+    from contextlib import nullcontext
+
     from tacdata.plans import read_plan
     from tacdata.recording.detection_process import in_background
     from tacdata.recording.preflight import Preflight
     from tacdata.recording.recorder import Recorder
+    from tacdata.registration.chosen import chosen_registration
     from tacdata.rig import read_rig
     from tacdata.sensor import default_sensor, read_sensor
     from tacdata.tags import detect_cube
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop from outside is a Ctrl-C
-    bench, skin = read_rig(rig), read_sensor(sensor) if sensor else default_sensor()
+    skin = read_sensor(sensor) if sensor else default_sensor()
+    chosen = chosen_registration(read_rig(rig), rig, registration, skin)
+    bench = chosen.rig
 
     def confirm(summary: Preflight) -> bool:
         print(summary.text, flush=True)
+        print("\n".join(chosen.warnings), file=sys.stderr, flush=True)
         return yes or _answer("Move now? [y/N] ").lower() in ("y", "yes")
 
-    with _Bar() as progress, in_background(detect_cube) as detect:
+    if live:
+        from viewers.live_view import live_view
+
+        view = live_view(live, skin.taxels.columns, skin.taxels.rows)
+    else:
+        view = nullcontext()
+    bar = _Bar()
+    with view as watch, bar as progress, in_background(detect_cube) as detect:
         recorder = Recorder(
             bench,
             skin,
             read_plan(plan),
             out,
             resume,
-            mount=_mounting(bench),
+            mount=_mounting(bench, bar),
             detect=detect,
             progress=progress,
+            sync_tap=sync_tap,
+            say=lambda words: print(f"  {words}", flush=True),
+            watch=watch,
         )
         try:
             session = recorder.run(confirm)
@@ -63,6 +89,8 @@ def run(
             nothing = "nothing was moved or written"
             print(f"interrupted: motion stopped; {kept if out.exists() else nothing}", file=sys.stderr)
             raise typer.Exit(130) from None
+        finally:
+            chosen.keep(out)
     print(f"{len(session.done)} of {len(session.plan.presses)} presses recorded in {out}")
     print(f"next: tacdata check {out}")
 
@@ -76,7 +104,7 @@ def _answer(question: str) -> str:
         return ""
 
 
-def _mounting(rig: Rig) -> Callable[[Press], None]:
+def _mounting(rig: Rig, bar: _Bar) -> Callable[[Press], None]:
     """Return who mounts indenters: the virtual rig, or a person who is asked."""
     if "mounting" in rig.document:
         from tacdata.virtual_rig.mounting import mount
@@ -86,6 +114,7 @@ def _mounting(rig: Rig) -> Callable[[Press], None]:
     def ask(press: Press) -> None:
         from tacdata.errors import UsageError
 
+        bar.pause()
         sizes = ", ".join(f"{k} {v:g}" for k, v in press.indenter.document.items() if k != "shape")
         print(f"\nMount {press.indenter_name} ({press.indenter.shape}; {sizes}) at {press.yaw:g} deg.")
         if _answer("Mounted, and its tip zeroed? [y/N] ").lower() not in ("y", "yes"):
@@ -99,31 +128,42 @@ def _mounting(rig: Rig) -> Callable[[Press], None]:
 
 
 class _Bar:
-    """A progress bar with the time left, or a line per press where there is no terminal."""
+    """A progress bar with the time left, counted down between presses, or a line per press without a terminal."""
 
     def __enter__(self) -> Callable[[int, int, float], None]:
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn
 
-        columns = (
-            TextColumn("recording"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[left]} left"),
-        )
+        bar = self
+
+        class TimeLeft(ProgressColumn):
+            def render(self, task: object) -> str:
+                return f"{bar.left()} left"
+
+        columns = (TextColumn("recording"), BarColumn(), MofNCompleteColumn(), TimeLeft())
         self._progress = Progress(*columns) if sys.stdout.isatty() else None
         self._task = None
+        self._seconds, self._since = 0.0, time.monotonic()
         return self._show
 
+    def left(self) -> str:
+        """Return the time left as minutes and seconds."""
+        seconds = max(self._seconds - (time.monotonic() - self._since), 0.0)
+        return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+    def pause(self) -> None:
+        """Take the bar away, so that a question to the person is not painted over."""
+        if self._progress and self._task is not None:
+            self._progress.stop()
+
     def _show(self, done: int, wanted: int, seconds: float) -> None:
-        left = f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+        self._seconds, self._since = seconds, time.monotonic()
         if self._progress is None:
-            print(f"  press {done} of {wanted} recorded, {left} left", flush=True)
+            print(f"  press {done} of {wanted} recorded, {self.left()} left", flush=True)
             return
         if self._task is None:
-            # Begun with the first press, so that no question to the person is painted over.
-            self._progress.start()
-            self._task = self._progress.add_task("", total=wanted, left=left)
-        self._progress.update(self._task, completed=done, left=left)
+            self._task = self._progress.add_task("", total=wanted)
+        self._progress.start()
+        self._progress.update(self._task, completed=done)
 
     def __exit__(self, *exception: object) -> None:
         if self._progress:

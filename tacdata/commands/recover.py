@@ -15,14 +15,12 @@ PANEL = TOOLS
 
 def run(
     file: Annotated[Path, typer.Argument(help="The damaged recording (MCAP).")],
-    out: Annotated[
-        Path | None, typer.Option(help="Where to write the repaired copy; default beside it.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Where to write the repaired copy; default beside it.")] = None,
 ) -> None:
     """Write a repaired copy of a recording that a crash cut off."""
     from tacdata.recording.recover import recover
 
-    target, records = recover(file, out)
-    for damage in records.damage or ["nothing was wrong with it"]:
+    found = recover(file, out)
+    for damage in found.damage or ["nothing was wrong with it"]:
         print(f"{file.name}: {damage}")
-    print(f"{len(records.messages)} messages and {len(records.attachments)} attachments are in {target}")
+    print(f"{found.messages} messages and {found.attachments} attachments are in {found.path}")

@@ -15,6 +15,8 @@ from tacdata.wire import Decoder, FrameFormat, default_format, read_format
 from tacdata.wire.frame_format import from_document
 from tacdata.wire.serial_port import open_port, read_available
 
+FINE_TICK = 0.0002
+"""Coarsest tick of a board's own time that is preferred to its frame counter [s]."""
 FIRST_FRAME = 2.0
 """Longest wait for the first good frame [s, real time]."""
 
@@ -54,7 +56,13 @@ class CapacitiveBoard(TaxelBoard):
             "kind": "taxel board", "driver": "capacitive_board", "port": self.port, "baud": self.baud,
             "channels": self.format.channels, "unit": "counts", "shape": [self.format.channels],
             "rate": {"nominal": self.format.rate, "unit": "Hz"}, "format": self.format.document,
+            "clock": self._clock_axis(),
         }  # fmt: skip
+
+    def _clock_axis(self) -> str:
+        # A counter is exact where sampling is; the board's own time is better if its ticks are fine enough.
+        fine = self.format.timestamp is not None and self.format.tick <= FINE_TICK
+        return "device_ns" if fine or (self.format.timestamp and not self.format.counter) else "counter"
 
     def open(self) -> None:
         """Open the port and wait for the first good frame.

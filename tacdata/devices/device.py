@@ -74,6 +74,10 @@ class ImageFrame:
     """Number of the image since the camera was opened."""
     image: np.ndarray
     """Grey or BGR image, shape (height, width) or (height, width, 3), uint8."""
+    jpeg: bytes = b""
+    """The same image as the camera sent it, if that was a JPEG file: what is stored, without loss; else empty."""
+    device_ns: int = -1
+    """The camera's or driver's own time of the image [ns of its clock]; -1 if it gives none."""
 
 
 @dataclass
@@ -157,6 +161,16 @@ class MotionController(Device):
     def max_rate(self) -> np.ndarray:
         """Speed limit of each axis [mm/s], shape (3,)."""
 
+    @property
+    def travel(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Lower and upper corner of what the controller itself allows [mm], shapes (3,) and (3,); None: everything."""
+        return None
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """What a person should know of its settings before the first move."""
+        return ()
+
     @abstractmethod
     def move(self, position: tuple[float, float, float], speed: float) -> Motion:
         """Queue a straight move to a machine position [mm] at ``speed`` [mm/s]; returns once it is acknowledged."""
@@ -179,15 +193,25 @@ class MotionController(Device):
 
     @abstractmethod
     def feed_hold(self) -> None:
-        """Stop the motion now, keeping the position (real-time command); safe from any thread and signal handler."""
+        """Stop the motion now, keeping the position (real-time command); safe from any thread and signal handler.
+
+        Until `resume` or `abandon` no line goes out, and a `move`, `dwell` or `wait_idle` under way raises.
+        """
 
     @abstractmethod
     def resume(self) -> None:
         """Go on after a feed hold."""
 
     @abstractmethod
-    def abandon(self) -> None:
-        """After a feed hold: throw the queued motion away, keeping the position, so that a retract can be sent."""
+    def abandon(self) -> tuple[float, float, float]:
+        """After a feed hold: throw the queued motion away, so that a retract can be sent.
+
+        Returns:
+            Machine position at rest [mm], read after the machine had stopped.
+
+        Raises:
+            DeviceError: If the machine does not come to rest, or its position is not known any more.
+        """
 
 
 class Camera(Device):

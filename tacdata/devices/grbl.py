@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -9,14 +10,16 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, Motion, MotionController
 from tacdata.errors import DeviceError, UsageError
-from tacdata.wire.grbl_lines import MESSAGE, READY_STATES, SETTING
-from tacdata.wire.grbl_link import GrblLink, inches_to_mm
+from tacdata.wire.grbl_lines import MOVING, OPENED_AGAIN
+from tacdata.wire.grbl_link import GrblLink
+from tacdata.wire.grbl_opening import ANSWER, clear, greet, locked
+from tacdata.wire.grbl_settings import GrblSettings
 from tacdata.wire.serial_port import open_port
 
-GREETING = 4.0
-"""Longest wait for the first sign of life [s, real time]: a boot loader takes 1-2 s of it."""
-ANSWER = 5.0
-"""Longest wait for the answer to a ``$`` command [s of the clock]."""
+HOMING = 600.0
+"""Longest homing cycle [s of the clock]: 1.5 times the travel of two cycles at a slow seek rate."""
+COMING_TO_REST = 30.0
+"""Longest deceleration of a feed hold [s of the clock]."""
 
 
 class Grbl(MotionController):
@@ -46,7 +49,8 @@ class Grbl(MotionController):
             )
         self.port, self.baud, self.poll_rate, self.dtr, self.home_first = port, baud, poll_rate, dtr, home
         self._link: GrblLink | None = None
-        self._settings: dict[str, str] = {}
+        self._answers = GrblSettings({})
+        self._found: dict[str, str] = {}
 
     def describe(self) -> dict[str, Any]:
         """Return what the status reports hold."""
@@ -63,50 +67,67 @@ class Grbl(MotionController):
         Raises:
             DeviceError: If the port is missing or busy, nothing answers, or the machine is moving or locked.
         """
-        self._link = GrblLink(
-            open_port(self.port, self.baud, "motion controller", 0.05, self.dtr), self.clock, self.poll_rate
-        )
+        port = open_port(self.port, self.baud, "motion controller", 0.05, self.dtr)
+        link = self._link = GrblLink(port, self.clock, self.poll_rate)
         try:
-            self._link.start()
-            reset = self._greet(self._link)
-            state = self._make_ready(self._link)
-            self._settings = self._read_settings(self._link)
-            self._settings["reset_at_opening"] = "yes" if reset else "no"
-            self._settings["state_at_opening"] = state
-            self._link.unit = inches_to_mm(self._settings.get("$13") == "1")
-            self._link.take_statuses()
-            self._link.poll()
-            self._limits("$12", 1.0)
-            self._limits("$11", 60.0)
+            link.start()
+            greet(link, self.baud)
+            state = self._make_ready(link)
+            if link.fresh_status(ANSWER).state.split(":")[0] == "Alarm":
+                if not self.home_first:
+                    raise locked(link, self._answers)
+                self.home()
+                self._read(link)
+            self._found = {
+                "banner": link.welcome or f"none, the board was not reset by opening; $I says {self._version}",
+                "reset_at_opening": "yes" if link.resets else "no",
+                "state_at_opening": state,
+            }
+            link.take_statuses()
+            link.poll()
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
-        """Close the port; a machine still in motion gets a feed hold first."""
+        """Close the port; a machine in motion gets a feed hold first, a homing one a reset."""
         link, self._link = self._link, None
         if link is None:
             return
-        if link.last and link.last.state.split(":")[0] in ("Run", "Jog") and not link.fault:
-            try:
+        with suppress(DeviceError):
+            if link.homing:
+                link.realtime(b"\x18")  # homing heeds nothing else
+            elif not link.fault and (not link.at_rest if link.polled else _moves(link)):
                 link.realtime(b"!")
-            except DeviceError:
-                pass
         link.stop()
 
     def settings(self) -> dict[str, str]:
         """Return ``banner``, the ``$n`` settings, and ``$G``, ``$#``, ``$I`` by their tags."""
-        return dict(self._settings)
+        return {**self._found, **self._answers.said}
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """What a person should know before the first move."""
+        found = self._answers.cautions
+        if self._found.get("reset_at_opening") == "yes" and not self._answers.homing:
+            lost = "the controller was reset and its position counts from where it stands now: touch off before moving"
+            found = (lost, *found)
+        return found
+
+    @property
+    def travel(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Machine box of the soft limits [mm], shapes (3,) and (3,); None if they are off."""
+        return self._answers.travel
 
     @property
     def acceleration(self) -> np.ndarray:
         """``$120``-``$122`` [mm/s^2], shape (3,)."""
-        return self._limits("$12", 1.0)
+        return self._answers.limits("$12", 1.0, self.port)
 
     @property
     def max_rate(self) -> np.ndarray:
         """``$110``-``$112`` [mm/s], shape (3,)."""
-        return self._limits("$11", 60.0)
+        return self._answers.limits("$11", 60.0, self.port)
 
     def move(self, position: tuple[float, float, float], speed: float) -> Motion:
         """Queue a straight move; every modal word stands in the line, so that no earlier state bends it."""
@@ -128,9 +149,7 @@ class Grbl(MotionController):
         link = self._opened()
         link.command("G4P0.01", timeout)
         while link.fresh_status(timeout).state != "Idle":
-            link.wait(
-                lambda: link.last is not None and link.last.state == "Idle", timeout, "the machine to be idle"
-            )
+            link.wait(lambda: link.last is not None and link.last.state == "Idle", timeout, "the machine to be idle")
 
     def statuses(self) -> list[CncStatus]:
         """Return the reports received since the last call; what came before a fault is still handed out."""
@@ -140,51 +159,58 @@ class Grbl(MotionController):
         """Raise what has gone wrong since the last call, if anything.
 
         Raises:
-            DeviceError: On alarm, reset, a broken line or silence.
+            DeviceError: On alarm, reset, a broken line or silence, a hold or an open door.
         """
         self._opened().check()
 
     def feed_hold(self) -> None:
-        """Send ``!``; does nothing on a closed controller."""
-        try:
+        """Send ``!``; no line goes out until `resume` or `abandon`. Does nothing on a closed controller."""
+        # The broken line is a fault that every other call raises; a signal handler must not.
+        with suppress(DeviceError):
             if self._link is not None:
-                self._link.realtime(b"!")
-        except DeviceError:
-            pass  # the broken line is a fault that every other call raises; a signal handler must not
+                self._link.hold()
 
     def resume(self) -> None:
         """Send ``~``."""
-        self._opened().realtime(b"~")
+        link = self._opened()
+        link.rearm()
+        link.realtime(b"~")
 
-    def abandon(self) -> None:
+    def abandon(self) -> tuple[float, float, float]:
         """Wait until the hold is complete, then soft-reset: the planner is emptied and the position kept.
+
+        Returns:
+            Where the machine stands then [mm].
 
         Raises:
             DeviceError: If the machine does not come to rest, or does not come back from the reset.
         """
         link = self._opened()
-        link.check()
-        status = link.fresh_status(ANSWER)
-        if status.state.split(":")[0] in ("Run", "Jog"):
-            link.realtime(b"!")
-        while (status := link.fresh_status(ANSWER)).state in ("Hold:1", "Run", "Jog"):
-            link.check()
+        status = self._rest(link)
+        if status.state.startswith("Door") and status.state not in OPENED_AGAIN:
+            raise DeviceError("the safety door is open", "a closed door", "close it; --resume lifts the tip first")
         link.soft_reset(ANSWER)
-        if link.fresh_status(ANSWER).state.startswith("Alarm"):
-            link.command("$X", ANSWER)
+        link.rearm()
+        link.command("", ANSWER)  # grblHAL refuses every line after a refused one until an empty one
+        x, y, z = link.fresh_status(ANSWER).position.tolist()
+        return x, y, z
 
-    def home(self, timeout: float = 120.0) -> None:
+    def home(self, timeout: float = HOMING) -> None:
         """Run the homing cycle (``$H``), which moves every axis to its switch [timeout in s of the clock].
 
         Raises:
             DeviceError: If homing is switched off or fails.
         """
         link = self._opened()
-        link.watch(False)  # GRBL answers nothing while homing
+        link.homing = True  # Grbl answers nothing while homing
         try:
             link.command("$H", timeout)
         finally:
-            link.watch(True)
+            link.homing = link.waiting  # one that was given up still moves
+
+    @property
+    def _version(self) -> str:
+        return self._answers.said.get("VER", "nothing")
 
     def _opened(self) -> GrblLink:
         if self._link is None:
@@ -195,75 +221,49 @@ class Grbl(MotionController):
         _, sent_ns, acknowledged_ns = self._opened().command(line, None)
         return Motion(line, sent_ns, acknowledged_ns)
 
-    def _greet(self, link: GrblLink) -> bool:
-        """Wait for a welcome or an answer to ``?``; return True if there was a welcome, that is, a reset."""
-        for _ in range(int(GREETING / 0.25)):
-            if link.hear(0.25):
-                link.check()
-                return bool(link.welcome)
-            link.ask()
-        raise self._silent(link)
-
-    def _silent(self, link: GrblLink) -> DeviceError:
-        seen = bytes(link.seen)
-        return DeviceError(
-            f"nothing on {self.port} at {self.baud} baud speaks GRBL: "
-            + (
-                f"it sent {len(seen)} bytes or more, beginning {seen[:24].hex(' ')}"
-                if seen
-                else "it sent no byte"
-            ),
-            "a GRBL 1.1 or grblHAL controller that says its welcome or answers ?",
-            "check the baud rate (GRBL: 115200) and that this is the controller's port"
-            if seen
-            else "check power, cable and port; some boards need dtr: false under cnc",
-        )
-
     def _make_ready(self, link: GrblLink) -> str:
-        """Bring the controller to Idle without moving it, or say why it cannot be; return the state found."""
-        state = link.fresh_status(ANSWER).state
-        if state == "Hold:0":
-            link.soft_reset(ANSWER)
-        if state.split(":")[0] == "Alarm" and self.home_first:
-            self.home()
-        now = link.fresh_status(ANSWER).state
-        if now.split(":")[0] not in READY_STATES:
-            raise DeviceError(
-                f"the controller on {self.port} is in state {now}",
-                "Idle",
-                "let it finish or stop it, then try again",
-            )
-        if now.split(":")[0] == "Alarm":
-            raise DeviceError(
-                f"the controller on {self.port} is locked (state {now}): its position is not known",
-                "a homed controller in state Idle",
-                "home it ($H), or set home: true under cnc in the rig file (every axis moves at opening)",
-            )
+        """End a standing hold, read the settings, and return the state that was found."""
+        resets = link.resets
+        try:
+            state = clear(link)
+            self._read(link)
+        except DeviceError:
+            if link.resets == resets:
+                raise
+            # Grbl with a fresh memory answers ? before its welcome, and what it was sent meanwhile is lost.
+            state = clear(link)
+            self._read(link)
         return state
 
-    def _read_settings(self, link: GrblLink) -> dict[str, str]:
-        found = {"banner": link.welcome}
-        for line in ("$I", "$$", "$G", "$#"):
-            for pushed in link.command(line, ANSWER)[0]:
-                if setting := SETTING.match(pushed):
-                    found[setting[1]] = setting[2]
-                elif message := MESSAGE.match(pushed):
-                    found[message[1]] = message[2]
-        if not found["banner"]:
-            found["banner"] = (
-                f"none, the board was not reset by opening; $I says {found.get('VER', 'nothing')}"
-            )
-        return found
+    def _read(self, link: GrblLink) -> None:
+        """Ask what the controller says of itself, and set the link up for it."""
+        self._answers = answers = GrblSettings.read(link, ANSWER)
+        link.statuses.unit, link.statuses.automatic = answers.unit, answers.reports_by_itself
+        link.rx_bytes = answers.rx_bytes or link.rx_bytes
+        if link.statuses.offset is None:
+            link.statuses.offset = answers.work_offset
+        answers.refuse_moves_at_start(self.port)
+        answers.limits("$12", 1.0, self.port)
+        answers.limits("$11", 60.0, self.port)
 
-    def _limits(self, prefix: str, divisor: float) -> np.ndarray:
-        try:
-            values = np.array([float(self._settings[f"{prefix}{axis}"]) for axis in range(3)]) / divisor
-        except (KeyError, ValueError):
-            values = np.zeros(3)
-        if not np.all(values > 0):
-            raise DeviceError(
-                f"the controller on {self.port} reports no usable {prefix}0 to {prefix}2",
-                "a positive rate and acceleration for each axis",
-                "open it first; if it is open, correct these settings in the controller",
-            )
-        return values
+    def _rest(self, link: GrblLink) -> CncStatus:
+        """Return a report of the machine at rest, holding it if it moves.
+
+        Raises:
+            DeviceError: On a fault, or if it goes on moving.
+        """
+        end = self.clock.now_ns() + round(COMING_TO_REST * 1e9)
+        while (status := link.fresh_status(ANSWER)).state.split(":")[0] in MOVING or status.state == "Hold:1":
+            if status.state.split(":")[0] in MOVING:
+                link.realtime(b"!")
+            if self.clock.now_ns() > end:
+                raise DeviceError(
+                    f"the machine is in state {status.state} {COMING_TO_REST:g} s after a feed hold",
+                    "a machine at rest",
+                    "press the emergency stop and look at it",
+                )
+        return status
+
+
+def _moves(link: GrblLink) -> bool:
+    return link.last is not None and link.last.state.split(":")[0] in MOVING

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import numpy as np
 
 from tacdata.clock import Clock
 from tacdata.devices.device import Camera, ImageFrame
-from tacdata.errors import DeviceError
+from tacdata.errors import DeviceError, UsageError
 
 FIRST_IMAGE = 5.0
 """Longest wait for the first image [s, real time]."""
@@ -22,27 +24,63 @@ STALL = 3.0
 WAITING = 120
 """Images kept until they are read; beyond that the oldest are dropped and counted."""
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+BACKENDS = {
+    "any": "CAP_ANY", "v4l2": "CAP_V4L2", "dshow": "CAP_DSHOW", "msmf": "CAP_MSMF",
+    "avfoundation": "CAP_AVFOUNDATION", "ffmpeg": "CAP_FFMPEG",
+}  # fmt: skip
+"""Name in a rig file -> OpenCV's name of the back-end."""
+MANUAL_AUTOMATIC = {"V4L2": (1, 3)}
+"""What a back-end calls manual and automatic exposure; the others say 0.25 and 0.75."""
+BAD_IN_A_ROW = 10
+"""Damaged images in a row that are too many."""
 
-Grab = Callable[[], np.ndarray | None]
+
+@dataclass(frozen=True, eq=False)
+class _Grabbed:
+    """What a source gives."""
+
+    image: np.ndarray | None
+    """Grey or BGR, uint8; None if it is damaged."""
+    jpeg: bytes = b""
+    """The image as the source sent it, if that is a whole JPEG file."""
+    device_ns: int = -1
+    """The source's own time [ns]; -1 if it has none."""
+
+
+Grab = Callable[[], "_Grabbed | None"]
 
 
 class OpencvCamera(Camera):
     """A thread grabs and stamps; `read` hands out.
 
-    Settings in the rig file: ``source``: index, URL, video file or image folder; ``rate`` [Hz]: nominal, and
-    the pace of a file or folder (absent: the file's own, or 30); ``intrinsics``, whose size the images must
-    have; ``cube``, which the tag room reads.
+    Settings in the rig file: ``source``: index, URL, video file or image folder; ``rate`` [Hz]: asked of a
+    camera, and the pace of a file or folder (absent: the file's own, or 30); ``intrinsics``, whose size the
+    images must have; ``cube``, which the tag room reads; for a camera by index also ``fourcc`` (default MJPG:
+    without compression USB carries few images), ``exposure`` [ms] or auto, ``gain`` and ``backend``;
+    ``loop``: begin a file or folder again at its end.
     """
 
     def __init__(
         self, clock: Clock, source: str | int, intrinsics: dict[str, Any], rate: float | None = None,
-        cube: dict[str, Any] | None = None,
+        cube: dict[str, Any] | None = None, fourcc: str = "MJPG", exposure: float | str = "auto",
+        gain: float | None = None, backend: str = "any", loop: bool = False,
     ) -> None:  # fmt: skip
-        """Keep the settings; see the class."""
+        """Keep the settings; see the class.
+
+        Raises:
+            UsageError: If a setting means nothing.
+        """
         super().__init__(clock)
         self.source = int(source) if isinstance(source, str) and source.isdigit() else source
         self.intrinsics, self.cube, self.rate = intrinsics, cube, rate
+        self.fourcc, self.exposure, self.gain, self.backend, self.loop = fourcc, exposure, gain, backend, loop
+        self._check_settings()
         self.dropped = 0
+        """Images that nobody fetched in time."""
+        self.damaged = 0
+        """Images that could not be decoded."""
+        self.notes: list[str] = []
+        """What the camera did not do as asked, in words."""
         self._live = isinstance(self.source, int) or "://" in str(self.source)
         self._ended = False
         self._fault: DeviceError | None = None
@@ -52,6 +90,18 @@ class OpencvCamera(Camera):
         self._changed = threading.Condition()
         self._stopped = threading.Event()
         self._thread: threading.Thread | None = None
+
+    def _check_settings(self) -> None:
+        where = f"camera {self.source}"
+        if self.backend not in BACKENDS:
+            raise UsageError(f"{where}: backend {self.backend!r}", ", ".join(BACKENDS), "correct the rig file")
+        if len(self.fourcc) != 4 or not self.fourcc.isascii():
+            given = f"{where}: fourcc {self.fourcc!r}"
+            raise UsageError(given, "four letters, for example MJPG or YUYV", "correct the rig file")
+        is_time = isinstance(self.exposure, int | float) and self.exposure > 0
+        if self.exposure != "auto" and not is_time:
+            given = f"{where}: exposure {self.exposure!r}"
+            raise UsageError(given, "auto, or a time above 0 ms", "correct the rig file")
 
     def describe(self) -> dict[str, Any]:
         """Return size, rate and source."""
@@ -69,25 +119,17 @@ class OpencvCamera(Camera):
         """
         grab, release = self._open_source()
         self._images.clear()
-        self._fault, self._ended, self._sequence, self.dropped = None, False, 0, 0
+        self._fault, self._ended, self._sequence, self.dropped, self.damaged = None, False, 0, 0, 0
         self._stopped.clear()
         self._last_at = time.monotonic()
         self._thread = threading.Thread(target=self._run, args=(grab, release), name="camera", daemon=True)
         self._thread.start()
         with self._changed:
             self._changed.wait_for(lambda: self._images or self._fault or self._ended, FIRST_IMAGE)
-            fault = self._fault
-            shape = self._images[0].image.shape[:2] if self._images else None
-        expected = (self.intrinsics["height"], self.intrinsics["width"])
-        if shape is None:
-            fault = fault or self._error(
-                f"gave no image within {FIRST_IMAGE:g} s", "check the cable and the stream"
-            )
-        elif shape != expected:
-            fault = self._error(
-                f"gives {shape[1]} x {shape[0]} pixels, its intrinsics are for {expected[1]} x {expected[0]}",
-                "calibrate at this size, or correct intrinsics in the rig file",
-            )
+            fault = self._fault if not self._images else None
+            if not self._images and not fault:
+                ended = "holds no image that can be read" if self._ended else f"gave no image in {FIRST_IMAGE:g} s"
+                fault = self._error(ended, "check the cable and the stream, or the file")
         if fault:
             self.close()
             raise fault
@@ -119,28 +161,57 @@ class OpencvCamera(Camera):
         return images
 
     def _run(self, grab: Grab, release: Callable[[], None]) -> None:
-        begun = self.clock.now_ns()
+        begun, bad = self.clock.now_ns(), 0
         while not self._stopped.is_set():
-            image = grab()
+            fault = None
+            try:
+                grabbed = grab()
+            except DeviceError as error:
+                grabbed, fault = None, error
+            except Exception as error:  # a thread that dies silently would look like a camera that stalls
+                grabbed, fault = None, self._error(f"failed ({error})", "report it with this line")
             arrival_ns = self.clock.now_ns()
+            bad = bad + 1 if grabbed is not None and grabbed.image is None else 0
+            if grabbed is None and self._live and not self._stopped.is_set():
+                fault = fault or self._error("stopped sending images", "check cable, power, network")
+            elif bad >= BAD_IN_A_ROW:
+                fault = self._error(f"sent {bad} damaged images in a row", "check the cable; try another fourcc")
+            elif grabbed is not None and grabbed.image is not None:
+                fault = self._wrong_size(grabbed.image)
             with self._changed:
-                if image is None:
-                    if self._live and not self._stopped.is_set():
-                        self._fault = self._error("stopped sending images", "check cable, power, network")
-                    self._ended = True
+                if grabbed is None or fault:
+                    self._fault, self._ended = self._fault or fault, True
                     self._changed.notify_all()
                     break
-                self._images.append(ImageFrame(arrival_ns, self._sequence, image))
-                self._sequence += 1
-                self._last_at = time.monotonic()
-                if len(self._images) > WAITING:
-                    self._images.popleft()
-                    self.dropped += 1
-                self._changed.notify_all()
+                self._keep(grabbed, arrival_ns)
             if not self._live:
-                due = begun + round(self._sequence / (self.rate or 30.0) * 1e9)
+                due = begun + round((self._sequence + self.damaged) / (self.rate or 30.0) * 1e9)
                 self._stopped.wait(max((due - self.clock.now_ns()) * 1e-9 / self.clock.rate, 0.0))
         release()
+
+    def _keep(self, grabbed: _Grabbed, arrival_ns: int) -> None:
+        if grabbed.image is None:
+            self.damaged += 1
+            return
+        frame = ImageFrame(arrival_ns, self._sequence, grabbed.image, grabbed.jpeg, grabbed.device_ns)
+        self._images.append(frame)
+        self._sequence += 1
+        self._last_at = time.monotonic()
+        if len(self._images) > WAITING:
+            self._images.popleft()
+            self.dropped += 1
+        self._changed.notify_all()
+
+    def _wrong_size(self, image: np.ndarray) -> DeviceError | None:
+        expected = (self.intrinsics["height"], self.intrinsics["width"])
+        if image.shape[:2] == expected:
+            return None
+        which = f"image {self._sequence}: " if self._sequence else ""
+        return self._error(
+            f"gives {which}{image.shape[1]} x {image.shape[0]} pixels, its intrinsics are for "
+            f"{expected[1]} x {expected[0]}",
+            "calibrate at this size (tacdata calibrate-camera), or correct intrinsics in the rig file",
+        )
 
     def _open_source(self) -> tuple[Grab, Callable[[], None]]:
         import cv2
@@ -153,33 +224,103 @@ class OpencvCamera(Camera):
             raise self._error("does not exist", "correct source in the rig file")
         quiet = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
         try:
-            if isinstance(self.source, str) and self._live:
-                limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, 5000, cv2.CAP_PROP_READ_TIMEOUT_MSEC, 5000]
-                capture = cv2.VideoCapture(self.source, cv2.CAP_FFMPEG, limits)
-            else:
-                capture = cv2.VideoCapture(self.source)
+            capture = self._capture()
         finally:
             cv2.utils.logging.setLogLevel(quiet)
         if not capture.isOpened():
             capture.release()
             raise self._error("cannot be opened", "check that it is a camera, stream or video and not in use")
-        if not self._live and self.rate is None:
+        if isinstance(self.source, int):
+            self._set_up(capture)
+        elif not self._live and self.rate is None:
             self.rate = capture.get(cv2.CAP_PROP_FPS) or 30.0
+        raw = self._ask_for_jpeg(capture)
+        # A stream over HTTP has no clock: its back-end makes times up at 25 Hz.
+        timed = not str(self.source).startswith("http")
 
-        def grab() -> np.ndarray | None:
+        def grab() -> _Grabbed | None:
             good, image = capture.read()
-            return image if good else None
+            if not good and self.loop and not self._live:
+                capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
+                good, image = capture.read()
+            if not good:
+                return None
+            milliseconds = capture.get(cv2.CAP_PROP_POS_MSEC) if timed else 0.0
+            device_ns = round(milliseconds * 1e6) if milliseconds > 0 or (timed and not self._live) else -1
+            return _decoded(image.tobytes(), device_ns) if raw else _Grabbed(image, device_ns=device_ns)
 
         return grab, capture.release
 
-    def _open_folder(self, folder: Path) -> tuple[Grab, Callable[[], None]]:
+    def _capture(self) -> Any:
         import cv2
 
-        paths = iter(sorted(p for p in folder.iterdir() if p.suffix.lower() in IMAGE_ENDINGS))
+        backend = getattr(cv2, BACKENDS[self.backend])
+        if isinstance(self.source, str) and self._live:
+            limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, 5000, cv2.CAP_PROP_READ_TIMEOUT_MSEC, 5000]
+            return cv2.VideoCapture(self.source, cv2.CAP_FFMPEG if backend == cv2.CAP_ANY else backend, limits)
+        return cv2.VideoCapture(self.source, backend)
 
-        def grab() -> np.ndarray | None:
+    def _set_up(self, capture: Any) -> None:
+        """Set a camera's format, and note what it does not take."""
+        import cv2
+
+        width, height = self.intrinsics["width"], self.intrinsics["height"]
+        wanted: list[tuple[str, int, float]] = [
+            ("fourcc", cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*self.fourcc)),
+            ("width", cv2.CAP_PROP_FRAME_WIDTH, width), ("height", cv2.CAP_PROP_FRAME_HEIGHT, height),
+        ]  # fmt: skip
+        if self.rate:
+            wanted.append(("rate", cv2.CAP_PROP_FPS, self.rate))
+        name = capture.getBackendName()
+        manual, automatic = MANUAL_AUTOMATIC.get(name, (0.25, 0.75))
+        if isinstance(self.exposure, int | float):
+            # V4L2 counts 0.1 ms, the others powers of two of a second.
+            value = 10 * self.exposure if name == "V4L2" else float(np.log2(self.exposure / 1000))
+            wanted += [
+                ("manual exposure", cv2.CAP_PROP_AUTO_EXPOSURE, manual),
+                ("exposure", cv2.CAP_PROP_EXPOSURE, value),
+            ]
+        else:
+            capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, automatic)
+        if self.gain is not None:
+            wanted.append(("gain", cv2.CAP_PROP_GAIN, self.gain))
+        for what, key, value in wanted:
+            taken = capture.set(key, value)
+            if not taken or abs(capture.get(key) - value) > 0.05 * abs(value) + 1e-6:
+                self.notes.append(f"camera {self.source}: {what} {value:g} asked, {capture.get(key):g} given")
+        # One image under way: with more, each is older when it arrives.
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+
+    def _ask_for_jpeg(self, capture: Any) -> bool:
+        """Ask for JPEG files as they come, so that they are stored without loss; say whether they will come so."""
+        import cv2
+
+        if int(capture.get(cv2.CAP_PROP_FOURCC)) != cv2.VideoWriter.fourcc(*"MJPG"):
+            return False
+        name = capture.getBackendName()
+        if name == "FFMPEG":
+            return bool(capture.set(cv2.CAP_PROP_FORMAT, -1))
+        return name == "V4L2" and bool(capture.set(cv2.CAP_PROP_CONVERT_RGB, 0))
+
+    def _open_folder(self, folder: Path) -> tuple[Grab, Callable[[], None]]:
+        found = sorted((p for p in folder.iterdir() if p.suffix.lower() in IMAGE_ENDINGS), key=_by_number)
+        if not found:
+            endings = ", ".join(ending[1:] for ending in IMAGE_ENDINGS)
+            raise DeviceError(f"camera {folder} holds no image", f"files of type {endings}", "correct source")
+        paths = iter(found)
+
+        def grab() -> _Grabbed | None:
+            nonlocal paths
             path = next(paths, None)
-            return None if path is None else cv2.imread(str(path), cv2.IMREAD_ANYCOLOR)
+            if path is None and self.loop:
+                paths = iter(found)
+                path = next(paths)
+            if path is None:
+                return None
+            grabbed = _decoded(path.read_bytes())
+            if grabbed.image is None:
+                raise DeviceError(f"{path} cannot be read as an image", "whole image files", "replace or remove it")
+            return grabbed
 
         return grab, lambda: None
 
@@ -194,3 +335,23 @@ class OpencvCamera(Camera):
 
     def _error(self, what: str, remedy: str) -> DeviceError:
         return DeviceError(f"camera {self.source} {what}", "a source that delivers images", remedy)
+
+
+def _decoded(data: bytes, device_ns: int = -1) -> _Grabbed:
+    """Decode an image file; a JPEG that lacks its end is damaged, one without Huffman tables is not kept as it is."""
+    import cv2
+
+    if data.startswith(b"\xff\xd8"):
+        end = data.rfind(b"\xff\xd9")
+        if end < 0:
+            return _Grabbed(None, device_ns=device_ns)
+        data = data[: end + 2]  # cameras pad their buffers
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYCOLOR) if data else None
+    is_whole = data.startswith(b"\xff\xd8") and b"\xff\xc4" in data
+    return _Grabbed(image, data if is_whole and image is not None else b"", device_ns)
+
+
+def _by_number(path: Path) -> list[tuple[int, str]]:
+    """Sort image-2 before image-10."""
+    parts = re.split(r"(\d+)", path.name)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from concurrent.futures import Future, wait
-from io import BytesIO
 from typing import Any
 
-from PIL import Image
+import numpy as np
 
 from tacdata.devices.device import ImageFrame
 from tacdata.errors import DeviceError
@@ -26,25 +25,25 @@ class CameraStream:
         """Keep the camera's name, its rig file's entry and the detector, if tags are to be searched."""
         self.name, self._intrinsics, self._cube = name, entry.get("intrinsics"), entry.get("cube")
         self._detect = detect if self._cube is not None else None
-        self._search: tuple[Future, ImageFrame, EpisodeWriter | None] | None = None
+        self._search: tuple[Future, ImageFrame, int, EpisodeWriter | None] | None = None
         self._last, self._asked = None, False
         self.ready = self._detect is None
         """Whether the detector has answered once (or there is none)."""
 
-    def take(self, frame: ImageFrame, sink: EpisodeWriter | None) -> None:
-        """Write one image; without a recording, search a first one, as a detector's first call takes long.
+    def take(self, frame: ImageFrame, sample_ns: int, sink: EpisodeWriter | None) -> None:
+        """Write one image with its sample time as estimated so far [ns].
 
-        An image has no device counter that a clock could be fitted to; its sample time is its arrival.
+        Without a recording, a first one is searched, as a detector's first call takes long.
 
         Raises:
             DeviceError: If the image is none.
         """
         if sink:
-            sink.image(self.name, frame.arrival_ns, frame.arrival_ns, frame.sequence, self._jpeg(frame))
+            sink.image(self.name, frame.arrival_ns, sample_ns, frame.sequence, self._jpeg(frame))
         self.collect(0.0)
         if self._detect is not None and self._search is None and (sink or not self._asked):
             search = self._detect(frame.image, self._intrinsics, self._cube, self._last)
-            self._search, self._asked = (search, frame, sink), True
+            self._search, self._asked = (search, frame, sample_ns, sink), True
 
     def collect(self, patience: float) -> None:
         """Write the pose of the search under way if it ends within ``patience`` [s of real time].
@@ -53,7 +52,7 @@ class CameraStream:
         """
         if self._search is None:
             return
-        search, frame, sink = self._search
+        search, frame, sample_ns, sink = self._search
         if patience:
             wait([search], patience)
         if not search.done():
@@ -70,21 +69,22 @@ class CameraStream:
                 )
             return
         if sink:
-            sink.cube(self.name, frame.arrival_ns, frame.arrival_ns, frame.sequence, _record(self._last))
+            sink.cube(self.name, frame.arrival_ns, sample_ns, frame.sequence, _record(self._last))
 
     def _jpeg(self, frame: ImageFrame) -> bytes:
-        image, data = frame.image, BytesIO()
-        try:
-            # Drivers give BGR; a picture file is RGB.
-            picture = Image.fromarray(image if image.ndim == 2 else image[..., ::-1])
-            picture.save(data, "JPEG", quality=JPEG_QUALITY)
-        except (TypeError, ValueError, OSError) as error:
+        import cv2
+
+        image = frame.image
+        good = image.dtype == np.uint8 and image.size > 0 and (image.ndim == 2 or image.shape[2:] == (3,))
+        if good:
+            good, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        if not good:
             raise DeviceError(
-                f"camera {self.name}: {image.dtype} image of shape {image.shape}: {error}",
+                f"camera {self.name}: {image.dtype} image of shape {image.shape}",
                 "grey or BGR uint8",
                 "correct the camera's driver settings",
-            ) from error
-        return data.getvalue()
+            )
+        return data.tobytes()
 
 
 def _record(pose: Any) -> CubePoseRecord | None:

@@ -15,6 +15,7 @@ STATUS = "/cnc/status"
 MOTION = "/cnc/motion"
 PHASE = "/phase"
 LOG = "/log"
+MEASURED = "/measured/"
 
 FIXED: dict[str, Any] = {
     TAXELS: tacdata_pb2.Taxels,
@@ -29,6 +30,11 @@ FIXED: dict[str, Any] = {
 def image(camera: str) -> str:
     """Return the topic of a camera's images."""
     return f"/camera/{camera}/image"
+
+
+def measured(name: str) -> str:
+    """Return the topic of a further measured quantity (`schemas/tacdata.proto`, message Measured)."""
+    return f"{MEASURED}{name}"
 
 
 def cube(camera: str) -> str:

@@ -10,9 +10,11 @@ import numpy as np
 
 import schemas
 from tacdata.errors import FormatError, UsageError
-from tacdata.recording.channel_map import misplaced, silent
+from tacdata.recording.check_clocks import clock_words
 from tacdata.recording.check_figures import Figures, figures
 from tacdata.recording.check_findings import UNUSABLE, WARNING, Finding, findings
+from tacdata.recording.check_imported import is_imported
+from tacdata.recording.check_session import session_findings
 from tacdata.recording.reader import read_recording
 from tacdata.recording.session import read_session
 
@@ -83,16 +85,9 @@ def _of_session(session: Any, entries: list[Figures]) -> list[Finding]:
     if session.remaining:
         text = f"{len(session.remaining)} of {len(session.plan.presses)} presses of the plan are not recorded"
         found.append(Finding(WARNING, "session", "", f"{text}; go on with tacdata record --resume"))
-    for channel, taxel in misplaced(entries).items() if entries else ():
-        text = (
-            f"channel {channel} answers like taxel {taxel}: swapped wires, or a wrong yaw in the registration"
-        )
-        found.append(Finding(UNUSABLE, "taxels", "", text))
-    quiet = silent(entries) if entries else []
-    if quiet:
-        text = f"channel {', '.join(map(str, quiet))} did not answer to presses close by"
-        found.append(Finding(UNUSABLE, "taxels", "", text))
-    return found
+    if entries and is_imported(entries[0].recording.episode):
+        return found  # its channels' places may be stand-ins
+    return [*found, *session_findings(entries)]
 
 
 def _summary(documents: list[dict[str, Any]]) -> list[str]:
@@ -104,9 +99,11 @@ def _summary(documents: list[dict[str, Any]]) -> list[str]:
         f"  taxels  {_middle(t['rate'] for t in taxels):.2f} Hz, {sum(t['frames'] for t in taxels)} frames, "
         f"{sum(t['lost'] for t in taxels)} lost, jitter {_middle(t['jitter'] for t in taxels):.1f} ms, "
         f"latency {_middle(t['latency'] for t in taxels):.0f} ms, idle noise {_middle(noise):.1f} counts",
+        f"          {clock_words(taxels[-1]['clock'])}",
         f"  cnc     {_middle(c['rate'] for c in cnc):.1f} reports/s, start of a move known to "
         f"{_middle(c['start_uncertainty'] for c in cnc):.1f} ms, depth to "
-        f"{max(c['depth_uncertainty'] for c in cnc):.3f} mm",
+        f"{max(c['depth_uncertainty'] for c in cnc):.3f} mm, answers within "
+        f"{_middle(c['round_trip'] for c in cnc):.1f} ms",
     ]
     for name in sorted({name for d in documents for name in d["cameras"]}):
         views = [d["cameras"][name] for d in documents if name in d["cameras"]]
@@ -114,8 +111,9 @@ def _summary(documents: list[dict[str, Any]]) -> list[str]:
         seen = sum(v["searched"] * (v["seen"] or 0.0) for v in views)
         lines.append(
             f"  camera {name}: {sum(v['images'] for v in views)} images, {searched} searched, "
-            f"tags in view in {100 * seen / max(searched, 1):.0f} %"
+            f"tags in view in {100 * seen / max(searched, 1):.0f} %, {_middle(v['rate'] for v in views):.1f} Hz"
         )
+        lines.append(f"          {clock_words(views[-1]['clock'])}")
     return lines
 
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tacdata.recording.check_clocks import clock_doubts
 from tacdata.recording.check_figures import Figures
+from tacdata.recording.check_imported import imported_findings, is_imported
 
 WARNING, UNUSABLE = "warning", "unusable"
 LOST_SHARE = 0.01
@@ -25,6 +27,10 @@ HOLD_MM = 0.05
 """Distance of the guide from the commanded position in the hold that makes a recording unusable [mm]."""
 NOISE_RATIO = 5.0
 """How much noisier than the median a channel may be [1]."""
+IMAGE_GAP_MS = 1000.0
+"""Time without an image, or with the same one, that is worth a word [ms of real time]; at least ten periods."""
+DEAD_DEPTH = 0.3
+"""Depth of a press from which a board with all channels at rest is dead [mm]."""
 SEEN_SHARE = 0.5
 """Share of images with a face in view under which it is worth a word [1]."""
 
@@ -45,7 +51,12 @@ class Finding:
 
 def findings(figures: Figures) -> list[Finding]:
     """Judge one recording."""
-    found = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
+    if is_imported(figures.recording.episode):
+        # Quantised or resting channels of a foreign sensor are no proof of a fault.
+        doubts = [(WARNING, stream, text) for _, stream, text in _channels(figures)]
+        found = [*imported_findings(figures), *doubts]
+    else:
+        found = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
     name = figures.recording.episode.path.name
     return [Finding(severity, stream, name, text) for severity, stream, text in found]
 
@@ -85,18 +96,15 @@ def _taxels(figures: Figures) -> list[Judgement]:
     if values["lost"]:
         share = values["lost"] / (values["frames"] + values["lost"])
         bad = share > LOST_SHARE or values["longest_gap"] > GAP_MS
-        text = (
-            f"{values['lost']} frames lost ({100 * share:.1f} %), longest gap {values['longest_gap']:.0f} ms"
-        )
+        text = f"{values['lost']} frames lost ({100 * share:.1f} %), longest gap {values['longest_gap']:.0f} ms"
         found.append((UNUSABLE if bad else WARNING, "taxels", text))
     elif values["longest_gap"] > max(GAP_MS, 2.5 * period):
         found.append((UNUSABLE, "taxels", f"a gap of {values['longest_gap']:.0f} ms without a sample"))
     if values["rate"] and abs(values["rate"] / values["nominal_rate"] - 1) > RATE_SHARE:
         text = f"{values['rate']:.2f} Hz, nominal {values['nominal_rate']:g} Hz"
         found.append((WARNING, "taxels", text))
-    corrupt = values["driver_counts"].get("corrupt", 0)
-    if corrupt:
-        found.append((WARNING, "taxels", f"{corrupt} damaged frames discarded since the session's start"))
+    found += [(WARNING, "taxels", text) for text in _line(values["driver_counts"])]
+    found += [(WARNING, "taxels", text) for text in clock_doubts(values["clock"], _rate_of_clock(figures))]
     if figures.recording.episode.taxels.counter.min() < 0:
         text = "the board sends no counter: lost frames cannot be seen, sample times are arrival times"
         found.append((WARNING, "taxels", text))
@@ -105,8 +113,28 @@ def _taxels(figures: Figures) -> list[Judgement]:
     return found
 
 
+def _line(counts: dict) -> list[str]:
+    """Return in words what the driver saw on the line."""
+    found = []
+    if counts.get("corrupt", 0):
+        found.append(f"{counts['corrupt']} damaged frames discarded")
+    if counts.get("repeated", 0):
+        found.append(f"{counts['repeated']} frames came twice and were discarded")
+    if counts.get("garbage_bytes", 0):
+        found.append(f"{counts['garbage_bytes']} bytes between the frames belong to none")
+    return [*found, *counts.get("notes", [])]
+
+
 def _channels(figures: Figures) -> list[Judgement]:
     values, found = figures.document["taxels"], []
+    if values["undefined"]:
+        found.append((UNUSABLE, "taxels", f"channel {_list(values['undefined'])} has readings that are no numbers"))
+    for first, second in values["tied"]:
+        found.append((UNUSABLE, "taxels", f"channels {first} and {second} read the same throughout: tied together"))
+    counts = figures.recording.episode.taxels.counts
+    if len(counts) > 1 and (counts == counts[:1]).all() and figures.recording.episode.press.depth >= DEAD_DEPTH:
+        found.append((UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"))
+    found += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1])]
     if values["stuck"]:
         found.append((UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"))
     if values["saturated"]:
@@ -151,12 +179,36 @@ def _cameras(figures: Figures) -> list[Judgement]:
         stream = f"camera {name}"
         if values is None or not values["images"]:
             found.append((WARNING, stream, "no image"))
-        elif "cube" in entry and not values["searched"]:
+            continue
+        found += [(WARNING, stream, text) for text in _still(values, _rate_of_clock(figures))]
+        if "cube" in entry and not values["searched"]:
             found.append((WARNING, stream, f"{values['images']} images, none searched for tags"))
         elif "cube" in entry and values["seen"] < SEEN_SHARE:
             text = f"tags in view in {100 * values['seen']:.0f} % of {values['searched']} images"
             found.append((WARNING, stream, "no tag in view in any image" if values["seen"] == 0 else text))
     return found
+
+
+def _still(values: dict, rate_of_clock: float) -> list[str]:
+    """Return in words whether a camera stopped sending, or sent the same image again and again."""
+    period = 1000 / (values["nominal_rate"] or values["rate"] or 1.0)
+    limit = max(IMAGE_GAP_MS * rate_of_clock, 10 * period)
+    found = []
+    if values["longest_gap"] > limit:
+        found.append(f"no image for {values['longest_gap'] / 1000:.1f} s")
+    if values["longest_still"] > limit:
+        found.append(f"the same image for {values['longest_still'] / 1000:.1f} s: it hangs")
+    return found
+
+
+def _jumps(found: list[dict], channels: int) -> list[str]:
+    if len(found) > channels / 2:
+        first = min(jump["at"] for jump in found)
+        return [f"{len(found)} channels jump while nothing moves, from {first:.1f} s on"]
+    return [
+        f"channel {jump['channel']} jumps by {jump['size']:+.0f} counts at {jump['at']:.1f} s while nothing moves"
+        for jump in found
+    ]
 
 
 def _list(channels: list[int]) -> str:

@@ -15,8 +15,8 @@ from tacdata.errors import UsageError
 from tacdata.provenance import code_version
 from tacdata.recording.mcap_records import PROFILE
 
-CHUNK_BYTES = 64 * 1024
-"""A chunk is closed at this size at the latest [bytes]."""
+CHUNK_BYTES = 1024 * 1024
+"""A chunk is closed at this size at the latest [bytes]; few chunks keep the index that grows in memory small."""
 CHUNK_SECONDS = 0.5
 """... and at this age [s of real time]: what a kill can cost."""
 
@@ -44,6 +44,7 @@ class ChunkedFile:
         self._schemas: dict[str, int] = {}
         self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._writer.start(profile=PROFILE, library=f"tacdata {code_version()}")
+        _sync_folder(path.parent)
 
     def register(self, topic: str, message: Any) -> None:
         """Open a channel for a protobuf message class."""
@@ -72,7 +73,11 @@ class ChunkedFile:
             self.flush()
 
     def flush(self) -> None:
-        """Close the chunk and hand everything to the disk now."""
+        """Close the chunk and hand everything to the disk now.
+
+        Raises:
+            OSError: If the disk refuses it.
+        """
         self._writer.flush()
         os.fsync(self._stream.fileno())
         self._flushed_at = time.monotonic()
@@ -90,3 +95,14 @@ class ChunkedFile:
         """Close the file as it is, without a summary; never raises."""
         with suppress(OSError):
             self._stream.close()
+
+
+def _sync_folder(folder: Path) -> None:
+    """Hand a folder's list of names to the disk, so that a power cut does not lose a new file's name (Unix)."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,136 +1,161 @@
-"""A stream's clock: the device's counter against the host's clock, fitted at the arrivals' lower envelope.
+"""A stream's clock: the device's counter against the host's clock, as a line that can be redone from the file.
 
 A frame k leaves the device at ``offset + period k`` and arrives a delay d_k >= 0 later. Delays only ever add,
-so the line through the least delayed arrivals estimates the sample times up to the smallest delay of the
-link; a least squares line would be late by the mean delay (9 ms behind an FTDI adapter, whose latency timer
-is 16 ms). The line is the one below all points with the smallest sum of distances: the edge of their lower
-convex hull under the mean counter (Moon, Skelly and Towsley, INFOCOM 1999). The smallest delay itself cannot
-be seen from arrivals and stays as a constant, about 1 ms over USB; only an event seen by two streams tells
-it.
+so the line under the least delayed arrivals (`clock_fit`) gives the sample times up to the link's smallest
+delay. That delay is constant and cannot be seen from arrivals; a sync tap (`sync_tap`) measures it, and the
+model carries it with its uncertainty. A device that restarts or steps begins a new line; the earlier ones stay.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-BLOCK_NS = 60_000_000_000
-"""Stretch of arrivals summarized by one hull [ns]."""
-BLOCKS = 10
-"""Stretches that a running fit remembers: ten minutes, within which drift is a line."""
+
+@dataclass(frozen=True)
+class Latency:
+    """The constant part of a stream's delay, which arrivals alone do not show."""
+
+    latency_ns: int
+    """From sampling to the fitted line [ns]."""
+    uncertainty_ns: int
+    """Its standard uncertainty [ns]."""
+    source: str = "sync tap"
+    """What measured it."""
+
+    @property
+    def document(self) -> dict[str, int | str]:
+        """The latency as plain data."""
+        return {"latency_ns": self.latency_ns, "uncertainty_ns": self.uncertainty_ns, "source": self.source}
+
+    @classmethod
+    def from_document(cls, document: dict) -> Latency:
+        """Rebuild one; raises KeyError or ValueError if it is damaged."""
+        return cls(int(document["latency_ns"]), int(document["uncertainty_ns"]), str(document["source"]))
 
 
 @dataclass(frozen=True)
 class ClockModel:
-    """Sample time = reference + period (counter - first counter)."""
+    """Sample time = reference + period (counter - first counter) - latency."""
 
     first_counter: int
-    """Counter at the reference [frames]."""
+    """Counter at the reference [frames], or the device's own time [ns] if `axis` says so."""
     reference_ns: int
-    """Estimated host time of that frame's sampling [ns]."""
+    """Fitted host time of that frame's earliest arrival [ns]."""
     period_ns: float
-    """Frame period on the host's clock [ns]."""
+    """Frame period on the host's clock [ns]; host time per device time [1] on the device's own time."""
     frames: int
     """Arrivals behind the fit."""
+    first_arrival_ns: int = 0
+    """Arrival from which this line holds [ns]."""
+    delay_ns: float = 0.0
+    """Mean delay beyond the smallest [ns]."""
+    jitter_ns: float = 0.0
+    """Standard deviation of the delay [ns]."""
+    uncertainty_ns: float = 0.0
+    """How far the smallest delay of a few seconds lies from the line, root mean square [ns]."""
+    drift_uncertainty: float = 0.0
+    """Uncertainty of the period that follows from it [1]."""
+    axis: str = "counter"
+    """What the line is over: ``counter``, ``device_ns``, or ``order`` (a number given on arrival: it misses losses)."""
+    latency: Latency | None = None
+    """The link's smallest delay, if something measured it."""
+    earlier: tuple[ClockModel, ...] = ()
+    """Lines before a restart or a step of the device's clock, oldest first."""
+
+    @property
+    def steady(self) -> bool:
+        """Whether the line can be relied on: numbers given on arrival must fit it to half a period."""
+        return self.axis != "order" or self.jitter_ns < 0.5 * self.period_ns
+
+    def drift(self, nominal_period_ns: float) -> float:
+        """Return how much slower the device runs than ``nominal_period_ns`` [ns] says [ppm]."""
+        return (self.period_ns / (1.0 if self.axis == "device_ns" else nominal_period_ns) - 1) * 1e6
+
+    def with_latency(self, latency: Latency | None) -> ClockModel:
+        """Return the model with another constant delay, on all its lines."""
+        return replace(self, latency=latency, earlier=tuple(replace(line, latency=latency) for line in self.earlier))
 
     def sample_ns(self, counter: np.ndarray) -> np.ndarray:
-        """Return the estimated sample times [ns], shape (n,), int64, of counters [frames], shape (n,)."""
+        """Return sample times [ns], shape (n,), int64, on the latest line, of counters [frames], shape (n,)."""
         elapsed = np.asarray(counter, dtype=np.int64) - self.first_counter
-        return self.reference_ns + np.rint(self.period_ns * elapsed).astype(np.int64)
+        constant = self.latency.latency_ns if self.latency else 0
+        return self.reference_ns - constant + np.rint(self.period_ns * elapsed).astype(np.int64)
 
     def sample_of(self, counter: int) -> int:
-        """Return the estimated sample time [ns] of one counter [frames]."""
-        return int(self.sample_ns(np.array([counter]))[0])
+        """Return the estimated sample time [ns] of one counter [frames] on the latest line."""
+        constant = self.latency.latency_ns if self.latency else 0
+        return self.reference_ns - constant + round(self.period_ns * (counter - self.first_counter))
+
+    def sample_times(self, arrival_ns: np.ndarray, counter: np.ndarray) -> np.ndarray:
+        """Return sample times [ns], shape (n,), int64, each frame on the line that held when it arrived.
+
+        Args:
+            arrival_ns: Host times of receipt [ns], shape (n,).
+            counter: Counters [frames] or device times [ns], shape (n,); where it is -1, or the
+                line is not steady, the arrival less the latency is returned.
+        """
+        arrival_ns, counter = np.asarray(arrival_ns, np.int64), np.asarray(counter, np.int64)
+        constant = self.latency.latency_ns if self.latency else 0
+        if not self.steady:
+            return arrival_ns - constant
+        lines = (*self.earlier, self)
+        begins = np.array([line.first_arrival_ns for line in lines])
+        which = np.maximum(np.searchsorted(begins, arrival_ns, side="right") - 1, 0)
+        times = np.zeros(len(counter), np.int64)
+        for number, line in enumerate(lines):
+            chosen = which == number
+            times[chosen] = line.sample_ns(counter[chosen])
+        return np.where(counter >= 0, times, arrival_ns - constant)
+
+    @property
+    def steps_ns(self) -> tuple[int, ...]:
+        """By how much the device's clock fell behind (positive) at each beginning of a new line [ns]."""
+        lines = (*self.earlier, self)
+        return tuple(
+            new.sample_of(new.first_counter) - old.sample_of(new.first_counter) for old, new in pairwise(lines)
+        )
 
     @property
     def document(self) -> dict[str, str]:
         """The model as MCAP metadata."""
-        return {
+        values = {
             "method": "lower envelope of arrival against counter",
             "first_counter": str(self.first_counter),
             "reference_ns": str(self.reference_ns),
             "period_ns": repr(self.period_ns),
             "frames": str(self.frames),
-            "remaining": "the link's smallest delay, constant and unknown",
+            "first_arrival_ns": str(self.first_arrival_ns),
+            "delay_ns": f"{self.delay_ns:.0f}",
+            "jitter_ns": f"{self.jitter_ns:.0f}",
+            "uncertainty_ns": f"{self.uncertainty_ns:.0f}",
+            "drift_uncertainty": f"{self.drift_uncertainty:.3g}",
+            "axis": self.axis,
         }
+        if self.latency is not None:
+            values |= {"latency": json.dumps(self.latency.document)}
+        if self.earlier:
+            values |= {"earlier": json.dumps([line.document for line in self.earlier])}
+        return values
 
     @classmethod
     def from_document(cls, document: dict[str, str]) -> ClockModel:
         """Rebuild a model from `document`; raises KeyError or ValueError if it is damaged."""
+        latency = document.get("latency")
         return cls(
             int(document["first_counter"]),
             int(document["reference_ns"]),
             float(document["period_ns"]),
             int(document["frames"]),
+            int(document.get("first_arrival_ns", 0)),
+            float(document.get("delay_ns", 0)),
+            float(document.get("jitter_ns", 0)),
+            float(document.get("uncertainty_ns", 0)),
+            float(document.get("drift_uncertainty", 0)),
+            document.get("axis", "counter"),
+            Latency.from_document(json.loads(latency)) if latency else None,
+            tuple(cls.from_document(line) for line in json.loads(document.get("earlier", "[]"))),
         )
-
-
-Point = tuple[int, int]
-
-
-def lower_hull(points: list[Point]) -> list[Point]:
-    """Return the lower convex hull of (counter, arrival) points, sorted by counter; integers, so exact."""
-    hull: list[Point] = []
-    for point in sorted(points):
-        if hull and hull[-1][0] == point[0]:
-            continue  # sorted: the earlier arrival of a repeated counter came first
-        while len(hull) >= 2:
-            (x1, y1), (x2, y2) = hull[-2:]
-            if (x2 - x1) * (point[1] - y1) > (y2 - y1) * (point[0] - x1):
-                break
-            hull.pop()
-        hull.append(point)
-    return hull
-
-
-class EnvelopeFit:
-    """A fit that goes on while frames arrive; memory and time stay small, as only hulls are kept."""
-
-    def __init__(self) -> None:
-        self._blocks: list[list[Point]] = []
-        self._sums: list[tuple[int, int, int]] = []  # frames, sum of counters, first arrival
-
-    def add(self, arrival_ns: int, counter: int) -> None:
-        """Take one arrival [ns]; a counter that falls back (a reset device) starts the fit anew."""
-        if counter < 0:
-            return
-        if self._blocks and counter < self._blocks[-1][0][0]:
-            self._blocks, self._sums = [], []
-        if not self._blocks or arrival_ns - self._sums[-1][2] > BLOCK_NS:
-            self._blocks = [*self._blocks[-BLOCKS + 1 :], []]
-            self._sums = [*self._sums[-BLOCKS + 1 :], (0, 0, arrival_ns)]
-        block = self._blocks[-1]
-        block.append((counter, arrival_ns))
-        frames, total, start = self._sums[-1]
-        self._sums[-1] = (frames + 1, total + counter, start)
-        if len(block) > 512:
-            self._blocks[-1] = lower_hull(block)
-
-    def model(self) -> ClockModel | None:
-        """Return the model of what has arrived, or None before two different counters are known."""
-        hull = lower_hull([point for block in self._blocks for point in block])
-        frames = sum(entry[0] for entry in self._sums)
-        if len(hull) < 2:
-            return None
-        mean = sum(entry[1] for entry in self._sums) / frames
-        edge = next((i for i in range(1, len(hull) - 1) if hull[i][0] >= mean), len(hull) - 1)
-        (x1, y1), (x2, y2) = hull[edge - 1], hull[edge]
-        period = (y2 - y1) / (x2 - x1)
-        if not (math.isfinite(period) and period > 0):
-            return None
-        return ClockModel(x1, y1, period, frames)
-
-
-def fit(arrival_ns: np.ndarray, counter: np.ndarray) -> ClockModel | None:
-    """Fit a whole stream at once.
-
-    Args:
-        arrival_ns: Host times of receipt [ns], shape (n,).
-        counter: Device counters [frames], shape (n,); -1 without one.
-    """
-    running = EnvelopeFit()
-    for arrival, count in zip(np.asarray(arrival_ns).tolist(), np.asarray(counter).tolist(), strict=True):
-        running.add(arrival, count)
-    return running.model()

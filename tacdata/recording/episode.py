@@ -24,6 +24,8 @@ class TaxelStream:
     """The device's frame counter [frames], shape (n,), int64."""
     counts: np.ndarray
     """Raw readings [counts], shape (n, taxels), float64."""
+    device_ns: np.ndarray | None = None
+    """The device's own time [ns of its clock], shape (n,), int64; -1 or None without one."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,22 @@ class TagStream:
     """Reprojection error, root mean square [px], shape (p,)."""
     faces: np.ndarray
     """Faces seen [count], shape (p,), int64."""
+
+
+@dataclass(frozen=True)
+class MeasuredStream:
+    """A further measured quantity: force, temperature, ..."""
+
+    name: str
+    """Its name, for example "force"."""
+    unit: str
+    """Unit of its values: N for forces, mm for lengths, otherwise as its source says."""
+    names: tuple[str, ...]
+    """Name of each of its values."""
+    sample_ns: np.ndarray
+    """Time of each reading [ns], shape (q,), int64; only times at which something was read."""
+    values: np.ndarray
+    """Readings [`unit`], shape (q, len(names)); NaN where one of several values is missing."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +117,8 @@ class Episode:
     """False if the recording was interrupted or salvaged."""
     notes: tuple[str, ...]
     """What a person should know of it, in words."""
+    measured: tuple[MeasuredStream, ...] = ()
+    """Further quantities, each with times of its own."""
 
     @property
     def number(self) -> int:

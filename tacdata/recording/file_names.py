@@ -14,6 +14,12 @@ def episode(folder: Path, number: int) -> Path:
     return folder / f"episode-{number:06d}.mcap"
 
 
+def next_sync_tap(folder: Path) -> Path:
+    """Return the first free name for the recording of a sync tap."""
+    number = len({path.name.split(".")[0] for path in folder.glob("sync_tap-*.mcap")})
+    return folder / f"sync_tap-{number:03d}.mcap"
+
+
 def partial(path: Path) -> Path:
     """Return the name that a recording has while it is written."""
     return path.with_name(path.name.removesuffix(".mcap") + PARTIAL)

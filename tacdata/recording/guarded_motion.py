@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import threading
 import time
-from contextlib import suppress
 
 import numpy as np
 
 from tacdata.clock import Clock
 from tacdata.devices.device import MotionController
-from tacdata.errors import DeviceError, TacdataError
+from tacdata.errors import TacdataError
 from tacdata.recording.anchoring import Command
 from tacdata.recording.press_steps import Position, Step
-from tacdata.recording.streams import POLL, Streams
+from tacdata.recording.streams import Streams
 from tacdata.recording.writer import EpisodeWriter
 
 WATCH = 0.02
@@ -31,7 +30,8 @@ class GuardedMotion:
         """Drive ``cnc``; nothing moves before `drive`."""
         self._cnc, self._clock = cnc, clock
         self._halted = threading.Event()
-        self._obedient = True
+        self._rest: Position | None = None  # where it stands after a stop; None: it runs, or it does not obey
+        self._why = "nothing was stopped"
 
     def stop(self) -> None:
         """Feed hold, now; and no further step is sent. Safe from any thread."""
@@ -60,18 +60,28 @@ class GuardedMotion:
             while work.is_alive():
                 work.join(WATCH)
                 if streams.fault:
-                    raise streams.fault
-            if failure:
-                raise failure[0]
+                    break
+            if failure and streams.fault is None:
+                time.sleep(WATCH)  # a stream that stopped the motion is about to say why
+            if streams.fault or failure:
+                raise streams.fault or failure[0]
         except BaseException:
             self.stop()
-            self._obedient = False
-            with suppress(TacdataError):
-                self._cnc.abandon()
-                self._obedient = True
-            work.join(LETTING_GO)
+            self._let_go(work)
             raise
         return next((step.target for step in reversed(path) if step.target), start)
+
+    def _let_go(self, work: threading.Thread) -> None:
+        """After a stop: see the motion's thread end, so that it sends nothing more, then empty the controller."""
+        self._rest = None
+        work.join(LETTING_GO)
+        if work.is_alive():
+            self._why = "the motion's thread does not end"
+            return
+        try:
+            self._rest = self._cnc.abandon()
+        except TacdataError as error:
+            self._why = error.given
 
     def _carry_out(
         self,
@@ -100,18 +110,15 @@ class GuardedMotion:
         except BaseException as error:  # handed to the watching thread, which raises it
             failure.append(error)
 
-    def lift(self, streams: Streams, height: float, speed: float) -> str:
+    def lift(self, height: float, speed: float) -> str:
         """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; say what came of it."""
-        if not self._obedient:
-            return "the indenter was not lifted: the controller no longer obeys; free it by hand"
-        time.sleep(2 * POLL)  # the position after the stop has to arrive
+        if self._rest is None:
+            return f"the indenter was not lifted ({self._why}); free it by hand"
+        x, y, z = self._rest
         try:
-            if streams.position is None:
-                raise DeviceError("the position is unknown", "a status report", "check the controller")
-            x, y, z = streams.position
             if z < height:
                 self._cnc.move((x, y, height), speed)
                 self._cnc.wait_idle(MARGIN + (height - z) / speed)
-            return "the indenter was lifted off the skin"
         except TacdataError as error:
             return f"the indenter was not lifted: {error.given}"
+        return f"the indenter was lifted off the skin, straight up from {z:.3f} to {max(z, height):.3f} mm"

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
+from zlib import crc32
 
-from mcap.exceptions import EndOfFile, InvalidMagic, RecordLengthLimitExceeded
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from google.protobuf.message import DecodeError
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, Header, Message, Metadata, Schema
+from mcap.stream_reader import breakup_chunk
 
 from tacdata.errors import FormatError, UsageError
 
 PROFILE = "tacdata"
 """MCAP profile of a recording of ours."""
+MAGIC = b"\x89MCAP0\r\n"
+HEAD = 9
+"""Opcode and length before each record's body [bytes] (MCAP specification, "Records")."""
+SEARCH = 1 << 20
+"""Bytes read at a time while looking for the next chunk behind damage [bytes]."""
+KNOWN = frozenset(opcode.value for opcode in Opcode)
+PRIVATE = 0x80
+"""Opcodes from here on are other programs' own."""
 
 
 @dataclass
@@ -36,8 +50,13 @@ class Records:
         return [message for message in self.messages if message.channel_id in wanted]
 
 
-def read_records(path: Path) -> Records:
+def read_records(path: Path, images: bool = True) -> Records:
     """Read a file from its beginning to its end or to where it breaks off.
+
+    Args:
+        path: The file.
+        images: Whether to keep the pictures; without them each message is replaced by its picture's CRC32,
+            4 bytes, and a long recording needs little memory.
 
     Raises:
         UsageError: If there is no such file.
@@ -46,61 +65,135 @@ def read_records(path: Path) -> Records:
     if not path.is_file():
         raise UsageError(f"no file {path}", "an MCAP recording", "check the path")
     records = Records(path)
-    with path.open("rb") as stream:
-        try:
-            for record in StreamReader(
-                stream, emit_chunks=True, record_size_limit=path.stat().st_size
-            ).records:
-                _take(records, record)
-        except InvalidMagic as error:
-            if not records.profile and not records.channels:
-                raise _foreign(path) from error
-            records.damage.append("the closing magic is missing")
-        except Exception as error:  # damaged lengths raise whatever the parser stumbles over
-            at = stream.tell()
-            cut = at >= path.stat().st_size or isinstance(error, EndOfFile | RecordLengthLimitExceeded)
-            what = type(error).__name__
-            records.damage.append(
-                f"the file breaks off after {at} bytes" if cut else f"unreadable at byte {at}: {what}"
-            )
+    for record in walk(path, records.damage):
+        match record:
+            case Header():
+                records.profile = record.profile
+            case Schema():
+                records.schemas[record.id] = record
+            case Channel():
+                records.channels[record.id] = record
+            case Message():
+                channel = records.channels.get(record.channel_id)
+                picture = channel is not None and channel.topic.endswith("/image")
+                if picture and not images:
+                    record = replace(record, data=_digest(record.data))
+                records.messages.append(record)
+            case Attachment():
+                records.attachments[record.name] = record
+            case Metadata():
+                records.metadata[record.name] = record.metadata
     if not records.profile and not records.channels and not records.attachments:
-        raise _foreign(path)
+        raise FormatError(
+            f"{path} is no MCAP file, or nothing of it can be read",
+            "an MCAP file recorded by tacdata",
+            "check the path; for a file of another kind, convert it first",
+        )
     return records
 
 
-def _take(records: Records, record: Any) -> None:
-    match record:
-        case Header():
-            records.profile = record.profile
-        case Chunk():
-            _take_chunk(records, record)
-        case Schema():
-            records.schemas[record.id] = record
-        case Channel():
-            records.channels[record.id] = record
-        case Message():
-            records.messages.append(record)
-        case Attachment():
-            records.attachments[record.name] = record
-        case Metadata():
-            records.metadata[record.name] = record.metadata
-        case DataEnd() | Footer() | _:
-            pass
-
-
-def _take_chunk(records: Records, chunk: Chunk) -> None:
+def _digest(message: bytes) -> bytes:
     try:
-        content = breakup_chunk(chunk, validate_crc=True)
-    except Exception as error:  # zstd's, struct's and mcap's own errors share no base
-        records.damage.append(f"a damaged chunk is left out ({type(error).__name__})")
-        return
-    for record in content:
-        _take(records, record)
+        return crc32(CompressedImage.FromString(message).data).to_bytes(4, "little")
+    except DecodeError:
+        return crc32(message).to_bytes(4, "little")
 
 
-def _foreign(path: Path) -> FormatError:
-    return FormatError(
-        f"{path} is no MCAP file, or nothing of it can be read",
-        "an MCAP file recorded by tacdata",
-        "check the path; for a file of another kind, convert it first",
-    )
+def walk(path: Path, damage: list[str]) -> Iterator[Any]:
+    """Yield every readable header, schema, channel, message, attachment and metadata record of a file.
+
+    A record that does not fit is left out; reading goes on at the next whole chunk behind it.
+
+    Args:
+        path: The file.
+        damage: Takes what could not be read, in words.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        if stream.read(len(MAGIC)) != MAGIC:
+            damage.append("the opening magic is missing")
+            stream.seek(0)
+        ended = False
+        while not ended:
+            at = stream.tell()
+            head = stream.read(HEAD)
+            length = int.from_bytes(head[1:], "little")
+            if head[:8] == MAGIC and at + len(MAGIC) == size:
+                damage.append("the footer is missing")
+                return
+            if len(head) < HEAD or at + HEAD + length > size or not _plausible(head[0], length):
+                ended = not _skip_to_chunk(stream, at, size, damage)
+                continue
+            try:
+                yield from _content(head[0], head, stream.read(length), damage)
+            except Exception as error:  # damaged lengths raise whatever the parser stumbles over
+                damage.append(f"an unreadable record at byte {at} is left out ({type(error).__name__})")
+            ended = head[0] == Opcode.FOOTER
+        if ended and head[:1] == bytes([Opcode.FOOTER]) and stream.read() != MAGIC:
+            damage.append("the closing magic is missing")
+
+
+def _plausible(opcode: int, length: int) -> bool:
+    return opcode >= PRIVATE or (opcode in KNOWN and (opcode != Opcode.FOOTER or length == 20))
+
+
+def _content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterator[Any]:
+    data = ReadDataStream(BytesIO(body))
+    match opcode:
+        case Opcode.HEADER:
+            yield Header.read(data)
+        case Opcode.SCHEMA:
+            yield Schema.read(data)
+        case Opcode.CHANNEL:
+            yield Channel.read(data)
+        case Opcode.MESSAGE:
+            yield Message.read(data, len(body))
+        case Opcode.METADATA:
+            yield Metadata.read(data)
+        case Opcode.ATTACHMENT:
+            if not _intact_attachment(body):
+                damage.append("a damaged attachment is left out")
+            else:
+                yield Attachment.read(data)
+        case Opcode.CHUNK:
+            try:
+                content = breakup_chunk(Chunk.read(data), validate_crc=True)
+            except Exception as error:  # zstd's, struct's and mcap's own errors share no base
+                damage.append(f"a damaged chunk is left out ({type(error).__name__})")
+                return
+            yield from content
+
+
+def _intact_attachment(body: bytes) -> bool:
+    written = int.from_bytes(body[-4:], "little")
+    return written in (0, crc32(body[:-4]))
+
+
+def _skip_to_chunk(stream: IO[bytes], at: int, size: int, damage: list[str]) -> bool:
+    """Move on to the next whole chunk behind a record that cannot be; return whether there is one."""
+    for start in _candidates(stream, at + 1, size):
+        stream.seek(start)
+        head = stream.read(HEAD)
+        length = int.from_bytes(head[1:], "little")
+        try:
+            breakup_chunk(Chunk.read(ReadDataStream(BytesIO(stream.read(length)))), validate_crc=True)
+        except Exception:  # most candidates are no chunks
+            continue
+        damage.append(f"{start - at} unreadable bytes at byte {at} are left out")
+        stream.seek(start)
+        return True
+    damage.append(f"the file breaks off after {size} bytes")
+    return False
+
+
+def _candidates(stream: IO[bytes], begin: int, size: int) -> Iterator[int]:
+    """Yield places at which a chunk that fits into the file could begin."""
+    for block in range(begin, size, SEARCH):
+        stream.seek(block)
+        data = stream.read(SEARCH + HEAD)
+        place = data.find(Opcode.CHUNK)
+        while 0 <= place < min(SEARCH, len(data) - HEAD):
+            length = int.from_bytes(data[place + 1 : place + HEAD], "little")
+            if 40 <= length <= size - block - place - HEAD:
+                yield block + place
+            place = data.find(Opcode.CHUNK, place + 1)

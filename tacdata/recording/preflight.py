@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.plans import Plan
+from tacdata.plans import Plan, Press
+from tacdata.recording import sync_tap_motion
 from tacdata.recording.motion_profile import AxisLimits
 from tacdata.recording.press_steps import Position, duration, steps
-from tacdata.rig import Rig
+from tacdata.rig import Envelope, Rig
 from tacdata.sensor import Sensor
 
 SECONDS_PER_PRESS = 0.5
@@ -37,25 +38,38 @@ class Preflight:
     """Largest machine coordinates [mm]."""
     seconds: tuple[float, ...]
     """Expected duration of each press [s]."""
+    cautions: tuple[str, ...] = ()
+    """What a person should know of the controller's settings before the first move."""
+    tap: str = ""
+    """What the sync tap before them does, in words; empty without one."""
 
     @property
     def text(self) -> str:
         """The summary in words."""
         bounds = ", ".join(
-            f"{axis} {low:.2f} to {high:.2f}"
-            for axis, low, high in zip("xyz", self.lower, self.upper, strict=True)
+            f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in zip("xyz", self.lower, self.upper, strict=True)
         )
         minutes, seconds = divmod(round(sum(self.seconds)), 60)
         return (
             f"plan {self.plan}: {self.presses} of {self.total} presses, deepest {self.deepest:.2f} mm\n"
             f"indenters in order: {', '.join(self.indenters)}\n"
-            f"machine bounds [mm]: {bounds}\n"
-            f"time: about {minutes} min {seconds:02d} s"
+            + (f"first {self.tap}\n" if self.tap else "")
+            + f"machine bounds [mm]: {bounds}\n"
+            f"time: about {minutes} min {seconds:02d} s" + "".join(f"\ncaution: {caution}" for caution in self.cautions)
         )
 
 
-def preflight(plan: Plan, sensor: Sensor, rig: Rig, limits: AxisLimits, wanted: tuple[int, ...]) -> Preflight:
-    """Check every commanded position against the envelope, every press against the skin, and sum up.
+def preflight(
+    plan: Plan,
+    sensor: Sensor,
+    rig: Rig,
+    limits: AxisLimits,
+    wanted: tuple[int, ...],
+    travel: tuple[np.ndarray, np.ndarray] | None = None,
+    cautions: tuple[str, ...] = (),
+    tap: Press | None = None,
+) -> Preflight:
+    """Check every commanded position against envelope and soft limits, every press against the skin, and sum up.
 
     Args:
         plan: The plan.
@@ -63,22 +77,29 @@ def preflight(plan: Plan, sensor: Sensor, rig: Rig, limits: AxisLimits, wanted: 
         rig: Where it lies and where the guide may go.
         limits: The controller's axis limits.
         wanted: Numbers of the presses still to do.
+        travel: Machine box of the controller's soft limits [mm], shapes (3,) and (3,); None: they are off.
+        cautions: What a person should know before the first move.
+        tap: What a sync tap touches before the first press (`sync_tap_motion`), if there is one.
 
     Raises:
-        FormatError: Naming the first press that would leave the envelope, miss the skin or pierce it.
+        FormatError: Naming the first press that would leave the envelope or the soft limits, miss the skin or
+            pierce it.
     """
     plan.check_against(sensor)
     corners, seconds, indenters = [], [], []
     position: Position | None = None
+    if tap is not None:
+        path = sync_tap_motion.steps(tap, plan, rig.registration)
+        corners += [step.target for step in path if step.target is not None]
+        for target in corners:
+            _refuse_outside(f"plan {plan.name}: the sync tap", target, rig.envelope, travel)
+        needed, position = duration(path, corners[0], limits)
+        seconds.append(needed)
+        indenters.append(tap.indenter_name)
     for press in (plan.presses[k] for k in wanted):
         path = steps(press, plan.motion, rig.registration)
         for target in (step.target for step in path if step.target is not None):
-            if not rig.envelope.contains(target):
-                raise FormatError(
-                    f"plan {plan.name}: presses/{press.index} needs machine position {_text(target)} mm",
-                    f"{_text(rig.envelope.min)} to {_text(rig.envelope.max)} mm (the rig's envelope)",
-                    "move the press, reduce the clearance, or correct the rig file",
-                )
+            _refuse_outside(f"plan {plan.name}: presses/{press.index}", target, rig.envelope, travel)
             corners.append(target)
         needed, position = duration(path, position or corners[0], limits)
         seconds.append(needed + SECONDS_PER_PRESS)
@@ -90,11 +111,37 @@ def preflight(plan: Plan, sensor: Sensor, rig: Rig, limits: AxisLimits, wanted: 
         len(wanted),
         len(plan.presses),
         tuple(indenters),
-        max((plan.presses[k].depth for k in wanted), default=0.0),
+        max((plan.presses[k].deepest for k in wanted), default=0.0),
         tuple(bounds.min(axis=0).tolist()),
         tuple(bounds.max(axis=0).tolist()),
         tuple(seconds),
+        cautions,
+        _described(tap),
     )
+
+
+def _described(tap: Press | None) -> str:
+    if tap is None:
+        return ""
+    touches = len(sync_tap_motion.TOUCHES)
+    return (
+        f"sync tap: {touches} touches with {tap.indenter_name} to {tap.depth:.2f} mm at ({tap.x:.2f}, {tap.y:.2f}) mm"
+    )
+
+
+def _refuse_outside(
+    what: str, target: Position, envelope: Envelope, travel: tuple[np.ndarray, np.ndarray] | None
+) -> None:
+    boxes = {"the rig's envelope": (envelope.min, envelope.max)}
+    if travel is not None:
+        boxes["the controller's soft limits, $130 to $132"] = (tuple(travel[0].tolist()), tuple(travel[1].tolist()))
+    for name, (lower, upper) in boxes.items():
+        if not all(a <= value <= b for a, value, b in zip(lower, target, upper, strict=True)):
+            raise FormatError(
+                f"{what} needs machine position {_text(target)} mm",
+                f"{_text(lower)} to {_text(upper)} mm ({name})",
+                "move the press, reduce the clearance, or correct the rig file",
+            )
 
 
 def _text(position: tuple[float, ...]) -> str:

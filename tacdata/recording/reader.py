@@ -14,13 +14,28 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from schemas import tacdata_pb2 as pb
 from tacdata.errors import FormatError
 from tacdata.plans import Press
-from tacdata.recording import anchoring, channels, clock_model
+from tacdata.recording import anchoring, channels
 from tacdata.recording.anchoring import AnchoredMove, Command, StatusTimes
+from tacdata.recording.clock_fit import fit
+from tacdata.recording.clock_model import ClockModel, Latency
 from tacdata.recording.episode import CncStream, Episode, TagStream, TaxelStream
 from tacdata.recording.mcap_records import Records, read_records
+from tacdata.recording.measured import marked_phases, measured_streams
 from tacdata.recording.motion_profile import AxisLimits
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor
+
+
+@dataclass(frozen=True)
+class ImageTimes:
+    """When one camera's images came, and which of them are the same."""
+
+    arrival_ns: np.ndarray
+    """Host times of receipt [ns], shape (n,), int64."""
+    sample_ns: np.ndarray
+    """Estimated times of exposure [ns], shape (n,), int64."""
+    digest: np.ndarray
+    """CRC32 of each compressed picture, shape (n,), int64."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +55,12 @@ class Recording:
     """Camera name -> images in the file."""
     log: tuple[str, ...]
     """Warnings and errors noted while recording."""
+    clocks: dict[str, ClockModel]
+    """Stream name ("taxels", "camera NAME") -> its clock, as stored or fitted anew."""
+    cameras: dict[str, ImageTimes]
+    """Camera name -> its images' times."""
+    polled: dict[str, str]
+    """What the file says of the motion controller's clock (`polled_clock`)."""
 
 
 def read_episode(path: Path) -> Episode:
@@ -54,7 +75,7 @@ def read_episode(path: Path) -> Episode:
 
 def read_recording(path: Path) -> Recording:
     """Read one recording with everything in it. Raises as `read_episode`."""
-    records = read_records(Path(path))
+    records = read_records(Path(path), images=False)
     try:
         return _recording(records)
     except (KeyError, ValueError, TypeError) as error:
@@ -76,26 +97,28 @@ def _recording(records: Records) -> Recording:
     limits = AxisLimits(np.array(controller["acceleration"], float), np.array(controller["max_rate"], float))
     moves = anchoring.anchor(commands, statuses, limits)
     tip_ns, machine = anchoring.machine_path(moves, statuses.stream, complete)
-    registration = Registration(tuple(rig["registration"]["origin"]), rig["registration"]["yaw"])
-    log = tuple(
-        entry.message for entry in map(_log, records.of_topic(channels.LOG)) if entry.level > Log.Level.INFO
-    )
+    registration = Registration.from_document(rig["registration"])
+    log = tuple(entry.message for entry in map(_log, records.of_topic(channels.LOG)) if entry.level > Log.Level.INFO)
     cameras = [t.split("/")[2] for t in (c.topic for c in records.channels.values()) if t.endswith("/image")]
+    clocks = _clocks(records, cameras, float(rig.get("clock", {}).get("rate", 1.0)))
     episode = Episode(
         path=records.path,
         press=press,
         sensor=sensor,
         rig=rig,
-        taxels=_taxels(records, sensor.taxels.count),
+        taxels=_taxels(records, sensor.taxels.count, clocks.get("taxels")),
         cnc=statuses.stream,
         tags=tuple(
-            _tags(records, camera) for camera in cameras if rig.get("cameras", {}).get(camera, {}).get("cube")
+            _tags(records, camera, clocks.get(f"camera {camera}"))
+            for camera in cameras
+            if rig.get("cameras", {}).get(camera, {}).get("cube")
         ),
-        phases=anchoring.phases(commands, moves),
+        phases=anchoring.phases(commands, moves) if commands else marked_phases(records),
         tip_ns=tip_ns,
         tip=registration.to_sensor(machine),
         complete=bool(complete),
         notes=_notes(records, end, moves, log),
+        measured=measured_streams(records),
     )
     counts = {
         name.removeprefix("stream_counts/"): {key: json.loads(value) for key, value in values.items()}
@@ -111,6 +134,9 @@ def _recording(records: Records) -> Recording:
         _attachment(records, "board.json"),
         images,
         log,
+        clocks,
+        {camera: _image_times(records, camera, clocks.get(f"camera {camera}")) for camera in cameras},
+        records.metadata.get("clock_model/cnc", {}),
     )
 
 
@@ -119,16 +145,12 @@ def _attachment(records: Records, name: str) -> Any:
         raise FormatError(
             f"{records.path} holds no {name}" + (f" ({records.damage[0]})" if records.damage else ""),
             "a recording of tacdata with its attachments",
-            "nothing of it can be restored"
-            if records.damage
-            else "this MCAP file comes from another program",
+            "nothing of it can be restored" if records.damage else "this MCAP file comes from another program",
         )
     return json.loads(records.attachments[name].data)
 
 
-def _notes(
-    records: Records, end: dict[str, str], moves: list[AnchoredMove], log: tuple[str, ...]
-) -> tuple[str, ...]:
+def _notes(records: Records, end: dict[str, str], moves: list[AnchoredMove], log: tuple[str, ...]) -> tuple[str, ...]:
     notes = [*records.damage]
     if not end:
         notes.append("the recording was never closed; everything up to its last chunk is here")
@@ -148,12 +170,37 @@ def _array(values: list[int]) -> np.ndarray:
     return np.array(values, dtype=np.int64)
 
 
-def _taxels(records: Records, count: int) -> TaxelStream:
+def _clocks(records: Records, cameras: list[str], rate: float) -> dict[str, ClockModel]:
+    """Return each stream's clock: the session's from the file, or one fitted to what a crash left."""
+    clocks = {}
+    for name in ("taxels", *(f"camera {camera}" for camera in cameras)):
+        stored = records.metadata.get(f"clock_model/{name}")
+        model = ClockModel.from_document(stored) if stored else _fitted(records, name, rate)
+        if model is not None:
+            clocks[name] = model
+    return clocks
+
+
+def _fitted(records: Records, stream: str, rate: float) -> ClockModel | None:
+    attached = records.attachments.get("latencies.json")
+    latency = json.loads(attached.data).get(stream) if attached else None
+    if stream == "taxels":
+        frames = [pb.Taxels.FromString(message.data) for message in records.of_topic(channels.TAXELS)]
+        axis = "device_ns" if _attachment(records, "board.json").get("clock") == "device_ns" else "counter"
+        arrival = _array([f.arrival_ns for f in frames])
+        model = fit(arrival, _array([getattr(f, axis) for f in frames]), axis, rate)
+    else:
+        messages = records.of_topic(channels.image(stream.removeprefix("camera ")))
+        model = fit(_array([m.log_time for m in messages]), _array([m.sequence for m in messages]), "order", rate)
+    return model.with_latency(Latency.from_document(latency)) if model and latency else model
+
+
+def _taxels(records: Records, count: int, clock: ClockModel | None) -> TaxelStream:
     frames = [pb.Taxels.FromString(message.data) for message in records.of_topic(channels.TAXELS)]
     arrival, counter = _array([f.arrival_ns for f in frames]), _array([f.counter for f in frames])
-    stored = records.metadata.get("clock_model/taxels")
-    model = clock_model.ClockModel.from_document(stored) if stored else clock_model.fit(arrival, counter)
-    sample = arrival if model is None else np.where(counter >= 0, model.sample_ns(counter), arrival)
+    device = _array([f.device_ns for f in frames])
+    on_device = clock is not None and clock.axis == "device_ns"
+    sample = arrival if clock is None else clock.sample_times(arrival, device if on_device else counter)
     widths = {len(f.counts) for f in frames}
     if widths - {count}:
         raise FormatError(
@@ -162,15 +209,20 @@ def _taxels(records: Records, count: int) -> TaxelStream:
             "record with the sensor file that belongs to the board",
         )
     counts = np.array([list(f.counts) for f in frames], dtype=float).reshape(-1, count)
-    return TaxelStream(arrival, sample, counter, counts)
+    return TaxelStream(arrival, sample, counter, counts, device)
+
+
+def _image_times(records: Records, camera: str, clock: ClockModel | None) -> ImageTimes:
+    messages = records.of_topic(channels.image(camera))
+    arrival = _array([m.log_time for m in messages])
+    sample = arrival if clock is None else clock.sample_times(arrival, _array([m.sequence for m in messages]))
+    return ImageTimes(arrival, sample, _array([int.from_bytes(m.data, "little") for m in messages]))
 
 
 def _statuses(records: Records) -> StatusTimes:
     reports = [pb.CncStatus.FromString(message.data) for message in records.of_topic(channels.STATUS)]
     sent, arrival = _array([r.sent_ns for r in reports]), _array([r.arrival_ns for r in reports])
-    position = np.array([[r.position.x, r.position.y, r.position.z] for r in reports], dtype=float).reshape(
-        -1, 3
-    )
+    position = np.array([[r.position.x, r.position.y, r.position.z] for r in reports], dtype=float).reshape(-1, 3)
     stream = CncStream(arrival, (sent + arrival) // 2, position, tuple(r.state for r in reports))
     return StatusTimes(sent, stream)
 
@@ -181,7 +233,7 @@ def _command(data: bytes) -> Command:
     return Command(m.phase, start, target, m.speed, m.dwell, m.sent_ns, m.acknowledged_ns, m.line)
 
 
-def _tags(records: Records, camera: str) -> TagStream:
+def _tags(records: Records, camera: str, clock: ClockModel | None) -> TagStream:
     views = [pb.CubeView.FromString(message.data) for message in records.of_topic(channels.cube(camera))]
     poses = {m.sequence: PoseInFrame.FromString(m.data).pose for m in records.of_topic(channels.pose(camera))}
     position, quaternion = np.full((len(views), 3), np.nan), np.full((len(views), 4), np.nan)
@@ -191,9 +243,11 @@ def _tags(records: Records, camera: str) -> TagStream:
             p, q = pose.position, pose.orientation
             position[row], quaternion[row] = (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)
     reprojection = np.array([v.reprojection if v.faces else np.nan for v in views], dtype=float)
+    arrival = _array([v.arrival_ns for v in views])
+    sample = arrival if clock is None else clock.sample_times(arrival, _array([v.sequence for v in views]))
     return TagStream(
         camera,
-        _array([v.sample_ns for v in views]),
+        sample,
         position,
         quaternion,
         reprojection,

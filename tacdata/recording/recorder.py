@@ -11,14 +11,18 @@ import numpy as np
 
 from tacdata.errors import DeviceError, TacdataError, UsageError
 from tacdata.plans import Plan, Press
-from tacdata.recording import file_names
+from tacdata.recording import file_names, sync_tap, sync_tap_motion
+from tacdata.recording.clock_model import Latency
 from tacdata.recording.detection_process import Detect
 from tacdata.recording.guarded_motion import WATCH, GuardedMotion
+from tacdata.recording.live_feed import Watch
 from tacdata.recording.motion_profile import AxisLimits
 from tacdata.recording.preflight import Preflight, preflight
 from tacdata.recording.press_steps import Position, Step, steps
+from tacdata.recording.reader import read_recording
 from tacdata.recording.rig_devices import RigDevices
 from tacdata.recording.session import Session, create_session, refresh, resume_session
+from tacdata.recording.session_sync import add_sync, changes, latencies
 from tacdata.recording.streams import Streams
 from tacdata.recording.writer import EpisodeWriter, Header
 from tacdata.rig import Rig
@@ -48,6 +52,9 @@ class Recorder:
         mount: Callable[[Press], None] | None = None,
         detect: Detect | None = None,
         progress: Callable[[int, int, float], None] | None = None,
+        sync_tap: bool = False,
+        say: Callable[[str], None] | None = None,
+        watch: Watch | None = None,
     ) -> None:
         """Prepare; nothing is opened, created or moved.
 
@@ -61,6 +68,9 @@ class Recorder:
             mount: Called when another indenter, or another yaw of it, is wanted; returns once it sits.
             detect: Searches an image for its cube (`detection_process`); without it images are only stored.
             progress: Called with (presses done, presses wanted, real seconds left) after each press.
+            sync_tap: Begin with a few touches that measure the streams' constant delays.
+            say: Is told in words what a person should know meanwhile.
+            watch: Is shown some of what arrives (`live_feed`); must return at once.
         """
         self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(out), resume
         self.devices = devices or RigDevices.of(rig)
@@ -68,6 +78,9 @@ class Recorder:
         self._mounted: tuple[str, float] | None = None
         self._height = rig.registration.origin[2] + plan.motion.clearance
         self._motion = GuardedMotion(self.devices.cnc, rig.clock)
+        self._tap = sync_tap_motion.touch(plan, sensor) if sync_tap else None
+        self._say, self._watch = say or (lambda words: None), watch
+        self._latencies: dict[str, Latency] = {}
 
     def run(self, confirm: Callable[[Preflight], bool]) -> Session:
         """Check, ask, then record every press that is wanted.
@@ -86,23 +99,26 @@ class Recorder:
         """
         self.plan.check_against(self.sensor)
         session = self._existing_session()
+        self._latencies = latencies(session) if session else {}
         wanted = session.remaining if session else tuple(press.index for press in self.plan.presses)
         if session and not wanted:
             return session
         with self.devices.opened() as devices:
             cnc = devices.cnc
             limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))
-            summary = preflight(self.plan, self.sensor, self.rig, limits, wanted)
+            bounds = cnc.travel, cnc.cautions
+            summary = preflight(self.plan, self.sensor, self.rig, limits, wanted, *bounds, self._tap)
             if not confirm(summary):
-                raise UsageError(
-                    "the summary was not confirmed", "yes", "nothing was moved; start again when ready"
-                )
+                raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
             session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
-            with Streams(devices, self.rig.cameras, self._motion.stop, self._detect) as streams:
+            with Streams(devices, self.rig.cameras, self._motion.stop, self._detect, self._watch) as streams:
                 try:
                     self._record_all(session, streams, limits, summary, wanted)
-                finally:
-                    session = refresh(session)
+                except BaseException:
+                    with suppress(TacdataError):  # the fault itself is what the person must hear of
+                        refresh(session)
+                    raise
+            session = refresh(session)
         return session
 
     def _existing_session(self) -> Session | None:
@@ -125,14 +141,18 @@ class Recorder:
         wanted: tuple[int, ...],
     ) -> None:
         self._wait_for_streams(streams)
+        streams.set_latencies(self._latencies)
         position = self._rise(streams)
+        if self._tap is not None:
+            session, position = self._touch(session, self._tap, position, streams, limits)
+        left = summary.seconds[-len(wanted) :]  # what comes before belongs to the sync tap
         for done, number in enumerate(wanted, start=1):
             press = self.plan.presses[number]
             self._change_indenter(press)
             position = self._record(press, position, streams, limits)
             refresh(session)
             if self._progress:
-                self._progress(done, len(wanted), sum(summary.seconds[done:]) / self.rig.clock.rate)
+                self._progress(done, len(wanted), sum(left[done:]) / self.rig.clock.rate)
 
     def _wait_for_streams(self, streams: Streams) -> None:
         end = time.monotonic() + FIRST_FRAME
@@ -162,8 +182,12 @@ class Recorder:
                 "jog it inside, or correct the rig file",
             )
         if here[2] < self._height:
-            rise = Step("", above, self.plan.motion.approach_speed)
-            return self._motion.drive((rise,), here, streams, None)
+            speed = self.plan.motion.approach_speed
+            try:
+                return self._motion.drive((Step("", above, speed),), here, streams, None)
+            except BaseException:
+                self._motion.lift(self._height, speed)
+                raise
         return here
 
     def _change_indenter(self, press: Press) -> None:
@@ -172,19 +196,44 @@ class Recorder:
             self._mount(press)
         self._mounted = wanted
 
-    def _record(self, press: Press, position: Position, streams: Streams, limits: AxisLimits) -> Position:
-        """Record one press from ``position`` [mm]; return where the guide stands then."""
-        path = file_names.episode(self.out, press.index)
+    def _touch(
+        self, session: Session, tap: Press, position: Position, streams: Streams, limits: AxisLimits
+    ) -> tuple[Session, Position]:
+        """Carry out the sync tap and take the delays that it shows; return the session and where the guide stands."""
+        self._change_indenter(tap)
+        before, self._latencies = self._latencies, {}
+        streams.set_latencies({})
+        path = file_names.next_sync_tap(self.out)
+        course = sync_tap_motion.steps(tap, self.plan, self.rig.registration)
+        position = self._record(tap, position, streams, limits, path, course)
+        found = sync_tap.measure(read_recording(path))
+        for words in (*found.words, *changes(session, found.latencies)):
+            self._say(words)
+        session = add_sync(session, path, found)
+        self._latencies = {**before, **found.latencies}
+        streams.set_latencies(self._latencies)
+        return session, position
+
+    def _record(
+        self,
+        press: Press,
+        position: Position,
+        streams: Streams,
+        limits: AxisLimits,
+        path: Path | None = None,
+        course: tuple[Step, ...] = (),
+    ) -> Position:
+        """Record one press from ``position`` [mm], or another course; return where the guide stands then."""
+        path = path or file_names.episode(self.out, press.index)
+        course = course or steps(press, self.plan.motion, self.rig.registration)
         writer = EpisodeWriter(path, self._header(press, limits), self.rig.clock, tuple(self.devices.cameras))
         streams.record_into(writer)
         try:
-            position = self._motion.drive(
-                steps(press, self.plan.motion, self.rig.registration), position, streams, writer
-            )
+            position = self._motion.drive(course, position, streams, writer)
         except BaseException as error:
             reason = error.given if isinstance(error, TacdataError) else "stopped by Ctrl-C"
             try:
-                lifted = self._motion.lift(streams, self._height, self.plan.motion.approach_speed)
+                lifted = self._motion.lift(self._height, self.plan.motion.approach_speed)
                 writer.note(f"broken off: {reason}; {lifted}", "error")
             finally:
                 with suppress(DeviceError):  # the fault itself is what the person must hear of
@@ -195,9 +244,10 @@ class Recorder:
 
     def _close(self, writer: EpisodeWriter, streams: Streams, broken_off: str = "") -> None:
         streams.catch_up()
+        counts = streams.counts
         streams.record_into(None)
         reason = f"broken off: {broken_off}" if broken_off else ""
-        writer.close(not broken_off, reason, streams.clock_models, streams.counts)
+        writer.close(not broken_off, reason, streams.clock_models, counts)
 
     def _header(self, press: Press, limits: AxisLimits) -> Header:
         controller = {
@@ -206,4 +256,5 @@ class Recorder:
             "max_rate": limits.max_rate.tolist(),
         }
         board = self.devices.board.describe()
-        return Header(press, self.sensor, self.rig.document, self.plan.document or {}, board, controller)
+        documents = self.rig.document, self.plan.document or {}
+        return Header(press, self.sensor, *documents, board, controller, self._latencies)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import schemas
 from tacdata import documents, provenance
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.plans import Plan
 from tacdata.recording import file_names
 from tacdata.sensor import Sensor
@@ -80,6 +82,7 @@ def create_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
 
     Raises:
         UsageError: If it exists.
+        DeviceError: If the disk refuses it.
     """
     if folder.exists():
         raise UsageError(
@@ -90,7 +93,7 @@ def create_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
             f"plan {plan.name} has no document", "a plan read from a file", "write the plan to a file first"
         )
     document = {
-        "version": "1.0",
+        "version": schemas.version("session"),
         "code_version": provenance.code_version(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "rig": rig,
@@ -100,7 +103,12 @@ def create_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
         "sensor_hash": sensor.content_hash,
         "episodes": [],
     }
-    documents.write(folder / FILE, document, "session")
+    try:
+        documents.write(folder / FILE, document, "session")
+    except DeviceError:
+        with suppress(OSError):
+            folder.rmdir()  # so that the same command can begin again
+        raise
     return read_session(folder)
 
 

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
+
+import numpy as np
 
 from tacdata.devices.device import Camera, StreamCounts
 from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.camera_stream import CameraStream
-from tacdata.recording.clock_model import ClockModel, EnvelopeFit
+from tacdata.recording.clock_model import ClockModel, Latency
 from tacdata.recording.detection_process import Detect
+from tacdata.recording.live_feed import LiveFeed, Watch
+from tacdata.recording.polled_clock import PolledClock, polled_clock
 from tacdata.recording.rig_devices import RigDevices
+from tacdata.recording.stream_clock import StreamClock
 from tacdata.recording.writer import EpisodeWriter
 
 SILENCE = 3.0
@@ -23,8 +30,8 @@ CATCH_UP = 5.0
 """How long the end of a recording waits for images not yet written [s of real time]."""
 SEARCH = 2.0
 """How long the end of a recording waits for a search for tags that is under way [s of real time]."""
-REFIT = 16
-"""Frames between two refits of the clock model while recording; the final one uses all."""
+TRIPS = 4096
+"""Round trips of the controller's reports that are remembered for its clock [count]."""
 
 
 class Streams:
@@ -36,6 +43,7 @@ class Streams:
         cameras: dict[str, dict[str, Any]],
         on_fault: Callable[[], None],
         detect: Detect | None = None,
+        watch: Watch | None = None,
     ) -> None:
         """Prepare the threads.
 
@@ -44,14 +52,21 @@ class Streams:
             cameras: The rig file's camera entries.
             on_fault: Called at once, in the faulty stream's thread, before anything else: stops the motion.
             detect: Searches an image for the cube; without it images are only stored.
+            watch: Is shown some of what arrives.
         """
         self._devices, self._on_fault = devices, on_fault
+        self._feed = LiveFeed(watch) if watch else None
         self._stop = threading.Event()
         self._lock = threading.Lock()
         self._sink: EpisodeWriter | None = None
+        self._before = StreamCounts()
         self._fault: TacdataError | None = None
-        self._fit = EnvelopeFit()
-        self._model: ClockModel | None = None
+        axis = "device_ns" if devices.board.describe().get("clock") == "device_ns" else "counter"
+        self._clocks = {"taxels": StreamClock(axis, devices.board.clock.rate)}
+        self._clocks |= {
+            f"camera {name}": StreamClock("order", camera.clock.rate) for name, camera in devices.cameras.items()
+        }
+        self._trips: deque[tuple[int, int]] = deque(maxlen=TRIPS)
         self._passes: dict[str, int] = {}
         self._ending = False
         self.frames = 0
@@ -67,8 +82,7 @@ class Streams:
             self._cameras.append(CameraStream(name, cameras.get(name, {}), detect))
             work.append((f"camera {name}", self._camera_reader(camera, self._cameras[-1])))
         self._threads = [
-            threading.Thread(target=self._run, args=(name, read), name=name, daemon=True)
-            for name, read in work
+            threading.Thread(target=self._run, args=(name, read), name=name, daemon=True) for name, read in work
         ]
 
     def __enter__(self) -> Streams:
@@ -88,9 +102,7 @@ class Streams:
         """The first thing that went wrong in a stream or in writing, or None."""
         failure = self._sink.failure if self._sink else None
         if self._fault is None and failure is not None:
-            self._fail(
-                DeviceError(f"writing failed: {failure}", "a disk with room", "make room, then --resume")
-            )
+            self._fail(DeviceError(f"writing failed: {failure}", "a disk with room", "make room, then --resume"))
         return self._fault
 
     @property
@@ -102,6 +114,7 @@ class Streams:
         """Send everything that arrives from now on into a recording, or nowhere."""
         with self._lock:
             self._sink = sink
+            self._before = copy.deepcopy(self._devices.board.counts)
 
     def catch_up(self, patience: float = CATCH_UP) -> None:
         """Wait at most so long [s of real time] until every stream has handed on what has arrived by now."""
@@ -119,16 +132,25 @@ class Streams:
                 time.sleep(POLL / 10)
 
     @property
-    def clock_models(self) -> dict[str, ClockModel]:
-        """Clock model of each stream that has a counter."""
+    def clock_models(self) -> dict[str, ClockModel | PolledClock]:
+        """Clock of each stream, by its name: "taxels", "camera NAME", "cnc"."""
         with self._lock:
-            model = self._fit.model()
-        return {} if model is None else {"taxels": model}
+            models: dict[str, Any] = {name: clock.model() for name, clock in self._clocks.items()}
+            models["cnc"] = polled_clock(*np.array(self._trips, np.int64).reshape(-1, 2).T)
+        return {name: model for name, model in models.items() if model is not None}
+
+    def set_latencies(self, latencies: dict[str, Latency]) -> None:
+        """Take these constant delays of streams, by name, into all sample times from now on, and no others."""
+        with self._lock:
+            for name, clock in self._clocks.items():
+                clock.latency = latencies.get(name)
 
     @property
     def counts(self) -> dict[str, StreamCounts]:
-        """What each stream has delivered since the session's start."""
-        return {"taxels": self._devices.board.counts}
+        """What each stream has delivered since `record_into` was called last."""
+        now, before = self._devices.board.counts, self._before
+        numbers = {k: v - getattr(before, k) for k, v in vars(now).items() if isinstance(v, int)}
+        return {"taxels": StreamCounts(**numbers, notes=now.notes[len(before.notes) :])}
 
     def _fail(self, error: TacdataError) -> None:
         if self._fault is None:
@@ -157,16 +179,14 @@ class Streams:
     def _read_board(self) -> bool:
         frames = self._devices.board.read(POLL)
         with self._lock:
+            clock = self._clocks["taxels"]
             for frame in frames:
-                self._fit.add(frame.arrival_ns, frame.counter)
-                if self.frames % REFIT == 0 or self._model is None:
-                    self._model = self._fit.model()
                 self.frames += 1
-                sample = frame.arrival_ns
-                if self._model is not None and frame.counter >= 0:
-                    sample = min(self._model.sample_of(frame.counter), sample)
+                sample = clock.take(frame.arrival_ns, frame.device_ns if clock.axis == "device_ns" else frame.counter)
                 if self._sink and frame.arrival_ns >= self._sink.begun_ns:
                     self._sink.taxels(frame, sample)
+            if self._feed and frames:
+                self._feed.taxels(frames[-1].arrival_ns, frames[-1].counts)
         return bool(frames)
 
     def _read_status(self) -> bool:
@@ -175,6 +195,9 @@ class Streams:
             for status in statuses:
                 x, y, z = status.position.tolist()
                 self.position = (x, y, z)
+                self._trips.append((status.sent_ns, status.arrival_ns))
+                if self._feed:
+                    self._feed.position(status.arrival_ns, self.position)
                 if self._sink and status.arrival_ns >= self._sink.begun_ns:
                     self._sink.status(status)
         time.sleep(POLL)
@@ -186,8 +209,11 @@ class Streams:
             for frame in frames:
                 with self._lock:
                     sink = self._sink
+                    sample_ns = self._clocks[f"camera {stream.name}"].take(frame.arrival_ns, frame.sequence)
                 if sink is None or frame.arrival_ns >= sink.begun_ns:
-                    stream.take(frame, sink)
+                    stream.take(frame, sample_ns, sink)
+                if self._feed:
+                    self._feed.image(stream.name, frame.arrival_ns, frame.image)
             stream.collect(SEARCH if self._ending else 0.0)
             return bool(frames)
 

@@ -26,9 +26,12 @@ from tacdata.plans import Press
 from tacdata.recording import channels, file_names
 from tacdata.recording.anchoring import Command
 from tacdata.recording.chunked_file import ChunkedFile
-from tacdata.recording.clock_model import ClockModel
+from tacdata.recording.clock_model import ClockModel, Latency
+from tacdata.recording.polled_clock import PolledClock
 from tacdata.sensor import Sensor
 
+WAITING = 256_000_000
+"""Bytes that may wait for the disk; more means that it cannot keep up [bytes]."""
 LEVELS = {"info": Log.Level.INFO, "warning": Log.Level.WARNING, "error": Log.Level.ERROR}
 
 
@@ -46,6 +49,8 @@ class Header:
     """The board's description of itself: channels, frame format, units, nominal rate."""
     controller: dict[str, Any] = field(default_factory=dict)
     """``settings`` as read, ``acceleration`` [mm/s^2] and ``max_rate`` [mm/s] of each axis."""
+    latencies: dict[str, Latency] = field(default_factory=dict)
+    """Constant delay of each stream that a sync tap measured, by the stream's name."""
 
     @property
     def attachments(self) -> dict[str, Any]:
@@ -58,6 +63,7 @@ class Header:
             "plan.json": self.plan,
             "board.json": self.board,
             "controller.json": self.controller,
+            "latencies.json": {name: latency.document for name, latency in self.latencies.items()},
         }
 
 
@@ -83,36 +89,37 @@ class EpisodeWriter:
 
         Raises:
             UsageError: If a recording of that name, finished or partial, exists.
+            DeviceError: If the disk refuses it.
         """
         if path.exists():
-            raise UsageError(
-                f"{path} exists", "a recording is never overwritten", "choose another session folder"
-            )
+            raise UsageError(f"{path} exists", "a recording is never overwritten", "choose another session folder")
         self.path, self._clock = path, clock
         self.begun_ns = clock.now_ns()
         """Host time of creation [ns]; what arrived before belongs to no recording or to the one before."""
-        self._file = ChunkedFile(file_names.partial(path))
-        for topic, message in channels.FIXED.items():
-            self._file.register(topic, message)
-        for camera in cameras:
-            for topic, message in channels.of_camera(camera).items():
-                self._file.register(topic, message)
-        for name, document in header.attachments.items():
-            data = json.dumps(document, indent=1).encode()
-            self._file.attach(name, "application/json", data, clock.now_ns())
-        self._file.flush()
+        try:
+            self._file = _begun(path, header, clock, cameras)
+        except OSError as error:
+            raise DeviceError(
+                f"{path} cannot be begun: {error}", "a disk with room for the recording", "make room, then --resume"
+            ) from error
         self._queue: queue.SimpleQueue[tuple[str, int, int, int, bytes] | None] = queue.SimpleQueue()
+        self._taken = self._written = 0  # bytes handed over and bytes dealt with
         self._failure: Exception | None = None
+        self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._drain, name=f"write {path.name}", daemon=True)
-        self._add(
-            channels.LOG, clock.now_ns(), clock.now_ns(), 0, self._log_message("recording begins", "info")
-        )
+        self.note("recording begins")
         self._thread.start()
 
     @property
     def failure(self) -> Exception | None:
         """What stopped the writing (a full disk, say), or None."""
         return self._failure
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that wait to be written."""
+        with self._lock:
+            return self._taken - self._written
 
     def _drain(self) -> None:
         while True:
@@ -125,11 +132,20 @@ class EpisodeWriter:
             try:
                 if self._failure is None:
                     self._file.add(*item) if item else self._file.tick()
-            except (OSError, ValueError) as error:
+            except Exception as error:  # whatever stops the writing stops the motion
                 self._failure = error
+            if item:
+                self._written += len(item[-1])
 
     def _add(self, topic: str, log_ns: int, publish_ns: int, sequence: int, message: Any) -> None:
-        self._queue.put((topic, log_ns, publish_ns, sequence, message.SerializeToString()))
+        data = message.SerializeToString()
+        with self._lock:
+            self._taken += len(data)
+            waiting = self._taken - self._written
+        if self._failure is None and waiting > WAITING:
+            self._failure = OSError(f"the disk is slower than the streams: {waiting / 1e6:.0f} MB wait to be written")
+        if self._failure is None:
+            self._queue.put((topic, log_ns, publish_ns, sequence, data))
 
     def taxels(self, frame: TaxelFrame, sample_ns: int) -> None:
         """Write one reading of the board with its sample time as estimated so far [ns]."""
@@ -178,9 +194,7 @@ class EpisodeWriter:
         message.timestamp.FromNanoseconds(sample_ns)
         self._add(channels.image(camera), arrival_ns, sample_ns, sequence, message)
 
-    def cube(
-        self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None
-    ) -> None:
+    def cube(self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None) -> None:
         """Write what the tag detector says of one image; ``None`` if no face was seen."""
         view = pb.CubeView(arrival_ns=arrival_ns, sample_ns=sample_ns, sequence=sequence)
         if pose is not None:
@@ -210,7 +224,7 @@ class EpisodeWriter:
         self,
         complete: bool,
         reason: str = "",
-        clock_models: dict[str, ClockModel] | None = None,
+        clock_models: dict[str, ClockModel | PolledClock] | None = None,
         counts: dict[str, StreamCounts] | None = None,
     ) -> Path:
         """Finish the file and give it its name.
@@ -236,12 +250,10 @@ class EpisodeWriter:
             for name, model in (clock_models or {}).items():
                 self._file.describe(f"clock_model/{name}", model.document)
             for name, count in (counts or {}).items():
-                self._file.describe(
-                    f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()}
-                )
+                self._file.describe(f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()})
             self._file.describe("episode", {"complete": json.dumps(complete), "reason": reason})
             self._file.close()
-        except (OSError, ValueError) as error:
+        except Exception as error:  # whatever stops the writing is said, and the file let go
             self._file.let_go()
             partial = self._file.path
             raise DeviceError(
@@ -251,3 +263,21 @@ class EpisodeWriter:
             ) from error
         self._file.path.rename(target)
         return target
+
+
+def _begun(path: Path, header: Header, clock: Clock, cameras: tuple[str, ...]) -> ChunkedFile:
+    """Create the file with its channels and attachments and hand it to the disk."""
+    file = ChunkedFile(file_names.partial(path))
+    for topic, message in channels.FIXED.items():
+        file.register(topic, message)
+    for camera in cameras:
+        for topic, message in channels.of_camera(camera).items():
+            file.register(topic, message)
+    try:
+        for name, document in header.attachments.items():
+            file.attach(name, "application/json", json.dumps(document, indent=1).encode(), clock.now_ns())
+        file.flush()
+    except OSError:
+        file.let_go()
+        raise
+    return file

@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tacdata import documents
+from tacdata import documents, provenance
 from tacdata.clock import Clock
-from tacdata.errors import FormatError
+from tacdata.errors import FormatError, UsageError
 
 
 @dataclass(frozen=True)
 class Registration:
-    """How the sensor lies in the guide's frame: machine = origin + R_z(yaw) (x, y, z - thickness)."""
+    """How the sensor lies in the guide's frame: machine = origin + R_z(yaw) (x, y, tilt . (x, y) - depth).
+
+    Depth is counted along the guide's z from the tilted outer face; of tilts up to a few degrees the second order
+    (0.15 % of a length at 3 deg) is left out.
+    """
 
     origin: tuple[float, float, float]
     """Machine position [mm] at which the tip touches the undeformed outer face at the array's centre."""
     yaw: float
     """Rotation of the sensor's x axis against the machine's [deg]."""
+    tilt: tuple[float, float] = (0.0, 0.0)
+    """Rise of the outer face along the sensor's x and along its y [mm/mm]."""
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> Registration:
+        """Build it from the ``registration`` of a rig file (`schemas/rig.schema.json`)."""
+        tilt = document.get("tilt", (0.0, 0.0))
+        return cls(tuple(document["origin"]), document["yaw"], tuple(tilt))
 
     def to_machine(self, x: float, y: float, depth: float) -> tuple[float, float, float]:
         """Return the machine position [mm] of a tip at (x, y) [mm, sensor frame], ``depth`` [mm] below the skin."""
@@ -28,14 +40,16 @@ class Registration:
         return (
             float(self.origin[0] + c * x - s * y),
             float(self.origin[1] + s * x + c * y),
-            float(self.origin[2] - depth),
+            float(self.origin[2] + self.tilt[0] * x + self.tilt[1] * y - depth),
         )
 
     def to_sensor(self, position: np.ndarray) -> np.ndarray:
         """Return x, y, depth [mm], shape (n, 3), of machine positions [mm], shape (n, 3)."""
         c, s = np.cos(np.radians(self.yaw)), np.sin(np.radians(self.yaw))
         dx, dy = position[:, 0] - self.origin[0], position[:, 1] - self.origin[1]
-        return np.stack([c * dx + s * dy, -s * dx + c * dy, self.origin[2] - position[:, 2]], axis=-1)
+        x, y = c * dx + s * dy, -s * dx + c * dy
+        height = position[:, 2] - self.origin[2] - self.tilt[0] * x - self.tilt[1] * y
+        return np.stack([x, y, -height], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -69,6 +83,35 @@ class Rig:
     document: dict[str, Any]
     """The file's document, as attached to every recording."""
 
+    def registered(self, document: dict[str, Any], sensor_hash: str, origin: str) -> Rig:
+        """Return the rig with the registration that `tacdata register` measured (`schemas/registration.schema.json`).
+
+        Args:
+            document: The registration's document.
+            sensor_hash: Content hash of the sensor that is going to be pressed.
+            origin: Names the document in errors.
+
+        Raises:
+            FormatError: If the document breaks its schema.
+            UsageError: If it belongs to another rig or sensor.
+        """
+        documents.check(document, "registration", origin)
+        for what, given, own in (
+            ("rig", document["rig"], self.name), ("sensor", document["sensor_hash"], sensor_hash),
+        ):  # fmt: skip
+            if given != own:
+                raise UsageError(
+                    f"{origin} was measured with another {what} ({document[what]})", f"this {what}",
+                    "run tacdata register again, or name the registration that belongs to it",
+                )  # fmt: skip
+        kept = {k: document[k] for k in ("origin", "yaw", "tilt", "method", "date", "uncertainty", "sensor_hash")}
+        residuals = document["residuals"]
+        kept["residual"] = max(map(abs, [*residuals["touches"], *residuals["taxels"]]))
+        kept["document_hash"] = provenance.content_hash(document)
+        return replace(
+            self, registration=Registration.from_document(kept), document={**self.document, "registration": kept}
+        )
+
 
 def from_document(document: dict[str, Any], origin: str) -> Rig:
     """Build a rig from a parsed file; ``origin`` names it in errors.
@@ -85,10 +128,15 @@ def from_document(document: dict[str, Any], origin: str) -> Rig:
             "correct the envelope",
         )
     clock = Clock(**document["clock"]) if "clock" in document else Clock.start()
-    registration = document["registration"]
     return Rig(
-        document["name"], document["cnc"], document["board"], document.get("cameras", {}),
-        Registration(tuple(registration["origin"]), registration["yaw"]), envelope, clock, document,
+        document["name"],
+        document["cnc"],
+        document["board"],
+        document.get("cameras", {}),
+        Registration.from_document(document["registration"]),
+        envelope,
+        clock,
+        document,
     )
 
 

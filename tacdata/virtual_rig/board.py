@@ -40,9 +40,7 @@ class Timing:
     def sample_ns(self, counter: int) -> int:
         """Return the true time of a sample [ns of the host's clock]."""
         seconds = counter * self.period * (1 + self.drift * 1e-6)
-        return self.start_ns + round(
-            1e9 * (seconds + self.wander * np.sin(2 * np.pi * seconds / self.wander_period))
-        )
+        return self.start_ns + round(1e9 * (seconds + self.wander * np.sin(2 * np.pi * seconds / self.wander_period)))
 
 
 def draw_timing(seed: int, start_ns: int, rate: float) -> Timing:

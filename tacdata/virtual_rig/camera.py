@@ -40,9 +40,7 @@ class Camera:
         self._server.daemon_threads = True
         self.url = f"http://127.0.0.1:{self._server.server_port}/stream.mjpg"
         self._threads = [
-            threading.Thread(
-                target=self._server.serve_forever, args=(0.1,), name="virtual-camera-http", daemon=True
-            ),
+            threading.Thread(target=self._server.serve_forever, args=(0.1,), name="virtual-camera-http", daemon=True),
             threading.Thread(target=self._expose, name="virtual-camera", daemon=True),
         ]
 
@@ -106,9 +104,7 @@ class Camera:
                 try:
                     while item := camera._next(number):
                         number, data = item
-                        head = (
-                            f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
-                        )
+                        head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
                         self.wfile.write(head.encode("ascii") + data + b"\r\n")
                         self.wfile.flush()
                 except OSError:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-WELCOME = "Grbl 1.1h ['$' for help]"
+from tacdata.virtual_rig.firmware import Firmware
+
 DEFAULTS = {
     "$0": "10", "$1": "255", "$2": "0", "$3": "0", "$4": "0", "$5": "0", "$6": "0", "$10": "1",
     "$11": "0.010", "$12": "0.002", "$13": "0", "$20": "1", "$21": "0", "$22": "1", "$23": "0",
@@ -16,7 +18,9 @@ DEFAULTS = {
     "$131": "200.000", "$132": "60.000",
 }  # fmt: skip
 """Settings of a small three-axis stage: mm, mm/min, mm/s^2, steps/mm."""
-PLANNER_BLOCKS, RX_BYTES = 15, 128
+LOCKED = "[MSG:'$H'|'$X' to unlock]"
+WCO_PERIOD, OV_PERIOD = {True: 30, False: 10}, {True: 20, False: 10}
+"""Reports from one with WCO (Ov) to the next, busy or not (Grbl's `config.h`)."""
 
 
 def axis_setting(settings: Mapping[str, str], prefix: str) -> np.ndarray:
@@ -29,24 +33,36 @@ def triple(values: np.ndarray, digits: int = 3) -> str:
     return ",".join(f"{value + 0.0:.{digits}f}" for value in values)
 
 
-def information(command: str, settings: Mapping[str, str], offset: np.ndarray) -> list[str] | None:
+def information(
+    command: str, firmware: Firmware, settings: Mapping[str, str], offset: np.ndarray, startup: list[str]
+) -> list[str] | None:
     """Return the answer to a ``$`` command that only tells, or None if it is none of them."""
-    zero = triple(np.zeros(3))
-    tags = [f"[G{n}:{triple(offset) if n == 54 else zero}]" for n in (*range(54, 60), 28, 30, 92)]
+    inches = settings["$13"] == "1"
+    unit, digits = (25.4, 4) if inches else (1.0, 3)
+    zero = triple(np.zeros(3), digits)
+    tags = [f"[G{n}:{triple(offset / unit, digits) if n == 54 else zero}]" for n in (*range(54, 60), 28, 30, 92)]
     return {
         "$$": [f"{name}={value}" for name, value in settings.items()],
-        "$#": [*tags, "[TLO:0.000]", f"[PRB:{zero}:0]"],
-        "$I": ["[VER:1.1h.20190825:virtual]", f"[OPT:V,{PLANNER_BLOCKS},{RX_BYTES}]"],
-        "$N": ["$N0=", "$N1="],
-        "$": ["[HLP:$$ $# $G $I $N $x=val $J=line $C $X $H ~ ! ? ctrl-x]"],
+        "$#": [*tags, f"[TLO:{0:.{digits}f}]", f"[PRB:{zero}:0]"],
+        "$I": list(firmware.information),
+        "$N": [f"$N{n}={line}" for n, line in enumerate(startup)],
+        "$": ["[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]"],
     }.get(command)
+
+
+@dataclass
+class Counters:
+    """When the fields that come only now and then are due again [reports]."""
+
+    wco: int = 0
+    overrides: int = 0
 
 
 def report(
     settings: Mapping[str, str], state: str, machine: np.ndarray, speed: float, offset: np.ndarray,
-    free: tuple[int, int], number: int, moving: bool,
+    free: tuple[int, int], counters: Counters, override: int, pins: str,
 ) -> str:  # fmt: skip
-    """Return a status report.
+    """Return a status report (Grbl's `report_realtime_status`).
 
     Args:
         settings: ``$10`` and ``$13`` decide on what is said and in which unit.
@@ -55,8 +71,9 @@ def report(
         speed: Present speed [mm/s].
         offset: Work coordinate offset [mm], shape (3,).
         free: Free planner blocks and bytes of the receive buffer.
-        number: Reports since the reset; WCO and Ov come only now and then.
-        moving: True lets them come less often.
+        counters: Brought up to date.
+        override: Feed override [%].
+        pins: Letters of the active inputs.
     """
     mask, inches = int(settings["$10"]), settings["$13"] == "1"
     unit, digits = (25.4, 4) if inches else (1.0, 3)
@@ -66,9 +83,15 @@ def report(
     if mask & 2:
         fields.append(f"Bf:{free[0]},{free[1]}")
     fields.append(f"FS:{60 * speed / unit:.0f},0")
-    period = 30 if moving else 10
-    if number % period == 0:
+    if pins:
+        fields.append(f"Pn:{pins}")
+    busy = state.split(":")[0] in ("Run", "Hold", "Jog", "Door", "Home")
+    if counters.wco == 0:
+        counters.wco, counters.overrides = WCO_PERIOD[busy], max(counters.overrides, 1)
         fields.append(f"WCO:{triple(offset / unit, digits)}")
-    elif number % (2 * period) == 1:
-        fields.append("Ov:100,100,100")
+    elif counters.overrides == 0:
+        counters.overrides = OV_PERIOD[busy]
+        fields.append(f"Ov:{override},100,100")
+    counters.wco -= 1
+    counters.overrides -= counters.overrides > 0
     return f"<{'|'.join(fields)}>"

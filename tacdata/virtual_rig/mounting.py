@@ -34,9 +34,7 @@ def mount(rig: dict[str, Any] | Path, indenter: dict[str, Any], yaw: float = 0.0
     else:
         path = rig / "mounted.json"
     from_document(indenter, "mounting")
-    documents.write(
-        path, {"version": schemas.version("mounting"), "indenter": indenter, "yaw": yaw}, "mounting"
-    )
+    documents.write(path, {"version": schemas.version("mounting"), "indenter": indenter, "yaw": yaw}, "mounting")
 
 
 class Mounted:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import math
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -159,6 +159,22 @@ class Planner:
                 return self._ends[0]
             return self._end_of(self._past[-1]) if self._past and self.held else None
 
+    @property
+    def rest_ns(self) -> int | None:
+        """When the planned motion ends, or the last one ended [ns]; None if nothing ever moved."""
+        with self._lock:
+            return self._end_of(self._past[-1]) if self._past else None
+
+    def scale(self, factor: float, now_ns: int) -> None:
+        """Change the speed of all queued blocks, the running one included, from now on [ns]."""
+        with self._lock:
+            if not self.blocks:
+                return
+            way, speed = self._cut(now_ns)
+            self.blocks = [replace(block, speed=block.speed * factor) for block in self.blocks]
+            if not self.held:
+                self._plan(now_ns, way, speed)
+
     def position(self, time_ns: int) -> np.ndarray:
         """Return the position [mm], shape (3,), at a time [ns]."""
         with self._lock:
@@ -202,9 +218,7 @@ class Planner:
         if moving and self._past:
             last = self._past[-1]
             seconds = min(last.seconds, (now_ns - last.start_ns) * 1e-9)
-            self._past[-1] = Stretch(
-                last.start_ns, seconds, last.block, last.way, last.speed, last.acceleration
-            )
+            self._past[-1] = Stretch(last.start_ns, seconds, last.block, last.way, last.speed, last.acceleration)
         while len(self._past) > 1 and self._starts[1] < now_ns - MEMORY_NS:
             self._past.pop(0)
             self._starts.pop(0)
@@ -224,9 +238,7 @@ class Planner:
         for i in range(len(blocks) - 1, 0, -1):
             in_line = float(blocks[i - 1].unit @ blocks[i].unit) > 1 - 1e-6
             corner = min(blocks[i - 1].speed, blocks[i].speed) if in_line else 0.0
-            entry[i] = min(
-                corner, math.sqrt(entry[i + 1] ** 2 + 2 * blocks[i].acceleration * blocks[i].length)
-            )
+            entry[i] = min(corner, math.sqrt(entry[i + 1] ** 2 + 2 * blocks[i].acceleration * blocks[i].length))
         for i, block in enumerate(blocks):
             a, room = block.acceleration, max(block.length - way, 0.0)
             out = min(entry[i + 1], math.sqrt(speed**2 + 2 * a * room))

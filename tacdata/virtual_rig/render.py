@@ -7,10 +7,13 @@ tag upright as OpenCV draws it, with cube z up on the side faces and cube y up o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
+
+from tacdata.virtual_rig.look import Look
 
 # outward normal and image-right direction of each face, cube frame; right x up = normal
 FACES = {
@@ -27,8 +30,8 @@ WHITE, BLACK, BACKGROUND = 225.0, 28.0, 120.0
 """Grey values [1 of 255] of paper and ink under full light, and of the bench."""
 AMBIENT = np.float32(0.55)
 """Share of the light that comes from all sides [1]."""
-BLUR, NOISE = 0.7, 2.0
-"""Standard deviations of the optical blur [px] and of the sensor noise [1 of 255]."""
+MOMENTS = 9
+"""Poses drawn during the exposure of a cube that moves."""
 CELL = 24
 """Texels a tag cell."""
 
@@ -46,26 +49,123 @@ def render_cube(
         cube: ``side`` and ``tag`` [mm] and ``ids`` by face, as in a rig file. Faces without id are blank.
         rng: Source of the noise.
     """
+    return render_scene([(pose_camera_cube, cube)], intrinsics, rng)
+
+
+def render_scene(
+    cubes: Sequence[tuple[np.ndarray, dict[str, Any]]], intrinsics: dict[str, Any],
+    rng: np.random.Generator, look: Look | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Return a grey image of several cubes, uint8, shape (height, width).
+
+    Args:
+        cubes: Pose [m] and cube [mm], as for `render_cube`, of each.
+        intrinsics: The camera.
+        rng: Source of the noise.
+        look: Optics, light and obstacles.
+    """
+    look = look or Look()
+    width, height = intrinsics["width"], intrinsics["height"]
+    image = (_bench(width, height) if look.background is None else look.background).astype(np.float32)
+    boxes = [
+        box
+        for pose, cube in sorted(cubes, key=lambda item: -float(item[0][2, 3]))
+        if (box := _compose(image, pose, intrinsics, cube, look)) is not None
+    ]
+    return expose(image, boxes if look.background is None else [(0, 0, width, height)], look, rng)
+
+
+def expose(
+    image: np.ndarray, boxes: list[tuple[int, int, int, int]], look: Look, rng: np.random.Generator
+) -> np.ndarray:
+    """Return what a sensor makes of a sharp scene, uint8.
+
+    Args:
+        image: The scene's grey values, float32, shape (height, width).
+        boxes: Left, top, right, bottom [px] of where something lies on a smooth bench: only there the blur matters.
+        look: Optics, light and obstacles.
+        rng: Source of the noise.
+    """
     import cv2
 
-    width, height = intrinsics["width"], intrinsics["height"]
-    image = _bench(width, height).copy()
-    box = _box(pose_camera_cube, intrinsics, cube["side"] / 1000)
-    if box is not None:
-        left, top, right, bottom = box
-        roi = image[top:bottom, left:right]
-        fine = max(2, min(4, int(np.sqrt(1.5e6 / roi.size))))
-        canvas = cv2.resize(roi, None, fx=fine, fy=fine, interpolation=cv2.INTER_LINEAR)
-        lens = _Lens(box, fine, intrinsics)
+    height, width = image.shape
+    _put_before(image, look)
+    image *= _light(width, height, look)
+    margin = int(np.ceil(4 * look.blur)) + 1
+    sharp = image.copy()
+    for left, top, right, bottom in [(0, 0, width, height)] if look.covers or look.shadow else boxes:
+        rows, columns = slice(max(top - margin, 0), bottom + margin), slice(max(left - margin, 0), right + margin)
+        image[rows, columns] = cv2.GaussianBlur(sharp[rows, columns], (0, 0), look.blur)
+    image += look.noise * rng.standard_normal((height, width), dtype=np.float32)
+    seen = cv2.convertScaleAbs(np.maximum(image, 0.0))
+    if look.jpeg is None:
+        return seen
+    coded = cv2.imencode(".jpg", seen, [cv2.IMWRITE_JPEG_QUALITY, look.jpeg])[1]
+    return np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE))
+
+
+def _compose(
+    image: np.ndarray, pose: np.ndarray, intrinsics: dict[str, Any], cube: dict[str, Any], look: Look
+) -> tuple[int, int, int, int] | None:
+    """Draw one cube into a sharp image; return the box [px] that it can touch, or None if it is out of view."""
+    import cv2
+
+    poses = _through_exposure(pose, look)
+    boxes = [box for each in poses if (box := _box(each, intrinsics, cube["side"] / 1000)) is not None]
+    if not boxes:
+        return None
+    corners = np.array(boxes)
+    (left, top), (right, bottom) = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
+    box = (int(left), int(top), int(right), int(bottom))
+    fine = max(2, min(4, int(np.sqrt(1.5e6 / ((right - left) * (bottom - top))))))
+    lens = Lens(box, fine, intrinsics)
+    grey, share = np.zeros((2, bottom - top, right - left), np.float32)
+    for each in poses:
+        canvas = np.full(((bottom - top) * fine, (right - left) * fine), -1.0, np.float32)
         for face in FACES:
-            _draw(canvas, face, pose_camera_cube, cube, lens)
-        drawn = cv2.resize(canvas, (right - left, bottom - top), interpolation=cv2.INTER_AREA)
-        image[top:bottom, left:right] = cv2.GaussianBlur(drawn, (0, 0), BLUR)
-    image += NOISE * rng.standard_normal((height, width), dtype=np.float32)
-    return cv2.convertScaleAbs(np.maximum(image, 0.0))
+            _draw(canvas, face, each, cube, lens)
+        hit = (canvas >= 0).astype(np.float32)
+        size = (int(right - left), int(bottom - top))
+        grey += cv2.resize(np.maximum(canvas, 0), size, interpolation=cv2.INTER_AREA)
+        share += cv2.resize(hit, size, interpolation=cv2.INTER_AREA)
+    part = image[top:bottom, left:right]
+    part += (grey - share * part) / len(poses)
+    return box
 
 
-class _Lens:
+def _through_exposure(pose: np.ndarray, look: Look) -> list[np.ndarray]:
+    """Return the poses, shape (4, 4) [m], that a cube goes through while the shutter is open."""
+    import cv2
+
+    if not (np.any(look.shift) or np.any(look.turn)):
+        return [pose]
+    poses = []
+    for when in (np.arange(MOMENTS) + 0.5) / MOMENTS - 0.5:
+        moved = pose.copy()
+        moved[:3, :3] = cv2.Rodrigues(when * np.array(look.turn, float))[0] @ pose[:3, :3]
+        moved[:3, 3] += when * np.array(look.shift)
+        poses.append(moved)
+    return poses
+
+
+def _put_before(image: np.ndarray, look: Look) -> None:
+    """Draw what covers the cubes, and a shadow, with smooth edges."""
+    import cv2
+
+    for polygon, is_shadow in [*((p, False) for p in look.covers), *(((look.shadow, True),) if look.shadow else ())]:
+        mask = np.zeros(image.shape, np.uint8)
+        places = np.round(np.array(polygon) * 16).astype(np.int32)
+        cv2.fillPoly(mask, [places], 255, cv2.LINE_AA, shift=4)
+        share = mask / np.float32(255)
+        image += share * ((-0.55 * image) if is_shadow else (look.cover - image))
+
+
+def _light(width: int, height: int, look: Look) -> np.ndarray:
+    """Return the brightness [1], float32, shape (1, width)."""
+    return look.gain * (1 - look.fall * np.linspace(0, 1, width, dtype=np.float32)[None])
+
+
+class Lens:
     """Fine pixels of a box to rays (x, y, 1)."""
 
     def __init__(self, box: tuple[int, int, int, int], fine: int, intrinsics: dict[str, Any]) -> None:
@@ -83,7 +183,11 @@ class _Lens:
             rows, columns = (box[3] - box[1]) * fine, (box[2] - box[0]) * fine
             v, u = np.mgrid[:rows, :columns].astype(float)
             pixels = np.stack([u, v], axis=-1) / fine + to_pixel[:2, 2]
-            bent = cv2.undistortPoints(pixels.reshape(-1, 1, 2), matrix, distortion).reshape(rows, columns, 2)
+            # OpenCV's five iterations leave up to a tenth of a pixel at the corners of a wide lens.
+            until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-7)
+            flat = pixels.reshape(-1, 1, 2)
+            bent = cv2.undistortPointsIter(flat, matrix, distortion, np.eye(3), np.eye(3), until)
+            bent = bent.reshape(rows, columns, 2)
             self.rays = np.stack([bent[..., 0], bent[..., 1], np.ones((rows, columns))]).astype(np.float32)
 
     def paint(self, canvas: np.ndarray, texture: np.ndarray, to_texture: np.ndarray) -> None:
@@ -97,10 +201,11 @@ class _Lens:
             cv2.warpPerspective(texture, to_texture @ self.to_ray, size, canvas, flags, borderMode=border)
         else:
             u, v, w = np.tensordot(to_texture.astype(np.float32), self.rays, 1)
+            w[w == 0] = np.float32(1e-30)  # a ray along the plane hits it nowhere
             cv2.remap(texture, u / w, v / w, cv2.INTER_LINEAR, canvas, borderMode=border)
 
 
-def _draw(canvas: np.ndarray, face: str, pose: np.ndarray, cube: dict[str, Any], lens: _Lens) -> None:
+def _draw(canvas: np.ndarray, face: str, pose: np.ndarray, cube: dict[str, Any], lens: Lens) -> None:
     """Paint one face onto the fine canvas, if it is turned to the camera."""
     normal, right = (np.array(v, float) for v in FACES[face])
     rotation, side = pose[:3, :3], cube["side"] / 1000
@@ -155,7 +260,7 @@ def _box(pose: np.ndarray, intrinsics: dict[str, Any], side: float) -> tuple[int
     if points[:, 2].min() < 1e-3:
         return None
     pixels = _project(points, intrinsics)
-    margin = 5
+    margin = 2
     low = np.floor(pixels.min(axis=0)).astype(int) - margin
     high = np.ceil(pixels.max(axis=0)).astype(int) + margin
     left, top = np.maximum(low, 0)

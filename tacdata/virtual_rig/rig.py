@@ -53,22 +53,24 @@ class VirtualRig:
 
     def __init__(
         self, directory: Path, speed: float = 1.0, seed: int = 0, camera: bool = True,
-        sensor: Sensor | None = None,
+        sensor: Sensor | None = None, rough: bool = False,
     ) -> None:  # fmt: skip
         """Set up a rig whose clock runs ``speed`` times as fast as real time; ``seed`` decides its world.
+
+        With ``rough`` the sensor was put down by eye, up to a millimetre and some degrees off; the rig file does not
+        say that it was registered.
 
         Raises:
             UsageError: If ``speed`` is not positive or too fast.
         """
         if not 0 < speed <= 100:
-            raise UsageError(
-                f"speed {speed:g}", "above 0, at most 100", "choose another speed (8 suits two cores)"
-            )
+            raise UsageError(f"speed {speed:g}", "above 0, at most 100", "choose another speed (8 suits two cores)")
         self.directory, self.path = directory, directory / "rig.yaml"
         self._lock: IO[str] | None = None
         self.clock = Clock.start(speed)
         self.sensor = sensor or default_sensor()
-        self.truth = draw(seed, self.sensor, NOMINAL)
+        self.truth = draw(seed, self.sensor, NOMINAL, rough)
+        self._rough = rough
         self.world = World(self.truth, self.sensor)
         self.mounted = Mounted(directory / "mounted.json")
         parked = (NOMINAL.origin[0], NOMINAL.origin[1], NOMINAL.origin[2] + PARKED)
@@ -99,10 +101,7 @@ class VirtualRig:
                 "format": self.layout.document,
             },
             "mounting": {"file": str(self.mounted.path.absolute())},
-            "registration": {
-                "origin": [x, y, z], "yaw": NOMINAL.yaw, "method": "virtual touch-off", "residual": 0.05,
-                "date": datetime.fromtimestamp(self.clock.epoch_ns * 1e-9, UTC).date().isoformat(),
-            },
+            "registration": {"origin": [x, y, z], "yaw": NOMINAL.yaw, **self._registered},
             "envelope": {
                 "min": [x - half_x, y - half_y, z - 0.95 * self.sensor.skin.thickness],
                 "max": [x + half_x, y + half_y, z + PARKED + 5],
@@ -116,6 +115,13 @@ class VirtualRig:
                 }
             }  # fmt: skip
         return document
+
+    @property
+    def _registered(self) -> dict[str, Any]:
+        if self._rough:
+            return {}
+        date = datetime.fromtimestamp(self.clock.epoch_ns * 1e-9, UTC).date().isoformat()
+        return {"method": "virtual touch-off", "residual": 0.05, "date": date}
 
     @property
     def emulates(self) -> list[str]:
@@ -137,9 +143,7 @@ class VirtualRig:
         """
         self._lock = _claim(self.directory, self.path)
         camera = (
-            {"rate": self.camera.rate, "start_ns": self.camera.start_ns, **self.scene.document}
-            if self.camera
-            else None
+            {"rate": self.camera.rate, "start_ns": self.camera.start_ns, **self.scene.document} if self.camera else None
         )
         truth = {
             "version": schemas.version("virtual_truth"), "world": self.truth.document,
@@ -177,9 +181,7 @@ class VirtualRig:
 def _claim(directory: Path, path: Path) -> IO[str]:
     directory.mkdir(parents=True, exist_ok=True)
     if path.exists() and documents.read(path, "rig")["name"] != NAME:
-        raise UsageError(
-            f"{path} describes another rig", "a directory without one", "choose another directory"
-        )
+        raise UsageError(f"{path} describes another rig", "a directory without one", "choose another directory")
     lock = (directory / ".virtual_rig.lock").open("w")
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -195,10 +197,11 @@ def _claim(directory: Path, path: Path) -> IO[str]:
 
 @contextmanager
 def running(
-    directory: Path, speed: float = 8.0, seed: int = 0, camera: bool = True, sensor: Sensor | None = None
-) -> Iterator[Path]:
+    directory: Path, speed: float = 8.0, seed: int = 0, camera: bool = True, sensor: Sensor | None = None,
+    rough: bool = False,
+) -> Iterator[Path]:  # fmt: skip
     """Run a virtual rig in threads of this process; yields the path of its ``rig.yaml``."""
-    rig = VirtualRig(directory, speed, seed, camera, sensor)
+    rig = VirtualRig(directory, speed, seed, camera, sensor, rough)
     try:
         rig.start()
         yield rig.path

@@ -59,27 +59,48 @@ class Truth:
         values = asdict(self)
         values["gain"], values["offset"] = list(self.gain), list(self.offset)
         values["registration"]["origin"] = list(self.registration.origin)
+        values["registration"]["tilt"] = list(self.registration.tilt)
         return values
 
 
-def draw(seed: int, sensor: Sensor, nominal: Registration) -> Truth:
-    """Draw a world around a nominal registration, off by as little as a good lab would be."""
+ROUGH = (0.7, 0.7, 0.5), 3.0, 0.02
+"""How far a sensor that was only put down may be off: x, y, z [mm], yaw [deg], tilt [mm/mm]."""
+
+
+def put_down(seed: int, nominal: Registration) -> Registration:
+    """Return where a sensor lies that was put down by eye and never registered."""
+    rng = np.random.default_rng([seed, 8])
+    shift, turn = rng.uniform(-1, 1, 3) * ROUGH[0], rng.uniform(-1, 1) * ROUGH[1]
+    tilt = rng.uniform(-1, 1, 2) * ROUGH[2]
+    x, y, z = (np.array(nominal.origin) + shift).tolist()
+    a, b = tilt.tolist()
+    return Registration((x, y, z), float(nominal.yaw + turn), (a, b))
+
+
+def draw(seed: int, sensor: Sensor, nominal: Registration, rough: bool = False) -> Truth:
+    """Draw a world around a nominal registration, off by as little as a good lab would be.
+
+    Args:
+        seed: Same seed, same world.
+        sensor: The sensor in it.
+        nominal: Where the lab believes the sensor to lie.
+        rough: Whether the sensor was only put down (`put_down`), so that it has to be registered first.
+    """
     rng = np.random.default_rng([seed, 1])
     modulus = sensor.material.youngs_modulus / (1 - sensor.material.poisson_ratio**2)
     error = rng.normal(0, (0.05, 0.05, 0.02))
+    careful = Registration(
+        tuple(float(a + b) for a, b in zip(nominal.origin, error, strict=True)),  # type: ignore[arg-type]
+        float(nominal.yaw + rng.normal(0, 0.25)),
+    )
     return Truth(
         seed=seed,
-        registration=Registration(
-            tuple(float(a + b) for a, b in zip(nominal.origin, error, strict=True)),  # type: ignore[arg-type]
-            float(nominal.yaw + rng.normal(0, 0.25)),
-        ),
+        registration=put_down(seed, nominal) if rough else careful,
         mount_yaw=float(rng.normal(0, 0.4)),
         stiffness=float(modulus / sensor.skin.thickness * rng.uniform(0.9, 1.1)),
         thickness=float(1.4 * sensor.skin.thickness),
         spread=float(sensor.skin.thickness * rng.uniform(0.5, 0.6)),
-        protrusion=float(
-            4 / 3 * modulus * np.sqrt(max(sensor.skin.protrusion_radius, 0.1)) * rng.uniform(0.9, 1.1)
-        ),
+        protrusion=float(4 / 3 * modulus * np.sqrt(max(sensor.skin.protrusion_radius, 0.1)) * rng.uniform(0.9, 1.1)),
         half_closure=float(rng.uniform(0.5, 0.6)),
         gain=tuple((4000 * rng.normal(1, 0.08, sensor.taxels.count).clip(0.7, 1.3)).tolist()),
         offset=tuple(rng.normal(9000, 500, sensor.taxels.count).tolist()),
@@ -121,9 +142,7 @@ class World:
         i, j = _window(self.x, x, indenter.extent), _window(self.y, y, indenter.extent)
         angle = np.radians(yaw + self.truth.mount_yaw)
         dx, dy = self.x[i, None] - x, self.y[None, j] - y
-        height = indenter.profile(
-            np.cos(angle) * dx + np.sin(angle) * dy, np.cos(angle) * dy - np.sin(angle) * dx
-        )
+        height = indenter.profile(np.cos(angle) * dx + np.sin(angle) * dy, np.cos(angle) * dy - np.sin(angle) * dx)
         depression = np.minimum(np.maximum(depth - height, 0.0), 0.9 * self.truth.thickness)
         pressure = self.truth.stiffness * depression / (1 - depression / self.truth.thickness)
         return np.tensordot(self.share[:, i, j], pressure, axes=2)
@@ -143,9 +162,7 @@ class World:
         change, self._elastic, self._time_ns = elastic - self._elastic, elastic, time_ns
         for n, (share, tau) in enumerate(PRONY):
             decay = np.exp(-dt / tau)
-            mean = (
-                (1 - decay) * tau / dt if dt > 0 else 1.0
-            )  # of the decay over the step, for a ramp within it
+            mean = (1 - decay) * tau / dt if dt > 0 else 1.0  # of the decay over the step, for a ramp within it
             self._branches[n] = decay * self._branches[n] + mean * share * change
         keep = np.exp(-dt / 60.0)
         fresh = self._rng.normal(0, 1, len(elastic))

@@ -12,8 +12,8 @@ from tacdata.wire.frame_format import BITS, FrameFormat
 
 def limits(kind: str) -> tuple[float, float]:
     """Return the least and greatest number of a wire type."""
-    if kind == "float32":
-        return -float(np.finfo(np.float32).max), float(np.finfo(np.float32).max)
+    if kind.startswith("float"):
+        return -float(np.finfo(kind).max), float(np.finfo(kind).max)
     bits = BITS[kind]
     return (0, 2**bits - 1) if kind[0] == "u" else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
@@ -71,11 +71,7 @@ class AsciiLines:
             if not mark or value is None or value != checksum(layout.checksum, covered):
                 return None
         body = text[len(layout.sync) :]
-        parts = (
-            body.split()
-            if layout.separator.isspace()
-            else body.strip(layout.separator).split(layout.separator)
-        )
+        parts = body.split() if layout.separator.isspace() else body.strip(layout.separator).split(layout.separator)
         if len(parts) != layout.channels + len(layout.order) - 1:
             return None
         return self._numbers(parts)
@@ -85,9 +81,10 @@ class AsciiLines:
         for name in layout.order:
             count, kind = (layout.channels if name == "channels" else 1), layout.type_of(name)
             low, high = limits(kind)
-            radix = 0 if kind == "float32" else layout.radix
+            radix = 0 if kind.startswith("float") else layout.radix
             values = [_number(part, radix) for part in parts[at : at + count]]
-            if any(v is None or not low <= v <= high for v in values):
+            # A board may say itself that it has no number (nan); that is kept, and `tacdata check` names it.
+            if any(v is None or not (low <= v <= high or v != v) for v in values):
                 return None
             fields[name] = np.array(values, dtype=np.float64)
             at += count
@@ -98,6 +95,8 @@ def _number(text: bytes, radix: int) -> float | None:
     # int() and float() take underscores and other alphabets' digits; a wire does not.
     allowed = b"0123456789+-." + (b"abcdefABCDEF" if radix == 16 else b"eE" if radix == 0 else b"")
     text = text.strip()
+    if radix == 0 and text.lower() == b"nan":
+        return float("nan")
     if not text or text.strip(allowed):
         return None
     try:

@@ -24,6 +24,23 @@ def widen(values: np.ndarray, kind: str, endianness: str) -> np.ndarray:
     return whole.astype(np.float64)
 
 
+def intact(layout: FrameFormat, frame: bytes) -> bool:
+    """Say whether checksum and trailer of a frame of the right length and sync are right."""
+    body_end = len(layout.sync) + layout.dtype.itemsize
+    width = WIDTHS[layout.checksum]
+    if frame[body_end + width :] != layout.trailer:
+        return False
+    covered = frame[:body_end] if layout.covers == "frame" else frame[len(layout.sync) : body_end]
+    written = int.from_bytes(frame[body_end : body_end + width], layout.checksum_endianness)
+    return not width or written == checksum(layout.checksum, covered)
+
+
+def fields(layout: FrameFormat, frame: bytes) -> Fields:
+    """Return the numbers of an intact frame."""
+    record = np.frombuffer(frame, layout.dtype, count=1, offset=len(layout.sync))[0]
+    return {name: widen(record[name], layout.type_of(name), layout.endianness) for name in layout.order}
+
+
 class BinaryFrames:
     """Finds frames by sync and checksum, and after damage looks for the next sync one byte further on.
 
@@ -52,29 +69,14 @@ class BinaryFrames:
             if len(self.buffer) < layout.size + proof:
                 break
             frame = bytes(self.buffer[: layout.size])
-            if self._intact(frame) and (not proof or self.buffer.startswith(layout.sync, layout.size)):
+            if intact(layout, frame) and (not proof or self.buffer.startswith(layout.sync, layout.size)):
                 del self.buffer[: layout.size]
                 self.offset += layout.size
                 self.expected = self.offset
-                found.append((self._fields(frame), self.offset))
+                found.append((fields(layout, frame), self.offset))
             else:
                 self._reject()
         return found
-
-    def _intact(self, frame: bytes) -> bool:
-        layout = self.layout
-        body_end = len(layout.sync) + layout.dtype.itemsize
-        width = WIDTHS[layout.checksum]
-        if frame[body_end + width :] != layout.trailer:
-            return False
-        covered = frame[:body_end] if layout.covers == "frame" else frame[len(layout.sync) : body_end]
-        written = int.from_bytes(frame[body_end : body_end + width], layout.endianness)
-        return not width or written == checksum(layout.checksum, covered)
-
-    def _fields(self, frame: bytes) -> Fields:
-        layout = self.layout
-        record = np.frombuffer(frame, layout.dtype, count=1, offset=len(layout.sync))[0]
-        return {name: widen(record[name], layout.type_of(name), layout.endianness) for name in layout.order}
 
     def _reject(self) -> None:
         # A sync inside garbage is no frame: only one that stands where a frame is due counts as corrupt.

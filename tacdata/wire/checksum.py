@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import binascii
+import zlib
 from dataclasses import dataclass
 from functools import cache
 
@@ -24,12 +26,21 @@ class Crc:
 
 CRCS = {
     "crc8": Crc(8, 0x07, 0x00, False, 0x00),
+    "crc8_maxim": Crc(8, 0x31, 0x00, True, 0x00),
+    "crc8_sae_j1850": Crc(8, 0x1D, 0xFF, False, 0xFF),
     "crc16_ccitt_false": Crc(16, 0x1021, 0xFFFF, False, 0x0000),
     "crc16_xmodem": Crc(16, 0x1021, 0x0000, False, 0x0000),
+    "crc16_kermit": Crc(16, 0x1021, 0x0000, True, 0x0000),
+    "crc16_x25": Crc(16, 0x1021, 0xFFFF, True, 0xFFFF),
     "crc16_modbus": Crc(16, 0x8005, 0xFFFF, True, 0x0000),
+    "crc16_arc": Crc(16, 0x8005, 0x0000, True, 0x0000),
     "crc32": Crc(32, 0x04C11DB7, 0xFFFFFFFF, True, 0xFFFFFFFF),
+    "crc32_mpeg2": Crc(32, 0x04C11DB7, 0xFFFFFFFF, False, 0x00000000),
+    "crc32c": Crc(32, 0x1EDC6F41, 0xFFFFFFFF, True, 0xFFFFFFFF),
 }
-WIDTHS = {"none": 0, "xor8": 1, "sum8": 1, "sum16": 2} | {name: crc.width // 8 for name, crc in CRCS.items()}
+SUMS = {"xor8": 1, "sum8": 1, "lrc8": 1, "sum16": 2, "fletcher16": 2}
+"""Kinds that are no CRC, and the bytes that they take."""
+WIDTHS = {"none": 0} | SUMS | {name: crc.width // 8 for name, crc in CRCS.items()}
 """Bytes that each kind takes in a frame."""
 
 
@@ -49,7 +60,8 @@ def _table(crc: Crc) -> tuple[int, ...]:
     return tuple(entries)
 
 
-def _crc(crc: Crc, data: bytes) -> int:
+def crc_of(crc: Crc, data: bytes) -> int:
+    """Return any cyclic redundancy check of ``data`` by its parameters."""
     table, mask = _table(crc), (1 << crc.width) - 1
     register = _reflect(crc.initial, crc.width) if crc.reflected else crc.initial
     for byte in data:
@@ -62,11 +74,34 @@ def _crc(crc: Crc, data: bytes) -> int:
 
 def checksum(kind: str, data: bytes) -> int:
     """Return the checksum of ``data`` by its name in `WIDTHS`; 0 for ``none``."""
-    if kind in CRCS:
-        return _crc(CRCS[kind], data)
-    if kind == "xor8":
-        value = 0
-        for byte in data:
-            value ^= byte
-        return value
+    match kind:
+        case "crc16_ccitt_false":  # the same numbers, at the speed of C
+            return binascii.crc_hqx(data, 0xFFFF)
+        case "crc16_xmodem":
+            return binascii.crc_hqx(data, 0)
+        case "crc32":
+            return zlib.crc32(data)
+        case "xor8":
+            return _xor(data)
+        case "lrc8":  # the sum's two's complement, as in Modbus ASCII
+            return -sum(data) & 0xFF
+        case "fletcher16":  # Fletcher 1982: second sum in the high byte
+            return _fletcher(data)
+        case _ if kind in CRCS:
+            return crc_of(CRCS[kind], data)
     return sum(data) & ((1 << 8 * WIDTHS[kind]) - 1)
+
+
+def _xor(data: bytes) -> int:
+    value = 0
+    for byte in data:
+        value ^= byte
+    return value
+
+
+def _fletcher(data: bytes) -> int:
+    first = second = 0
+    for byte in data:
+        first = (first + byte) % 255
+        second = (second + first) % 255
+    return second << 8 | first

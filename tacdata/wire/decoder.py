@@ -9,6 +9,7 @@ from tacdata.wire.ascii import AsciiLines
 from tacdata.wire.binary import BinaryFrames
 from tacdata.wire.counter import CounterTrack
 from tacdata.wire.frame_format import BITS, FrameFormat
+from tacdata.wire.packets import PacketFrames
 
 
 class Decoder:
@@ -21,7 +22,8 @@ class Decoder:
         """Decode frames that lie as ``layout`` says."""
         self.layout = layout
         self.counts = StreamCounts()
-        self._frames = (BinaryFrames if layout.encoding == "binary" else AsciiLines)(layout, self.counts)
+        cutter = AsciiLines if layout.encoding == "ascii" else BinaryFrames
+        self._frames = (PacketFrames if layout.framing != "none" else cutter)(layout, self.counts)
         modulus = 1 << BITS[layout.counter] if layout.counter else 0
         self._counter = CounterTrack(modulus, layout.rate, self.counts) if modulus else None
         self._received = 0
@@ -45,6 +47,8 @@ class Decoder:
             self.counts.received += 1
             device_ns = -1 if ticks is None else round(ticks * self.layout.tick * 1e9)
             frames.append(TaxelFrame(arrival, counter, fields["channels"], device_ns))
+        while self._arrivals and self._arrivals[0][0] <= self._frames.offset:
+            self._arrivals.popleft()  # of bytes that are cut up already, were they frames or garbage
         return frames
 
     def _arrival_of(self, end: int) -> int:

@@ -15,7 +15,8 @@ from tacdata import documents
 from tacdata.errors import FormatError
 from tacdata.wire.checksum import WIDTHS
 
-BITS = {f"{sign}int{bits}": bits for bits in (8, 16, 24, 32) for sign in ("", "u")} | {"float32": 32}
+BITS = {f"{sign}int{bits}": bits for bits in (8, 16, 24, 32) for sign in ("", "u")}
+BITS |= {"uint64": 64, "float32": 32, "float64": 64}
 """Width of each wire type [bits]."""
 
 
@@ -27,7 +28,7 @@ class FrameFormat:
     encoding: str
     """``binary`` or ``ascii``."""
     endianness: Literal["little", "big"]
-    """``little`` or ``big``: numbers and checksum of a binary frame."""
+    """``little`` or ``big``: numbers of a binary frame."""
     sync: bytes
     """What every frame begins with; may be empty in ascii."""
     order: tuple[str, ...]
@@ -44,8 +45,12 @@ class FrameFormat:
     """Type of one reading."""
     checksum: str
     """Kind, a name in `tacdata.wire.checksum.WIDTHS`."""
+    checksum_endianness: Literal["little", "big"]
+    """Byte order of a binary frame's checksum."""
     covers: str
     """``fields`` or ``frame``: whether the sync is part of what the checksum covers."""
+    framing: str
+    """``none``, ``slip`` or ``cobs``: how binary frames are told apart besides by their sync."""
     mark: bytes
     """Text before the checksum of an ascii line."""
     trailer: bytes
@@ -89,7 +94,8 @@ def from_document(document: dict[str, Any], origin: str) -> FrameFormat:
     documents.check(document, "frame_format", origin)
     present = [name for name in ("counter", "timestamp", "channels") if name in document]
     order = document.get("order", present)
-    sync, binary = document.get("sync", ""), document["encoding"] == "binary"
+    binary = document["encoding"] == "binary"
+    sync = document.get("sync", [] if "framing" in document else "")
     _check_consistency(document, origin, present, order)
     timestamp, check = document.get("timestamp"), document.get("checksum", {"kind": "none"})
     return FrameFormat(
@@ -104,7 +110,9 @@ def from_document(document: dict[str, Any], origin: str) -> FrameFormat:
         channels=document["channels"]["count"],
         channel_type=document["channels"]["type"],
         checksum=check["kind"],
+        checksum_endianness=check.get("endianness", document.get("endianness", "little")),
         covers=check.get("covers", "fields"),
+        framing=document.get("framing", "none"),
         mark=check.get("mark", "*").encode("ascii"),
         trailer=bytes(document.get("trailer", [])),
         separator=document.get("separator", ",").encode("ascii"),
@@ -115,7 +123,13 @@ def from_document(document: dict[str, Any], origin: str) -> FrameFormat:
 
 
 def _check_consistency(document: dict[str, Any], origin: str, present: list[str], order: list[str]) -> None:
-    sync, binary = document.get("sync", ""), document["encoding"] == "binary"
+    binary = document["encoding"] == "binary"
+    sync = document.get("sync", [] if "framing" in document else "")
+    if "framing" in document and not binary:
+        raise FormatError(
+            f"{origin}: framing {document['framing']} in an ascii format", "framing of a binary format only",
+            "remove framing; lines tell ascii frames apart",
+        )  # fmt: skip
     if binary != isinstance(sync, list):
         raise FormatError(
             f"{origin}: sync {sync!r} in a {document['encoding']} format",
@@ -134,13 +148,10 @@ def _check_consistency(document: dict[str, Any], origin: str, present: list[str]
         "" if binary else sync,
     )
     if not all(text.isascii() and "\n" not in text for text in texts):
-        raise FormatError(
-            f"{origin}: {texts!r}", "plain ASCII without a line break", "correct sync, separator or mark"
-        )
-    if document.get("radix", 10) == 16 and document["channels"]["type"] == "float32":
-        raise FormatError(
-            f"{origin}: float32 channels with radix 16", "radix 10 for float32", "correct radix"
-        )
+        raise FormatError(f"{origin}: {texts!r}", "plain ASCII without a line break", "correct sync, separator or mark")
+    kind = document["channels"]["type"]
+    if document.get("radix", 10) == 16 and kind.startswith("float"):
+        raise FormatError(f"{origin}: {kind} channels with radix 16", "radix 10 for numbers like 1.5", "correct radix")
 
 
 def read_format(path: Path) -> FrameFormat:

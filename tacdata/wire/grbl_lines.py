@@ -1,4 +1,4 @@
-"""What a line from a GRBL controller is, by its form alone (Grbl v1.1 interface documentation)."""
+"""What a line from a GRBL controller is, by its form alone (Grbl v1.1 interface documentation; grblHAL `report.c`)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ MM_PER_INCH = 25.4
 
 RESPONSE = re.compile(r"^(?:ok|error:(\d+))$")
 ALARM = re.compile(r"^ALARM:(\d+)$")
-WELCOME = re.compile(r"grbl(?:hal)? v?\d\S* \[", re.IGNORECASE)
+WELCOME = re.compile(r"grbl(?:hal)? v?(\d+)\.(\d+)\S* \[", re.IGNORECASE)
 SETTING = re.compile(r"^(\$[A-Z0-9]+)=([^\s(]*)")
-MESSAGE = re.compile(r"^\[([A-Z0-9]+):(.*)\]$")
+STARTUP = re.compile(r"^\$N\d+=(.*)$")
+MESSAGE = re.compile(r"^\[([A-Z][A-Z0-9. ]*):(.*)\]$")
 
-READY_STATES = ("Idle", "Alarm")
-"""States in which GRBL answers ``$$``, ``$#`` and ``$I``."""
+OPENED_AGAIN = ("Hold:0", "Door:0")
+"""States of a machine at rest that only waits for a cycle start."""
+MOVING = ("Run", "Jog", "Home")
+"""States, without their substate, in which something moves."""
 
 
 @dataclass(frozen=True)
@@ -33,29 +36,41 @@ class StatusReport:
     """Work coordinate offset WCO [report units], shape (3,), if the report has one."""
     feed: float
     """Feed rate [report units/min]; NaN if the report has none."""
+    feed_override: float | None = None
+    """Feed override [%], if the report has one."""
+    pins: str = ""
+    """Letters of the active inputs, for example ``Z`` for its limit switch, ``D`` for the door."""
 
 
 def parse_status(line: str) -> StatusReport | None:
     """Return what ``<State|MPos:x,y,z|...>`` says, or None if the line is damaged.
 
-    After the first two fields any other may follow in any order or be absent.
+    After the first two fields any other may follow in any order or be absent; unknown ones are passed over.
     """
     if not (line.startswith("<") and line.endswith(">")):
         return None
     state, *fields = line[1:-1].split("|")
     values: dict[str, list[float]] = {}
+    pins = ""
     for field in fields:
         name, _, text = field.partition(":")
-        if name in ("MPos", "WPos", "WCO", "FS", "F"):
+        if name in ("MPos", "WPos", "WCO", "FS", "F", "Ov"):
             try:
                 values[name] = [float(number) for number in text.split(",")]
             except ValueError:
                 return None
+        elif name == "Pn":
+            pins = text
     kind = "MPos" if "MPos" in values else "WPos"
     position, offset = values.get(kind, []), values.get("WCO")
     if not re.fullmatch(r"[A-Za-z]+(:\d+)?", state) or len(position) < 3 or (offset and len(offset) < 3):
         return None
-    feed = (values.get("FS") or values.get("F") or [float("nan")])[0]
     return StatusReport(
-        state, np.array(position[:3]), kind == "WPos", np.array(offset[:3]) if offset else None, feed
+        state,
+        np.array(position[:3]),
+        kind == "WPos",
+        np.array(offset[:3]) if offset else None,
+        (values.get("FS") or values.get("F") or [float("nan")])[0],
+        (values.get("Ov") or [None])[0],
+        pins,
     )

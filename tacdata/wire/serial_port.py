@@ -17,15 +17,11 @@ except ImportError:  # Windows has no hang-up flag to clear.
 
 def ports() -> str:
     """Return the serial ports that this machine has, in words."""
-    found = [
-        f"{p.device} ({p.description})" if p.description != "n/a" else p.device for p in list_ports.comports()
-    ]
+    found = [f"{p.device} ({p.description})" if p.description != "n/a" else p.device for p in list_ports.comports()]
     return ", ".join(found) or "this machine shows none"
 
 
-def open_port(
-    port: str, baud: int, device: str, timeout: float, dtr: bool | None = None
-) -> serial.SerialBase:
+def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | None = None) -> serial.SerialBase:
     """Open a port for one process alone.
 
     The kernel raises DTR when a port is opened, which resets an Arduino board only if DTR was low. Clearing

@@ -276,3 +276,242 @@ def test_refused_line_says_why(rig):
     _, _, driver = rig
     with driver, pytest.raises(DeviceError, match=r"error:20 \(an unsupported"):
         driver._opened().command("G2X1Y1", 5.0)
+
+
+HAL = {"firmware": "grblHAL"}
+BOTH = pytest.mark.parametrize("rig", [{}, HAL], indirect=True, ids=["Grbl", "grblHAL"])
+
+
+def start(**options):
+    clock = Clock.start(RATE)
+    controller = Controller(clock, seed=1, position=START, **options)
+    return clock, controller, Grbl(clock, controller.port.path)
+
+
+@pytest.mark.parametrize("rig", [HAL], indirect=True)
+def test_grblhal_tells_what_it_is(rig):
+    _, _, driver = rig
+    with driver:
+        said = driver.settings()
+        driver.move((-50.0, -50.0, -21.0), 5.0)
+        driver.wait_idle(10)
+        np.testing.assert_allclose(driver.statuses()[-1].position, [-50, -50, -21], atol=2e-3)
+    assert (said["FIRMWARE"], said["NVS STORAGE"]) == ("grblHAL", "*EEPROM 2K")
+    assert said["PLUGIN"] == "none v0.1; another v0.2"
+
+
+@pytest.mark.parametrize("firmware", ["Grbl", "grblHAL"])
+def test_a_board_with_an_empty_memory_that_starts_late(firmware):
+    _, controller, driver = start(firmware=firmware, fresh=True, settings={"$22": "0", "$20": "0"})
+    threading.Timer(0.5, controller.start).start()
+    with driver:
+        said = driver.settings()
+        assert said["reset_at_opening"] == "yes"
+        assert said["$110"] == "1800.000"
+        assert "touch off before moving" in driver.cautions[0]
+        driver.move((-50.0, -50.0, -21.0), 5.0)
+        driver.wait_idle(10)
+        driver.check()
+    controller.stop()
+
+
+def test_parameters_that_cannot_be_read_do_not_shift_the_answers(rig):
+    _, controller, driver = rig
+    controller.inject_unreadable_memory()
+    with driver:
+        assert "G54" not in driver.settings()
+        assert driver.settings()["GC"].startswith("G0 G54")
+        motion = driver.dwell(1.0)
+    assert (motion.acknowledged_ns - motion.sent_ns) * 1e-9 >= 1.0
+
+
+def test_a_line_longer_than_the_buffer_is_refused_before_it_is_sent(rig):
+    _, controller, driver = rig
+    with driver:
+        before = len(controller.machine.planner.blocks)
+        with pytest.raises(DeviceError, match=r"(?s)100 bytes.*at most 79"):
+            driver._opened().command("G1X" + "0" * 97, 5.0)
+        driver.check()
+        assert len(controller.machine.planner.blocks) == before
+
+
+def test_lines_of_many_threads_never_overrun_the_buffer(rig):
+    _, _, driver = rig
+    with driver:
+        driver.dwell(0.5)
+        done = []
+
+        def send(k):
+            for _ in range(6):
+                driver.move((-50.0, -50.0, -20.0 - 0.1 * k), 10.0)
+            done.append(k)
+
+        threads = [threading.Thread(target=send, args=(k,)) for k in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(30)
+        assert sorted(done) == list(range(8))
+        driver.wait_idle(30)
+
+
+@BOTH
+def test_after_a_refused_line_the_retract_is_obeyed(rig):
+    _, _, driver = rig
+    with driver:
+        with pytest.raises(DeviceError, match="error:20"):
+            driver._opened().command("G77X1", 5.0)
+        driver.feed_hold()
+        x, y, z = driver.abandon()
+        assert (x, y, z) == pytest.approx(START, abs=2e-3)
+        driver.move((x, y, -15.0), 5.0)
+        driver.wait_idle(10)
+        np.testing.assert_allclose(driver.statuses()[-1].position, [-50, -50, -15], atol=2e-3)
+
+
+@BOTH
+def test_a_hold_ends_the_wait_and_lets_no_line_out(rig):
+    clock, controller, driver = rig
+    with driver:
+        driver.move((-50.0, -50.0, -30.0), 2.0)
+        threading.Timer(0.15, driver.feed_hold).start()
+        with pytest.raises(DeviceError, match="stopped by a feed hold"):
+            driver.dwell(0.01)
+        with pytest.raises(DeviceError, match="stopped by a feed hold"):
+            driver.move((-50.0, -50.0, -40.0), 2.0)
+        rest = driver.abandon()
+        clock.sleep(2)
+        np.testing.assert_allclose(controller.position_at(clock.now_ns()), rest, atol=2e-3)
+        assert -30 < rest[2] < -20
+        assert [byte for byte, _ in controller.heard if byte in (0x18, 0x21)] == [0x21, 0x18]
+
+
+@BOTH
+def test_somebody_elses_hold_is_noticed(rig):
+    _, controller, driver = rig
+    with driver:
+        driver.move((-50.0, -50.0, -30.0), 1.0)
+        controller.inject_byte(0x21)
+        with pytest.raises(DeviceError, match="someone held"):
+            driver.dwell(0.01)
+        driver.feed_hold()
+        assert driver.abandon()[2] < -20
+        driver.check()
+
+
+@BOTH
+def test_an_open_door_stops_and_lets_nothing_move_until_it_is_closed(rig):
+    clock, controller, driver = rig
+    with driver:
+        driver.move((-50.0, -50.0, -30.0), 1.0)
+        controller.inject_door(True)
+        with pytest.raises(DeviceError, match="safety door was opened"):
+            driver.dwell(0.01)
+        driver.feed_hold()
+        with pytest.raises(DeviceError, match="door is open"):
+            driver.abandon()
+        controller.inject_door(False)
+        clock.sleep(1)
+        x, y, z = driver.abandon()
+        driver.move((x, y, z + 2.0), 5.0)
+        driver.wait_idle(10)
+        np.testing.assert_allclose(driver.statuses()[-1].position, [-50, -50, z + 2], atol=2e-3)
+
+
+def test_overrides_are_set_back_at_opening_and_minded_after(rig):
+    _, controller, driver = rig
+    controller.inject_byte(0x92)
+    with driver:
+        time.sleep(0.05)
+        assert controller.machine.override == 100
+        driver.move((-50.0, -50.0, -40.0), 2.0)
+        controller.inject_byte(0x92)
+        with pytest.raises(DeviceError, match="feed override stands at 90 %"):
+            driver.dwell(0.01)
+        driver.feed_hold()
+        driver.abandon()
+        driver.check()
+
+
+@pytest.mark.parametrize(("lines", "state", "remedy"), [
+    (["$SLP"], "Sleep", "wake it"), (["$C"], "Check", "check mode"), (["$J=G91X-20F60"], "Jog", "let it finish"),
+])  # fmt: skip
+def test_states_that_only_a_person_should_end(rig, lines, state, remedy):
+    clock, controller, driver = rig
+    for line in lines:
+        controller.machine.execute(line, clock.now_ns())
+    with pytest.raises(DeviceError, match=rf"(?s)in state {state}.*{remedy}"):
+        driver.open()
+
+
+def test_a_startup_line_that_moves_is_refused(rig):
+    _, controller, driver = rig
+    controller.machine.startup[1] = "G0Z-1"
+    with pytest.raises(DeviceError, match="at every reset"):
+        driver.open()
+
+
+@pytest.mark.parametrize("rig", [{"homed": False, "settings": {"$22": "0", "$20": "0"}}], indirect=True)
+def test_a_locked_machine_without_homing_is_to_be_unlocked_by_hand(rig):
+    _, _, driver = rig
+    with pytest.raises(DeviceError, match=r"(?s)locked.*unlock it \(\$X\)"):
+        driver.open()
+
+
+@pytest.mark.parametrize("rig", [{"homed": False}], indirect=True)
+def test_giving_homing_up_resets_as_it_heeds_nothing_else(rig):
+    clock, controller, driver = rig
+    controller.settings["$25"] = "60"  # a minute of travel
+    driver.home_first = True
+    closed = []
+
+    def give_up():
+        clock.sleep(8)
+        link = driver._link
+        driver.close()
+        closed.append(link)
+
+    threading.Thread(target=give_up, daemon=True).start()
+    with pytest.raises(DeviceError):
+        driver.open()
+    clock.sleep(2)
+    assert 0x18 in [byte for byte, _ in controller.heard]
+    at = controller.position_at(clock.now_ns())
+    clock.sleep(2)
+    np.testing.assert_array_equal(controller.position_at(clock.now_ns()), at)
+
+
+def test_soft_limits_are_known(rig):
+    _, _, driver = rig
+    assert driver.travel is None, "nothing is known before opening"
+    with driver:
+        lower, upper = driver.travel
+        np.testing.assert_array_equal(lower, [-200, -200, -60])
+        np.testing.assert_array_equal(upper, 0)
+        assert driver.cautions == ()
+
+
+def test_an_alarm_whose_line_was_lost_is_seen_in_the_status(rig):
+    _, controller, driver = rig
+    with driver:
+        controller.machine.alarm = 0
+        with pytest.raises(DeviceError, match="locked"):
+            wait_for_fault(driver)
+
+
+def test_the_middle_of_a_move_is_reported_as_the_firmware_counts(rig):
+    _, _, driver = rig
+    with driver:
+        assert driver._opened().at_rest or driver._opened().fresh_status(5.0).state == "Idle"
+        driver.move((-50.0, -50.0, -30.0), 1.0)
+        assert not driver._opened().at_rest
+
+
+def test_a_grbl_too_old_is_refused(rig):
+    clock, controller, _ = rig
+    controller.inject_silence()
+    driver = Grbl(clock, controller.port.path)
+    old = threading.Timer(0.3, controller.inject_bytes, (b"\r\nGrbl 0.9j ['$' for help]\r\n",))
+    old.start()
+    with pytest.raises(DeviceError, match=r"(?s)0\.9j.*Grbl 1\.1 or grblHAL"):
+        driver.open()

@@ -100,6 +100,7 @@ class Controller(MotionController):
         with self._lock:
             self._at, self._move = self.position(), None
         self.calls.append("feed_hold")
+        self._reset.set()
 
     def resume(self):
         self.calls.append("resume")
@@ -110,6 +111,8 @@ class Controller(MotionController):
             raise DeviceError("the controller does not obey", "one that does", "free it by hand")
         self._until = 0
         self._reset.set()
+        x, y, z = self.position().tolist()
+        return x, y, z
 
 
 class Board(TaxelBoard):

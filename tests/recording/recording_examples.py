@@ -5,7 +5,7 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
 from tacdata.plans import Plan
-from tacdata.recording import clock_model
+from tacdata.recording import clock_fit
 from tacdata.recording.anchoring import Command
 from tacdata.recording.motion_profile import AxisLimits
 from tacdata.recording.press_steps import steps
@@ -143,7 +143,7 @@ class Press:
         """Write the recording; returns its path."""
         writer = EpisodeWriter(path, self.header, Clock(T0, 0, 1.0), ("side",) if self.camera else ())
         self.feed(writer)
-        model = clock_model.fit(self.arrival, self.counter)
+        model = clock_fit.fit(self.arrival, self.counter)
         models = {"taxels": model} if model else {}
         counts = {"taxels": StreamCounts(received=len(self.sample))}
         return writer.close(complete, reason, models, counts)

@@ -1,7 +1,13 @@
+import time
+
 import numpy as np
 import pytest
 
-from tacdata.recording.clock_model import ClockModel, EnvelopeFit, fit
+from tacdata.clock import Clock
+from tacdata.recording.clock_fit import EnvelopeFit, fit
+from tacdata.recording.clock_model import ClockModel, Latency
+from tacdata.recording.polled_clock import polled_clock
+from tacdata.recording.stream_clock import StreamClock
 
 START = 1_760_000_000_000_000_000
 
@@ -56,10 +62,10 @@ def test_running_fit_equals_the_batch_fit_and_keeps_hulls_only():
     rng = np.random.default_rng(4)
     _, arrival = arrivals(rng, 20_000, 100.0, 50e-6, rng.exponential(0.002, 20_000))
     running = EnvelopeFit()
-    for count, time in enumerate(arrival.tolist()):
-        running.add(time, count)
+    for count, moment in enumerate(arrival.tolist()):
+        running.add(moment, count)
     assert running.model() == fit(arrival, np.arange(20_000))
-    assert sum(len(block) for block in running._blocks) < 2500
+    assert sum(len(block.hull) for block in running._stretch.blocks) < 2500
 
 
 def test_reset_of_the_device_starts_anew_and_unknown_counters_give_no_model():
@@ -73,6 +79,132 @@ def test_reset_of_the_device_starts_anew_and_unknown_counters_give_no_model():
     assert fit(np.array([START]), np.array([0])) is None
 
 
+def link(seed, rate, seconds, kind, drift):
+    """True times and arrivals of a link of that kind, with a delay of 2 ms at least."""
+    rng = np.random.default_rng(seed)
+    count = int(rate * seconds)
+    true, arrival = arrivals(rng, count, rate, drift, 0.002 + rng.exponential(0.0005, count))
+    if "ftdi" in kind:
+        begin = START + int(rng.integers(16_000_000))
+        arrival = begin + -(-(arrival - begin) // 16_000_000) * 16_000_000
+    time = START
+    while "stall" in kind and time < true[-1]:
+        time += int(rng.exponential(1e9))
+        length = int(rng.uniform(0.01, 0.3) * 1e9)
+        stalled = (arrival >= time) & (arrival < time + length)
+        arrival[stalled] = time + length
+    return rng, true, np.maximum.accumulate(arrival)
+
+
+@pytest.mark.parametrize("kind", ["usb", "ftdi", "stall", "ftdi and stall"])
+@pytest.mark.parametrize(("rate", "limit"), [(30.0, 3.0), (100.0, 1.0), (1000.0, 1.0)])
+def test_every_link_is_known_up_to_a_constant(kind, rate, limit):
+    for seed in range(4):
+        drift = np.random.default_rng(seed).uniform(-200e-6, 200e-6)
+        rng, true, arrival = link(seed, rate, 20.0 if rate > 500 else 120.0, kind, drift)
+        counter = np.arange(len(true)) + 60_000
+        kept = rng.random(len(true)) > 0.03
+        model = fit(arrival[kept], counter[kept])
+        error = (model.sample_times(arrival[kept], counter[kept]) - true[kept]) / 1e6 - 2.0
+        constant = (error.max() + error.min()) / 2
+        assert model.earlier == ()
+        assert np.abs(error - constant).max() < limit
+        assert -0.1 < constant < 2.0
+        assert abs(model.drift(1e9 / rate) - drift * 1e6) < 3 * model.drift_uncertainty * 1e6 + 1.0
+
+
+def test_a_stall_of_seconds_is_no_step_of_the_device():
+    _, true, arrival = link(5, 100.0, 60.0, "usb", 50e-6)
+    stalled = (arrival > START + 20_000_000_000) & (arrival < START + 26_000_000_000)
+    arrival[stalled] = START + 26_000_000_000
+    model = fit(arrival, np.arange(len(true)))
+    assert model.earlier == ()
+    assert np.abs(model.sample_ns(np.arange(len(true))) - true).max() / 1e6 < 2.1
+
+
+def test_a_host_that_is_late_for_long_and_then_is_not_has_not_stepped():
+    _, true, arrival = link(11, 100.0, 60.0, "usb", 30e-6)
+    busy = (arrival > START + 20_000_000_000) & (arrival < START + 26_000_000_000)
+    arrival[busy] += 60_000_000
+    arrival = np.maximum.accumulate(arrival)
+    running = EnvelopeFit()
+    for count, moment in enumerate(arrival.tolist()):
+        running.add(moment, count)
+        if count == 2400:
+            assert len(running.model().earlier) == 1, "so it looked for a while"
+    assert running.model().earlier == ()
+    assert running.model().frames == 6000
+    assert np.abs(running.model().sample_times(arrival, np.arange(6000)) - true).max() / 1e6 < 2.1
+
+
+@pytest.mark.parametrize("gap", [0.05, 2.0, 30.0])
+def test_a_device_that_pauses_or_restarts_begins_a_new_line(gap):
+    _, true, arrival = link(6, 100.0, 60.0, "usb", -80e-6)
+    after = np.arange(len(true)) >= 2500
+    true, arrival = true + after * round(gap * 1e9), arrival + after * round(gap * 1e9)
+    for counter in (np.arange(6000), np.where(after, np.arange(6000) - 2500, np.arange(6000) + 9000)):
+        model = fit(arrival, counter)
+        assert len(model.earlier) == 1
+        assert np.abs(model.sample_times(arrival, counter) - true).max() / 1e6 < 2.1
+    model = fit(arrival, np.arange(6000))
+    assert model.steps_ns[0] / 1e9 == pytest.approx(gap, abs=1e-3)
+
+
+def test_a_counter_that_jumps_without_time_begins_a_new_line():
+    _, true, arrival = link(7, 100.0, 60.0, "usb", 20e-6)
+    counter = np.arange(6000) + 256 * (np.arange(6000) > 3000)
+    model = fit(arrival, counter)
+    assert len(model.earlier) == 1
+    assert np.abs(model.sample_times(arrival, counter) - true).max() / 1e6 < 2.1
+
+
+def test_the_devices_own_time_is_followed_where_sampling_is_irregular():
+    rng = np.random.default_rng(8)
+    device = np.cumsum(rng.integers(5_000_000, 40_000_000, 3000))
+    true = START + np.rint(device * (1 + 150e-6)).astype(np.int64)
+    arrival = np.maximum.accumulate(true + np.rint((0.001 + rng.exponential(0.004, 3000)) * 1e9).astype(np.int64))
+    model = fit(arrival, device, "device_ns")
+    assert np.abs(model.sample_times(arrival, device) - true).max() / 1e6 < 1.3
+    assert model.drift(0.0) == pytest.approx(150, abs=3)
+
+
+def test_numbers_given_on_arrival_are_left_alone_when_they_fit_no_line():
+    rng = np.random.default_rng(9)
+    arrival = START + np.cumsum(rng.integers(20_000_000, 400_000_000, 500))
+    model = fit(arrival, np.arange(500), "order")
+    assert not model.steady
+    moved = model.with_latency(Latency(40_000_000, 1_000_000))
+    np.testing.assert_array_equal(moved.sample_times(arrival, np.arange(500)), arrival - 40_000_000)
+
+
+def test_a_wall_clock_that_steps_does_not_reach_the_streams(monkeypatch):
+    clock = Clock.start()
+    before = clock.now_ns()
+    monkeypatch.setattr(time, "time_ns", lambda: 0)
+    monkeypatch.setattr(time, "time", lambda: 0.0)
+    assert 0 <= clock.now_ns() - before < 1_000_000_000
+
+
+def test_a_stream_is_timed_while_it_arrives():
+    _, true, arrival = link(10, 100.0, 20.0, "ftdi", 60e-6)
+    clock = StreamClock()
+    sample = np.array([clock.take(int(a), k) for k, a in enumerate(arrival)])
+    assert (sample <= arrival).all()
+    assert np.abs((sample - true)[500:] / 1e6 - 3.0).max() < 2.0
+    clock.latency = Latency(2_000_000, 100_000)
+    assert clock.model().latency == clock.latency
+    assert StreamClock().take(5, -1) == 5
+
+
+def test_polled_answers_lie_between_query_and_receipt():
+    sent = np.arange(10) * 100
+    assert polled_clock(sent, sent + 8).document["round_trip_ns"] == "8"
+    assert polled_clock(np.array([]), np.array([])) is None
+
+
 def test_model_survives_its_document():
-    model = ClockModel(7, START, 33_333_333.25, 900)
-    assert ClockModel.from_document(model.document) == model
+    old = ClockModel(7, START, 33_333_333.25, 900)
+    assert ClockModel.from_document(old.document) == old
+    whole = ClockModel(9, START, 1e7, 80, START, 2e6, 1e6, 5e5, 0.001, "device_ns", None, (old,))
+    whole = whole.with_latency(Latency(6_000_000, 200_000))
+    assert ClockModel.from_document(whole.document) == whole

@@ -12,7 +12,7 @@ from recording_examples import SENSOR, T0, Press, header
 
 from tacdata.clock import Clock
 from tacdata.errors import FormatError, UsageError
-from tacdata.recording import clock_model, file_names, read_episode
+from tacdata.recording import clock_fit, file_names, read_episode
 from tacdata.recording.mcap_records import read_records
 from tacdata.recording.reader import read_recording
 from tacdata.recording.recover import recover
@@ -34,7 +34,7 @@ def test_what_was_written_is_read_exactly(press, tmp_path):
     np.testing.assert_array_equal(episode.taxels.counts, press.counts)
     np.testing.assert_array_equal(episode.taxels.counter, press.counter)
     np.testing.assert_array_equal(episode.taxels.arrival_ns, press.arrival)
-    model = clock_model.fit(press.arrival, press.counter)
+    model = clock_fit.fit(press.arrival, press.counter)
     np.testing.assert_array_equal(episode.taxels.sample_ns, model.sample_ns(press.counter))
     np.testing.assert_array_equal(episode.cnc.position, [s.position for s in press.statuses])
     np.testing.assert_array_equal(episode.cnc.arrival_ns, [s.arrival_ns for s in press.statuses])
@@ -135,8 +135,9 @@ def test_a_damaged_chunk_costs_that_chunk_only(press, tmp_path):
     press.feed(writer)
     writer.close(True)
     data = bytearray(path.read_bytes())
-    middle = len(data) // 2
-    data[middle : middle + 3] = b"\xff\x00\xff"
+    chunks = [end for end in record_ends(data)[:-1] if data[end] == 6]
+    inside = chunks[len(chunks) // 2] + 60
+    data[inside : inside + 3] = b"\xff\x00\xff"
     path.write_bytes(data)
     episode = read_episode(path)
     assert not episode.complete
@@ -194,11 +195,12 @@ def test_recover_writes_what_every_reader_opens(press, tmp_path):
     path = press.write(tmp_path / "episode-000000.mcap")
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-3000])
-    target, records = recover(cut)
+    found = recover(cut)
+    target = found.path
     assert target == tmp_path / "cut.recovered.mcap"
-    assert records.damage
+    assert found.damage
     with target.open("rb") as stream:
-        assert make_reader(stream).get_summary().statistics.message_count == len(records.messages)
+        assert make_reader(stream).get_summary().statistics.message_count == found.messages
     before, after = read_records(cut), read_records(target)
     assert [(m.log_time, m.publish_time, m.sequence, m.data) for m in after.messages] == [
         (m.log_time, m.publish_time, m.sequence, m.data) for m in before.messages
@@ -233,9 +235,7 @@ for k in range(100000):
 def test_kill_9_costs_at_most_the_last_second(tmp_path):
     path = tmp_path / "episode-000000.mcap"
     here = str(Path(__file__).parent)
-    child = subprocess.Popen(
-        [sys.executable, "-c", WRITE_FOREVER, str(path), here], stdout=subprocess.PIPE, text=True
-    )
+    child = subprocess.Popen([sys.executable, "-c", WRITE_FOREVER, str(path), here], stdout=subprocess.PIPE, text=True)
     lines = []
     begun = None
     while begun is None or time.monotonic() - begun < 2.5:
@@ -262,3 +262,63 @@ def test_header_of_the_examples_is_what_a_recorder_would_attach():
         "plan.json",
         "controller.json",
     }
+
+
+def record_ends(data):
+    """Return where each record of an MCAP file ends [bytes]."""
+    ends, at = [8], 8
+    while at + 9 <= len(data) - 8:
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+        ends.append(at)
+    return ends
+
+
+def test_every_truncation_gives_the_beginning_of_the_recording_or_words(press, tmp_path):
+    path = tmp_path / "episode-000000.mcap"
+    writer = EpisodeWriter(path, press.header, Clock(T0, 0, 1.0), ("side",))
+    writer._file._chunk_seconds = 0.005
+    press.feed(writer)
+    writer.close(True)
+    data, cut = path.read_bytes(), tmp_path / "cut.mcap"
+    whole = read_records(path)
+    assert whole.damage == []
+    ends = record_ends(data)
+    places = {end + shift for end in ends for shift in (-1, 0, 1, 9)} | set(range(0, len(data), 211))
+    before = 0
+    for place in sorted(p for p in places if p < len(data)):
+        cut.write_bytes(data[:place])
+        try:
+            records = read_records(cut)
+        except FormatError:
+            assert place < ends[2], "only a file without any content is refused"
+            continue
+        assert records.damage, place
+        assert records.messages == whole.messages[: len(records.messages)]
+        assert len(records.messages) >= before
+        before = len(records.messages)
+    assert before == len(whole.messages)
+
+
+def test_a_file_cut_before_its_first_message_is_not_recovered(press, tmp_path):
+    path = press.write(tmp_path / "episode-000000.mcap")
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(path.read_bytes()[: record_ends(path.read_bytes())[4]])
+    with pytest.raises(FormatError, match="before its first message"):
+        recover(cut)
+    assert not (tmp_path / "cut.recovered.mcap").exists()
+
+
+def test_a_damaged_length_costs_its_record_only(press, tmp_path):
+    path = tmp_path / "episode-000000.mcap"
+    writer = EpisodeWriter(path, press.header, Clock(T0, 0, 1.0), ("side",))
+    writer._file._chunk_seconds = 0.0
+    press.feed(writer)
+    writer.close(True)
+    data = bytearray(path.read_bytes())
+    whole = len(read_records(path).messages)
+    chunk = next(end for end in record_ends(data)[60:] if data[end] == 6)
+    data[chunk + 1 : chunk + 9] = b"\xff" * 8
+    path.write_bytes(data)
+    records = read_records(path)
+    assert whole - 3 <= len(records.messages) < whole
+    assert any("unreadable bytes" in damage for damage in records.damage)

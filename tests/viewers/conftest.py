@@ -110,8 +110,12 @@ def label(episode):
         tip=tip,
         signed=signed,
         taxel_force=np.zeros((FRAMES, 24), np.float32),
+        taxel_closure=np.zeros((FRAMES, 24), np.float32),
+        taxel_area=np.zeros((FRAMES, 24), np.float32),
         force=force,
+        error_map=np.full(signed.shape, 0.004, np.float16),
         error=np.full(FRAMES, 0.004, np.float32),
+        force_error=np.full(FRAMES, 0.01, np.float32),
         provenance=made(episode),
     )
 

@@ -7,11 +7,13 @@ from tacdata.wire.grbl_codes import ALARMS, ERRORS, alarm_in_words, error_in_wor
 from tacdata.wire.grbl_lines import ALARM, MESSAGE, RESPONSE, SETTING, WELCOME, parse_status
 
 
-def test_every_code_of_grbl_1_1_has_words():
-    assert set(ERRORS) == {*range(1, 18), *range(20, 39)}
-    assert set(ALARMS) == set(range(1, 10))
-    assert "not a GRBL 1.1 code" in error_in_words(79)
+def test_every_code_has_words():
+    assert set(ERRORS) >= {*range(1, 18), *range(20, 39)}, "Grbl 1.1"
+    assert set(ERRORS) >= {18, 19, *range(39, 59), 79}, "grblHAL"
+    assert set(ALARMS) == set(range(1, 19))
+    assert "neither Grbl 1.1 nor grblHAL" in error_in_words(222)
     assert alarm_in_words(2).startswith("ALARM:2 (the target lies beyond the soft limits")
+    assert "homed before" in alarm_in_words(11)
 
 
 @pytest.mark.parametrize("line", ["ok", "error:22"])
@@ -43,6 +45,10 @@ def test_settings_and_messages():
     said = MESSAGE.match("[OPT:VL,15,128]")
     assert said
     assert said.groups() == ("OPT", "VL,15,128")
+    for line, tag in (("[NVS STORAGE:*EEPROM 2K]", "NVS STORAGE"), ("[G59.1:0.000,0.000,0.000]", "G59.1")):
+        spaced = MESSAGE.match(line)
+        assert spaced
+        assert spaced[1] == tag
     alarm = ALARM.match("ALARM:9")
     assert alarm
     assert alarm[1] == "9"
@@ -61,6 +67,15 @@ def test_status_reports(line, state, position, work, feed):
     np.testing.assert_allclose(report.position, position)
     if "WCO" in line:
         np.testing.assert_allclose(report.offset, [10, 20, 30])
+
+
+def test_overrides_and_inputs_of_a_report():
+    report = parse_status("<Door:1|MPos:1,2,3|FS:0,0|Pn:ZD|Ov:50,100,100|A:S|Xy:new field>")
+    assert report is not None
+    assert (report.state, report.feed_override, report.pins) == ("Door:1", 50, "ZD")
+    bare = parse_status("<Idle|MPos:1,2,3>")
+    assert bare is not None
+    assert (bare.feed_override, bare.pins, np.isnan(bare.feed)) == (None, "", True)
 
 
 @pytest.mark.parametrize("line", [

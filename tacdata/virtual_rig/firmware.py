@@ -1,0 +1,57 @@
+"""What tells one emulated firmware from another: its texts, buffers and habits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """A firmware's character."""
+
+    welcome: str
+    """First line after power-on and every reset."""
+    information: tuple[str, ...]
+    """Answer to ``$I``."""
+    planner_blocks: int
+    """Moves that it queues."""
+    rx_bytes: int
+    """Receive buffer [bytes]."""
+    line_bytes: int
+    """Longest line without blanks [bytes]; beyond it ``error:11``."""
+    dwell_step: float
+    """Pauses are rounded up to multiples of this, and ``?`` is only looked for between them [s]."""
+    alarm_pause: float
+    """How long it says and hears nothing after an ALARM line [s]."""
+    answers_in_critical_alarm: bool
+    """Whether ``?`` is answered after a limit alarm, before the reset."""
+    refuses_after_error: bool
+    """Whether a refused G-code line makes it refuse all further ones until an empty or ``$`` line."""
+    alarm_substate: bool
+    """Whether the state reads ``Alarm:N``."""
+    changed: dict[str, str] = field(default_factory=dict)
+    """Settings whose defaults differ."""
+
+
+GRBL = Firmware(
+    "Grbl 1.1h ['$' for help]",
+    ("[VER:1.1h.20190830:virtual]", "[OPT:V,15,128]"),
+    planner_blocks=15, rx_bytes=128, line_bytes=79, dwell_step=0.05, alarm_pause=0.5,
+    answers_in_critical_alarm=False, refuses_after_error=False, alarm_substate=False,
+)  # fmt: skip
+"""Grbl 1.1h on an ATmega328p (`config.h`, `protocol.c`, `report.c` of that version)."""
+
+GRBLHAL = Firmware(
+    "GrblHAL 1.1f ['$' or '$HELP' for help]",
+    (
+        "[VER:1.1f.20250401:]", "[OPT:VNMSL,100,1024,3,0]", "[AXS:3:XYZ]", "[NEWOPT:ENUMS,RT+,REBOOT]",
+        "[FIRMWARE:grblHAL]", "[SIGNALS:HSEP]", "[NVS STORAGE:*EEPROM 2K]", "[DRIVER:virtual]", "[PLUGIN:none v0.1]",
+        "[PLUGIN:another v0.2]",
+    ),
+    planner_blocks=100, rx_bytes=1024, line_bytes=256, dwell_step=0.001, alarm_pause=0.1,
+    answers_in_critical_alarm=True, refuses_after_error=True, alarm_substate=True,
+    changed={"$10": "511", "$22": "1", "$481": "0"},
+)  # fmt: skip
+"""grblHAL (`report.c`, `protocol.c` of its core)."""
+
+NAMES = {"Grbl": GRBL, "grblHAL": GRBLHAL}

@@ -1,0 +1,375 @@
+"""`tacdata check` against a table of planted faults: each is named, and nothing is said of clean recordings."""
+
+import re
+
+import numpy as np
+import pytest
+from recording_examples import SENSOR, T0, Press, plan_document, rig_document
+
+from tacdata.clock import Clock
+from tacdata.devices.device import CncStatus, StreamCounts
+from tacdata.plans import Plan
+from tacdata.recording import clock_fit
+from tacdata.recording.check import check
+from tacdata.recording.clock_model import Latency
+from tacdata.recording.polled_clock import polled_clock
+from tacdata.recording.session import create_session, refresh
+from tacdata.recording.writer import EpisodeWriter
+
+BAD, WARN = "unusable", "warning"
+MS = 1_000_000
+IMAGE_PERIOD = 33_333_333
+
+
+class Whole(Press):
+    """A press with a camera at 30 Hz whose images all differ; everything that a fault may change is an attribute."""
+
+    def __init__(self, number=0, seed=0, rate=30.0):
+        super().__init__(number, seed, rate, camera=True)
+        self.header.rig["cameras"]["side"]["rate"] = 30.0
+        self.header.board["format"] = {"channels": {"type": "uint16"}}
+        self.header.board["rate"]["nominal"] = 30.0
+        self.driver = StreamCounts(received=len(self.sample))
+        self.images = list(np.arange(T0, self.end, IMAGE_PERIOD) + 40 * MS)
+        self.pictures = [b"picture %d" % k for k in range(len(self.images))]
+        self.faces, self.complete, self.reason = 2, True, ""
+        self.views = []
+
+    def write(self, path):
+        writer = EpisodeWriter(path, self.header, Clock(T0, 0, 1.0), ("side",))
+        self.feed(writer)
+        for k, (time, picture) in enumerate(zip(self.images, self.pictures, strict=True)):
+            time = int(time) + int(self.rng.integers(3 * MS))
+            writer.image("side", time, time, k, picture)
+            if k % 4 == 0:
+                writer.cube("side", time, time, k, self._pose())
+        sent, arrival = (np.array([getattr(s, name) for s in self.statuses]) for name in ("sent_ns", "arrival_ns"))
+        models = {
+            "taxels": clock_fit.fit(self.arrival, self.counter),
+            "camera side": clock_fit.fit(np.array(self.images), np.arange(len(self.images)), "order"),
+            "cnc": polled_clock(sent, arrival),
+        }
+        return writer.close(self.complete, self.reason, {k: m for k, m in models.items() if m}, {"taxels": self.driver})
+
+    def _pose(self):
+        from tacdata.recording.writer import CubePoseRecord
+
+        return CubePoseRecord((0.1, 0.2, 0.4), (0.0, 0.6, 0.0, 0.8), 0.25, self.faces) if self.faces else None
+
+    def while_still(self, phase="hold"):
+        """Return the row in the middle of a still phase."""
+        command = next(c for c in self.commands if c.phase == phase and not c.is_move)
+        return int(np.searchsorted(self.sample, command.acknowledged_ns - 0.3e9))
+
+
+FAULTS = {}
+
+
+def fault(severity, stream, words, **options):
+    def keep(plant):
+        FAULTS[plant.__name__] = plant, severity, stream, words, options
+        return plant
+
+    return keep
+
+
+@fault(WARN, "taxels", "1 frames lost")
+def one_frame_lost(p):
+    p.drop(40, 41)
+
+
+@fault(BAD, "taxels", r"15 frames lost .* longest gap 533 ms")
+def gap(p):
+    p.drop(60, 75)
+
+
+@fault(BAD, "taxels", "gap of 4.. ms")
+def gap_that_no_counter_shows(p):
+    p.counter[:] = -1
+    p.sample[90:] += 400 * MS
+    p.arrival[90:] += 400 * MS
+
+
+@fault(WARN, "taxels", r"clock stepped by \+150 ms: it restarted")
+def device_clock_steps(p):
+    later = np.arange(len(p.sample)) >= 60
+    p.sample, p.arrival = p.sample + later * 150 * MS, p.arrival + later * 150 * MS
+
+
+@fault(WARN, "taxels", r"\+[45]\d\d ppm off", rate=30 / (1 + 500e-6))
+def drift_of_500_ppm(p):
+    pass
+
+
+@fault(WARN, "taxels", r"-\d+ ppm off", rate=30 / (1 - 700e-6))
+def drift_of_minus_700_ppm(p):
+    pass
+
+
+@fault(WARN, "taxels", "27.00 Hz, nominal 30 Hz", rate=27.0)
+def wrong_rate(p):
+    pass
+
+
+@fault(WARN, "taxels", "late in reading")
+def host_stalls(p):
+    stalled = (p.arrival > p.arrival[50]) & (p.arrival < p.arrival[50] + 600 * MS)
+    p.arrival[stalled] = p.arrival[50] + 600 * MS
+
+
+@fault(WARN, "taxels", "7 damaged frames")
+def corrupt_frames(p):
+    p.driver.corrupt = 7
+
+
+@fault(WARN, "taxels", "3 frames came twice")
+def repeated_frames(p):
+    p.driver.repeated = 3
+
+
+@fault(WARN, "taxels", "99 bytes between")
+def garbage(p):
+    p.driver.garbage_bytes = 99
+
+
+@fault(WARN, "taxels", "the counter went from 9 to 0")
+def board_restarts(p):
+    p.driver.notes = ["the counter went from 9 to 0: it restarted"]
+
+
+@fault(WARN, "taxels", "no counter")
+def no_counter(p):
+    p.counter[:] = -1
+
+
+@fault(BAD, "taxels", "channel 5 stopped changing")
+def dead_channel(p):
+    p.counts[:, 5] = 0.0
+
+
+@fault(BAD, "taxels", "channel 6 stopped changing")
+def channel_sticks(p):
+    p.counts[80:, 6] = p.counts[5, 6]
+
+
+@fault(BAD, "taxels", "ran into a limit")
+def clipped_channel(p):
+    strongest = int(np.argmax(p.counts.max(axis=0) - p.counts[0]))
+    p.counts[:, strongest] = np.minimum(p.counts[:, strongest], 9500)
+
+
+@fault(BAD, "taxels", "channel 2 ran into a limit")
+def full_scale(p):
+    p.counts[100:104, 2] = 65535
+
+
+@fault(BAD, "taxels", "channel 8 has readings that are no numbers")
+def nan_channel(p):
+    p.counts[:, 8] = np.nan
+
+
+@fault(BAD, "taxels", "channel 8 has readings that are no numbers")
+def one_nan(p):
+    p.counts[50, 8] = np.nan
+
+
+@fault(BAD, "taxels", "channels 3 and 4 read the same")
+def tied_channels(p):
+    p.counts[:, 4] = p.counts[:, 3]
+
+
+@fault(BAD, "taxels", "the board is dead")
+def frozen_board(p):
+    p.counts[:] = p.counts[0]
+
+
+@fault(WARN, "taxels", "channel 11 is over 5 times as noisy")
+def noisy_channel(p):
+    p.counts[:, 11] += np.round(p.rng.normal(0, 60, len(p.counts)))
+
+
+@fault(BAD, "taxels", r"channel 10 jumps by \+1[78]\d\d counts at .* while nothing moves")
+def gain_step_at_rest(p):
+    p.counts[p.while_still("rest") :, 10] += 1800
+
+
+@fault(BAD, "taxels", r"channel 10 jumps by [+]4\d\d\d counts")
+def gain_step_in_the_hold(p):
+    p.counts[p.while_still("hold") :, 10] *= 1.5
+
+
+@fault(BAD, "taxels", "24 channels jump")
+def supply_steps(p):
+    p.counts[p.while_still("rest") :] -= 700
+
+
+@fault(BAD, "cnc", "no status report")
+def controller_silent(p):
+    p.statuses = []
+
+
+@fault(WARN, "cnc", "no status report for 2125 ms")
+def controller_pauses(p):
+    del p.statuses[10:26]
+
+
+@fault(BAD, "cnc", "state Alarm:1")
+def alarm(p):
+    last = p.statuses[-1]
+    p.statuses[-1] = CncStatus(last.sent_ns, last.arrival_ns, "Alarm:1", last.position, 0.0)
+
+
+@fault(BAD, "cnc", r"0.2\d\d mm from the commanded position")
+def guide_stops_short(p):
+    hold = next(c for c in p.commands if c.phase == "hold")
+    p.statuses = [
+        CncStatus(s.sent_ns, s.arrival_ns, s.state, s.position + np.array([0, 0, 0.2]), s.feed)
+        if hold.sent_ns < s.sent_ns < hold.acknowledged_ns
+        else s
+        for s in p.statuses
+    ]
+
+
+@fault(WARN, "camera side", "no image$")
+def dead_camera(p):
+    p.images, p.pictures = [], []
+
+
+@fault(WARN, "camera side", r"no image for \d\.\d s")
+def camera_dies(p):
+    p.images, p.pictures = p.images[:60], p.pictures[:60]
+
+
+@fault(WARN, "camera side", r"the same image for \d\.\d s")
+def camera_hangs(p):
+    p.pictures[60:] = [p.pictures[60]] * len(p.pictures[60:])
+
+
+@fault(WARN, "camera side", "no tag in view in any image")
+def no_tag(p):
+    p.faces = 0
+
+
+@fault(WARN, "registration", "how and when")
+def no_registration(p):
+    del p.header.rig["registration"]["method"]
+
+
+@fault(BAD, "recording", "the cable was pulled")
+def broken_off(p):
+    p.complete, p.reason = False, "the cable was pulled"
+
+
+def judged(report):
+    return [(f.severity, f.stream, f.text) for f in report.findings]
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_planted_fault_is_named(tmp_path, name):
+    plant, severity, stream, words, options = FAULTS[name]
+    press = Whole(**options)
+    plant(press)
+    report = check(press.write(tmp_path / "episode-000000.mcap"))
+    matching = [f for f in judged(report) if f[:2] == (severity, stream) and re.search(words, f[2])]
+    assert matching, judged(report)
+    assert report.usable == all(f[0] == WARN for f in judged(report))
+    assert report.usable == (severity == WARN), judged(report)
+    others = [f for f in judged(report) if f not in matching and f[1] != stream]
+    assert others == [], "a fault of one stream is none of another"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_is_said_of_a_clean_recording(tmp_path, seed):
+    press = Whole(number=seed % 3, seed=seed)
+    report = check(press.write(tmp_path / "episode-000000.mcap"))
+    assert judged(report) == []
+    assert "drift" in report.text
+    assert "record --sync-tap" in report.text
+
+
+def test_clocks_are_shown_for_every_stream(tmp_path):
+    press = Whole()
+    path = tmp_path / "episode-000000.mcap"
+    writer = EpisodeWriter(path, press.header, Clock(T0, 0, 1.0), ("side",))
+    press.feed(writer)
+    model = clock_fit.fit(press.arrival, press.counter).with_latency(Latency(6_100_000, 300_000))
+    writer.close(True, "", {"taxels": model, "cnc": polled_clock(np.array([0]), np.array([8 * MS]))})
+    report = check(path)
+    values = report.document["episodes"][0]
+    assert values["taxels"]["clock"]["latency"] == 6.1
+    assert abs(values["taxels"]["clock"]["drift"]) < 100
+    assert values["taxels"]["clock"]["jitter"] == pytest.approx(5 / np.sqrt(12), rel=0.2)
+    assert values["cnc"]["round_trip"] == 8.0
+    assert "constant delay 6.1 +- 0.3 ms taken off" in report.text
+
+
+SITES = np.round(np.random.default_rng(8).uniform([-4.7, -3.7], [4.7, 3.7], (24, 2)), 2).tolist()
+
+
+def session_of(folder, change):
+    """Record 24 presses at random sites; ``change(number, counts)`` returns what the board says instead."""
+    document = plan_document(1)
+    document["presses"] = [{"indenter": "ball", "x": x, "y": y, "depth": 0.8} for x, y in SITES]
+    plan = Plan.from_document(document, "many")
+    made = create_session(folder, plan, SENSOR, rig_document())
+    gain = np.random.default_rng(3).normal(1, 0.08, 24)
+    for number in range(24):
+        press = Press(0, seed=number)
+        object.__setattr__(press.header, "press", plan.presses[number])
+        depth = np.interp(press.position(press.sample)[:, 2], [-30.8, -30.0], [0.8, 0.0])
+        tip = np.column_stack([np.tile(SITES[number], (len(depth), 1)), depth])
+        counts = press._counts(tip)
+        press.counts = change(number, np.round(9000 + gain * (counts - 9000)))
+        press.write(folder / f"episode-{number:06d}.mcap")
+    return check(refresh(made).folder)
+
+
+def exchanged(a, b):
+    order = np.arange(24)
+    order[[a, b]] = b, a
+    return lambda number, counts: counts[:, order]
+
+
+def weaker(number, counts):
+    counts[:, 14] = 9000 + (counts[:, 14] - 9000) * (0.4 if number >= 12 else 1.0)
+    return counts
+
+
+def offset(number, counts):
+    counts[:, 7] += 1500 * (number >= 10)
+    return counts
+
+
+def mute(number, counts):
+    counts[:, 9] = np.round(9000 + np.random.default_rng(number).normal(0, 5, len(counts)))
+    return counts
+
+
+def no_contact(number, counts):
+    return np.round(9000 + np.random.default_rng(number).normal(0, 5, counts.shape))
+
+
+SESSION_FAULTS = {
+    "far channels swapped": (exchanged(2, 21), [
+        (BAD, "channel 2 answers like taxel 21"), (BAD, "channel 21 answers like taxel 2"),
+    ]),
+    "neighbours swapped": (exchanged(8, 9), [
+        (BAD, "channel 8 answers like taxel 9"), (BAD, "channel 9 answers like taxel 8"),
+    ]),
+    "plug turned": (lambda number, counts: counts[:, ::-1], [(BAD, "as if the array were turned by 180 deg")]),
+    "gain step": (weaker, [(BAD, "channel 14 answers 0.4. times as strongly from about")]),
+    "offset step": (offset, [(WARN, r"idle reading of channel 7 steps by \+1500 counts before episode-000010")]),
+    "mute channel": (mute, [(BAD, "channel 9 did not answer")]),
+    "no contact": (no_contact, [(BAD, "no channel answered to any press")]),
+    "nothing": (lambda number, counts: counts, []),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SESSION_FAULTS)
+def test_a_fault_that_only_a_session_shows_is_named(tmp_path, name):
+    change, expected = SESSION_FAULTS[name]
+    report = session_of(tmp_path / "session", change)
+    found = judged(report)
+    assert len(found) == len(expected), found
+    for severity, words in expected:
+        assert any(f[0] == severity and re.search(words, f[2]) for f in found), (words, found)

@@ -1,0 +1,154 @@
+"""Faults in mid-press on the emulated rig: the motion stops, what was received is on disk, the session goes on."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+import yaml
+from recording_examples import SENSOR, plan, plan_document
+
+from tacdata.errors import DeviceError
+from tacdata.recording import file_names, read_session
+from tacdata.recording.check import check
+from tacdata.recording.reader import read_recording
+from tacdata.recording.recorder import Recorder
+from tacdata.recording.recover import recover
+from tacdata.rig import read_rig
+from tacdata.virtual_rig.mounting import mount
+from tacdata.virtual_rig.rig import VirtualRig
+
+SPEED = 10.0
+CLEARANCE = 3.0
+
+
+@pytest.fixture
+def virtual(tmp_path, request):
+    rig = VirtualRig(tmp_path / "rig", SPEED, seed=5, camera=getattr(request, "param", False))
+    rig.start()
+    yield rig
+    rig.stop()
+
+
+def recorder(virtual, out, **options):
+    rig = read_rig(virtual.path)
+    return Recorder(
+        rig, SENSOR, plan(2), out,
+        mount=lambda press: mount(rig.document, press.indenter.document, press.yaw), **options,
+    )  # fmt: skip
+
+
+def height(virtual):
+    """Height of the indenter above the skin's nominal face [mm]."""
+    at = virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000)
+    return at[2] - read_rig(virtual.path).registration.origin[2]
+
+
+def on_the_skin(virtual, act):
+    def wait():
+        while height(virtual) > -0.2:
+            time.sleep(0.002)
+        act()
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def test_a_pulled_cable_in_mid_press(virtual, tmp_path):
+    out = tmp_path / "session"
+    on_the_skin(virtual, virtual.board.port.close)
+    with pytest.raises(DeviceError, match="taxel board"):
+        recorder(virtual, out).run(lambda summary: True)
+    assert height(virtual) == pytest.approx(CLEARANCE, abs=0.01)
+    (broken,) = file_names.unfinished(out)
+    recording = read_recording(broken)
+    assert any("lifted" in note for note in recording.episode.notes)
+    counters = recording.episode.taxels.counter
+    assert len(counters) > 20
+    assert (np.diff(counters) == 1).all()
+    assert len(read_session(out).remaining) == 2
+
+
+def test_garbage_and_half_frames_in_mid_press_cost_what_they_hit(virtual, tmp_path):
+    out = tmp_path / "session"
+    on_the_skin(virtual, lambda: [virtual.board.port.write(junk) for junk in (bytes(70), b"\xa5\x5a\x01", b"\xff" * 9)])
+    session = recorder(virtual, out).run(lambda summary: True)
+    assert session.remaining == ()
+    first, second = (read_recording(path) for path in session.episodes)
+    assert first.counts["taxels"]["garbage_bytes"] + 54 * first.counts["taxels"]["corrupt"] >= 70
+    assert first.counts["taxels"]["lost"] <= 2
+    assert second.counts["taxels"]["garbage_bytes"] == 0, "each recording counts its own"
+    report = check(out)
+    assert any("belong to none" in f.text or "damaged" in f.text for f in report.findings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("virtual", [True], indirect=True)
+def test_a_camera_that_stalls_in_mid_press(virtual, tmp_path):
+    out = tmp_path / "session"
+    on_the_skin(virtual, virtual.camera.inject_stall)
+    with pytest.raises(DeviceError, match="camera"):
+        for _ in range(4):  # the plan may end before the stall is noticed
+            recorder(virtual, out, resume=out.exists()).run(lambda summary: True)
+            (out / "session.json").unlink()
+            out = out.with_name(out.name + "x")
+    assert height(virtual) == pytest.approx(CLEARANCE, abs=0.01)
+
+
+TACDATA = [sys.executable, "-m", "tacdata.cli"]
+
+
+@pytest.fixture
+def bench(virtual, tmp_path):
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(plan_document(2, hold=0.3, rest=0.4)))
+    common = ["--rig", str(virtual.path), "--plan", str(tmp_path / "plan.yaml"), "--out", str(tmp_path / "session")]
+    return [*TACDATA, "record", *common, "--yes"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("room", [3_000, 12_000, 30_000])
+def test_a_full_disk_is_said_and_the_session_goes_on(bench, virtual, tmp_path, room):
+    out = tmp_path / "session"
+    result = subprocess.run(
+        bench, capture_output=True, text=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
+    )  # fmt: skip
+    assert result.returncode == 4, result.stderr
+    assert "Traceback" not in result.stderr
+    assert "room" in result.stderr
+    if height(virtual) < 20:
+        assert height(virtual) == pytest.approx(CLEARANCE, abs=0.01), "off the skin"
+    assert not list(out.glob(".session*")), "no litter"
+    for path in out.glob("*.partial.mcap"):
+        recovered = recover(path, tmp_path / "copy.mcap") if room > 12_000 else None
+        assert recovered is None or recovered.messages > 20
+    again = [*bench, "--resume"] if (out / "session.json").exists() else bench
+    result = subprocess.run(again, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "2 of 2" in result.stdout
+
+
+@pytest.mark.slow
+def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(bench, virtual, tmp_path):
+    out = tmp_path / "session"
+    child = subprocess.Popen(bench, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while height(virtual) > -0.2:
+        time.sleep(0.002)
+    time.sleep(0.3)
+    killed_ns = virtual.clock.now_ns()
+    os.kill(child.pid, signal.SIGKILL)
+    child.wait()
+    (partial,) = out.glob("*.partial.mcap")
+    last = read_recording(partial).episode.taxels.arrival_ns[-1]
+    assert (killed_ns - last) / 1e9 / SPEED < 1.0, "seconds of real time"
+    found = recover(partial, tmp_path / "copy.mcap")
+    assert found.messages > 20
+    time.sleep(1.0)  # the emulated machine ends its last line
+    result = subprocess.run([*bench, "--resume"], capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "2 of 2" in result.stdout
+    assert len(file_names.unfinished(out)) == 1, "what the kill left is put aside, not overwritten"

@@ -1,0 +1,62 @@
+"""What follows from a controller's answers."""
+
+import numpy as np
+import pytest
+
+from tacdata.errors import DeviceError
+from tacdata.wire.grbl_settings import GrblSettings
+
+TRAVEL = {"$20": "1", "$22": "1", "$23": "0", "$130": "200.000", "$131": "150.000", "$132": "60.000", "$1": "255"}
+
+
+def test_receive_buffer():
+    assert GrblSettings({"OPT": "V,15,128"}).rx_bytes == 128
+    assert GrblSettings({"OPT": "VNMSL,100,1024,3,0"}).rx_bytes == 1024
+    assert GrblSettings({"OPT": "V"}).rx_bytes is None
+
+
+def test_travel_is_negative_unless_the_origin_is_at_the_switch():
+    lower, upper = GrblSettings({**TRAVEL, "OPT": "V,15,128"}).travel
+    np.testing.assert_array_equal(lower, [-200, -150, -60])
+    np.testing.assert_array_equal(upper, 0)
+    for said in ({"OPT": "VZ,15,128", "$23": "3"}, {"FIRMWARE": "grblHAL", "$22": "9", "$23": "3"}):
+        lower, upper = GrblSettings({**TRAVEL, **said}).travel
+        np.testing.assert_array_equal(lower, [0, 0, -60])
+        np.testing.assert_array_equal(upper, [200, 150, 0])
+    assert GrblSettings({**TRAVEL, "FIRMWARE": "grblHAL", "OPT": "VZ,100,1024", "$22": "1"}).travel[1].max() == 0
+
+
+@pytest.mark.parametrize("missing", [{"$20": "0"}, {"$132": "0"}])
+def test_no_travel_without_soft_limits(missing):
+    assert GrblSettings({**TRAVEL, **missing}).travel is None
+
+
+def test_work_offset_is_the_sum_of_what_is_active():
+    said = {"GC": "G1 G55 G17 G21 G90 G94 M5 M9 T0 F0 S0", "G54": "9,9,9", "G55": "1,2,3", "G92": "10,0,0"}
+    np.testing.assert_array_equal(GrblSettings({**said, "TLO": "0.5"}).work_offset, [11, 2, 3.5])
+    np.testing.assert_array_equal(GrblSettings({**said, "TLO": "1,1,1"}).work_offset, [12, 3, 4])
+    second = {**said, "GC": "G0 G59.1 G17", "G59.1": "7,7,7"}
+    np.testing.assert_array_equal(GrblSettings({**second, "TLO": "0"}).work_offset, [17, 7, 7])
+    assert GrblSettings({}).work_offset is None
+
+
+def test_cautions():
+    assert GrblSettings(TRAVEL).cautions == ()
+    said = " ".join(GrblSettings({"$1": "25", "$20": "0", "$22": "0"}).cautions)
+    for word in ("soft limits are off", "homing is off", "switched off 25 ms"):
+        assert word in said
+
+
+@pytest.mark.parametrize(("line", "moves"), [("G54 G21", False), ("", False), ("G0Z-5", True), ("g91x1f10", True)])
+def test_startup_lines_that_move_are_refused(line, moves):
+    settings = GrblSettings({"$N0": "", "$N1": line})
+    if moves:
+        with pytest.raises(DeviceError, match=r"at every reset \(\$N1\)"):
+            settings.refuse_moves_at_start("/dev/x")
+    else:
+        settings.refuse_moves_at_start("/dev/x")
+
+
+def test_unusable_limits_name_the_settings():
+    with pytest.raises(DeviceError, match=r"\$120 to \$122"):
+        GrblSettings({"$120": "0", "$121": "10", "$122": "10"}).limits("$12", 1.0, "/dev/x")

@@ -1,0 +1,58 @@
+"""The times that bracket a reported position."""
+
+import numpy as np
+import pytest
+
+from tacdata.clock import Clock
+from tacdata.wire import grbl_statuses
+from tacdata.wire.grbl_lines import parse_status
+from tacdata.wire.grbl_statuses import REPORT_LAG_NS, Statuses
+
+MACHINE = parse_status("<Run|MPos:1,2,3|FS:60,0>")
+WORK = parse_status("<Run|WPos:1,2,3|FS:60,0>")
+
+
+@pytest.fixture
+def statuses():
+    return Statuses(Clock.start())
+
+
+def test_one_query_at_a_time(statuses):
+    assert statuses.ask()
+    assert not statuses.ask()
+    asked = statuses.asked_ns
+    status = statuses.take(MACHINE, asked + 7)
+    assert (status.sent_ns, status.arrival_ns) == (asked, asked + 7)
+    assert statuses.ask()
+
+
+def test_an_answer_after_a_repeated_query_may_be_the_first_ones_or_the_seconds(statuses, monkeypatch):
+    monkeypatch.setattr(grbl_statuses, "REPEAT", 0.0)
+    assert statuses.ask()
+    first = statuses.asked_ns
+    assert statuses.ask(), "repeated"
+    assert statuses.take(MACHINE, first + 10_000_000).sent_ns == first
+    repeated = statuses.asked_ns
+    assert repeated is not None, "the second query may still be answered"
+    assert statuses.take(MACHINE, first + 20_000_000).sent_ns == repeated
+
+
+def test_a_report_that_nobody_asked_for_is_younger_than_the_one_before(statuses):
+    statuses.automatic = True
+    statuses.take(MACHINE, 1_000_000_000)
+    assert statuses.take(MACHINE, 1_100_000_000).sent_ns == 1_000_000_000 - REPORT_LAG_NS
+
+
+def test_work_positions_need_their_offset(statuses):
+    assert statuses.take(WORK, 1) is None
+    statuses.offset = np.array([10.0, 0.0, -1.0])
+    np.testing.assert_array_equal(statuses.take(WORK, 2).position, [11, 2, 2])
+    assert len(statuses.collect()) == 1
+    assert statuses.collect() == []
+
+
+def test_inches(statuses):
+    statuses.unit = 25.4
+    status = statuses.take(parse_status("<Run|MPos:1,0,0|FS:2,0|WCO:0,0,0>"), 1)
+    assert status.position[0] == pytest.approx(25.4)
+    assert status.feed == pytest.approx(50.8)
