@@ -63,7 +63,10 @@ def label(of: Episode) -> Label:
         episode=of.number, time_ns=of.taxels.sample_ns, tip=of.tip,
         signed=(of.tip[:, 2, None, None] * dent).astype(np.float32),
         taxel_force=np.ones((count, sensor.taxels.count), np.float32), force=np.ones((count, 3), np.float32),
-        error=np.full(count, 0.01, np.float32),
+        taxel_closure=np.ones((count, sensor.taxels.count), np.float32),
+        taxel_area=np.ones((count, sensor.taxels.count), np.float32),
+        error_map=np.full((count, *sensor.map.shape), 0.01, np.float16), error=np.full(count, 0.01, np.float32),
+        force_error=np.full(count, 0.01, np.float32),
         provenance=provenance.stamp("benchmark", parents, {}),
     )  # fmt: skip
 

@@ -45,7 +45,11 @@ def instant_path(sensor: Sensor, depths: tuple[float, ...]) -> PathSolution:
     surface = depth[:, None, None] * np.random.default_rng(1).random(sensor.map.shape)
     taxels = depth[:, None] * np.ones(sensor.taxels.count)
     zero = np.zeros(len(depth))
-    return PathSolution(depth, surface, taxels, taxels, depth[:, None] * np.ones(3), zero, zero, {})
+    return PathSolution(
+        depth=depth, surface=surface, numerical=np.zeros_like(surface), taxel_force=taxels, taxel_force_error=taxels,
+        taxel_closure=taxels, taxel_area=taxels, force=depth[:, None] * np.ones(3), force_error=zero, residual=zero,
+        penetration=zero, provenance={},
+    )
 
 
 def jobs(count: int, model: str, sensor: Sensor) -> list[Job]:

@@ -17,9 +17,14 @@ class FemModel:
         Raises:
             SolveError: If the sensor cannot be modelled.
         """
-        from tacdata.skin.press import SkinModel
+        from tacdata.skin.model import SkinModel
 
         self._model = SkinModel(sensor)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """In words, what a user should know of this skin."""
+        return self._model.remarks
 
     @property
     def content_hash(self) -> str:

@@ -8,19 +8,23 @@ from label_farm.interpolate import Branch
 from label_farm.plan import LabelRequest
 from tacdata import provenance
 from tacdata.errors import SolveError
-from tacdata.labels import Label, PathSolution
+from tacdata.labels import Label, PathSolution, table
 
 ERROR = (
-    "root mean square over the pixels: interpolation between states + offset from the solved configuration"
+    "of each pixel: root sum of squares of (interpolation between states + offset from the solved configuration) and "
+    "of the mesh's estimate; error is its root mean square over the pixels"
 )
+TAXEL = ("taxel_force", "taxel_closure", "taxel_area")
+"""What a label says of each protrusion."""
 
 
 def make_label(request: LabelRequest, solution: PathSolution | None) -> Label:
     """Return the label of an episode: each frame takes its map from the prescribed configuration at its time.
 
     Frames up to the deepest point follow the loading branch, later ones the unloading branch; frames whose
-    nominal pose does not touch have a zero map. `Label.error` holds what is lost by interpolating and by
-    sharing one path among nearly equal presses; the solver's own errors (mesh, residual) are not in it.
+    nominal pose does not touch have a zero map. `Label.error_map` joins what is lost by interpolating and by
+    sharing one path among nearly equal presses, a bound, with the error that the mesh leaves, an estimate: as the root
+    of the sum of their squares, since neither knows of the other. The solver's tolerances are not in it.
 
     Args:
         request: The frames.
@@ -33,32 +37,51 @@ def make_label(request: LabelRequest, solution: PathSolution | None) -> Label:
         raise SolveError(
             f"episode {request.episode} has no solution", "a solved path", "run `tacdata label` again"
         )
-    frames, shape = len(request.time_ns), request.sensor.map.shape
-    signed = np.zeros((frames, *shape))
-    error = np.maximum(request.tip[:, 2], 0.0)
-    taxel_force, force = np.zeros((frames, request.sensor.taxels.count)), np.zeros((frames, 3))
-    if solution is not None:
-        error = np.zeros(frames)
-        for loading in (True, False):
-            chosen = ((request.time_ns <= request.deepest_ns) == loading) & (request.tip[:, 2] > 0)
-            if chosen.any():
-                depth = request.tip[chosen, 2]
-                surface = Branch.of(solution, "surface", loading)
-                signed[chosen] = surface.at(depth).reshape(-1, *shape)
-                bound = surface.bound(depth).reshape(-1, *shape) + _offset(request, signed[chosen], chosen)
-                error[chosen] = np.sqrt((bound**2).mean(axis=(1, 2)))
-                taxel_force[chosen] = Branch.of(solution, "taxel_force", loading).at(depth)
-                force[chosen] = Branch.of(solution, "force", loading).at(depth)
+    values = _untouched(request) if solution is None else _along_path(request, solution)
+    error_map = values["error_map"]
     return Label(
         episode=request.episode,
         time_ns=np.asarray(request.time_ns, dtype=np.int64),
         tip=request.tip,
-        signed=signed.astype(np.float32),
-        taxel_force=taxel_force.astype(np.float32),
-        force=force.astype(np.float32),
-        error=error.astype(np.float32),
+        error=np.sqrt((error_map**2).mean(axis=(1, 2))).astype(np.float32),
         provenance=_provenance(request, solution),
+        **{name: values[name].astype(table.DTYPES[name]) for name in values},
     )
+
+
+def _untouched(request: LabelRequest) -> dict[str, np.ndarray]:
+    """Return zeros; a frame that touches after all is in doubt by its whole depth."""
+    frames, shape, taxels = len(request.time_ns), request.sensor.map.shape, request.sensor.taxels.count
+    doubt = np.maximum(request.tip[:, 2], 0.0)
+    return {
+        "signed": np.zeros((frames, *shape)),
+        "error_map": np.broadcast_to(doubt[:, None, None], (frames, *shape)),
+        "force": np.zeros((frames, 3)),
+        "force_error": np.zeros(frames),
+        **{name: np.zeros((frames, taxels)) for name in TAXEL},
+    }
+
+
+def _along_path(request: LabelRequest, solution: PathSolution) -> dict[str, np.ndarray]:
+    """Return each frame's values from the neighbouring states of its branch."""
+    values = _untouched(request)
+    values["error_map"] = np.zeros_like(values["signed"])
+    for loading in (True, False):
+        chosen = ((request.time_ns <= request.deepest_ns) == loading) & (request.tip[:, 2] > 0)
+        if not chosen.any():
+            continue
+        depth, shape = request.tip[chosen, 2], (-1, *request.sensor.map.shape)
+        surface, force = Branch.of(solution, "surface", loading), Branch.of(solution, "force", loading)
+        mesh, mesh_force = (Branch.of(solution, name, loading).at(depth) for name in ("numerical", "force_error"))
+        signed = values["signed"][chosen] = surface.at(depth).reshape(shape)
+        bound = surface.bound(depth).reshape(shape) + _offset(request, signed, chosen)
+        values["error_map"][chosen] = np.hypot(bound, mesh.reshape(shape))
+        values["force"][chosen] = force.at(depth)
+        lost = np.linalg.norm(force.bound(depth), axis=1)
+        values["force_error"][chosen] = np.hypot(lost, mesh_force[:, 0])
+        for name in TAXEL:
+            values[name][chosen] = Branch.of(solution, name, loading).at(depth)
+    return values
 
 
 def parents(request: LabelRequest) -> dict[str, str]:

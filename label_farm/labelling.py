@@ -57,6 +57,8 @@ class Summary:
     """Time of each path solved in this run [s]."""
     found: int = 0
     """Paths that the store held already."""
+    remarks: list[str] = field(default_factory=list)
+    """What a user should know of the models, in words."""
 
 
 class Labelling:
@@ -138,8 +140,10 @@ class Labelling:
     def _version(self, sensor: Sensor) -> str:
         key = sensor.content_hash
         if key not in self._versions:
-            self._versions[key] = model.version(self.settings.factory, sensor)
-            self._sensors[self._versions[key]] = sensor
+            found = model.version(self.settings.factory, sensor)
+            self._versions[key] = found.content_hash
+            self._sensors[found.content_hash] = sensor
+            self.summary.remarks += found.remarks
         return self._versions[key]
 
     def _missing(self, requests: list[LabelRequest]) -> list[Job]:

@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import dataclass
 from typing import Protocol
 
 import tacdata.errors
@@ -47,8 +48,18 @@ def build(factory: str, sensor: Sensor) -> Model:
         raise UsageError(f"no model {factory!r}: {error}", "package.module:name", "check the name") from error
 
 
-def version(factory: str, sensor: Sensor) -> str:
-    """Return the model's content hash, found by a process of its own.
+@dataclass(frozen=True)
+class Version:
+    """What is known of a model before anything is solved."""
+
+    content_hash: str
+    """Hash of everything in the model that decides a result."""
+    remarks: tuple[str, ...] = ()
+    """In words, what a user should know of it, such as strains at which its material law is unstable."""
+
+
+def version(factory: str, sensor: Sensor) -> Version:
+    """Return the model's version, found by a process of its own.
 
     The caller stays free of the solver's libraries, and the mesh is cached before the workers ask for it.
 
@@ -73,7 +84,7 @@ def version(factory: str, sensor: Sensor) -> str:
         ) from None
     if "error" in answer:
         raise getattr(tacdata.errors, answer["kind"], SolveError)(*answer["error"])
-    return answer["version"]
+    return Version(answer["version"], tuple(answer["remarks"]))
 
 
 def main() -> None:
@@ -83,7 +94,7 @@ def main() -> None:
     asked = json.load(sys.stdin)
     try:
         model = build(asked["factory"], Sensor.from_document(asked["sensor"], "sensor"))
-        answer = {"version": model.content_hash}
+        answer = {"version": model.content_hash, "remarks": list(getattr(model, "remarks", ()))}
     except TacdataError as error:
         answer = {"kind": type(error).__name__, "error": [error.given, error.allowed, error.remedy]}
     os.write(answer_to, json.dumps(answer).encode())

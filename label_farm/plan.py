@@ -66,6 +66,7 @@ def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> Lab
             "a recording with both",
             "see `tacdata check`, or record this press again",
         )
+    _check_known(episode, sensor)
     depth = episode.tip[:, 2]
     peak = int(np.argmax(depth >= depth.max() - 1e-6))
     job = None
@@ -91,6 +92,19 @@ def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> Lab
         deepest_ns=int(episode.tip_ns[peak]),
         job=job,
     )
+
+
+def _check_known(episode: Episode, sensor: Sensor) -> None:
+    """Refuse imported recordings whose press or skin nobody described: their labels would be invented."""
+    stand_ins = [text.split(":")[0] for text in episode.rig.get("imported", {}).get("stand_ins", [])]
+    if sensor.content_hash != episode.sensor.content_hash:  # another file says what the skin is
+        stand_ins = [name for name in stand_ins if name.split("/")[0] in ("indenter", "contact") and name != "contact"]
+    if stand_ins:
+        raise FormatError(
+            f"{episode.path}: imported without {', '.join(stand_ins)}",
+            "a recording whose sensor, indenter and height of contact are known",
+            "import it again with a mapping that names a sensor file, the indenter and contact",
+        )
 
 
 def _settled_depth(episode: Episode) -> float:

@@ -10,7 +10,7 @@ from label_farm.label import make_label, parents
 from label_farm.plan import LabelRequest
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
-from tacdata.labels import PathSolution, read_label, write_label
+from tacdata.labels import PathSolution, read_label, table, write_label
 
 
 class SessionLabels:
@@ -38,6 +38,9 @@ class SessionLabels:
     def _read_parents(self, path: Path) -> dict[str, str] | None:
         try:
             return dict(read_label(path).provenance["parents"]) if path.exists() else None
+        except table.VersionError as error:
+            # Not damaged: it must not be replaced unasked.
+            return {"model": error.given.rpartition(": ")[2]}
         except FormatError:
             return None
 
@@ -56,7 +59,7 @@ class SessionLabels:
             request, model = others[0]
             raise UsageError(
                 f"{self.folder} is a label store from another model version: {len(others)} of "
-                f"{len(requests)} labels, first {self.path(request.episode).name}, are of {model[:12]}…",
+                f"{len(requests)} labels, first {self.path(request.episode).name}, are of {_short(model)}",
                 f"labels of the current model {request.model[:12]}… (sensor, law, mesh, settings, code)",
                 "give --redo to replace them, or use the tacdata release and sensor file that made them",
             )
@@ -77,3 +80,8 @@ class SessionLabels:
         if self.path(episode).exists():
             self.path(episode).replace(self.path(episode).with_suffix(".superseded"))
         self._parents.pop(episode, None)
+
+
+def _short(model: str) -> str:
+    """Return the start of a hash; words as they are."""
+    return model if " " in model else f"{model[:12]}…"

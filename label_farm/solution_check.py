@@ -20,9 +20,13 @@ def check_solution(job: Job, solution: PathSolution, sensor: Sensor) -> None:
     shapes = {
         "depth": (states,),
         "surface": (states, *sensor.map.shape),
+        "numerical": (states, *sensor.map.shape),
         "taxel_force": (states, sensor.taxels.count),
+        "taxel_force_error": (states, sensor.taxels.count),
         "taxel_closure": (states, sensor.taxels.count),
+        "taxel_area": (states, sensor.taxels.count),
         "force": (states, 3),
+        "force_error": (states,),
         "residual": (states,),
         "penetration": (states,),
     }

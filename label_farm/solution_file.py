@@ -21,9 +21,13 @@ HEADER = "header.json"
 UNITS = {
     "depth": "mm",
     "surface": "mm",
+    "numerical": "mm",
     "taxel_force": "N",
+    "taxel_force_error": "N",
     "taxel_closure": "mm",
+    "taxel_area": "mm^2",
     "force": "N",
+    "force_error": "N",
     "residual": "1",
     "penetration": "mm",
 }

@@ -110,6 +110,8 @@ class _Bars:
 def _report(summary: Summary, labels: Path, session: Path) -> None:
     import statistics
 
+    for remark in summary.remarks:
+        print(f"warning: {remark}", file=sys.stderr)
     print(
         f"labels written: {len(summary.written)} ({summary.untouched} without contact), "
         f"already there: {len(summary.current)}, failed: {len(summary.failed)}"

@@ -52,6 +52,9 @@ def run(
     from tacdata.tags import detect_cube
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop from outside is a Ctrl-C
+    hang_up = getattr(signal, "SIGHUP", None)  # so is a closed terminal, but not under nohup; Windows has none
+    if hang_up is not None and signal.getsignal(hang_up) == signal.SIG_DFL:
+        signal.signal(hang_up, signal.default_int_handler)
     skin = read_sensor(sensor) if sensor else default_sensor()
     chosen = chosen_registration(read_rig(rig), rig, registration, skin)
     bench = chosen.rig

@@ -16,14 +16,25 @@ PANEL = TOOLS
 def run(
     case: Annotated[Path, typer.Argument(help="Case file (schemas/case.schema.json).")],
     out: Annotated[Path, typer.Option(help="Folder for NAME.json (forces), NAME.parquet (displacements).")] = Path("."),
+    picture: Annotated[bool, typer.Option("--picture", help="Also draw the deepest state into NAME.png.")] = False,
 ) -> None:
-    """Solve one press with the skin model: displacements of the outer face and forces, as files."""
+    """Solve one press with the skin model: displacements, forces, readings and their error, as files."""
     from rich.console import Console
 
+    from tacdata import documents
     from tacdata.skin.case import read_case, solve_case
 
     console = Console(stderr=True)
     wanted = read_case(case)
     with console.status(f"{wanted.name}: meshing and factorizing") as status:
-        report = solve_case(wanted, out, lambda depth: status.update(f"{wanted.name}: {depth:g} mm solved"))
+        report = solve_case(wanted, out, lambda depth: status.update(f"{wanted.name}: {depth:g} mm solved"), picture)
+    answer = documents.read(report, "case_result")
+    mesh = answer["mesh"]
+    console.print(
+        f"mesh: {mesh['elements']:.0f} elements, radius ratio {mesh['worst_ratio']:.2f} at worst, "
+        f"{mesh['median_ratio']:.2f} in the median (1 is best), volume {100 * mesh['volume_error']:+.2f} %",
+        markup=False, highlight=False, soft_wrap=True,
+    )
+    for remark in answer["remarks"]:
+        console.print(f"warning: {remark}", markup=False, highlight=False, soft_wrap=True)
     print(report)

@@ -22,6 +22,7 @@ def run(
     seed: Annotated[int, typer.Option(help="which world: registration error, gains, noise")] = 0,
     camera: Annotated[bool, typer.Option(help="with a camera that watches the AprilTag cube")] = True,
     sensor: Annotated[Path | None, typer.Option(help="sensor file; default: the paper's")] = None,
+    rough: Annotated[bool, typer.Option("--rough", help="sensor put down by eye, to be registered first")] = False,
 ) -> None:
     """Emulate a rig (GRBL, taxel board, camera) that other verbs reach by its rig.yaml, until Ctrl-C."""
     from tacdata.sensor import read_sensor
@@ -30,7 +31,7 @@ def run(
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
-    rig = VirtualRig(directory, speed, seed, camera, read_sensor(sensor) if sensor else None)
+    rig = VirtualRig(directory, speed, seed, camera, read_sensor(sensor) if sensor else None, rough)
     try:
         rig.start()
         print("\n".join([*rig.emulates, f"rig file           {rig.path}", "Ctrl-C stops it."]), flush=True)

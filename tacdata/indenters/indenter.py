@@ -17,8 +17,9 @@ recompiles the others.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from numbers import Real
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -73,6 +74,30 @@ class Indenter(ABC):
     @abstractmethod
     def parameters(self) -> tuple[float, ...]:
         """At most 8 numbers handed to the distance function, in mm or radians."""
+
+    def device_parameters(self, device: str) -> tuple[float, ...]:
+        """Return `parameters` for kernels on a device; a shape with data of its own puts them there at the first call.
+
+        Args:
+            device: Warp's name of the device, for example "cuda:0".
+        """
+        return self.parameters
+
+    @property
+    def exactness(self) -> float:
+        """How far the zero of the distance function may lie from the shape [mm]; next to nothing for closed forms."""
+        return 1e-7
+
+    @classmethod
+    def complete(cls, values: dict[str, Any], origin: str, folder: Path | None) -> dict[str, Any]:
+        """Return a document's parameters with those filled in that follow from the others; a hook for shapes in files.
+
+        Args:
+            values: Parameters as given.
+            origin: What gave them, for errors.
+            folder: Folder that file names are relative to; None where the document lies in no file.
+        """
+        return values
 
     @staticmethod
     @abstractmethod
@@ -166,8 +191,13 @@ def cut(convex: trimesh.Trimesh, height: float) -> trimesh.Trimesh:
     return trimesh.convex.convex_hull(np.vstack([points[points[:, 2] <= height], rim]))
 
 
-def from_document(document: dict[str, Any], origin: str = "indenter") -> Indenter:
+def from_document(document: dict[str, Any], origin: str = "indenter", folder: Path | None = None) -> Indenter:
     """Build an indenter from ``{"shape": name, parameter: value, ...}``.
+
+    Args:
+        document: The indenter as plain data.
+        origin: What it comes from, for errors.
+        folder: Folder that file names in it are relative to.
 
     Raises:
         UsageError: If no such shape is known.
@@ -180,10 +210,14 @@ def from_document(document: dict[str, Any], origin: str = "indenter") -> Indente
         raise FormatError(f"{origin}: no shape given", known, "add shape: NAME")
     kind: type[Indenter] = registry.load(ROOM, BASE, shape, Indenter)
     wanted = {f.name for f in fields(kind)}
-    if set(values) != wanted:
+    needed = {f.name for f in fields(kind) if f.default is MISSING}
+    values = kind.complete(values, origin, folder)
+    if not needed <= set(values) <= wanted:
+        optional = sorted(wanted - needed)
         raise FormatError(
             f"{origin}: {shape} with {', '.join(sorted(values)) or 'no parameters'}",
-            f"exactly {', '.join(sorted(wanted))} (lengths in mm, angles in deg)",
+            f"exactly {', '.join(sorted(needed))} (lengths in mm, angles in deg)"
+            + (f"; {', '.join(optional)} if wanted" if optional else ""),
             "correct the parameters",
         )
     return kind(**values)

@@ -22,8 +22,16 @@ class PathSolution:
     """Normal force carried by each protrusion [N], shape (k, taxels)."""
     taxel_closure: np.ndarray
     """Mean downward displacement over each protrusion's base [mm], shape (k, taxels)."""
+    taxel_area: np.ndarray
+    """Area of each protrusion in contact with the board, undeformed [mm^2], shape (k, taxels)."""
     force: np.ndarray
     """Force of the skin on the indenter [N], shape (k, 3)."""
+    numerical: np.ndarray
+    """Estimated error of ``surface`` by the mesh alone [mm], shape (k, pixels_x, pixels_y); 0 if none was asked for."""
+    force_error: np.ndarray
+    """The same of ``force``, all components together [N], shape (k,)."""
+    taxel_force_error: np.ndarray
+    """The same of ``taxel_force`` [N], shape (k, taxels)."""
     residual: np.ndarray
     """Norm of the out-of-balance force over the contact force [1], shape (k,)."""
     penetration: np.ndarray
@@ -48,10 +56,21 @@ class Label:
     Signed: bulging is negative."""
     taxel_force: np.ndarray
     """Normal force carried by each protrusion [N], shape (n, taxels), float32."""
+    taxel_closure: np.ndarray
+    """Mean downward displacement over each protrusion's base [mm], shape (n, taxels), float32."""
+    taxel_area: np.ndarray
+    """Area of each protrusion in contact with the board, undeformed [mm^2], shape (n, taxels), float32."""
     force: np.ndarray
     """Force of the skin on the indenter [N], shape (n, 3), float32."""
+    error_map: np.ndarray
+    """Estimated numerical error of each pixel [mm], shape (n, pixels_x, pixels_y), float16: three digits suffice.
+
+    Root sum of squares of the bound on what is lost between states and of the error by the mesh; the spread of
+    material, thickness and registration is not in it."""
     error: np.ndarray
-    """Estimated numerical error of the map, root mean square over the pixels [mm], shape (n,), float32."""
+    """Root mean square of ``error_map`` over the pixels [mm], shape (n,), float32."""
+    force_error: np.ndarray
+    """Estimated numerical error of ``force``, all components together [N], shape (n,), float32; made up alike."""
     provenance: dict[str, Any]
     """What made it: recording, path solution, sensor, code."""
 

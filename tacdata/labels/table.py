@@ -19,15 +19,25 @@ from tacdata.labels.label import Label
 
 HEADER = b"tacdata.label"
 REMEDY = "run `tacdata label` again: labels can always be made anew"
-UNITS = {"time_ns": "ns", "tip": "mm", "signed": "mm", "taxel_force": "N", "force": "N", "error": "mm"}
-DTYPES = {
-    "time_ns": "int64",
-    "tip": "float64",
-    "signed": "float32",
-    "taxel_force": "float32",
-    "force": "float32",
-    "error": "float32",
+COLUMNS = {
+    "time_ns": ("ns", "int64", 1),
+    "tip": ("mm", "float64", 2),
+    "signed": ("mm", "float32", 3),
+    "taxel_force": ("N", "float32", 2),
+    "taxel_closure": ("mm", "float32", 2),
+    "taxel_area": ("mm^2", "float32", 2),
+    "force": ("N", "float32", 2),
+    "error_map": ("mm", "float16", 3),
+    "error": ("mm", "float32", 1),
+    "force_error": ("N", "float32", 1),
 }
+"""Unit, type and number of axes of each column; the first axis is the frames."""
+UNITS = {name: unit for name, (unit, _, _) in COLUMNS.items()}
+DTYPES = {name: dtype for name, (_, dtype, _) in COLUMNS.items()}
+
+
+class VersionError(FormatError):
+    """A label was written by a release with another major version of the format; it is not damaged."""
 
 
 def _column(values: np.ndarray) -> pa.Array:
@@ -39,8 +49,7 @@ def _column(values: np.ndarray) -> pa.Array:
 
 def _check(label: Label, origin: str) -> None:
     frames = len(label.time_ns)
-    shapes = {"time_ns": 1, "tip": 2, "signed": 3, "taxel_force": 2, "force": 2, "error": 1}
-    for name, ndim in shapes.items():
+    for name, (_, _, ndim) in COLUMNS.items():
         values = getattr(label, name)
         if values.ndim != ndim or len(values) != frames or frames == 0:
             raise FormatError(
@@ -58,6 +67,13 @@ def _check(label: Label, origin: str) -> None:
         raise FormatError(
             f"{origin}: tip {label.tip.shape}, force {label.force.shape}",
             "three columns each",
+            "correct the label",
+        )
+    taxels = {name: getattr(label, name).shape[1] for name in ("taxel_force", "taxel_closure", "taxel_area")}
+    if len(set(taxels.values())) > 1 or label.error_map.shape != label.signed.shape:
+        raise FormatError(
+            f"{origin}: taxels {taxels}, maps {label.signed.shape}, their errors {label.error_map.shape}",
+            "the same number of taxels everywhere, one error a pixel",
             "correct the label",
         )
     if (np.diff(label.time_ns) <= 0).any():
@@ -124,7 +140,8 @@ def read(path: Path) -> Label:
     shapes = {
         "tip": (3,),
         "signed": (header["pixels_x"], header["pixels_y"]),
-        "taxel_force": (header["taxels"],),
+        "error_map": (header["pixels_x"], header["pixels_y"]),
+        **dict.fromkeys(("taxel_force", "taxel_closure", "taxel_area"), (header["taxels"],)),
         "force": (3,),
     }
     try:
@@ -170,8 +187,19 @@ def _header(schema: pa.Schema, path: Path) -> dict[str, Any]:
         raise FormatError(
             f"{path}: unreadable header: {error}", "a label file", "run `tacdata label` again"
         ) from None
+    _check_version(header, path)
     documents.check(header, "label", str(path))
     return header
+
+
+def _check_version(header: Any, path: Path) -> None:
+    found, known = str(dict(header).get("version", "")), schemas.version("label")
+    if found.split(".")[0] != known.split(".")[0]:
+        raise VersionError(
+            f"{path}: label format version {found}",
+            f"version {known}",
+            "run `tacdata label --redo`: labels can always be made anew; or use the tacdata release that wrote it",
+        )
 
 
 def _values(table: pa.Table, name: str, shape: tuple[int, ...]) -> np.ndarray:

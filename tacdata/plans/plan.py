@@ -98,16 +98,19 @@ class Plan:
     """The file's document, kept as written."""
 
     @classmethod
-    def from_document(cls, document: dict[str, Any], origin: str) -> Plan:
-        """Build a plan from a parsed file.
+    def from_document(cls, document: dict[str, Any], origin: str, folder: Path | None = None) -> Plan:
+        """Build a plan from a parsed file; ``folder`` is what names of surface files in it are relative to.
 
         Raises:
             FormatError: If the document breaks the schema or a press names an unknown indenter.
         """
         documents.check(document, "plan", origin)
         indenters = {
-            name: from_document(values, f"{origin}: indenters/{name}") for name, values in document["indenters"].items()
+            name: from_document(values, f"{origin}: indenters/{name}", folder)
+            for name, values in document["indenters"].items()
         }
+        # A shape from a file is named by its content from here on.
+        document = {**document, "indenters": {name: found.document for name, found in indenters.items()}}
         motion = MotionSettings(**document["motion"])
         presses = []
         for index, entry in enumerate(document["presses"]):
@@ -167,4 +170,4 @@ def read_plan(path: Path) -> Plan:
         UsageError: If it does not exist.
         FormatError: If it is damaged or contradicts itself.
     """
-    return Plan.from_document(documents.read(path, "plan"), str(path))
+    return Plan.from_document(documents.read(path, "plan"), str(path), path.parent)

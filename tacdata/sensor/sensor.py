@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -119,12 +119,16 @@ class Sensor:
     source: str = ""
     transduction: Transduction | None = None
     """From loads of protrusions to counts; None if the file says nothing of it."""
+    uncertainty: dict[str, float] = field(default_factory=dict)
+    """Standard deviations of the skin model's parameters, in their units; empty if the file says nothing of them."""
 
     @property
     def document(self) -> dict[str, Any]:
         """The sensor as its file's document (`schemas/sensor.schema.json`)."""
         document = {"version": schemas.version("sensor"), **asdict(self), "material": self.material.document}
         del document["transduction"]
+        if not self.uncertainty:
+            del document["uncertainty"]
         if self.transduction:
             document["transduction"] = self.transduction.document
         for name in ("skin", "contact", "map"):
@@ -133,15 +137,22 @@ class Sensor:
 
     @property
     def content_hash(self) -> str:
-        """Hash of every value that can change a label; names, remarks and the transduction do not count."""
+        """Hash of every value that can change a label; names, remarks, spreads and the transduction do not
+        count."""
         document = {**self.document, "skin": self.skin.identity}
         return provenance.content_hash({k: document[k] for k in ("taxels", "skin", "material", "contact", "map")})
 
     @classmethod
-    def from_document(cls, document: dict[str, Any], origin: str) -> Sensor:
-        """Build a sensor from a parsed file; ``origin`` names it in errors.
+    def from_document(cls, document: dict[str, Any], origin: str, folder: Path | None = None) -> Sensor:
+        """Build a sensor from a parsed file.
+
+        Args:
+            document: The file's document.
+            origin: Names it in errors.
+            folder: Folder that the name of a surface file is relative to.
 
         Raises:
+            UsageError: If a surface file is not found.
             FormatError: If the document breaks the schema or its parts contradict each other.
         """
         documents.check(document, "sensor", origin)
@@ -150,7 +161,7 @@ class Sensor:
         sensor = cls(
             name=document["name"],
             taxels=Taxels(**document["taxels"]),
-            skin=Skin(**document["skin"]),
+            skin=Skin.from_document(document["skin"], origin, folder),
             material=Material.from_document(document["material"], origin),
             contact=Contact(**contact),
             map=DepthMap(**document["map"]),
@@ -161,6 +172,7 @@ class Sensor:
                 if "transduction" in document
                 else None
             ),
+            uncertainty=dict(document.get("uncertainty", {})),
         )
         _check_consistency(sensor, origin)
         return sensor
@@ -223,7 +235,7 @@ def read_sensor(path: Path) -> Sensor:
         UsageError: If it does not exist.
         FormatError: If it is damaged or contradicts itself.
     """
-    return Sensor.from_document(documents.read(path, "sensor"), str(path))
+    return Sensor.from_document(documents.read(path, "sensor"), str(path), path.parent)
 
 
 def default_sensor() -> Sensor:

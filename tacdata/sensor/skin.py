@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
 from tacdata.errors import FormatError
+from tacdata.sensor import own_surface
+from tacdata.sensor.own_surface import OwnSurface
 
 _OPTIONAL = {"protrusion_height": None, "curvature_radius_x": 0.0, "curvature_radius_y": 0.0, "underside": "bent"}
 """Fields that a document leaves out where they say nothing, so that files and hashes of format 1.0 stay."""
@@ -40,6 +43,8 @@ class Skin:
     """Radius of the outer face in the yz plane [mm]; 0 for straight. Two equal radii make a sphere's cap."""
     underside: str = "bent"
     """Of a curved pad: "bent" (constant thickness along the normal) or "flat" (z = 0, thinner towards the rim)."""
+    surface: OwnSurface | None = None
+    """The skin's own surface from a file; the sizes above then state its box. None: as above."""
 
     @property
     def protrusion_tip(self) -> float:
@@ -54,13 +59,35 @@ class Skin:
     @property
     def document(self) -> dict[str, Any]:
         """The skin as its part of the sensor's document."""
-        values = asdict(self)
-        return {k: v for k, v in values.items() if k not in _OPTIONAL or v != _OPTIONAL[k]}
+        values = {k: v for k, v in asdict(self).items() if k not in _OPTIONAL or v != _OPTIONAL[k]}
+        del values["surface"]
+        return values if self.surface is None else {**values, "surface": self.surface.document}
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What of the document decides a mesh or a label."""
-        return self.document
+        """What of the document decides a mesh or a label: of a surface file its content, not its name."""
+        values = self.document
+        if self.surface is not None:
+            values["surface"] = {k: v for k, v in values["surface"].items() if k != "file"}
+        return values
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], origin: str, folder: Path | None) -> Self:
+        """Build a skin from its part of the sensor's document.
+
+        Args:
+            document: That part.
+            origin: Names the file in errors.
+            folder: Folder that the name of a surface file is relative to; None where the document lies in no file.
+
+        Raises:
+            UsageError: If a surface file is not found.
+            FormatError: If it bounds no solid, or not one of the sizes stated.
+        """
+        if "surface" not in document:
+            return cls(**document)
+        document = own_surface.complete(document, origin, folder)
+        return cls(**{**document, "surface": OwnSurface.from_document(document["surface"])})
 
     def outer_height(self, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
         """Return the height z of the undeformed outer face [mm] at (x, y) [mm], like the arguments in shape."""
@@ -103,9 +130,14 @@ class Skin:
             )
         if not self.curved:
             return
+        if self.surface is not None:
+            raise FormatError(
+                f"{origin}: skin/surface and a curvature radius", "one of them",
+                "remove skin/curvature_radius_x and _y: the surface in the file is taken as it is",
+            )
         if board and self.underside != "flat":
             raise FormatError(
-                f"{origin}: a flat board under a pad whose underside is bent touches no more than its lowest protrusions",
+                f"{origin}: a flat board under a bent underside touches no more than its lowest protrusions",
                 "underside: flat with a board, or board: false", "set skin/underside: flat or contact/board: false",
             )
         self._check_bend(origin)
@@ -131,5 +163,5 @@ class Skin:
         if self.underside == "flat" and left < _LEAST * self.thickness:
             raise FormatError(
                 f"{origin}: the outer face falls to z = {left:.2f} mm at the skin's corners, the underside is flat",
-                f"at least {_LEAST * self.thickness:g} mm left", "enlarge the radii or skin/thickness, or bend the underside",
+                f"at least {_LEAST * self.thickness:g} mm left", "enlarge the radii or the thickness",
             )

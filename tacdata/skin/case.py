@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents
 from tacdata.errors import UsageError
 from tacdata.indenters import from_document
 from tacdata.sensor import Sensor, default_sensor, read_sensor
-from tacdata.skin.mesh import quality
+from tacdata.skin.case_answer import CaseAnswer, answer
+from tacdata.skin.case_mesh import mesh_for
 from tacdata.skin.mesher import MeshSettings
-from tacdata.skin.press import ModelSettings, PressRequest, SkinModel
+from tacdata.skin.model import ModelSettings
+from tacdata.skin.press import PressRequest
 
 
 @dataclass(frozen=True)
@@ -32,6 +28,8 @@ class Case:
     settings: ModelSettings
     document: dict[str, Any]
     """The file's document."""
+    error_estimate: bool = True
+    """Whether the numerical error is wanted as well; costs about a third more, and a coarser mesh once."""
 
 
 def read_case(path: Path) -> Case:
@@ -48,24 +46,30 @@ def read_case(path: Path) -> Case:
     elif isinstance(given, str):
         sensor = read_sensor(path.parent / given)
     else:
-        sensor = Sensor.from_document(given, f"{path}: sensor")
+        sensor = Sensor.from_document(given, f"{path}: sensor", path.parent)
     request = PressRequest(
-        from_document(document["indenter"], f"{path}: indenter"), float(document.get("x", 0.0)),
+        from_document(document["indenter"], f"{path}: indenter", path.parent), float(document.get("x", 0.0)),
         float(document.get("y", 0.0)), float(document.get("yaw", 0.0)), tuple(float(d) for d in document["depths"]),
     )
-    mesh = dict(document.get("mesh", {}))
-    if "focus" in mesh:
-        mesh["focus"] = tuple(mesh["focus"])
-    return Case(document["name"], sensor, request, ModelSettings(mesh=MeshSettings(**mesh)), document)
+    mesh = mesh_for(sensor, request)
+    if "mesh" in document:
+        given = dict(document["mesh"])
+        mesh = MeshSettings(**{**given, "focus": tuple(given["focus"]) if "focus" in given else None})
+    # The estimate is made apart from the states, so that their times are their own.
+    settings = ModelSettings(mesh=mesh, error_estimate=False)
+    return Case(document["name"], sensor, request, settings, document, document.get("error_estimate", True))
 
 
-def solve_case(case: Case, out: Path, done: Callable[[float], None] = lambda depth: None) -> Path:
-    """Solve a case and write ``<name>.parquet`` and ``<name>.json`` into ``out``.
+def solve_case(
+    case: Case, out: Path, done: Callable[[float], None] = lambda depth: None, picture: bool = False
+) -> Path:
+    """Solve a case and write ``<name>.parquet`` and ``<name>.json`` into ``out``, and ``<name>.png`` if wanted.
 
     Args:
         case: What to solve.
         out: Folder for the results.
         done: Called with each depth [mm] that is solved.
+        picture: Whether to draw the deepest state.
 
     Returns:
         The JSON file.
@@ -74,44 +78,20 @@ def solve_case(case: Case, out: Path, done: Callable[[float], None] = lambda dep
         UsageError: If results of that name lie there already.
         SolveError: If the press is impossible or an equilibrium is not found.
     """
-    report, table = out / f"{case.name}.json", out / f"{case.name}.parquet"
-    for path in (report, table):
+    report, table, drawing = (out / f"{case.name}.{ending}" for ending in ("json", "parquet", "png"))
+    for path in (report, table, *([drawing] if picture else [])):
         if path.exists():
             raise UsageError(
                 f"{path} exists", "a folder without it: results are never overwritten", "choose another --out"
             )
-    model = SkinModel(case.sensor, case.settings)
-    top = np.unique(model.mesh.outer)
-    columns: dict[str, list[np.ndarray]] = {k: [] for k in ("depth", "x", "y", "ux", "uy", "uz")}
-    results = []
-    began = time.perf_counter()
-    for depth, state in model.states(case.request):
-        seconds, began = time.perf_counter() - began, time.perf_counter()
-        place, moved = model.mesh.nodes[top], state.displacement[top]
-        for name, values in zip(columns, [np.full(len(top), depth), *place[:, :2].T, *moved.T], strict=True):
-            columns[name].append(values)
-        results.append(
-            {
-                "depth": depth, "force_N": state.force.tolist(), "protrusion_force_N": state.taxel_force.tolist(),
-                "residual": float(state.outcome.residual[0]), "misfit_um": 1e3 * float(state.outcome.penetration[0]),
-                "newton": state.outcome.newton, "cg": state.outcome.cg, "seconds": round(seconds, 3),
-            }
-        )
-        done(depth)
-    stamp = provenance.stamp("tacdata solve", model.identity, {"settings": asdict(case.settings)})
+    found: CaseAnswer = answer(case.sensor, case.request, case.settings, case.error_estimate, done)
     out.mkdir(parents=True, exist_ok=True)
-    _write_table(table, case.name, columns, provenance.canonical(stamp))
-    document = {
-        "version": schemas.version("case_result"), "case": case.document, "displacements": table.name,
-        "mesh": {k: float(v) for k, v in asdict(quality(model.mesh)).items()}, "results": results, "provenance": stamp,
-    }
+    found.write_table(table, case.name)
+    document = {**found.document, "case": case.document, "displacements": table.name}
+    if picture:
+        from tacdata.skin.case_picture import draw
+
+        draw(drawing, case.name, found)
+        document["picture"] = drawing.name
     documents.write(report, document, "case_result")
     return report
-
-
-def _write_table(path: Path, name: str, columns: dict[str, list[np.ndarray]], stamp: str) -> None:
-    arrays = {k: np.concatenate(v) for k, v in columns.items()}
-    table = pa.table({"case": pa.array([name] * len(arrays["depth"])).dictionary_encode(), **arrays})
-    temporary = path.with_name(f".{path.name}.partial")
-    pq.write_table(table.replace_schema_metadata({"tacdata": stamp}), temporary)
-    temporary.replace(path)

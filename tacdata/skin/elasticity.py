@@ -1,9 +1,11 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
 # pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
-"""Internal forces of the skin and their linearization, matrix-free, for a batch of states of one mesh."""
+"""Internal forces of the skin and their linearization, matrix-free, for a batch of states of one mesh.
 
-from __future__ import annotations
+Fields are laid out (nodes, 3, batch), the batch innermost: neighbouring threads of a card then read neighbouring
+numbers, and a field is the right-hand side of a matrix product as it stands.
+"""
 
 from functools import cache
 from types import SimpleNamespace
@@ -12,123 +14,171 @@ import numpy as np
 import torch
 import warp as wp
 
-from tacdata.sensor import Material
+from tacdata.skin.conditions import Conditions
 from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
 
 wp.config.log_level = wp.LOG_ERROR
 wp.init()
-Parameters = wp.types.vector(length=8, dtype=wp.float64)
+
+REAL = {torch.float32: wp.float32, torch.float64: wp.float64}
+"""Warp's name of a scalar type."""
 
 
 @cache
-def _kernels(law_name: str) -> SimpleNamespace:
-    """Compile the element kernels of one law."""
+def _kernels(law_name: str, real: type) -> SimpleNamespace:
+    """Compile the element kernels of one law in one precision."""
     law = load_law(law_name)
-    energy_of, stress_of, tangent_of = law.energy_function(), law.stress_function(), law.tangent_function()
+    energy_of, stress_of = law.energy_function(real, "H"), law.stress_function(real, "H")
+    tangent_of = law.tangent_function(real, "H")
+    Parameters = wp.types.vector(length=8, dtype=real)
+    vec3, mat33 = wp.types.vector(3, real), wp.types.matrix((3, 3), real)
+    Nodal = wp.types.matrix((10, 3), real)
 
     @wp.func
-    def gradient(
-        u: wp.array2d(dtype=wp.vec3d), tets: wp.array2d(dtype=wp.int32), slopes: wp.array4d(dtype=wp.float64),
-        b: int, e: int, q: int,
-    ):
-        H = wp.mat33d()
+    def gather(u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), e: int, b: int):
+        values = Nodal()
         for a in range(10):
-            g = wp.vec3d(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2])
-            H += wp.outer(u[b, tets[e, a]], g)
+            n = tets[e, a]
+            for i in range(3):
+                values[a, i] = u[n, i, b]
+        return values
+
+    @wp.func
+    def slope(slopes: wp.array4d(dtype=real), e: int, q: int, a: int, s: real):
+        return vec3(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2] / s)
+
+    @wp.func
+    def gradient(values: Nodal, slopes: wp.array4d(dtype=real), e: int, q: int, s: real):
+        H = mat33()
+        for a in range(10):
+            g = slope(slopes, e, q, a, s)
+            H += wp.outer(vec3(values[a, 0], values[a, 1], values[a, 2]), g)
         return H
 
-    @wp.kernel(module="unique")
+    @wp.func
+    def add(values: Nodal, tets: wp.array2d(dtype=wp.int32), e: int, b: int, total: wp.array3d(dtype=real)):
+        for a in range(10):
+            n = tets[e, a]
+            for i in range(3):
+                wp.atomic_add(total, n, i, b, values[a, i])
+
+    @wp.func
+    def constants(m: wp.array2d(dtype=real), b: int):
+        values = Parameters()
+        for k in range(8):
+            values[k] = m[k, b]
+        return values
+
+    @wp.func
+    def stretch(slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), e: int, b: int):
+        s = real(1.0)
+        if slab[e] == 1:
+            s = thickness[b]
+        return s
+
+    @wp.kernel(module="unique", enable_backward=False)
     def internal_force(
-        u: wp.array2d(dtype=wp.vec3d), tets: wp.array2d(dtype=wp.int32), slopes: wp.array4d(dtype=wp.float64),
-        weights: wp.array2d(dtype=wp.float64), m: Parameters,
-        force: wp.array2d(dtype=wp.vec3d), smallest_volume_ratio: wp.array(dtype=wp.float64),
+        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), slopes: wp.array4d(dtype=real),
+        weights: wp.array2d(dtype=real), slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real),
+        m: wp.array2d(dtype=real), force: wp.array3d(dtype=real), smallest_volume_ratio: wp.array(dtype=real),
     ):
-        b, e = wp.tid()
-        identity = wp.identity(n=3, dtype=wp.float64)
+        e, b = wp.tid()
+        values, result, c = gather(u, tets, e, b), Nodal(), constants(m, b)
+        s = stretch(slab, thickness, e, b)
+        least = real(1.0e30)
         for q in range(4):
-            F = identity + gradient(u, tets, slopes, b, e, q)
-            wp.atomic_min(smallest_volume_ratio, b, wp.determinant(F))
-            P = stress_of(F, m) * weights[e, q]
+            H = gradient(values, slopes, e, q, s)
+            least = wp.min(least, wp.determinant(wp.identity(n=3, dtype=real) + H))
+            P = stress_of(H, c) * (weights[e, q] * s)
             for a in range(10):
-                g = wp.vec3d(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2])
-                wp.atomic_add(force, b, tets[e, a], P * g)
+                f = P * slope(slopes, e, q, a, s)
+                for i in range(3):
+                    result[a, i] = result[a, i] + f[i]
+        wp.atomic_min(smallest_volume_ratio, b, least)
+        add(result, tets, e, b, force)
 
-    @wp.kernel(module="unique")
+    @wp.kernel(module="unique", enable_backward=False)
     def tangent_product(
-        u: wp.array2d(dtype=wp.vec3d), p: wp.array2d(dtype=wp.vec3d),
-        tets: wp.array2d(dtype=wp.int32), slopes: wp.array4d(dtype=wp.float64),
-        weights: wp.array2d(dtype=wp.float64), m: Parameters, product: wp.array2d(dtype=wp.vec3d),
+        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32),
+        slopes: wp.array4d(dtype=real), weights: wp.array2d(dtype=real), slab: wp.array(dtype=wp.int32),
+        thickness: wp.array(dtype=real), m: wp.array2d(dtype=real), product: wp.array3d(dtype=real),
     ):
-        b, e = wp.tid()
-        identity = wp.identity(n=3, dtype=wp.float64)
+        e, b = wp.tid()
+        values, along = gather(u, tets, e, b), gather(p, tets, e, b)
+        result, c = Nodal(), constants(m, b)
+        s = stretch(slab, thickness, e, b)
         for q in range(4):
-            F = identity + gradient(u, tets, slopes, b, e, q)
-            dP = tangent_of(F, gradient(p, tets, slopes, b, e, q), m) * weights[e, q]
+            H = gradient(values, slopes, e, q, s)
+            dP = tangent_of(H, gradient(along, slopes, e, q, s), c) * (weights[e, q] * s)
             for a in range(10):
-                g = wp.vec3d(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2])
-                wp.atomic_add(product, b, tets[e, a], dP * g)
+                f = dP * slope(slopes, e, q, a, s)
+                for i in range(3):
+                    result[a, i] = result[a, i] + f[i]
+        add(result, tets, e, b, product)
 
-    @wp.kernel(module="unique")
+    @wp.kernel(module="unique", enable_backward=False)
     def energy(
-        u: wp.array2d(dtype=wp.vec3d), tets: wp.array2d(dtype=wp.int32), slopes: wp.array4d(dtype=wp.float64),
-        weights: wp.array2d(dtype=wp.float64), m: Parameters, total: wp.array(dtype=wp.float64),
+        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), slopes: wp.array4d(dtype=real),
+        weights: wp.array2d(dtype=real), slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real),
+        m: wp.array2d(dtype=real), total: wp.array(dtype=real),
     ):
-        b, e = wp.tid()
-        identity = wp.identity(n=3, dtype=wp.float64)
+        e, b = wp.tid()
+        values, c = gather(u, tets, e, b), constants(m, b)
+        s = stretch(slab, thickness, e, b)
         for q in range(4):
-            wp.atomic_add(total, b, energy_of(identity + gradient(u, tets, slopes, b, e, q), m) * weights[e, q])
+            H = gradient(values, slopes, e, q, s)
+            wp.atomic_add(total, b, energy_of(H, c) * (weights[e, q] * s))
 
     return SimpleNamespace(internal_force=internal_force, tangent_product=tangent_product, energy=energy)
 
 
 class Elasticity:
-    """The elastic body: mesh, law and elastic constants on one device."""
+    """The elastic body: a mesh and a law on one device; elastic constants and thickness are each member's own."""
 
-    def __init__(self, mesh: SkinMesh, material: Material, device: str = "cpu") -> None:
-        """Place the mesh on ``device`` ("cpu" or "cuda:0") and compile the law's kernels."""
+    def __init__(self, mesh: SkinMesh, law: str, device: str = "cpu") -> None:
+        """Place the mesh on ``device`` ("cpu" or "cuda:0")."""
         slopes, weights = mesh.shape_gradients()
-        self.device = device
-        self.mesh = mesh
-        self.material = material
-        self.element_count = len(mesh.tets)
+        self.device, self.mesh, self.law = device, mesh, law
         self._tets = wp.array(mesh.tets, dtype=wp.int32, device=device)
-        self._slopes = wp.array(slopes, dtype=wp.float64, device=device)
-        self._weights = wp.array(weights, dtype=wp.float64, device=device)
-        values = load_law(material.law).parameters(material)
-        self._parameters = Parameters(*values, *([0.0] * (8 - len(values))))
-        self._kernels = _kernels(material.law)
+        # Elements of the slab stretch with its thickness; protrusions below z = 0 keep their size.
+        slab = mesh.nodes[mesh.tets[:, :4], 2].mean(axis=1) > 0
+        self._slab = wp.array(slab.astype(np.int32), dtype=wp.int32, device=device)
+        self._geometry = {
+            dtype: (wp.array(slopes, dtype=real, device=device), wp.array(weights, dtype=real, device=device))
+            for dtype, real in REAL.items()
+        }
 
-    def internal_force(self, u: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return nodal forces [N], shape (b, n, 3), and the smallest det F [1], shape (b,), of displacements [mm]."""
+    def internal_force(self, u: torch.Tensor, conditions: Conditions) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return nodal forces [N], shape (n, 3, b), and the smallest det F [1], shape (b,), of displacements [mm]."""
         force = torch.zeros_like(u)
-        ratio = torch.full((u.shape[0],), np.inf, dtype=torch.float64, device=u.device)
-        wp.launch(
-            self._kernels.internal_force, dim=(u.shape[0], self.element_count),
-            inputs=[vectors(u), self._tets, self._slopes, self._weights, self._parameters],
-            outputs=[vectors(force), wp.from_torch(ratio)], device=self.device,
-        )
+        ratio = torch.full((u.shape[2],), torch.inf, dtype=u.dtype, device=u.device)
+        self._launch("internal_force", u, (), conditions, force, ratio)
         return force, ratio
 
-    def tangent_product(self, u: torch.Tensor, p: torch.Tensor, product: torch.Tensor) -> None:
-        """Add K(u) p [N] to ``product``; all of shape (b, n, 3)."""
-        wp.launch(
-            self._kernels.tangent_product, dim=(u.shape[0], self.element_count),
-            inputs=[vectors(u), vectors(p), self._tets, self._slopes, self._weights, self._parameters],
-            outputs=[vectors(product)], device=self.device,
-        )
+    def tangent_product(
+        self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor
+    ) -> None:
+        """Add K(u) p [N] to ``product``; all of shape (n, 3, b) and of one precision."""
+        self._launch("tangent_product", u, (p,), conditions, product)
 
-    def energy(self, u: torch.Tensor) -> torch.Tensor:
+    def energy(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor:
         """Return the strain energy [N mm], shape (b,)."""
-        total = torch.zeros(u.shape[0], dtype=torch.float64, device=u.device)
-        wp.launch(
-            self._kernels.energy, dim=(u.shape[0], self.element_count),
-            inputs=[vectors(u), self._tets, self._slopes, self._weights, self._parameters],
-            outputs=[wp.from_torch(total)], device=self.device,
-        )
+        total = torch.zeros(u.shape[2], dtype=u.dtype, device=u.device)
+        self._launch("energy", u, (), conditions, total)
         return total
 
-
-def vectors(tensor: torch.Tensor) -> wp.array:
-    """View a contiguous tensor of shape (b, n, 3) as a Warp array of 3-vectors, without copying."""
-    return wp.from_torch(tensor, dtype=wp.vec3d)
+    def _launch(
+        self, name: str, u: torch.Tensor, more: tuple[torch.Tensor, ...], conditions: Conditions, *out: torch.Tensor
+    ) -> None:
+        kernel = getattr(_kernels(self.law, REAL[u.dtype]), name)
+        slopes, weights = self._geometry[u.dtype]
+        own = conditions.to(u.dtype)
+        wp.launch(
+            kernel, dim=(len(self.mesh.tets), u.shape[2]),
+            inputs=[
+                wp.from_torch(u), *map(wp.from_torch, more), self._tets, slopes, weights, self._slab,
+                wp.from_torch(own.thickness), wp.from_torch(own.law),
+            ],
+            outputs=[wp.from_torch(tensor) for tensor in out], device=self.device,
+        )

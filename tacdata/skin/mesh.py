@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from tacdata.errors import SolveError
 from tacdata.skin import elements
@@ -44,12 +45,25 @@ class SkinMesh:
             digest.update(f"{field.name}{array.dtype}{array.shape}".encode() + array.tobytes())
         return digest.hexdigest()
 
-    def fixed(self, bonded: tuple[str, ...]) -> np.ndarray:
-        """Return which nodes are held, shape (n,), bool, for bonded faces among "sides" and "bottom"."""
+    def fixed(self, bonded: tuple[str, ...], rim_width: float = 1.0) -> np.ndarray:
+        """Return which nodes are held, shape (n,), bool.
+
+        Args:
+            bonded: Among "sides", "bottom" and "rim".
+            rim_width: Width of the underside's border that "rim" holds [mm].
+        """
         held = np.zeros(len(self.nodes), dtype=bool)
         for face in bonded:
-            held |= getattr(self, face)
+            held |= self.rim(rim_width) if face == "rim" else getattr(self, face)
         return held
+
+    def rim(self, width: float) -> np.ndarray:
+        """Return True for nodes of the underside within ``width`` [mm] of its border with the sides, shape (n,)."""
+        border = self.nodes[self.sides & self.bottom]
+        held = self.bottom.copy()
+        if len(border):
+            held[self.bottom] = KDTree(border).query(self.nodes[self.bottom])[0] <= width
+        return held & self.bottom
 
     def volumes(self) -> np.ndarray:
         """Return the volume of each element by its straight-sided corners [mm^3], shape (e,)."""

@@ -1,36 +1,41 @@
-"""From displacements of the outer face to the depth map: the height of the deformed face above each pixel centre.
+"""From displacements of the outer face to the depth map, and point location on the undeformed outer face.
 
-Point-sampled at pixel centres. The material point above a pixel, X + u(X) = x, is found on the quadratic surface,
-so the map is exact to the surface triangles.
+Maps are exact to the quadratic triangles of the outer face: point-sampled at pixel centres or averaged over pixels
+(`tacdata.skin.depth_raster`, which also takes many states at once, on CUDA too).
 """
 
 from __future__ import annotations
 
 import numpy as np
+import torch
 
-from tacdata.errors import SolveError
 from tacdata.skin import elements
+from tacdata.skin.depth_raster import DepthRaster
 from tacdata.skin.mesh import SkinMesh
 
-_ITERATIONS = 100
-"""Searches for the material point above a pixel before its face counts as folded."""
-
-_CUTS = 8
-"""Parts into which a triangle's edge is cut where the face is folded."""
+_NEWTON = 20
+"""Steps to a point on a triangle whose edges bend in plan; straight ones need none."""
 
 
 class OuterFace:
-    """Point location and interpolation on the undeformed outer face, which is a graph over (x, y)."""
+    """The undeformed outer face, which is a graph over (x, y): point location, interpolation, depth maps."""
 
     def __init__(self, mesh: SkinMesh) -> None:
         """Sort the triangles of the outer face into a grid of cells."""
-        self._nodes, self._faces = mesh.nodes, mesh.outer
-        corners = mesh.nodes[mesh.outer[:, :3], :2]
+        self._mesh, self._faces = mesh, mesh.outer
+        self._plan = mesh.nodes[mesh.outer][:, :, :2]
+        corners = self._plan[:, :3]
         self._origin = corners[:, 0]
         self._inverse = np.linalg.inv(np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1))
+        self._bent = bool(np.abs(self._plan[:, 3:] - _middles(corners)).max(initial=0.0) > 1e-9)
         self._low, self._high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         self._cell = 2.0 * float(np.sqrt(np.prod(self._high - self._low) / len(corners)))
         self._count = np.ceil((self._high - self._low) / self._cell).astype(int)
+        self._bins = self._sort(corners)
+        self._rasters: dict[tuple[bytes, bytes, str], DepthRaster] = {}
+
+    def _sort(self, corners: np.ndarray) -> np.ndarray:
+        """Return the triangles near each cell, shape (cells, most), the last of a cell repeated."""
         bins: list[list[int]] = [[] for _ in range(int(np.prod(self._count)))]
         first = np.clip(((corners.min(axis=1) - self._low) / self._cell).astype(int), 0, self._count - 1)
         last = np.clip(((corners.max(axis=1) - self._low) / self._cell).astype(int), 0, self._count - 1)
@@ -39,21 +44,39 @@ class OuterFace:
                 for j in range(a[1], b[1] + 1):
                     bins[i * self._count[1] + j].append(triangle)
         width = max(len(b) for b in bins)
-        self._bins = np.array([b + b[-1:] * (width - len(b)) if b else [0] * width for b in bins])
+        return np.array([b + b[-1:] * (width - len(b)) if b else [0] * width for b in bins])
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the triangle, shape (n,), and its (xi, eta), shape (n, 2), under points [mm], shape (n, 2).
 
-        Points off the face get the nearest place on it.
+        Points off the face get a place on its rim, for a rectangular face the nearest.
         """
         inside = np.clip(points, self._low, self._high)
         cell = np.clip(((inside - self._low) / self._cell).astype(int), 0, self._count - 1)
         candidates = self._bins[cell[:, 0] * self._count[1] + cell[:, 1]]
         local = np.einsum("ncij,ncj->nci", self._inverse[candidates], inside[:, None] - self._origin[candidates])
+        if self._bent:
+            local = self._bend(candidates, local, inside)
         worst = np.minimum(np.minimum(local[..., 0], local[..., 1]), 1 - local.sum(axis=-1))
         best = worst.argmax(axis=1)
         row = np.arange(len(points))
-        return candidates[row, best], local[row, best]
+        return candidates[row, best], _inside(local[row, best])
+
+    def _bend(self, triangles: np.ndarray, local: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Correct places (n, c, 2) on triangles (n, c) for edges that bend in plan, by Newton's method."""
+        shape = local.shape
+        local, plan = np.clip(local.reshape(-1, 2), -1.0, 2.0), self._plan[triangles.ravel()]
+        target = np.repeat(points, shape[1], axis=0)
+        for _ in range(_NEWTON):
+            rest = target - np.einsum("na,nai->ni", elements.triangle_shapes(local), plan)
+            jacobian = np.einsum("nai,nak->nik", plan, elements.triangle_gradients(local))
+            regular = np.abs(np.linalg.det(jacobian)) > 1e-12
+            step = np.zeros_like(local)
+            step[regular] = np.linalg.solve(jacobian[regular], rest[regular][..., None])[..., 0]
+            local = np.clip(local + np.clip(step, -0.5, 0.5), -1.0, 2.0)
+            if np.abs(step).max(initial=0.0) < 1e-13:
+                break
+        return local.reshape(shape)
 
     def displacement(self, points: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the displacement [mm], shape (n, 3), of the material points above (x, y) [mm], shape (n, 2).
@@ -65,61 +88,36 @@ class OuterFace:
         triangle, local = self.locate(points)
         return np.einsum("na,nai->ni", elements.triangle_shapes(local), u[self._faces[triangle]])
 
-    def depth_map(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return undeformed minus deformed height [mm] at pixel centres, shape (len(x), len(y)).
+    def height(self, points: np.ndarray) -> np.ndarray:
+        """Return the height of the undeformed face [mm], shape (n,), above (x, y) [mm], shape (n, 2)."""
+        return self.displacement(points, self._mesh.nodes)[:, 2]
 
-        Where an indenter's steep flank folds the face over itself, the uppermost sheet counts.
+    def depth_map(self, x: np.ndarray, y: np.ndarray, u: np.ndarray, sampling: str = "point") -> np.ndarray:
+        """Return undeformed minus deformed height [mm] of pixels, shape (len(x), len(y)).
+
+        Where an indenter's steep flank folds the face over itself, the uppermost sheet counts. A pixel beside the
+        skin, deformed or not, has depth 0.
+
+        Args:
+            x: Pixel centres along x [mm], ascending.
+            y: Pixel centres along y [mm], ascending.
+            u: Nodal displacements [mm], shape (nodes, 3).
+            sampling: "point" (at pixel centres) or "area" (mean over the pixel's square).
 
         Raises:
-            SolveError: If no part of the deformed face lies above a pixel.
+            UsageError: If there is no such sampling, or pixels to average over are not evenly spaced.
         """
-        pixels = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-        material = pixels.copy()
-        shift = np.zeros((len(pixels), 3))
-        open_ = np.arange(len(pixels))
-        for _ in range(_ITERATIONS):
-            shift[open_] = self.displacement(material[open_], u)
-            error = pixels[open_] - shift[open_, :2] - material[open_]
-            open_, error = open_[(off := np.abs(error).max(axis=1) > 1e-7)], error[off]
-            if not len(open_):
-                break
-            material[open_] += error
-        depth = -shift[:, 2]
-        if len(open_):
-            depth[open_] = self._uppermost(pixels[open_], u)
-        return depth.reshape(len(x), len(y))
+        key = (np.asarray(x, dtype=float).tobytes(), np.asarray(y, dtype=float).tobytes(), sampling)
+        if key not in self._rasters:
+            self._rasters[key] = DepthRaster(self._mesh, x, y, sampling)
+        return self._rasters[key].depth(torch.as_tensor(np.asarray(u))[:, :, None])[0].numpy()
 
-    def _uppermost(self, pixels: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the depth [mm] of the uppermost sheet above pixels (n, 2), triangles cut into flat sixty-fourths."""
-        steps = np.arange(_CUTS + 1) / _CUTS
-        grid = np.array([(a, b) for a in steps for b in steps if a + b < 1 + 1e-9])
-        number = {(round(a * _CUTS), round(b * _CUTS)): k for k, (a, b) in enumerate(grid)}
-        cells = []
-        for i, j in number:
-            if i + j < _CUTS:
-                cells.append((number[i, j], number[i + 1, j], number[i, j + 1]))
-            if i + j < _CUTS - 1:
-                cells.append((number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]))
-        shapes = elements.triangle_shapes(grid)
-        place = np.einsum("ka,fai->fki", shapes, (self._nodes + u)[self._faces])
-        depth = np.einsum("ka,fa->fk", shapes, -u[self._faces][:, :, 2])
-        corners = place[:, np.array(cells)].reshape(-1, 3, 3)
-        depths = depth[:, np.array(cells)].reshape(-1, 3)
-        edges = np.stack([corners[:, 1, :2] - corners[:, 0, :2], corners[:, 2, :2] - corners[:, 0, :2]], axis=-1)
-        keep = np.abs(np.linalg.det(edges)) > 1e-12
-        corners, depths, inverse = corners[keep], depths[keep], np.linalg.inv(edges[keep])
-        result = np.empty(len(pixels))
-        for k, pixel in enumerate(pixels):
-            local = np.einsum("tij,tj->ti", inverse, pixel - corners[:, 0, :2])
-            b = np.concatenate([1 - local.sum(axis=1, keepdims=True), local], axis=1)
-            over = np.flatnonzero(b.min(axis=1) > -1e-9)
-            if not len(over):
-                raise SolveError(
-                    f"no part of the deformed face lies above pixel {pixel.round(2).tolist()} mm",
-                    "a map inside the skin's footprint",
-                    "check map and skin in the sensor file, or press less deep",
-                )
-            heights = (b[over] * corners[over, :, 2]).sum(axis=1)
-            best = over[heights.argmax()]
-            result[k] = (b[best] * depths[best]).sum()
-        return result
+
+def _middles(corners: np.ndarray) -> np.ndarray:
+    return np.stack([(corners[:, a] + corners[:, b]) / 2 for a, b in elements.FACE_EDGES], axis=1)
+
+
+def _inside(local: np.ndarray) -> np.ndarray:
+    """Return places (n, 2) moved into the triangle."""
+    local = np.maximum(local, 0.0)
+    return local / np.maximum(local.sum(axis=1, keepdims=True), 1.0)

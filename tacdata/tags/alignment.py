@@ -8,25 +8,26 @@ of a pattern count, not only four corners, so that the scale's bias of detected 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tacdata.tags.cube import AXES, Cube
+from tacdata.tags.cube import Cube
+from tacdata.tags.face_patch import FacePatch, draw_face, slopes_of
 
-STEPS = 3
-"""Gauss-Newton steps; a fourth changed the median error of rendered cubes by less than a micrometre."""
-FINE = 3
-"""Fine pixels a pixel, along each axis, of the drawing."""
-CELL = 12
-"""Texels a cell of the pattern."""
-CLEAR = 2.0
-"""Distance from the paper's edge, in blurs [1], up to which something else may shine in."""
-GRAZING = 0.12
-"""Cosine between face normal and view below which a face is not looked at."""
+STEPS = 4
+"""Most Gauss-Newton steps."""
+SETTLED = 0.4
+"""Move in the image [px] below which a step is the last."""
+COVERED = (0.05, 0.15)
+"""Difference, over the contrast [1], from which a pixel counts as covered by something: three times what is left on
+the detected faces, within these."""
+ENTIRE = 0.85
+"""Correlation [1] with its pattern from which a face that was not detected is uncovered enough to take part."""
+GRAIN = 0.015
+"""Standard deviation of a tag's corner [px] that remains however good the image is: print, lens, drawing."""
 ALIKE = 0.6
-"""Correlation [1] with its pattern from which a face that was not detected takes part."""
+"""Correlation [1] with its pattern from which a face is there."""
 
 
 @dataclass(eq=False)
@@ -42,25 +43,22 @@ class Alignment:
     likeness: dict[str, float] = field(default_factory=dict)
     """Face that should be seen -> correlation of the image with its pattern [1]."""
     residual: float = np.inf
-    """Root mean square difference of image and drawing over the contrast of black and white [1]."""
+    """Difference of image and drawing on the faces detected, over the contrast of black and white [1]: root mean
+    square, but for what is covered."""
+    covariance: np.ndarray = field(default_factory=lambda: np.full((6, 6), np.inf))
+    """Of a small turn in the camera frame [rad] and the translation [m], in this order, shape (6, 6)."""
 
 
 @dataclass(eq=False)
-class _Patch:
-    """One face's pixels."""
+class _Step:
+    """Where a Gauss-Newton step leads."""
 
-    image: np.ndarray
-    """Grey values, shape (n,)."""
-    model: np.ndarray
-    """Pattern drawn and blurred, 0 black to 1 white, shape (n,)."""
-    slopes: np.ndarray
-    """Change of `model` with rotation [rad], translation [m] and the blur's variance [px^2], shape (n, 7)."""
-
-    @property
-    def likeness(self) -> float:
-        a, b = self.image - self.image.mean(), self.model - self.model.mean()
-        scale = float(np.sqrt((a @ a) * (b @ b)))
-        return float(a @ b) / scale if scale > 0 else 0.0
+    move: np.ndarray
+    """Rotation [rad], translation [m], the blur's variance [px^2], shape (7,)."""
+    covariance: np.ndarray
+    """Of rotation [rad] and translation [m], shape (6, 6)."""
+    pixels: float
+    """By how far the rotation and translation move the cube in the image, about [px]."""
 
 
 def align(
@@ -74,155 +72,103 @@ def align(
         cube: The cube.
         matrix: Camera matrix [px], shape (3, 3).
         grey: Image without distortion, uint8, shape (height, width).
-        steps: Gauss-Newton steps.
+        steps: Most Gauss-Newton steps; one that is too small to see is the last.
     """
     pose = start
-    for step in range(steps):
+    for step in range(max(steps, 1)):
         patches = _patches(pose, cube, matrix, grey)
-        used = [p for face, p in patches.items() if face in seen or p.likeness > ALIKE]
-        move = _step(used, robust=step >= 2) if used else None
-        if move is None:
-            pose = start
-            break
+        used = [p for f, p in patches.items() if f in seen or p.likeness > ENTIRE]
+        detected = [p for f, p in patches.items() if f in seen]
+        found = _step(used, pose, matrix, cube, None if step == 0 else pose.residual) if steps else None
         pose = Alignment(
-            _rotation(move[:3]) @ pose.rotation, pose.translation + move[3:6],
-            float(np.sqrt(np.clip(pose.blur**2 + move[6], 0.2**2, 3.0**2))),
-        )
-    patches = _patches(pose, cube, matrix, grey)
-    pose.likeness = {face: patch.likeness for face, patch in patches.items()}
-    used = [p for face, p in patches.items() if face in seen or p.likeness > ALIKE]
-    pose.residual = _residual(used) if used else np.inf
-    return pose
+            pose.rotation, pose.translation, pose.blur, {f: p.likeness for f, p in patches.items()},
+            _residual(detected, np.zeros(7)), pose.covariance,
+        )  # fmt: skip
+        if found is None:
+            return pose if step == 0 else replace(start, likeness=pose.likeness)
+        pose = Alignment(
+            _rotation(found.move[:3]) @ pose.rotation, pose.translation + found.move[3:6],
+            float(np.sqrt(np.clip(pose.blur**2 + found.move[6], 0.2**2, 3.0**2))),
+            pose.likeness, _residual(detected, found.move), found.covariance,
+        )  # fmt: skip
+        if step > 0 and found.pixels < SETTLED:
+            break
+    return replace(pose, covariance=pose.covariance + _grain(pose, seen, cube, matrix))
 
 
-def _step(patches: list[_Patch], robust: bool) -> np.ndarray | None:
-    """Return the step in rotation [rad], translation [m] and the blur's variance [px^2], shape (7,)."""
-    count = 7 + 2 * len(patches)
-    normal, right = np.zeros((count, count)), np.zeros(count)
-    for index, patch in enumerate(patches):
-        base = np.column_stack([np.ones_like(patch.model), patch.model])
-        (black, contrast), *_ = np.linalg.lstsq(base, patch.image, rcond=None)
-        if contrast <= 1.0:
+def _grain(pose: Alignment, seen: set[str], cube: Cube, matrix: np.ndarray) -> np.ndarray:
+    """Return the covariance of rotation [rad] and translation [m] that `GRAIN` gives, shape (6, 6)."""
+    arms = np.concatenate([cube.corners(face) for face in seen]) @ pose.rotation.T
+    slopes = np.empty((2, 6, len(arms)))
+    for row, (x, y) in zip(slopes, ((-1.0, 0.0), (0.0, -1.0)), strict=True):
+        ones = np.ones(len(arms))
+        slopes_of(x * ones, y * ones, arms.T, pose.translation, matrix, row)
+    rows = slopes.transpose(0, 2, 1).reshape(-1, 6)
+    return GRAIN**2 * np.linalg.pinv(rows.T @ rows, rcond=1e-12)
+
+
+def _residual(patches: list[FacePatch], move: np.ndarray) -> float:
+    """Return what is left after a step, to first order, over each face's contrast; what is covered counts little."""
+    if not patches:
+        return np.inf
+    left = [p.rest / max(p.contrast, 1.0) - move @ p.columns[:7] for p in patches]
+    return float(COVERED[1] * np.sqrt(np.log1p(np.square(np.concatenate(left) / COVERED[1])).mean()))
+
+
+def _step(
+    patches: list[FacePatch], pose: Alignment, matrix: np.ndarray, cube: Cube, left: float | None
+) -> _Step | None:
+    """Return the Gauss-Newton step on some faces; None if they do not determine one.
+
+    Args:
+        patches: The faces.
+        pose: Where they are drawn.
+        matrix: Camera matrix [px].
+        cube: The cube.
+        left: What the step before has left of the difference, over the contrast [1]; None at the first step, when
+            large differences mean that the pose is off.
+    """
+    normal, right = np.zeros((7, 7)), np.zeros(7)
+    squares = count = 0.0
+    for patch in patches:
+        if patch.contrast <= 1.0:
             continue
-        rest = patch.image - black - contrast * patch.model
-        columns = np.zeros((len(rest), count))
-        columns[:, :7] = contrast * patch.slopes
-        columns[:, 7 + 2 * index : 9 + 2 * index] = base
-        # Cauchy weights: what covers a part of the face counts little.
-        weight = 1 / (1 + (rest / (0.15 * contrast)) ** 2) if robust else np.ones_like(rest)
-        normal += columns.T @ (weight[:, None] * columns)
-        right += columns.T @ (weight * rest)
+        weighted, rest = patch.columns, patch.rest
+        if left is not None:
+            # Cauchy weights: what covers a part of the face counts little.
+            weight = 1 / (1 + np.square(rest / (patch.contrast * np.clip(3 * left, *COVERED))))
+            weighted, rest = weighted * weight, weight * rest
+            count += float(weight.sum())
+        else:
+            count += len(rest)
+        squares += float(rest @ patch.rest)
+        product, towards = weighted @ patch.columns.T, patch.columns @ rest
+        # Black and white of a face are its own: they are solved for and drop out.
+        inner = product[:7, 7:] @ np.linalg.inv(product[7:, 7:])
+        normal += patch.contrast**2 * (product[:7, :7] - inner @ product[7:, :7])
+        right += patch.contrast * (towards[:7] - inner @ towards[7:])
+    if not count:
+        return None
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+    scales = np.outer(scale, scale)
     try:
-        damped = normal / np.outer(scale, scale) + 1e-9 * np.eye(count)
-        solution = np.linalg.solve(damped, right / scale) / scale
+        inverse = np.linalg.inv(normal / scales + 1e-9 * np.eye(7)) / scales
     except np.linalg.LinAlgError:
         return None
-    return solution[:7] if np.isfinite(solution).all() and np.linalg.norm(solution[:3]) < 0.5 else None
+    move = inverse @ right
+    if not np.isfinite(move).all() or np.linalg.norm(move[:3]) > 0.5:
+        return None
+    focal, depth = matrix[0, 0], max(float(pose.translation[2]), 1e-3)
+    turned, moved = np.linalg.norm(move[:3]) * cube.side / 1000, np.linalg.norm(move[3:6])
+    return _Step(move, squares / count * inverse[:6, :6], float(turned + moved) * focal / depth)
 
 
-def _residual(patches: list[_Patch]) -> float:
-    """Return the root mean square of what is left, over each face's contrast."""
-    rest = []
-    for patch in patches:
-        base = np.column_stack([np.ones_like(patch.model), patch.model])
-        fit, *_ = np.linalg.lstsq(base, patch.image, rcond=None)
-        rest.append((patch.image - base @ fit) / max(float(fit[1]), 1.0))
-    return float(np.sqrt((np.concatenate(rest) ** 2).mean()))
-
-
-def _patches(pose: Alignment, cube: Cube, matrix: np.ndarray, grey: np.ndarray) -> dict[str, _Patch]:
+def _patches(pose: Alignment, cube: Cube, matrix: np.ndarray, grey: np.ndarray) -> dict[str, FacePatch]:
     """Draw every face that the pose turns to the camera and that lies inside the image."""
-    patches = {}
-    for face, tag in cube.ids.items():
-        patch = _patch(pose, face, tag, cube, matrix, grey)
-        if patch is not None:
-            patches[face] = patch
-    return patches
-
-
-def _patch(
-    pose: Alignment, face: str, tag: int, cube: Cube, matrix: np.ndarray, grey: np.ndarray
-) -> _Patch | None:
-    import cv2
-
-    axes, half = pose.rotation @ AXES[face], cube.tag / 2000
-    centre = pose.translation + axes[:, 2] * cube.side / 2000
-    if -axes[:, 2] @ centre < GRAZING * np.linalg.norm(centre):
-        return None
-    # Pixels within two and a half blurs of the paper's edge may show what is behind it.
-    facing = -axes[:, 2] @ centre / np.linalg.norm(centre)
-    half_pixels = half * matrix[0, 0] / centre[2] * facing
-    reach = max(1.0, cube.side / cube.tag - CLEAR * pose.blur / half_pixels)
-    outline = centre + half * reach * np.array([[a, b] for a in (-1, 1) for b in (-1, 1)]) @ axes[:, :2].T
-    if outline[:, 2].min() <= 1e-3:
-        return None
-    pixels = outline @ matrix.T
-    pixels = pixels[:, :2] / pixels[:, 2:]
-    left, top = np.floor(pixels.min(axis=0)).astype(int) - 2
-    right, bottom = np.ceil(pixels.max(axis=0)).astype(int) + 3
-    if (right - left) * (bottom - top) > 4 * grey.size:
-        return None
-    # to_plane takes a pixel of the box to right and up on the face in half tags, homogeneous.
-    plane = np.column_stack([half * axes[:, 0], half * axes[:, 1], centre])
-    to_plane = np.linalg.inv(matrix @ plane) @ np.array([[1, 0, left], [0, 1, top], [0, 0, 1.0]])
-    model = _drawn(tag, to_plane, (right - left, bottom - top), pose.blur)
-    v, u = np.mgrid[: bottom - top, : right - left].reshape(2, -1).astype(float)
-    places = to_plane @ np.stack([u, v, np.ones_like(u)])
-    places = places[:2] / places[2]
-    in_image = (u + left >= 0) & (v + top >= 0) & (u + left < grey.shape[1]) & (v + top < grey.shape[0])
-    inside = (np.abs(places) <= reach).all(axis=0) & in_image
-    if inside.sum() < 30:
-        return None
-    slope = np.stack([cv2.Sobel(model, cv2.CV_32F, *axis, ksize=1) for axis in ((1, 0), (0, 1))]) / 2
-    curvature = cv2.Laplacian(model, cv2.CV_32F, ksize=1)
-    arm = half * places[:, inside].T @ axes[:, :2].T + (centre - pose.translation)
-    image = grey[v[inside].astype(int) + top, u[inside].astype(int) + left].astype(float)
-    slopes = _slopes(slope.reshape(2, -1)[:, inside], arm, pose.translation, matrix)
-    return _Patch(
-        image, model.ravel()[inside].astype(float), np.column_stack([slopes, curvature.ravel()[inside] / 2])
+    drawn = (
+        (face, draw_face(face, pose.rotation, pose.translation, pose.blur, cube, matrix, grey)) for face in cube.ids
     )
-
-
-def _slopes(slope: np.ndarray, arm: np.ndarray, translation: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Return the change of the drawing with rotation about the cube's centre and translation, shape (n, 6).
-
-    A point that moves by dx in the image takes its value along: the drawing changes by -slope . dx.
-    """
-    (x, y, z), (a, b, c) = (arm + translation).T, arm.T
-    u, v = -slope[0] * matrix[0, 0] / z, -slope[1] * matrix[1, 1] / z
-    w = -(u * x + v * y) / z
-    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u, u, v, w], axis=-1)
-
-
-def _drawn(tag: int, to_plane: np.ndarray, size: tuple[int, int], blur: float) -> np.ndarray:
-    """Return a tag's pattern as the pixels of a box see it, float32, 0 black to 1 white."""
-    import cv2
-
-    fine = FINE
-    texture = _pattern(tag)
-    texels = len(texture)
-    # Half tags to texels (the pattern is 8 cells and 2 cells of paper on each side), rows downwards.
-    to_texel = np.array([[4 * CELL, 0, texels / 2 - 0.5], [0, -4 * CELL, texels / 2 - 0.5], [0, 0, 1]])
-    offset = 0.5 / fine - 0.5
-    to_coarse = np.array([[1 / fine, 0, offset], [0, 1 / fine, offset], [0, 0, 1]])
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    drawn = cv2.warpPerspective(
-        texture, to_texel @ to_plane @ to_coarse, (size[0] * fine, size[1] * fine),
-        flags=flags, borderMode=cv2.BORDER_REPLICATE,
-    )
-    drawn = cv2.GaussianBlur(drawn, (0, 0), blur * fine)
-    return cv2.resize(drawn, size, interpolation=cv2.INTER_AREA)
-
-
-@cache
-def _pattern(tag: int) -> np.ndarray:
-    """Return a tag's pattern with two cells of paper around it, float32, 0 black to 1 white."""
-    import cv2
-
-    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-    cells = np.pad(cv2.aruco.generateImageMarker(family, tag, 8, borderBits=1) / 255, 2, constant_values=1.0)
-    return np.kron(cells, np.ones((CELL, CELL))).astype(np.float32)
+    return {face: patch for face, patch in drawn if patch is not None}
 
 
 def _rotation(vector: np.ndarray) -> np.ndarray:

@@ -72,6 +72,15 @@ class Camera:
         square = self.matrix
         return cv2.undistortPoints(pixels.reshape(-1, 1, 2), square, self.distortion, P=square)[:, 0]
 
+    def bend(self, pixels: np.ndarray) -> np.ndarray:
+        """Return where straightened pixels, shape (n, 2), lie in the image as taken, shape (n, 2)."""
+        import cv2
+
+        if not self.distortion.any():
+            return pixels
+        rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(self.matrix).T
+        return cv2.projectPoints(rays, np.zeros(3), np.zeros(3), self.matrix, self.distortion)[0][:, 0]
+
     def project(self, points: np.ndarray) -> np.ndarray:
         """Return pixels without distortion, shape (n, 2), of points in the camera frame [m], shape (n, 3)."""
         pixels = points @ self.matrix.T

@@ -2,12 +2,13 @@
 
 Every tag alone gives two poses: a square seen in weak perspective looks the same tilted either way (Collins
 & Bartoli, "Infinitesimal plane-based pose estimation", IJCV 109, 2014). All corners together give one. A
-pose is refined by Levenberg-Marquardt on the tags that fit it, first loosely, then tightly; the others are
-outliers.
+pose is refined by Gauss-Newton steps (OpenCV's VVS) on the tags that fit it, first loosely, then tightly; the
+others are outliers.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,13 +50,13 @@ def candidates(tags: list[Tag], cube: Cube, camera: Camera) -> list[Candidate]:
         cube: The cube.
         camera: The camera.
     """
-    import cv2
-
-    if len({tag.id for tag in tags}) > 1:
-        found = _solved(tags, cv2.SOLVEPNP_ITERATIVE, tags, cube, camera)
-        if found and len(found[0].tags) == len(tags):
-            return found
-    found = [c for tag in tags for c in _solved([tag], cv2.SOLVEPNP_IPPE, tags, cube, camera)]
+    found: list[Candidate] = []
+    several = len({tag.id for tag in tags}) > 1
+    for tag in sorted(tags, key=lambda tag: -tag.size):
+        for candidate in _solved(tag, tags, cube, camera):
+            found.append(candidate)
+            if several and len(candidate.tags) == len(tags) and candidate.reprojection < LEAST:
+                return [candidate]  # several faces allow one pose only
     most = max((len(c.tags) for c in found), default=0)
     kept: list[Candidate] = []
     for candidate in sorted((c for c in found if len(c.tags) == most), key=lambda c: c.reprojection):
@@ -69,17 +70,20 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.arccos(np.clip(((a * b).sum() - 1) / 2, -1.0, 1.0)))
 
 
-def _solved(start: list[Tag], method: int, tags: list[Tag], cube: Cube, camera: Camera) -> list[Candidate]:
-    """Return the poses that some tags give, each refined on all tags that fit it."""
+def _solved(start: Tag, tags: list[Tag], cube: Cube, camera: Camera) -> Iterator[Candidate]:
+    """Yield the two poses that one tag gives, each refined on all tags that fit it."""
     import cv2
 
-    points, pixels = _pairs(start, cube)
+    points, pixels = _pairs([start], cube)
+    method = cv2.SOLVEPNP_IPPE
     try:
         _, rotations, translations, _ = cv2.solvePnPGeneric(points, pixels, camera.matrix, None, flags=method)
     except cv2.error:  # corners on a line, from a false detection
-        return []
-    settled = (_settle(r, t, tags, cube, camera) for r, t in zip(rotations, translations, strict=True))
-    return [candidate for candidate in settled if candidate is not None]
+        return
+    for rotation, translation in zip(rotations, translations, strict=True):
+        candidate = _settle(rotation, translation, tags, cube, camera)
+        if candidate is not None:
+            yield candidate
 
 
 def _settle(
@@ -93,7 +97,7 @@ def _settle(
         if not group:
             return None
         try:
-            rotation, translation = cv2.solvePnPRefineLM(
+            rotation, translation = cv2.solvePnPRefineVVS(
                 *_pairs(group, cube), camera.matrix, None, rotation.copy(), translation.copy()
             )
         except cv2.error:

@@ -13,6 +13,7 @@ left-bottom.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ class Cube:
             raise FormatError(f"{origin}: ids {ids}", "different numbers from 0 to 586", "correct ids")
         return cls(float(side), float(tag), dict(ids))
 
-    @property
+    @cached_property
     def faces(self) -> dict[int, str]:
         """Tag number to face."""
         return {tag: face for face, tag in self.ids.items()}
@@ -83,6 +84,10 @@ class Cube:
         flat = np.column_stack([half * np.asarray(places), np.full(len(places), self.side / 2000)])
         return flat @ AXES[face].T
 
+    @cached_property
+    def _corners(self) -> dict[str, np.ndarray]:
+        return {face: self.points(face, CORNERS) for face in self.ids}
+
     def corners(self, face: str) -> np.ndarray:
         """Return a tag's corners in the cube frame [m], shape (4, 3), in the AprilTag library's order."""
-        return self.points(face, CORNERS)
+        return self._corners[face]

@@ -1,7 +1,7 @@
-"""Find AprilTags: OpenCV's ArUco detector says where, the AprilTag library says what and exactly where.
+"""Find AprilTags: a cheap search says where one may lie, the AprilTag library says what and exactly where.
 
-ArUco looks through a 1280 x 720 image in a few milliseconds but places corners to a pixel or two; the
-AprilTag library places them to a quarter of a pixel but takes a hundred milliseconds for the whole image.
+The AprilTag library places corners to a quarter of a pixel but takes a hundred milliseconds for a noisy
+image of 1280 x 720; shown only the small boxes that `search` leaves, it takes one.
 """
 
 from __future__ import annotations
@@ -13,32 +13,46 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import UsageError
+from tacdata.tags.search import Suspect, suspects
 from tacdata.tags.tag import Tag
 
 HALF_PIXEL = 0.5
 """The AprilTag library puts pixel centres at halves (AprilRobotics/apriltag issue 121), OpenCV does not."""
 HAMMING, MARGIN = 2, 15.0
 """Bits that may be corrected, and the least decision margin, of a tag that is believed."""
-SMALL = 160
-"""Longer side of a region [px] below which it is looked at in double size: its tags are below 35 px."""
-CLUTTER = 0.3
-"""Share of the image [1] from which searching it whole is no slower."""
+TINY, SMALL, LARGE = 28, 40, 160
+"""Size of a suspect [px] below which it is read in double size first, below which in double size if it cannot be read
+as it is, and from which in half size or less."""
+ROOM = 0.25
+"""What is shown of a suspect's surroundings, over its size [1]: the white margin that a tag needs."""
+NEAR = 1.2
+"""How far from a tag, over its size [1], the other tags of its cube lie."""
+LAST = 24
+"""How many boxes that do not look like a tag are read where nothing else was found."""
 _LOCK = Lock()
 
 
-def detect_tags(image: np.ndarray, *, whole: bool = True) -> list[Tag]:
+def detect_tags(image: np.ndarray, *, whole: bool = True, within: tuple[int, int, int, int] | None = None) -> list[Tag]:
     """Return the tags of family 36h11 in an image, in no particular order.
 
     Args:
         image: Grey (height, width) or BGR (height, width, 3), uint8.
-        whole: Search everywhere. Otherwise only around the quadrilaterals that ArUco finds, if there are any.
+        whole: Show the AprilTag library everything. Otherwise only what the search suspects.
+        within: Left, top, right, bottom [px] of the part to look at.
 
     Raises:
         UsageError: If this is no such image.
     """
     grey = to_grey(image)
-    boxes = [(0, 0, grey.shape[1], grey.shape[0])] if whole else _regions(grey)
-    return [tag for box in boxes for tag in _detect(grey, box, enlarge=not whole)]
+    height, width = grey.shape
+    left, top, right, bottom = within or (0, 0, width, height)
+    left, top = max(left, 0), max(top, 0)
+    part = grey[top : min(bottom, height), left : min(right, width)]
+    if not part.size:
+        return []
+    offset = np.array([left, top], float)
+    found = _read(part, (0, 0, part.shape[1], part.shape[0]), 1.0) if whole else _read_suspects(part)
+    return [Tag(tag.id, tag.corners + offset, tag.margin, tag.hamming) for tag in found]
 
 
 def to_grey(image: np.ndarray) -> np.ndarray:
@@ -75,68 +89,54 @@ def _april() -> Any:
     return pyapriltags.Detector(families="tag36h11", nthreads=1, quad_decimate=1.0, refine_edges=0)
 
 
-@cache
-def _aruco() -> Any:
-    import cv2
+def _read_suspects(grey: np.ndarray) -> list[Tag]:
+    """Read what looks like a tag, then what lies beside a tag that was read, or without one the smallest rest."""
+    tags: list[Tag] = []
+    rest = []
+    for suspect in suspects(grey):
+        if suspect.framed:
+            _read_one(grey, suspect, tags)
+        else:
+            rest.append(suspect)
+    read = [(tag.corners, NEAR * tag.size) for tag in tags]
+    beside = [s for s in rest if any(s.is_near(corners, reach) for corners, reach in read)]
+    for suspect in beside if tags else sorted(rest, key=lambda s: s.size)[:LAST]:
+        _read_one(grey, suspect, tags)
+    return tags
 
-    return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11))
+
+def _read_one(grey: np.ndarray, suspect: Suspect, tags: list[Tag]) -> None:
+    """Add a suspect's tags; two boxes may show the same tag, which counts once."""
+    height, width = grey.shape
+    scale = 1.0
+    while suspect.size * scale >= LARGE:
+        scale /= 2
+    scales = (2.0, scale) if suspect.size < TINY else (scale, 2.0) if suspect.size < SMALL else (scale,)
+    box = suspect.box(ROOM * suspect.size + 3, width, height)
+    found = next((found for each in scales if (found := _read(grey, box, each))), [])
+    for tag in found:
+        same = [t for t in tags if t.id == tag.id and np.abs(t.corners - tag.corners).max() < tag.size / 2]
+        if all(tag.margin > other.margin for other in same):
+            tags[:] = [t for t in tags if not any(t is other for other in same)] + [tag]
 
 
-def _detect(grey: np.ndarray, box: tuple[int, int, int, int], *, enlarge: bool) -> list[Tag]:
-    """Run the AprilTag library on a box (left, top, right, bottom); a small one is enlarged first on wish."""
+def _read(grey: np.ndarray, box: tuple[int, int, int, int], scale: float) -> list[Tag]:
+    """Run the AprilTag library on a box (left, top, right, bottom) [px] drawn ``scale`` times as large."""
     import cv2
 
     left, top, right, bottom = box
     crop = grey[top:bottom, left:right]
-    scale = 2 if enlarge and max(crop.shape) < SMALL else 1
-    if scale > 1:
-        crop = cv2.resize(crop, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    if scale != 1.0:
+        kind = cv2.INTER_CUBIC if scale > 1 else cv2.INTER_AREA
+        crop = cv2.resize(crop, None, fx=scale, fy=scale, interpolation=kind)
     with _LOCK:
         found = _april().detect(np.ascontiguousarray(crop))
-    # In the library's coordinates a pixel's corner is a whole number, so scaling is plain division.
+    # In the library's coordinates a pixel's corner is a whole number, so scaling is plain division, by what
+    # the rounding of the sides has made of the scale.
+    scales = np.array([crop.shape[1] / (right - left), crop.shape[0] / (bottom - top)])
     offset = np.array([left, top], float) - HALF_PIXEL
     return [
-        Tag(int(d.tag_id), d.corners / scale + offset, float(d.decision_margin), int(d.hamming))
+        Tag(int(d.tag_id), d.corners / scales + offset, float(d.decision_margin), int(d.hamming))
         for d in found
         if d.hamming <= HAMMING and d.decision_margin >= MARGIN and np.isfinite(d.corners).all()
     ]
-
-
-def _regions(grey: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """Return disjoint boxes (left, top, right, bottom) [px] around quadrilaterals, with room for a cube."""
-    with _LOCK:
-        read, _, unread = _aruco().detectMarkers(grey)
-    height, width = grey.shape
-    # ArUco fails to read most tags below 20 px: what it saw but could not read is looked at too, unless it is
-    # half of a cluttered image.
-    for quads in ([*read, *unread], read):
-        boxes = _merge([_roomy(quad[0], width, height) for quad in quads])
-        area = sum((b[2] - b[0]) * (b[3] - b[1]) for b in boxes)
-        if boxes and area < CLUTTER * grey.size:
-            return [(int(b[0]), int(b[1]), int(b[2]), int(b[3])) for b in boxes]
-    return [(0, 0, width, height)]
-
-
-def _roomy(quad: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Return the box around a quadrilateral, wide enough for the cube that it may belong to, in the image."""
-    low, high = quad.min(axis=0), quad.max(axis=0)
-    # A neighbour face of the same cube reaches about one tag beside the tag that was found.
-    room = 1.2 * float((high - low).max()) + 6
-    box = np.concatenate([low - room, high + room])
-    return np.clip(np.round(box), 0, [width, height, width, height]).astype(int)
-
-
-def _merge(boxes: list[np.ndarray]) -> list[np.ndarray]:
-    """Join overlapping boxes until none overlap, so that no tag is found twice."""
-    merged: list[np.ndarray] = []
-    for box in boxes:
-        joined = box
-        while True:
-            hits = [m for m in merged if (m[:2] < joined[2:]).all() and (joined[:2] < m[2:]).all()]
-            if not hits:
-                break
-            merged = [m for m in merged if not any(m is h for h in hits)]
-            stack = np.stack([joined, *hits])
-            joined = np.concatenate([stack[:, :2].min(axis=0), stack[:, 2:].max(axis=0)])
-        merged.append(joined)
-    return merged

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +21,8 @@ class Tag:
     hamming: int
     """Bits corrected."""
 
-    @property
+    @cached_property
     def size(self) -> float:
         """Longest side [px]."""
-        return float(np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=0), axis=1).max())
+        sides = self.corners - self.corners[[3, 0, 1, 2]]
+        return float(np.sqrt(np.square(sides).sum(axis=1).max()))

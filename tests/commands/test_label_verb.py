@@ -71,3 +71,10 @@ def test_bad_input_ends_in_words(tmp_path):
     assert finished.returncode == 2
     assert "nowhere is no session" in finished.stderr and "next:" in finished.stderr
     assert "Traceback" not in finished.stderr
+
+
+def test_what_the_model_says_of_itself_reaches_the_user(label, monkeypatch):
+    monkeypatch.setenv("FAST_MODEL_REMARK", "material law yeoh is unstable above 1.5")
+    shown = label()
+    assert shown.exit_code == 0
+    assert "warning: material law yeoh is unstable above 1.5" in shown.stderr

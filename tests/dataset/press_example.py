@@ -57,8 +57,12 @@ def label(of: Episode, **changes) -> Label:
         "tip": of.tip_at(of.taxels.sample_ns),
         "signed": signed,
         "taxel_force": random.random((count, of.sensor.taxels.count)).astype(np.float32),
+        "taxel_closure": np.zeros((count, of.sensor.taxels.count), np.float32),
+        "taxel_area": np.zeros((count, of.sensor.taxels.count), np.float32),
         "force": random.random((count, 3)).astype(np.float32),
+        "error_map": np.full(signed.shape, 0.01, np.float16),
         "error": random.random(count).astype(np.float32),
+        "force_error": np.full(count, 0.01, np.float32),
         "provenance": provenance.stamp("test", parents, {}),
     }
     return Label(**{**values, **changes})

@@ -16,6 +16,7 @@ class FastModel:
 
     def __init__(self, sensor):
         self.sensor = sensor
+        self.remarks = tuple(filter(None, [os.environ.get("FAST_MODEL_REMARK")]))
         self.content_hash = provenance.content_hash(
             [sensor.content_hash, os.environ.get("FAST_MODEL_VERSION", "1")]
         )
@@ -38,8 +39,8 @@ class FastModel:
         return path(self.sensor, job.depths, lambda d: d, job.x, bad=os.environ.get("FAST_MODEL_NAN") == "1")
 
 
-def path(sensor, depths, answer, x=0.0, bad=False):
-    """A path whose surface is ``answer(depth)`` times a bump around x."""
+def path(sensor, depths, answer, x=0.0, bad=False, numerical=0.0):
+    """A path whose surface is ``answer(depth)`` times a bump around x, every error ``numerical`` times ``answer``."""
     depth = np.array(depths)
     bump = np.exp(-((sensor.map.x[:, None] - x) ** 2 + sensor.map.y[None] ** 2) / 4.0)
     values = np.array([answer(d) for d in depth])
@@ -51,7 +52,11 @@ def path(sensor, depths, answer, x=0.0, bad=False):
         surface=values[:, None, None] * bump,
         taxel_force=values[:, None] * taxels,
         taxel_closure=values[:, None] * taxels,
+        taxel_area=values[:, None] * taxels,
         force=values[:, None] * np.array([0.0, 0.0, -1.0]),
+        numerical=np.abs(values)[:, None, None] * numerical * np.ones_like(bump),
+        force_error=np.abs(values) * numerical,
+        taxel_force_error=np.abs(values)[:, None] * numerical * taxels,
         residual=np.zeros(len(depth)),
         penetration=np.zeros(len(depth)),
         provenance={"law": "bump"},

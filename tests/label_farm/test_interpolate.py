@@ -52,6 +52,28 @@ def test_the_bound_holds_on_curved_paths_and_is_not_idle(name, loading):
     assert (branch.bound(branch.depth)[:, 2] < 1e-12).all(), "at a solved state nothing is interpolated"
 
 
+def test_the_meshs_error_joins_what_is_lost_between_states(tmp_path):
+    episode = press_episode(tmp_path, depth=1.5, frames=400)
+    wish = request(episode, SENSOR, "0" * 64, Ladder())
+    states = {share: path(SENSOR, wish.job.depths, lambda d: d**1.5, numerical=share) for share in (0.0, 0.02)}
+    exact, meshed = (make_label(wish, solution) for solution in states.values())
+    mesh = 0.02 * np.maximum(wish.tip[:, 2], 0) ** 1.5
+    joined = np.sqrt(exact.error_map.astype(float) ** 2 + mesh[:, None, None] ** 2)
+    np.testing.assert_allclose(meshed.error_map, joined, rtol=2e-3, atol=3e-4)
+    rms = np.sqrt((meshed.error_map.astype(float) ** 2).mean(axis=(1, 2)))
+    np.testing.assert_allclose(meshed.error, rms, rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(meshed.force_error, np.hypot(exact.force_error, mesh), rtol=1e-2, atol=3e-4)
+    assert exact.force_error.max() > 0.001 and meshed.force_error[200] == pytest.approx(mesh[200], rel=1e-2)
+    np.testing.assert_allclose(meshed.taxel_area, meshed.taxel_closure)
+    assert meshed.taxel_area.max() > 1
+
+
+def test_without_contact_there_is_neither_a_map_nor_a_doubt(tmp_path):
+    wish = request(press_episode(tmp_path, depth=-0.2), SENSOR, "0" * 64, Ladder())
+    label = make_label(wish, None)
+    assert not label.signed.any() and not label.error_map.any() and not label.taxel_area.any()
+
+
 def test_finer_steps_shrink_the_bound_at_second_order():
     largest = []
     for step in (0.2, 0.1, 0.05):

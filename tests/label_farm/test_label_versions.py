@@ -1,13 +1,15 @@
 """What changes between two runs: damage, another model version, another sensor, another recording."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from farm_examples import SENSOR, press_episode
 
 from tacdata.errors import UsageError
-from tacdata.labels import read_label
+from tacdata.labels import read_label, table
 
 
 @pytest.mark.parametrize("damage", ["flip", "cut", "empty"])
@@ -43,6 +45,22 @@ def test_labels_of_another_model_version_are_not_touched_unless_asked(
     monkeypatch.setenv("FAST_MODEL_VERSION", "1")
     assert label_all([episode], redo=True).found == 1, "results of both versions lie side by side"
     assert len(solves()) == 2
+
+
+def test_a_label_of_an_older_format_is_not_replaced_unasked(tmp_path, label_all):
+    episode = press_episode(tmp_path)
+    label_all([episode])
+    path = tmp_path / "labels" / "episode-000000.parquet"
+    content = pq.read_table(path)
+    header = json.loads(content.schema.metadata[table.HEADER])
+    older = {table.HEADER: json.dumps({**header, "version": "1.0"})}
+    pq.write_table(content.drop_columns(["error_map"]).replace_schema_metadata(older), path)
+    before = path.read_bytes()
+    with pytest.raises(UsageError, match=r"are of label format version 1\.0"):
+        label_all([episode])
+    assert path.read_bytes() == before
+    assert label_all([episode], redo=True).written == [0]
+    assert read_label(path).error_map.dtype == np.float16
 
 
 def test_a_new_recording_of_a_press_renews_its_label_without_a_solve(tmp_path, label_all, solves):

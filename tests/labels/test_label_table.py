@@ -12,7 +12,7 @@ from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import Label, read_label, table, write_label
 
-ARRAYS = ("time_ns", "tip", "signed", "taxel_force", "force", "error")
+ARRAYS = tuple(table.COLUMNS)
 
 
 def example(frames: int = 7, **changes) -> Label:
@@ -23,8 +23,12 @@ def example(frames: int = 7, **changes) -> Label:
         "tip": random.normal(size=(frames, 3)),
         "signed": random.normal(size=(frames, 35, 26)).astype(np.float32),
         "taxel_force": random.normal(size=(frames, 24)).astype(np.float32),
+        "taxel_closure": random.normal(size=(frames, 24)).astype(np.float32),
+        "taxel_area": random.random((frames, 24)).astype(np.float32),
         "force": random.normal(size=(frames, 3)).astype(np.float32),
+        "error_map": (0.1 * random.random((frames, 35, 26))).astype(np.float16),
         "error": random.random(frames).astype(np.float32),
+        "force_error": random.random(frames).astype(np.float32),
         "provenance": provenance.stamp("test", {"sensor": "a" * 64, "recording": "b" * 64}, {"mesh": 0.4}),
     }
     return Label(**{**values, **changes})
@@ -60,6 +64,9 @@ def test_header_says_units_and_is_checked(tmp_path: Path) -> None:
         ({"force": np.zeros((6, 3), np.float32)}, "label.force"),
         ({"tip": np.zeros((7, 2))}, "three columns"),
         ({"time_ns": np.zeros(7, np.int64)}, "does not increase"),
+        ({"error_map": np.full((7, 35, 25), 0.01, np.float16)}, "one error a pixel"),
+        ({"taxel_area": np.zeros((7, 23), np.float32)}, "same number of taxels"),
+        ({"force_error": np.zeros((7, 1), np.float32)}, "label.force_error"),
         ({"provenance": {"made_by": "hand"}}, "code_version"),
     ],
 )
@@ -102,8 +109,31 @@ def test_another_major_version(tmp_path: Path) -> None:
     header = json.loads(content.schema.metadata[table.HEADER])
     header["version"] = "9.0"
     pq.write_table(content.replace_schema_metadata({table.HEADER: json.dumps(header)}), path)
-    with pytest.raises(FormatError, match=r"version 9\.0"):
+    with pytest.raises(table.VersionError, match=r"version 9\.0"):
         read_label(path)
+
+
+def test_a_label_of_the_first_format_is_refused_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "l.parquet"
+    write_label(path, example())
+    content = pq.read_table(path)
+    header = json.loads(content.schema.metadata[table.HEADER])
+    header["version"] = "1.0"
+    for name in ("error_map", "force_error", "taxel_area", "taxel_closure"):
+        del header["units"][name]
+        content = content.drop_columns([name])
+    pq.write_table(content.replace_schema_metadata({table.HEADER: json.dumps(header)}), path)
+    with pytest.raises(FormatError, match=r"label format version 1\.0") as refusal:
+        read_label(path)
+    assert "--redo" in refusal.value.remedy and schemas.version("label") in refusal.value.allowed
+
+
+def test_a_pixels_error_costs_two_bytes_and_keeps_three_digits(tmp_path: Path) -> None:
+    given = np.geomspace(1e-4, 1.0, 7 * 35 * 26).reshape(7, 35, 26)
+    write_label(tmp_path / "l.parquet", example(error_map=given.astype(np.float16)))
+    assert pq.read_schema(tmp_path / "l.parquet").field("error_map").type.value_type == "halffloat"
+    back = read_label(tmp_path / "l.parquet").error_map
+    np.testing.assert_allclose(back.astype(float), given, rtol=6e-4)
 
 
 def test_header_and_columns_must_agree(tmp_path: Path) -> None:

@@ -8,17 +8,24 @@ import shutil
 from pathlib import Path
 
 import pytest
+import torch
 import warp as wp
 from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata.skin.mesher import MeshSettings
-from tacdata.skin.press import ModelSettings, SkinModel
+from tacdata.skin.model import ModelSettings, SkinModel
+
+
+def _settings(**mesh):
+    """Settings without the estimate of the mesh's error, which doubles the work and changes no other figure."""
+    return ModelSettings(mesh=MeshSettings(**mesh), error_estimate=False)
 
 
 @pytest.fixture(scope="session", autouse=True)
 def mesh_cache(tmp_path_factory):
-    """Keep meshes of the tests apart from the user's; start Warp."""
+    """Keep meshes of the tests apart from the user's; start Warp; one thread, as in a worker of the farm."""
     wp.init()
+    torch.set_num_threads(1)
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
         shutil.copytree(Path(__file__).parent / "meshes", folder / "meshes")
@@ -29,7 +36,7 @@ def mesh_cache(tmp_path_factory):
 @pytest.fixture(scope="session")
 def slab():
     """A slab of 6 x 6 x 2 mm, bottom bonded, without friction, about 900 elements."""
-    return SkinModel(slab_sensor(), ModelSettings(mesh=MeshSettings(outer=0.8, interior=1.2)))
+    return SkinModel(slab_sensor(), _settings(outer=0.8, interior=1.2))
 
 
 @pytest.fixture(scope="session")
@@ -41,11 +48,10 @@ def rough_slab(slab):
 @pytest.fixture(scope="session")
 def fine_slab():
     """A wide slab, refined under its centre."""
-    mesh = MeshSettings(outer=1.2, interior=1.5, focus=(0.0, 0.0, 0.7, 0.16))
-    return SkinModel(slab_sensor(size=10.0), ModelSettings(mesh=mesh))
+    return SkinModel(slab_sensor(size=10.0), _settings(outer=1.2, interior=1.5, focus=(0.0, 0.0, 0.7, 0.16)))
 
 
 @pytest.fixture(scope="session")
 def bumps():
     """Four protrusions on a board."""
-    return SkinModel(bumps_sensor(), ModelSettings(mesh=MeshSettings(outer=0.9, interior=1.5, protrusion=1.0)))
+    return SkinModel(bumps_sensor(), _settings(outer=0.9, interior=1.5, protrusion=1.0))

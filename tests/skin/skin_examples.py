@@ -4,13 +4,18 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import torch
 import warp as wp
 
-from tacdata.sensor import Sensor, default_sensor
+from tacdata.sensor import Material, Sensor, default_sensor
 from tacdata.sensor.sensor import Contact, DepthMap, Skin, Taxels
 from tacdata.skin import elements
+from tacdata.skin.conditions import Conditions
 from tacdata.skin.mesh import SkinMesh
 from tacdata.skin.mesher import quadratic
+from tacdata.skin.rest import rest_stiffness
+
+MATERIAL = Material("neo_hookean", 0.30, 0.47)
 
 Parameters = wp.types.vector(length=8, dtype=wp.float64)
 
@@ -18,16 +23,24 @@ Parameters = wp.types.vector(length=8, dtype=wp.float64)
 def slab_sensor(size=6.0, thickness=2.0, friction=0.0, bonded=("bottom",), pixels=15) -> Sensor:
     """A plain slab [mm] with a map of ``pixels`` x ``pixels`` 0.4 mm pixels."""
     return replace(
-        default_sensor(), name="slab", taxels=Taxels(1, 1, 1.0, 1.0), skin=Skin(size, size, thickness, 0.0),
-        contact=Contact(friction, bonded, False), map=DepthMap(pixels, pixels, 0.4, 1.0),
+        default_sensor(),
+        name="slab",
+        taxels=Taxels(1, 1, 1.0, 1.0),
+        skin=Skin(size, size, thickness, 0.0),
+        contact=Contact(friction, bonded, False),
+        map=DepthMap(pixels, pixels, 0.4, 1.0),
     )
 
 
 def bumps_sensor() -> Sensor:
     """Four protrusions under a slab held at its sides, standing on a board."""
     return replace(
-        default_sensor(), name="bumps", taxels=Taxels(2, 2, 2.0, 1.8), skin=Skin(5.0, 5.0, 2.0, 0.7),
-        contact=Contact(0.2, ("sides",), True), map=DepthMap(11, 11, 0.4, 1.0),
+        default_sensor(),
+        name="bumps",
+        taxels=Taxels(2, 2, 2.0, 1.8),
+        skin=Skin(5.0, 5.0, 2.0, 0.7),
+        contact=Contact(0.2, ("sides",), True),
+        map=DepthMap(11, 11, 0.4, 1.0),
     )
 
 
@@ -35,7 +48,8 @@ def box_mesh(sensor: Sensor, nx: int, ny: int, nz: int) -> SkinMesh:
     """A structured mesh of a plain slab: every cell cut into six tetrahedra (Kuhn)."""
     skin = sensor.skin
     axes = [
-        np.linspace(-skin.size_x / 2, skin.size_x / 2, nx + 1), np.linspace(-skin.size_y / 2, skin.size_y / 2, ny + 1),
+        np.linspace(-skin.size_x / 2, skin.size_x / 2, nx + 1),
+        np.linspace(-skin.size_y / 2, skin.size_y / 2, ny + 1),
         np.linspace(0, skin.thickness, nz + 1),
     ]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -50,6 +64,44 @@ def box_mesh(sensor: Sensor, nx: int, ny: int, nz: int) -> SkinMesh:
             path.append(index[i : nx + i, j : ny + j, k : nz + k].ravel())
         tets.append(np.stack(path, axis=-1))
     return quadratic(sensor, points, np.concatenate(tets))
+
+
+def batch(*fields: np.ndarray) -> torch.Tensor:
+    """Nodal fields (n, 3), one a member, as the solver lays them out: (n, 3, b)."""
+    return torch.as_tensor(np.stack(fields, axis=-1), dtype=torch.float64).contiguous()
+
+
+def joined(*members: Conditions) -> Conditions:
+    """Conditions of several members, made of single ones."""
+    together = members[0].repeat(len(members))
+    for column, member in enumerate(members):
+        together.put(column, member)
+    return together
+
+
+class HeldSlab:
+    """A slab of 4 x 4 x 2 cells, bottom held, contact possible on its outer face, with its rest stiffness."""
+
+    def __init__(self) -> None:
+        """Mesh and assemble."""
+        self.mesh = box_mesh(slab_sensor(size=4.0), 4, 4, 2)
+        self.count = len(self.mesh.nodes)
+        self.stiffness = rest_stiffness(self.mesh, MATERIAL)
+        self.free = np.flatnonzero(~np.repeat(self.mesh.bottom, 3))
+        self.held = np.setdiff1d(np.arange(3 * self.count), self.free)
+        self.loadable = (3 * np.unique(self.mesh.outer)[:, None] + np.arange(3)).ravel()
+
+    def random(self, *seeds: int) -> torch.Tensor:
+        """Random fields (3n, b), zero where held, float32, one for each seed."""
+        field = np.stack([np.random.default_rng(seed).normal(size=3 * self.count) for seed in seeds], axis=-1)
+        field[self.held] = 0
+        return torch.as_tensor(field).float()
+
+    def times(self, x: torch.Tensor) -> torch.Tensor:
+        """The rest stiffness times fields (3n, b), on free degrees of freedom, float64."""
+        r = torch.as_tensor(self.stiffness @ x.double().numpy())
+        r[self.held] = 0
+        return r
 
 
 def tetrahedron_shapes(points: np.ndarray) -> np.ndarray:
@@ -75,12 +127,15 @@ def evaluate(law, material, F: np.ndarray, dF: np.ndarray) -> tuple[np.ndarray, 
     energy = wp.zeros(n, dtype=wp.float64, device="cpu")
     stress, tangent = (wp.zeros(n, dtype=wp.mat33d, device="cpu") for _ in range(2))
     wp.launch(
-        _law_kernel(type(law)), dim=n,
+        _law_kernel(type(law)),
+        dim=n,
         inputs=[
-            wp.array(F, dtype=wp.mat33d, device="cpu"), wp.array(dF, dtype=wp.mat33d, device="cpu"),
+            wp.array(F, dtype=wp.mat33d, device="cpu"),
+            wp.array(dF, dtype=wp.mat33d, device="cpu"),
             Parameters(*values, *([0.0] * (8 - len(values)))),
         ],
-        outputs=[energy, stress, tangent], device="cpu",
+        outputs=[energy, stress, tangent],
+        device="cpu",
     )
     return energy.numpy(), stress.numpy(), tangent.numpy()
 
@@ -92,8 +147,12 @@ def _law_kernel(kind):
 
     @wp.kernel(module="unique")
     def values(
-        F: wp.array(dtype=wp.mat33d), dF: wp.array(dtype=wp.mat33d), m: Parameters,
-        energy: wp.array(dtype=wp.float64), stress: wp.array(dtype=wp.mat33d), tangent: wp.array(dtype=wp.mat33d),
+        F: wp.array(dtype=wp.mat33d),
+        dF: wp.array(dtype=wp.mat33d),
+        m: Parameters,
+        energy: wp.array(dtype=wp.float64),
+        stress: wp.array(dtype=wp.mat33d),
+        tangent: wp.array(dtype=wp.mat33d),
     ):
         i = wp.tid()
         energy[i] = energy_of(F[i], m)

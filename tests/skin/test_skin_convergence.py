@@ -7,12 +7,13 @@ surface; inside, quadratic tetrahedra must find it with an error falling as h^3 
 
 import numpy as np
 import torch
-from skin_examples import box_mesh, conical_rule, slab_sensor, tetrahedron_shapes
+from skin_examples import batch, box_mesh, conical_rule, slab_sensor, tetrahedron_shapes
 
 from tacdata.sensor.sensor import Material
 from tacdata.skin import elements
+from tacdata.skin.conditions import conditions
 from tacdata.skin.elasticity import Elasticity
-from tacdata.skin.preconditioner import RestFactor, rest_stiffness
+from tacdata.skin.rest import rest_solver
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
 PLACE = np.array([0.3, -0.2, -1.5])
@@ -38,15 +39,17 @@ def solve(cells):
     """Equilibrium by the kernels' own internal force, corrected with the rest stiffness's factor."""
     mesh = box_mesh(slab_sensor(size=2.0), cells, cells, cells)
     held = mesh.sides | (np.abs(mesh.nodes[:, 2]) < 1e-9) | (np.abs(mesh.nodes[:, 2] - 2) < 1e-9)
-    factor = RestFactor(rest_stiffness(mesh, MATERIAL), np.flatnonzero(~np.repeat(held, 3)))
-    body = Elasticity(mesh, MATERIAL)
-    u = torch.as_tensor(np.where(held[:, None], kelvin(mesh.nodes), 0.0))[None].contiguous()
+    rest = rest_solver(mesh, MATERIAL, held, np.arange(0), "cpu")
+    body, member = Elasticity(mesh, MATERIAL.law), conditions(MATERIAL, 0.0)
+    u = batch(np.where(held[:, None], kelvin(mesh.nodes), 0.0))
     for _ in range(8):
-        u -= factor.apply(body.internal_force(u)[0])
+        force = body.internal_force(u, member)[0]
+        size = force[torch.as_tensor(~held)].abs().max()
+        u -= (rest.apply((force / size).float().reshape(-1, 1)).double() * size).reshape(u.shape)
     free = torch.as_tensor(~held)
-    force = body.internal_force(u)[0][0]
+    force = body.internal_force(u, member)[0]
     assert force[free].abs().max() < 1e-6 * force[~free].abs().max()
-    return mesh, u[0].numpy()
+    return mesh, u[..., 0].numpy()
 
 
 def errors(mesh, u):

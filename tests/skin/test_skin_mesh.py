@@ -14,7 +14,7 @@ from tacdata.skin import elements
 from tacdata.skin.contact import face_quadrature
 from tacdata.skin.mesh import SkinMesh, quality
 from tacdata.skin.mesher import PINNED, MeshSettings, build_mesh, make_mesh, mesh_key, surface
-from tacdata.skin.press import ModelSettings, SkinModel
+from tacdata.skin.model import ModelSettings, SkinModel
 
 
 def volume(mesh):

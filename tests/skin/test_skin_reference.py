@@ -17,13 +17,15 @@ from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
 from tacdata.sensor.sensor import Contact, Skin
 from tacdata.skin.mesher import MeshSettings
-from tacdata.skin.press import ModelSettings, PressRequest, SkinModel
+from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.skin.press import PressRequest
 from tacdata.skin.raster import OuterFace
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared" / "reference"
 FOLDER = Path(os.environ.get("TACDATA_REFERENCE", BESIDE))
 pytestmark = [
-    pytest.mark.reference, pytest.mark.slow,
+    pytest.mark.reference,
+    pytest.mark.slow,
     pytest.mark.skipif(not (FOLDER / "A1.parquet").exists(), reason=f"no reference solutions in {FOLDER}"),
 ]
 DEPTHS = (0.25, 0.5, 0.75)
@@ -52,8 +54,10 @@ def compare(case, sensor, request):
         near = np.hypot(*(points - [request.x, request.y]).T) < np.sqrt(2 * 4.0 * depth) * 0.8
         forces = force_of(document, depth)
         row = {
-            "depth": depth, "force": 100 * (state.force[2] / forces["total"] - 1),
-            "top": float(np.sqrt((off**2).mean())), "contact": float(np.sqrt((off[near] ** 2).mean())),
+            "depth": depth,
+            "force": 100 * (state.force[2] / forces["total"] - 1),
+            "top": float(np.sqrt((off**2).mean())),
+            "contact": float(np.sqrt((off[near] ** 2).mean())),
             "worst": float(np.abs(off).max()),
         }
         if forces["protrusions"] is not None:

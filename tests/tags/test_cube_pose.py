@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.tags import Cube, detect_cube, detect_tags
-from tacdata.virtual_rig.render import FACES, render_cube
+from tacdata.virtual_rig.look import Look
+from tacdata.virtual_rig.render import FACES, render_cube, render_scene
 
 INTRINSICS = {"width": 1280, "height": 720, "fx": 900.0, "fy": 900.0, "cx": 639.5, "cy": 359.5}
 CUBE = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}
@@ -236,3 +237,99 @@ def test_corner_convention_agrees_with_the_renderer():
             assert np.abs(pixels - tag.corners).max() < 2.0
             seen.add(face)
     assert seen == set(CUBE["ids"]) == set(FACES) - {"-z"}
+
+
+def covered(truth, along, share=0.25):
+    """A grey edge over a share of the cube's outline, from a direction [rad], as a finger that holds something."""
+    out, aside = np.array([np.cos(along), np.sin(along)]), np.array([-np.sin(along), np.cos(along)])
+    size = 900 * 0.026 / truth[2, 3]
+    edge = 900 * truth[:2, 3] / truth[2, 3] + (639.5, 359.5) + (0.5 - share) * size * out
+    near, far = (edge - size * aside, edge + size * aside), (edge + size * (aside + out), edge + size * (out - aside))
+    return tuple((float(x), float(y)) for x, y in (*near, *far))
+
+
+CONDITIONS = {
+    "blur and noise": lambda truth, random: Look(blur=1.2, noise=5.0),
+    "moving": lambda truth, random: Look(shift=(0.001, 0.0, 0.0), turn=(0.0, 0.02, 0.0)),
+    "half the light": lambda truth, random: Look(gain=0.5, fall=0.5),
+    "JPEG": lambda truth, random: Look(jpeg=60),
+    "covered": lambda truth, random: Look(blur=1.0, noise=4.0, covers=(covered(truth, random.uniform(0, 6.3)),)),
+}
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_bad_images_at_40_cm(condition):
+    random = np.random.default_rng(31)
+    rows, missed = [], 0
+    for _ in range(16):
+        truth = random_pose(random)
+        image = render_scene([(truth, CUBE)], INTRINSICS, random, CONDITIONS[condition](truth, random))
+        pose = detect_cube(image, INTRINSICS, CUBE)
+        if pose is None:
+            missed += 1
+            assert not detect_tags(image), "a pose whenever a tag can be read at all"
+        elif not pose.ambiguous:
+            rows.append(errors(pose, truth))
+    position, rotation = np.array(rows).T
+    assert missed <= (10 if condition == "covered" else 0)
+    assert np.median(position) <= 0.32 and np.median(rotation) <= 0.18
+    assert np.percentile(position, 95) <= 1.0
+    assert rotation.max() < 3.0, "no flipped pose that is not marked as ambiguous"
+
+
+def test_the_other_pose_of_an_ambiguous_face_is_told():
+    random = np.random.default_rng(3)
+    lone = {**CUBE, "ids": {"+z": 4}}
+    found = []
+    for azimuth in np.linspace(0, 2 * np.pi, 8, endpoint=False):
+        truth = facing(12 * np.cos(azimuth), 12 * np.sin(azimuth), (0.03, 0.02, 0.5))
+        image = render_scene([(truth, lone)], INTRINSICS, random, Look(blur=1.0, noise=5.0))
+        pose = detect_cube(image, INTRINSICS, lone)
+        assert pose is not None
+        best = errors(pose, truth)[1]
+        other = errors(pose.rival, truth)[1] if pose.rival is not None else np.inf
+        assert (pose.rival is not None) == pose.ambiguous
+        assert min(best, other) < 4.0, "one of the two is the pose"
+        found.append((best > 4.0, pose.ambiguous))
+    assert all(ambiguous for wrong, ambiguous in found if wrong), "undecidable is said to be so"
+    assert any(ambiguous for _, ambiguous in found)
+
+
+def crowded(random):
+    """A bench full of things with corners and letters."""
+    image = np.full((720, 1280), 120, np.uint8)
+    for _ in range(120):
+        corner, size, grey = random.integers(0, (1200, 680)), int(random.integers(8, 90)), int(random.integers(0, 256))
+        x, y = corner.tolist()
+        if grey % 3:
+            cv2.rectangle(image, (x, y), (x + size, y + int(random.integers(8, 90))), grey, -1)
+        else:
+            cv2.putText(image, "36h11", (x, y), 0, size / 40, grey, 2, cv2.LINE_AA)
+    return image
+
+
+def test_a_crowded_bench_hides_nothing_and_invents_nothing():
+    random = np.random.default_rng(17)
+    for _ in range(4):
+        bench, truth = crowded(random), random_pose(random)
+        image = render_scene([(truth, CUBE)], INTRINSICS, random, Look(background=bench))
+        pose = detect_cube(image, INTRINSICS, CUBE)
+        assert pose is not None and errors(pose, truth)[0] < 0.4
+        again = detect_cube(image, INTRINSICS, CUBE, hint=pose)
+        assert again is not None and np.allclose(again.position, pose.position, atol=1e-4)
+        assert detect_tags(bench, whole=False) == []
+        assert detect_cube(bench, INTRINSICS, CUBE, hint=pose) is None
+
+
+def test_the_cheap_search_finds_what_the_library_finds():
+    random = np.random.default_rng(23)
+    wanted = found = 0
+    for distance in (0.25, 0.4, 0.6):
+        for _ in range(4):
+            image = render_cube(random_pose(random, distance), INTRINSICS, CUBE, random)
+            whole = {tag.id for tag in detect_tags(image)}
+            wanted, found = (
+                wanted + len(whole),
+                found + len(whole & {tag.id for tag in detect_tags(image, whole=False)}),
+            )
+    assert wanted > 15 and found >= 0.95 * wanted

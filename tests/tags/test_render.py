@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tacdata.virtual_rig import render
+from tacdata.virtual_rig.look import Look
 from tacdata.virtual_rig.render import render_cube
 
 INTRINSICS = {"width": 640, "height": 480, "fx": 600.0, "fy": 600.0, "cx": 319.5, "cy": 239.5}
@@ -38,7 +38,7 @@ def test_same_seed_same_image_and_noise_as_stated():
     assert (first == again).all() and (first != other).any()
     spread = (first.astype(float) - other)[:100, :100].std() / np.sqrt(2)
     # Rounding to whole grey values adds 1/12.
-    assert abs(spread - np.sqrt(render.NOISE**2 + 1 / 12)) < 0.1
+    assert abs(spread - np.sqrt(Look().noise ** 2 + 1 / 12)) < 0.1
 
 
 def test_out_of_view_and_behind_show_the_bench():

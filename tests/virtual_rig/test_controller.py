@@ -138,3 +138,43 @@ def test_burst_beyond_the_buffer_loses_bytes(terminal):
     time.sleep(0.5)
     answers = terminal.line.read(4096).decode().split()
     assert 1 < len(answers) < 31
+
+
+def test_a_dwell_is_rounded_up_to_the_firmwares_steps(terminal):
+    clock = terminal.controller.clock
+    begun = clock.now_ns()
+    assert terminal.ask("G4P0.06") == "ok"
+    assert (clock.now_ns() - begun) * 1e-9 >= 0.1
+
+
+def test_carriage_return_and_line_feed_are_two_lines(terminal):
+    terminal.say(b"G21\r\n")
+    time.sleep(0.2)
+    assert terminal.line.read(64).split() == [b"ok", b"ok"]
+
+
+@pytest.mark.parametrize(("line", "answer"), [
+    ("G1X" + "0" * 80, "error:11"), ("N12 G0 X-50", "ok"), ("$N1=G54", "ok"), ("$N3=G54", "error:3"),
+])  # fmt: skip
+def test_lines_as_the_firmware_takes_them(terminal, line, answer):
+    assert terminal.ask(line) == answer
+
+
+def test_nothing_is_executed_in_a_hold_and_everything_after_it(terminal):
+    terminal.say(b"!")
+    time.sleep(0.05)
+    terminal.say(b"G0X-49\n?")
+    assert terminal.hear("<")[-1].startswith("<Hold:0|MPos:-50.000")
+    terminal.say(b"~")
+    assert "ok" in terminal.hear("ok")
+
+
+def test_a_limit_alarm_hears_nothing_but_a_reset(terminal):
+    terminal.controller.inject_alarm(1)
+    assert terminal.hear("[MSG:")[-2:] == ["ALARM:1", "[MSG:Reset to continue]"]
+    time.sleep(0.1)
+    terminal.say(b"?$X\n")
+    time.sleep(0.2)
+    assert terminal.line.read(64) == b""
+    terminal.say(b"\x18")
+    assert terminal.hear("[MSG:")[-1] == "[MSG:'$H'|'$X' to unlock]"

@@ -76,6 +76,17 @@ def instabilities(material: Material, stretch: float = 2.0) -> list[str]:
     return words
 
 
+def unstable(material: Material, strains: np.ndarray) -> np.ndarray:
+    """Return where a law is unstable, shape (n,), bool, at isochoric principal logarithmic strains [1], shape (n, 3).
+
+    Raises:
+        UsageError: If there is no such law.
+        FormatError: If a parameter of the law is unknown or out of its range.
+    """
+    law = load_law(material.law)
+    return ~(_least_stiffness(law, law.parameters(material), strains) > 0)
+
+
 def _least_stiffness(law, numbers: tuple[float, ...], strains: np.ndarray) -> np.ndarray:
     """Return the least d tau : d eps / |d eps|^2 over isochoric changes [MPa], shape (n,), at log strains (n, 3)."""
     stretches = np.exp(strains)

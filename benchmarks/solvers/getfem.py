@@ -1,0 +1,119 @@
+"""GetFEM (Debian): the same mesh, the same law, the indenter as a formula, Coulomb friction by augmented Lagrangian."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from solvers import gwfl
+from solvers.peer import ALONE, Answer, Peer, PeerError, outer_face, run_alone, within_reach
+
+from tacdata.skin.case import Case
+from tacdata.skin.mesh import SkinMesh
+
+PYTHON = "/usr/bin/python3"
+
+
+@dataclass(frozen=True)
+class GetFEM(Peer):
+    """Debian's GetFEM in Debian's Python."""
+
+    name = "GetFEM"
+    contact: str = "lagrangian"
+    """"lagrangian", or "penalty" (without friction): the traction is ``augmentation`` times the penetration."""
+    multiplier_degree: int = 2
+    """Degree of the multipliers' polynomials on the contact faces [1]."""
+    augmentation: float = 10.0
+    """Augmentation of the Lagrangian, or the penalty, over Young's modulus [1/mm]."""
+    volume_rule: str = "IM_TETRAHEDRON(2)"
+    """Quadrature of the body, 4 points of degree 2; IM_TETRAHEDRON(5) has 15 points and takes 1.4 times as long."""
+    surface_rule: str = "IM_TETRAHEDRON(5)"
+    """Quadrature of the contact: on the faces, 7 points of degree 5."""
+    board_rule: str = "IM_STRUCTURED_COMPOSITE(IM_TETRAHEDRON(5),2)"
+    """Quadrature of the contact with the board: the same on 4 sub-triangles."""
+    penalty_rules: tuple[str, str] = ("IM_TRIANGLE(4)", "IM_STRUCTURED_COMPOSITE(IM_TRIANGLE(4),2)")
+    """Quadrature with "penalty", outer face and board: the 6 points of degree 4, and those on 4 sub-triangles."""
+    step: float = 0.25
+    """Longest load step [mm]."""
+    residual: float = 1e-9
+    """Largest out-of-balance nodal force [N] at which Newton's method stops."""
+    limit: float = 3600.0
+    """Longest run [s]."""
+
+    def missing(self) -> str | None:
+        """Return how to install it, if it is not there."""
+        there = (
+            Path(PYTHON).exists()
+            and not subprocess.run([PYTHON, "-c", "import getfem, numpy"], capture_output=True, check=False).returncode
+        )
+        return None if there else "apt-get install python3-getfem++ (Debian, Ubuntu)"
+
+    def solve(self, case: Case, mesh: SkinMesh, folder: Path) -> Answer:
+        """Hand mesh, law and shape to `getfem_press.py`."""
+        folder.mkdir(parents=True, exist_ok=True)
+        files = [folder / name for name in ("mesh.npz", "press.json", "result.npz")]
+        near = within_reach(case, mesh)
+        np.savez(
+            files[0],
+            nodes=mesh.nodes,
+            tets=mesh.tets,
+            outer=mesh.outer[near],
+            protrusions=mesh.protrusions,
+            taxel=mesh.protrusion_taxel,
+            fixed=mesh.fixed(case.sensor.contact.bonded),
+        )
+        files[1].write_text(json.dumps(self._press(case), indent=1) + "\n")
+        run_alone([PYTHON, str(ALONE / "getfem_press.py"), *map(str, files)], folder, self.limit)
+        with np.load(files[2], allow_pickle=False) as found:
+            top, triangles = outer_face(mesh)
+            return Answer(
+                found["depth"],
+                mesh.nodes[top, :2],
+                triangles,
+                found["displacement"][:, top],
+                found["force"][:, 2],
+                found["protrusion_force"],
+                found["residual"],
+                found["seconds"],
+                found["cpu_seconds"],
+                float(found["setup_cpu_seconds"]),
+                int(found["dofs"]),
+            )
+
+    def _press(self, case: Case) -> dict:
+        sensor, request = case.sensor, case.request
+        law, shape = gwfl.LAWS.get(sensor.material.law), gwfl.shape(request.indenter)
+        if law is None or shape is None:
+            what = f"law {sensor.material.law}" if law is None else f"shape {request.indenter.shape}"
+            raise PeerError(f"{what} is not written in GWFL (benchmarks/solvers/gwfl.py)")
+        modulus = sensor.material.youngs_modulus
+        if self.contact == "penalty" and sensor.contact.friction:
+            raise PeerError("the penalty is written without friction: contact=lagrangian has it")
+        rules = self.penalty_rules if self.contact == "penalty" else (self.surface_rule, self.board_rule)
+        numbers = {
+            "r": self.augmentation * modulus,
+            "r_t": self.augmentation * modulus,
+            "friction": sensor.contact.friction,
+        }
+        return {
+            "law": law,
+            "constants": {**gwfl.constants(sensor.material), **numbers},
+            "shape": shape[0],
+            "edge": shape[1],
+            "tip": [request.x, request.y, sensor.skin.thickness],
+            "yaw": float(np.radians(request.yaw)),
+            "depths": [d for d in request.depths if d > 0],
+            "step": self.step,
+            "friction": sensor.contact.friction,
+            "board": -sensor.skin.protrusion_radius if sensor.contact.board else None,
+            "contact": self.contact,
+            "volume_rule": self.volume_rule,
+            "surface_rule": rules[0],
+            "board_rule": rules[1],
+            "multiplier_degree": self.multiplier_degree,
+            "residual": self.residual,
+            "max_newton": 60,
+        }

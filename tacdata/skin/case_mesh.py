@@ -1,0 +1,46 @@
+"""The mesh for one press: fine where it touches, as many elements elsewhere as the far field needs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.indenters import Indenter
+from tacdata.sensor import Sensor
+from tacdata.skin.meshing.settings import MeshSettings
+from tacdata.skin.press import PressRequest
+
+_OUTER, _INTERIOR, _PROTRUSION = 0.8, 1.4, 1.2
+"""Edge lengths away from the press [mm]."""
+
+_TIP = 0.3
+"""Edge length at a protrusion's tip over its radius [1]."""
+
+_FINEST, _COARSEST = 0.15, 0.4
+"""Bounds of the edge length under the press [mm]."""
+
+_FEATURE, _ALLOWANCE = 0.15, 0.12
+"""The edge length under the press is this share of the indenter's sharpest curvature, plus this [mm]: about a third of
+the contact radius that a sphere has at a twentieth of its radius."""
+
+_MARGIN = 0.4
+"""How far beyond the contact the mesh stays fine [mm]."""
+
+_TOUCHED = 0.6
+"""Share of the depth to which the skin follows a shape upward: half on a sphere (Hertz)."""
+
+
+def mesh_for(sensor: Sensor, request: PressRequest) -> MeshSettings:
+    """Return mesh settings for a press: for one case, not for labels, which share one mesh."""
+    fine = float(np.clip(_FEATURE * sharpest(request.indenter) + _ALLOWANCE, _FINEST, _COARSEST))
+    reach = max(request.indenter.footprint(_TOUCHED * max(request.depths), request.yaw), default=0.0)
+    radius = sensor.skin.protrusion_radius
+    return MeshSettings(
+        outer=_OUTER, interior=_INTERIOR, protrusion=_PROTRUSION, tip=_TIP * radius if radius else None,
+        focus=(request.x, request.y, round(reach + _MARGIN, 3), round(fine, 3)),
+    )
+
+
+def sharpest(indenter: Indenter) -> float:
+    """Return the smallest radius of curvature that the skin meets [mm]: the smallest length of the shape."""
+    lengths = [value for name, value in indenter.document.items() if name != "shape" and "angle" not in name]
+    return min(float(value) for value in lengths if isinstance(value, int | float))

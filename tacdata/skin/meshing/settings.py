@@ -1,0 +1,23 @@
+"""How fine a mesh is to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """Target edge lengths [mm]."""
+
+    outer: float = 0.6
+    """At the outer face [mm]."""
+    interior: float = 2.0
+    """In the middle of the slab [mm]."""
+    protrusion: float = 1.2
+    """At the protrusions [mm]."""
+    tip: float | None = None
+    """At the protrusions' tips [mm]; None: one ring of edges around the contact patch."""
+    envelope: float = 1e-3
+    """fTetWild's envelope over the bounding box's diagonal [1]."""
+    focus: tuple[float, float, float, float] | None = None
+    """A disc of the outer face to refine: x, y, radius, edge length [mm]."""

@@ -1,0 +1,153 @@
+"""How far the mesh leaves a result from the exact one: the same press on a coarser mesh.
+
+Richardson's argument: a quantity solved with edges of length h is off by C h^p, with edges of r h by C (r h)^p, so from
+the difference d of the two follows the error at h, |d| / (r^p - 1) (Richardson, Phil. Trans. R. Soc. A 210 (1911)
+307-357; Roache, J. Fluids Eng. 116 (1994) 405-413). The force follows it: a coarser mesh is stiffer. A pixel of the
+map does not: which way it is off depends on how the elements lie there, and the errors of two irregular meshes are
+correlated by rho only. The mean square of their difference is then e^2 (r^2p + 1 - 2 rho r^p), which is Richardson's
+for rho = 1. It is taken over the neighbourhood that the contact couples, because at a pixel where the two meshes
+happen to agree the error does not vanish: the estimate is a standard deviation.
+
+Orders and correlation were measured on a slab of 6 x 6 x 2 mm under a sphere of 2 mm radius, on eight meshes with edges
+of 0.87 to 0.30 mm at depths of 0.25 to 0.75 mm, against the finest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from tacdata.sensor import Sensor
+
+ORDER = 2.0
+"""Order p of the map's error in the edge length [1]; measured 1.6 to 2.7, median 2.2."""
+
+CORRELATION = 0.4
+"""Correlation rho of a pixel's errors on two meshes [1]; measured 0.38 on average, more between coarse meshes."""
+
+FORCE_ORDER = 2.0
+"""Order of the force's error [1]; measured 1.7 to 3.4, median 2.4, so that this errs on the safe side."""
+
+_LEAST_RATIO = 1.2
+"""Ratio of edge lengths that stands in for smaller ones [1]: below, the estimate would only divide by nothing."""
+
+_STEEP = 1.5
+"""Reach of a neighbourhood over the half width of the contact [1]: the map's error sits in the ring at its edge."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What k states of a press say on one mesh."""
+
+    depth: np.ndarray
+    """Nominal depths [mm], shape (k,)."""
+    surface: np.ndarray
+    """Undeformed minus deformed height at the pixel centres [mm], shape (k, pixels_x, pixels_y)."""
+    force: np.ndarray
+    """Force of the skin on the indenter [N], shape (k, 3)."""
+    taxel_force: np.ndarray
+    """Normal force on each protrusion [N], shape (k, taxels)."""
+
+    @classmethod
+    def joined(cls, parts: list[Figures]) -> Figures:
+        """Return the states of several, one after another."""
+        return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
+
+    def first(self, count: int) -> Figures:
+        """Return the first states alone."""
+        return Figures(*(getattr(self, field.name)[:count] for field in fields(self)))
+
+
+@dataclass(frozen=True)
+class NumericalError:
+    """Estimated error of k states by the mesh alone; solver tolerances, law and geometry are not in it."""
+
+    surface: np.ndarray
+    """Of the map [mm], shape (k, pixels_x, pixels_y): one standard deviation."""
+    force: np.ndarray
+    """Of the force of the skin on the indenter, all components together [N], shape (k,)."""
+    taxel_force: np.ndarray
+    """Of the force on each protrusion [N], shape (k, taxels)."""
+    remark: str
+    """What is missing, in words; empty if nothing."""
+
+    @classmethod
+    def none(cls, fine: Figures) -> NumericalError:
+        """Return zeros, for states whose error is not asked for."""
+        return cls(np.zeros_like(fine.surface), np.zeros_like(fine.depth), np.zeros_like(fine.taxel_force), "not asked")
+
+
+def estimate(
+    sensor: Sensor, fine: Figures, coarse: Figures, reach: float, ratio: float, remark: str = ""
+) -> NumericalError:
+    """Return the error of the finer states.
+
+    Args:
+        sensor: Gives the places of pixels and taxels.
+        fine: All states of the press; loading first.
+        coarse: Those states of the loading branch that a coarser mesh reached, a subset of the depths of ``fine``.
+            Others take the estimate at their depth, between these linearly, beyond the last in proportion to the depth;
+            if there are none, all of the depth and of the force is in doubt.
+        reach: Half width of the contact at the deepest state [mm].
+        ratio: Edge length of the coarser mesh over that of the finer [1].
+        remark: Carried along.
+    """
+    depths, ratio = fine.depth, max(ratio, _LEAST_RATIO)
+    rows = [int(np.flatnonzero(np.abs(depths - depth) < 1e-9)[0]) for depth in coarse.depth]
+    if not len(rows) or coarse.depth.max() <= 0:
+        force = np.linalg.norm(fine.force, axis=1)
+        doubt = np.broadcast_to(depths[:, None, None], fine.surface.shape).copy()
+        return NumericalError(doubt, force, np.abs(fine.taxel_force), remark)
+    growth = ratio**ORDER
+    factor = 1 / np.sqrt(growth**2 + 1 - 2 * CORRELATION * growth)
+    factor_of_force = 1 / (ratio**FORCE_ORDER - 1)
+    pixels = np.stack(np.meshgrid(sensor.map.x, sensor.map.y, indexing="ij"), axis=-1).reshape(-1, 2)
+    taxels = sensor.taxels.centers
+    apart = max(sensor.taxels.pitch_x, sensor.taxels.pitch_y)
+    surface = _local(coarse.surface - fine.surface[rows], pixels, _STEEP * reach)
+    taxel = _local(coarse.taxel_force - fine.taxel_force[rows], taxels, max(_STEEP * reach, apart))
+    force = _along(coarse, fine.force[rows])
+
+
+    def at_all(values: np.ndarray) -> np.ndarray:
+        return _by_depth(coarse.depth, values, depths)
+
+    surface, force, taxel = factor * surface, factor_of_force * force, factor_of_force * taxel
+    return NumericalError(at_all(surface), at_all(force), at_all(taxel), remark)
+
+
+def _local(difference: np.ndarray, places: np.ndarray, width: float) -> np.ndarray:
+    """Return root mean squares of differences, shape (k, ...), over their places [mm], shape (m, 2), by a Gaussian.
+
+    ``width`` is two of its standard deviations [mm].
+    """
+    apart = ((places[:, None] - places[None]) ** 2).sum(axis=-1)
+    weights = np.exp(-apart / (2 * (width / 2) ** 2))
+    square = difference.reshape(len(difference), -1) ** 2 @ (weights / weights.sum(axis=1, keepdims=True)).T
+    return np.sqrt(square).reshape(difference.shape)
+
+
+def _along(coarse: Figures, force: np.ndarray) -> np.ndarray:
+    """Return differences of the force [N], shape (k,): their share of it as a root mean square over the neighbours.
+
+    The share is smooth in depth but may cross zero.
+    """
+    size = np.linalg.norm(force, axis=1)
+    square = (np.linalg.norm(coarse.force - force, axis=1) / np.maximum(size, 1e-12)) ** 2
+    touched = (size > 0).astype(float)
+    kernel = np.array([1.0, 2.0, 1.0])
+    total = np.convolve(touched, kernel)[1:-1]
+    return size * np.sqrt(np.convolve(square * touched, kernel)[1:-1] / np.maximum(total, 1e-12))
+
+
+def _by_depth(known: np.ndarray, values: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Interpolate values, shape (k, ...), at depths [mm], shape (n,), linearly from 0 at 0; beyond, in proportion."""
+    known, values = np.concatenate([[0.0], known[known > 0]]), values[known > 0]
+    values = np.concatenate([np.zeros_like(values[:1]), values])
+    after = np.clip(np.searchsorted(known, depth), 1, len(known) - 1)
+    share = np.minimum((depth - known[after - 1]) / (known[after] - known[after - 1]), 1.0)
+    beyond = np.maximum(depth / known[-1], 1.0)
+    shape = (-1, *[1] * (values.ndim - 1))
+    share, beyond = share.reshape(shape), beyond.reshape(shape)
+    return beyond * (values[after - 1] + share * (values[after] - values[after - 1]))

@@ -1,0 +1,183 @@
+# Warp kernels are Python in form only; their operators have no types that pyright knows.
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
+"""The Warp kernel that finds the height of deformed quadratic triangles above sample points.
+
+One thread takes one triangle of one state. Seen from above, a quadratic triangle is the map
+x(xi, eta) = a + b xi + c eta + d xi^2 + e xi eta + f eta^2; for every sample under its Bezier hull Newton's method
+solves x(xi, eta) = sample, and the greatest height wins (a z-buffer), so of several sheets the uppermost is kept.
+A triangle whose Jacobian determinant keeps its sign holds a sample at most once; where it does not, or bends strongly,
+the search starts from 16 places.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import warp as wp
+
+NOTHING = wp.constant(-1.0e30)
+"""Height where no triangle lies above a sample [mm]."""
+
+
+@wp.func
+def _cross(a: wp.vec2d, b: wp.vec2d):
+    return a[0] * b[1] - a[1] * b[0]
+
+
+@wp.func
+def _flat(a: wp.vec3d):
+    return wp.vec2d(a[0], a[1])
+
+
+@wp.func
+def _position(
+    nodes: wp.array(dtype=wp.vec3d), u: wp.array3d(dtype=Any), node: wp.int32, state: wp.int32
+):
+    moved = wp.vec3d(
+        wp.float64(u[node, 0, state]), wp.float64(u[node, 1, state]), wp.float64(u[node, 2, state])
+    )
+    return nodes[node] + moved
+
+
+@wp.func
+def _first_at_least(values: wp.array(dtype=wp.float64), bound: wp.float64):
+    """Number of the first of ascending values that is not below a bound."""
+    low = wp.int32(0)
+    high = values.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if values[middle] < bound:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@wp.func
+def _jacobian(
+    b: wp.vec2d, c: wp.vec2d, d: wp.vec2d, e: wp.vec2d, f: wp.vec2d, xi: wp.float64, eta: wp.float64
+):
+    two = wp.float64(2.0)
+    return _cross(b + two * xi * d + eta * e, c + xi * e + two * eta * f)
+
+
+@wp.func
+def _search(
+    a: wp.vec2d, b: wp.vec2d, c: wp.vec2d, d: wp.vec2d, e: wp.vec2d, f: wp.vec2d, target: wp.vec2d, start: wp.vec2d
+):
+    """Newton's method: (xi, eta, 1 if the sample lies in the triangle, 0 if not, -1 if no point was found)."""
+    two, far, close = wp.float64(2.0), wp.float64(0.7), wp.float64(1.0e-12)
+    xi, eta = start[0], start[1]
+    found = wp.float64(-1.0)
+    for _step in range(40):
+        rest = target - (a + xi * b + eta * c + xi * xi * d + xi * eta * e + eta * eta * f)
+        s, t = b + two * xi * d + eta * e, c + xi * e + two * eta * f
+        determinant = _cross(s, t)
+        if wp.abs(determinant) < wp.float64(1.0e-14):
+            determinant = wp.float64(1.0e-14)
+        dxi, deta = _cross(rest, t) / determinant, _cross(s, rest) / determinant
+        size = wp.length(wp.vec2d(dxi, deta))
+        if size > far:
+            dxi, deta = dxi * far / size, deta * far / size
+        xi, eta = xi + dxi, eta + deta
+        if size < close:
+            found = wp.float64(0.0)
+            break
+    edge = wp.float64(-1.0e-9)
+    if found == wp.float64(0.0) and xi > edge and eta > edge and wp.float64(1.0) - xi - eta > edge:
+        found = wp.float64(1.0)
+    return wp.vec3d(xi, eta, found)
+
+
+@wp.func
+def _height(p: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, e: wp.vec3d, f: wp.vec3d, found: wp.vec3d):
+    xi, eta = found[0], found[1]
+    return p[2] + xi * b[2] + eta * c[2] + xi * xi * d[2] + xi * eta * e[2] + eta * eta * f[2]
+
+
+@wp.func
+def _center(k: wp.int32):
+    """Centre of one of the 16 triangles that halving all edges twice gives, (xi, eta)."""
+    row = wp.int32(0)
+    place = k
+    for _above_row in range(3):
+        if place >= 7 - 2 * row:
+            place = place - (7 - 2 * row)
+            row = row + 1
+    turned = place % 2
+    third = wp.float64(1.0 / 12.0)
+    return wp.vec2d(
+        wp.float64(3 * (place // 2) + 1 + turned) * third, wp.float64(3 * row + 1 + turned) * third
+    )
+
+
+@wp.func
+def _above(
+    target: wp.vec2d, p: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, e: wp.vec3d, f: wp.vec3d,
+    inverse: wp.mat22d, mild: bool,
+):
+    """Greatest height of one triangle above a sample, or NOTHING."""
+    a2, b2, c2, d2, e2, f2 = _flat(p), _flat(b), _flat(c), _flat(d), _flat(e), _flat(f)
+    best = wp.float64(NOTHING)
+    many = not mild
+    if mild:
+        found = _search(a2, b2, c2, d2, e2, f2, target, inverse * (target - a2))
+        if found[2] > wp.float64(0.0):
+            best = _height(p, b, c, d, e, f, found)
+        many = found[2] < wp.float64(0.0)
+    if many:
+        for k in range(16):
+            found = _search(a2, b2, c2, d2, e2, f2, target, _center(k))
+            if found[2] > wp.float64(0.0):
+                best = wp.max(best, _height(p, b, c, d, e, f, found))
+    return best
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def highest(
+    nodes: wp.array(dtype=wp.vec3d), faces: wp.array2d(dtype=wp.int32), u: wp.array3d(dtype=Any),
+    xs: wp.array(dtype=wp.float64), ys: wp.array(dtype=wp.float64), height: wp.array3d(dtype=wp.float64),
+):
+    """Raise ``height`` (len(xs), len(ys), b) [mm] to that of the triangles above each sample."""
+    face, state = wp.tid()
+    two, three, four, half = wp.float64(2.0), wp.float64(3.0), wp.float64(4.0), wp.float64(0.5)
+    zero, one = wp.float64(0.0), wp.float64(1.0)
+    p0 = _position(nodes, u, faces[face, 0], state)
+    p1 = _position(nodes, u, faces[face, 1], state)
+    p2 = _position(nodes, u, faces[face, 2], state)
+    p3 = _position(nodes, u, faces[face, 3], state)
+    p4 = _position(nodes, u, faces[face, 4], state)
+    p5 = _position(nodes, u, faces[face, 5], state)
+    # The Bezier control points: the curved triangle lies within their hull.
+    q3, q4, q5 = two * p3 - half * (p0 + p1), two * p4 - half * (p1 + p2), two * p5 - half * (p2 + p0)
+    low = wp.min(wp.min(wp.min(p0, p1), wp.min(p2, q3)), wp.min(q4, q5))
+    high = wp.max(wp.max(wp.max(p0, p1), wp.max(p2, q3)), wp.max(q4, q5))
+    # As wide as the tolerance of the search, so that a sample on an edge is not lost between two triangles.
+    margin = wp.float64(1.0e-8)
+    i0, i1 = _first_at_least(xs, low[0] - margin), _first_at_least(xs, high[0] + margin)
+    j0, j1 = _first_at_least(ys, low[1] - margin), _first_at_least(ys, high[1] + margin)
+    if i0 >= i1 or j0 >= j1:
+        return
+    b3, c3 = four * p3 - three * p0 - p1, four * p5 - three * p0 - p2
+    d3, f3 = two * (p0 + p1) - four * p3, two * (p0 + p2) - four * p5
+    e3 = four * (p0 - p3 + p4 - p5)
+    a, b, c, d, e, f = _flat(p0), _flat(b3), _flat(c3), _flat(d3), _flat(e3), _flat(f3)
+    # Bezier coefficients of the Jacobian determinant: all of one sign, and it has that sign everywhere.
+    j00, j10, j01 = _jacobian(b, c, d, e, f, zero, zero), _jacobian(b, c, d, e, f, one, zero), _jacobian(
+        b, c, d, e, f, zero, one
+    )
+    m0 = two * _jacobian(b, c, d, e, f, half, zero) - half * (j00 + j10)
+    m1 = two * _jacobian(b, c, d, e, f, half, half) - half * (j10 + j01)
+    m2 = two * _jacobian(b, c, d, e, f, zero, half) - half * (j00 + j01)
+    least = wp.min(wp.min(wp.min(j00, j10), wp.min(j01, m0)), wp.min(m1, m2))
+    most = wp.max(wp.max(wp.max(j00, j10), wp.max(j01, m0)), wp.max(m1, m2))
+    mild = least > half * most or most < half * least
+    # The flat triangle of the corners: its inverse is where the search starts.
+    s, t = _flat(p1) - a, _flat(p2) - a
+    start = wp.matrix_from_rows(wp.vec2d(t[1], -t[0]), wp.vec2d(-s[1], s[0])) / _cross(s, t)
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            z = _above(wp.vec2d(xs[i], ys[j]), p0, b3, c3, d3, e3, f3, start, mild)
+            if z > wp.float64(NOTHING / 2.0):
+                wp.atomic_max(height, i, j, state, z)

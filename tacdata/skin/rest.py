@@ -1,0 +1,196 @@
+"""The rest state's stiffness, prepared once: the preconditioner of every press on a mesh."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+import torch
+
+from tacdata.errors import SolveError
+from tacdata.sensor import Material
+from tacdata.skin.mesh import SkinMesh
+
+
+def rest_stiffness(mesh: SkinMesh, material: Material) -> sp.csr_matrix:
+    """Assemble the linear-elastic stiffness [N/mm], shape (3n, 3n): every law's tangent at F = I."""
+    mu = material.shear_modulus
+    lam = material.bulk_modulus - 2 * mu / 3
+    slopes, weights = mesh.shape_gradients()
+    count = len(mesh.tets)
+    blocks = np.zeros((count, 10, 3, 10, 3))
+    for q in range(weights.shape[1]):
+        g, w = slopes[:, q], weights[:, q]
+        dots = np.einsum("eai,ebi,e->eab", g, g, mu * w)
+        pairs = np.einsum("eai,ebj,e->eaibj", g, g, w, optimize=True)
+        blocks += lam * pairs + mu * pairs.transpose(0, 1, 4, 3, 2)
+        for i in range(3):
+            blocks[:, :, i, :, i] += dots
+    dofs = (3 * mesh.tets[:, :, None] + np.arange(3)).reshape(count, 30)
+    rows = np.repeat(dofs, 30, axis=1).ravel()
+    columns = np.tile(dofs, (1, 30)).ravel()
+    size = 3 * len(mesh.nodes)
+    return sp.csr_matrix(sp.coo_matrix((blocks.ravel(), (rows, columns)), shape=(size, size)))
+
+
+class RestSolver(Protocol):
+    """K0^-1 on one device, and the compliance of those degrees of freedom that contact may load."""
+
+    def apply(self, residual: torch.Tensor) -> torch.Tensor:
+        """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
+        ...
+
+    def loadable(self, residual: torch.Tensor) -> torch.Tensor:
+        """Return `apply` at the loadable degrees of freedom only, shape (m, b)."""
+        ...
+
+    def compliance(self, which: torch.Tensor) -> torch.Tensor:
+        """Return K0^-1 [mm/N] between loadable degrees of freedom.
+
+        Args:
+            which: Numbers among the loadable ones of every member, shape (b, k); m stands for none.
+
+        Returns:
+            Shape (b, k, k), float32, symmetric, zero where there is none.
+        """
+        ...
+
+
+def rest_solver(
+    mesh: SkinMesh, material: Material, fixed: np.ndarray, loadable: np.ndarray, device: str
+) -> RestSolver:
+    """Prepare K0^-1: a sparse factor on the CPU, the dense inverse on a card.
+
+    Args:
+        mesh: The skin.
+        material: Its elastic constants.
+        fixed: Which nodes are held, shape (n,), bool.
+        loadable: Free degrees of freedom (3 node + axis) that contact may load, ascending, shape (m,).
+        device: "cpu" or "cuda:0".
+
+    Raises:
+        SolveError: If the inverse does not fit onto the card.
+    """
+    stiffness = rest_stiffness(mesh, material)
+    free = np.flatnonzero(~np.repeat(fixed, 3))
+    return (SparseRest if device == "cpu" else DenseRest)(stiffness, free, loadable, device)
+
+
+class SparseRest:
+    """Sparse Cholesky factor of the rest stiffness on the free degrees of freedom (CHOLMOD through cholespy).
+
+    Kept in single precision: a preconditioner needs no more, and its two triangular solves are bound by memory.
+    """
+
+    _BLOCK = 64
+
+    def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, loadable: np.ndarray, device: str = "cpu") -> None:
+        """Factorize; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
+        # A compiled module without type stubs.
+        from cholespy import CholeskySolverF, MatrixType  # pyright: ignore[reportAttributeAccessIssue]
+
+        self._free, self._loadable = torch.as_tensor(free), torch.as_tensor(loadable)
+        self.size = stiffness.shape[0]  # pyright: ignore[reportOptionalSubscript]
+        reduced = stiffness[free][:, free].tocsc()
+        reduced.sort_indices()
+        self._solver = CholeskySolverF(
+            reduced.shape[0], reduced.indptr.astype(np.int32), reduced.indices.astype(np.int32),
+            reduced.data.astype(np.float64), MatrixType.CSC,
+        )
+        # Rows are filled when a press first needs them and serve every later one; memory is taken as they are.
+        self._table = torch.from_numpy(np.empty((len(loadable) + 1, len(loadable) + 1), dtype=np.float32))
+        self._table[-1] = 0.0
+        self._known = torch.zeros(len(loadable) + 1, dtype=torch.bool)
+        self._known[-1] = True
+
+    def apply(self, residual: torch.Tensor) -> torch.Tensor:
+        """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
+        rhs = np.ascontiguousarray(residual[self._free].numpy(), dtype=np.float32)
+        solution = np.empty_like(rhs)
+        if rhs.shape[1] == 1:
+            self._solver.solve(rhs.reshape(-1), solution.reshape(-1))
+        else:
+            self._solver.solve(rhs, solution)
+        result = torch.zeros(residual.shape, dtype=torch.float32)
+        result[self._free] = torch.from_numpy(solution)
+        return result
+
+    def loadable(self, residual: torch.Tensor) -> torch.Tensor:
+        """Return `apply` at the loadable degrees of freedom only, shape (m, b)."""
+        return self.apply(residual)[self._loadable]
+
+    def compliance(self, which: torch.Tensor) -> torch.Tensor:
+        """Return K0^-1 [mm/N] between loadable degrees of freedom, as in `RestSolver`."""
+        wanted = torch.unique(which)
+        missing = wanted[~self._known[wanted]]
+        for start in range(0, len(missing), self._BLOCK):
+            part = missing[start : start + self._BLOCK]
+            unit = torch.zeros(self.size, len(part), dtype=torch.float32)
+            unit[self._loadable[part], torch.arange(len(part))] = 1.0
+            self._table[part, :-1] = self.apply(unit)[self._loadable].T
+            self._table[part, -1] = 0.0
+        self._known[missing] = True
+        blocks = self._table[which[:, :, None], which[:, None, :]]
+        return (blocks + blocks.transpose(1, 2)) / 2
+
+
+class DenseRest:
+    """Inverse of the rest stiffness as a full matrix on a card: one product serves a whole batch.
+
+    Scaled to a unit diagonal and rounded to half precision, at half the memory and several times the rate of single.
+    What is rounded is a preconditioner; what must hold exactly is that the Woodbury identity sees the same matrix. So
+    the compliance is taken from the rounded one, and sums are kept in single precision.
+    """
+
+    _SHIFT = 2e-4
+    """Added to the unit diagonal, so that rounding (2^-12) leaves the matrix positive [1]."""
+    _LARGEST = 1024.0
+    """To which right-hand sides are scaled, clear of both ends of half precision."""
+
+    def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, loadable: np.ndarray, device: str) -> None:
+        """Invert; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
+        need, have = 2 * 8 * len(free) ** 2, torch.cuda.mem_get_info(device)[0]
+        if need > have:
+            raise SolveError(
+                f"a mesh with {len(free)} degrees of freedom, whose inverse takes {need / 2**30:.0f} GiB on {device}",
+                f"at most {have / 2**30:.0f} GiB", "coarsen the mesh, or use device cpu",
+            )
+        # Loadable ones first, so that their rows are a view.
+        order = np.concatenate([loadable, np.setdiff1d(free, loadable)])
+        reduced = stiffness[order][:, order].tocoo()
+        place = torch.as_tensor(np.stack([reduced.row, reduced.col]), dtype=torch.int64, device=device)
+        inverse = torch.zeros(reduced.shape, dtype=torch.float64, device=device)
+        inverse[place[0], place[1]] = torch.as_tensor(reduced.data, device=device)
+        inverse = torch.cholesky_inverse(torch.linalg.cholesky(inverse))
+        scale = inverse.diagonal().sqrt()
+        inverse /= scale[:, None]
+        inverse /= scale
+        self._count, self._order = len(loadable), torch.as_tensor(order, device=device)
+        self._scale = scale.to(torch.float32)[:, None]
+        inverse.diagonal().add_(self._SHIFT)
+        self._inverse = inverse.to(torch.float16)
+        del inverse
+        part = self._inverse[: self._count, : self._count].to(torch.float32)
+        part *= self._scale[: self._count]
+        part *= self._scale[: self._count].T
+        self._table = torch.nn.functional.pad(part, (0, 1, 0, 1))
+
+    def apply(self, residual: torch.Tensor) -> torch.Tensor:
+        """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
+        result = torch.zeros(residual.shape, dtype=torch.float32, device=residual.device)
+        result[self._order] = self._times(self._inverse, residual) * self._scale
+        return result
+
+    def loadable(self, residual: torch.Tensor) -> torch.Tensor:
+        """Return `apply` at the loadable degrees of freedom only, shape (m, b)."""
+        return self._times(self._inverse[: self._count], residual) * self._scale[: self._count]
+
+    def compliance(self, which: torch.Tensor) -> torch.Tensor:
+        """Return K0^-1 [mm/N] between loadable degrees of freedom, as in `RestSolver`."""
+        return self._table[which[:, :, None], which[:, None, :]]
+
+    def _times(self, matrix: torch.Tensor, residual: torch.Tensor) -> torch.Tensor:
+        scaled = residual[self._order] * self._scale
+        size = scaled.abs().amax(dim=0).clamp_min(1e-30) / self._LARGEST
+        return torch.mm(matrix, (scaled / size).to(torch.float16), out_dtype=torch.float32) * size

@@ -1,0 +1,58 @@
+"""Surface files kept by content, so that a document names a shape by its hash and no path of a machine."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+from tacdata import provenance
+from tacdata.errors import FormatError, UsageError
+
+
+def cache_folder() -> Path:
+    """Return where things made from a user's files are kept: ``TACDATA_CACHE``, or the user's cache folder."""
+    root = os.environ.get("TACDATA_CACHE")
+    return Path(root) if root else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "tacdata"
+
+
+def keep(path: Path) -> str:
+    """Keep a copy of a surface file; return its SHA-256 (hex, 64 characters)."""
+    digest = provenance.file_hash(path)
+    kept = _kept(digest, path.name)
+    if not kept.is_file():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        temporary = kept.with_name(f".{kept.name}.{os.getpid()}")
+        shutil.copyfile(path, temporary)
+        temporary.replace(kept)
+    return digest
+
+
+def find(file: str, digest: str, what: str) -> Path:
+    """Return a surface file of that content: from what was kept, or by name from the folders in ``TACDATA_SHAPES``.
+
+    Raises:
+        UsageError: If it is not on this machine.
+        FormatError: If a file of that name is, and it is not the same.
+    """
+    kept = _kept(digest, file)
+    if kept.is_file():
+        return kept
+    for folder in filter(None, os.environ.get("TACDATA_SHAPES", "").split(os.pathsep)):
+        path = Path(folder) / Path(file).name
+        if path.is_file():
+            if provenance.file_hash(path) != digest:
+                raise FormatError(
+                    f"{what} surface {path} is not the file that was used (SHA-256 {digest[:12]} wanted)",
+                    "the same file, byte by byte", "put the original there",
+                )
+            return _kept(keep(path), file)
+    raise UsageError(
+        f"{what} surface {file} (SHA-256 {digest[:12]}) is not on this machine",
+        "a file that was read here before, or one in a folder named by TACDATA_SHAPES",
+        f"copy {Path(file).name} into a folder and set TACDATA_SHAPES to it",
+    )
+
+
+def _kept(digest: str, file: str) -> Path:
+    return cache_folder() / "shapes" / f"{digest}{Path(file).suffix.lower()}"

@@ -1,0 +1,84 @@
+"""Which cube each finger carries, and where its fingertip is on it (`schemas/fingers.schema.json`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata import documents
+from tacdata.errors import FormatError
+from tacdata.tags.cube import Cube
+
+
+@dataclass(frozen=True, eq=False)
+class Finger:
+    """A finger with its cube.
+
+    The fingertip's frame: origin on the pad, x along the finger to its end, z out of the pad towards what is
+    touched, right-handed.
+    """
+
+    name: str
+    """Its name in the file."""
+    cube: Cube
+    tip: np.ndarray
+    """The fingertip's frame in the cube's, homogeneous, shape (4, 4) [m]."""
+    tip_spread: float = 0.0
+    """Standard deviation of the fingertip's place on the cube [m]."""
+    hand: str = ""
+    """"left", "right" or unknown."""
+    kind: str = ""
+    """"thumb", "index", "middle", "ring", "little" or unknown."""
+
+
+def fingers_of(document: dict[str, Any], origin: str = "fingers") -> dict[str, Finger]:
+    """Return the fingers of a parsed file by name; ``origin`` names it in errors.
+
+    Raises:
+        FormatError: If the document breaks the schema, a cube is impossible, a quaternion has no length or
+            two cubes carry the same tag.
+    """
+    documents.check(document, "fingers", origin)
+    found = {name: _finger(name, entry, origin) for name, entry in document["fingers"].items()}
+    owners: dict[int, str] = {}
+    for name, finger in found.items():
+        for face, tag in finger.cube.ids.items():
+            if tag in owners:
+                raise FormatError(
+                    f"{origin}: tag {tag} is on {owners[tag]} and on {name} {face}",
+                    "every tag on one face only",
+                    "read the numbers off the cubes and correct ids",
+                )
+            owners[tag] = f"{name} {face}"
+    return found
+
+
+def read_fingers(path: Path) -> dict[str, Finger]:
+    """Read a fingers file.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: As `fingers_of`.
+    """
+    return fingers_of(documents.read(Path(path), "fingers"), str(path))
+
+
+def _finger(name: str, entry: dict[str, Any], origin: str) -> Finger:
+    from scipy.spatial.transform import Rotation
+
+    tip, turn = np.eye(4), np.array(entry["tip"]["quaternion"], float)
+    if not 0.99 < np.linalg.norm(turn) < 1.01:
+        raise FormatError(
+            f"{origin}: {name}: tip quaternion {turn.tolist()} of length {np.linalg.norm(turn):.3f}",
+            "xyzw of length 1",
+            "correct it; no rotation is [0, 0, 0, 1]",
+        )
+    tip[:3, :3] = Rotation.from_quat(turn).as_matrix()
+    tip[:3, 3] = np.array(entry["tip"]["position"], float) / 1000
+    spread = float(entry["tip"].get("residual", 0.0)) / 1000
+    cube = Cube.from_document(entry["cube"], f"{origin}: {name}: cube")
+    kind = entry.get("finger") or next((k for k in ("thumb", "index", "middle") if k in name), "")
+    return Finger(name, cube, tip, spread, entry.get("hand", ""), kind)

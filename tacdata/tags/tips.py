@@ -1,0 +1,94 @@
+"""Fingertips in an image: each finger's cube, and its tip from there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tacdata.tags.camera import Camera
+from tacdata.tags.detector import detect_tags, to_grey
+from tacdata.tags.fingers import Finger
+from tacdata.tags.mixups import mixups
+from tacdata.tags.pose import CubePose, solve_cube
+from tacdata.tags.tag import Tag
+
+
+@dataclass(frozen=True, eq=False)
+class TipPose:
+    """Where a fingertip is in the camera frame (x right, y down, z forward)."""
+
+    position: np.ndarray
+    """Origin of the fingertip's frame [m], shape (3,)."""
+    quaternion: np.ndarray
+    """Rotation from the fingertip's frame to the camera frame, xyzw [1], shape (4,)."""
+    covariance: np.ndarray
+    """Of a small turn in the camera frame [rad] and the position [m], in this order, shape (6, 6)."""
+    cube: CubePose
+    """The cube's pose that it rests on, with faces seen, reprojection and ambiguity."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What one image shows of the fingers."""
+
+    tips: dict[str, TipPose]
+    """Name of each finger that is seen -> its tip."""
+    tags: tuple[Tag, ...] = ()
+    """All tags read, of whatever number."""
+    remarks: tuple[str, ...] = field(default=())
+    """What looks wrong, in words: tags or cubes that seem to be swapped."""
+
+    @property
+    def cubes(self) -> dict[str, CubePose]:
+        """Name of each finger that is seen -> its cube's pose."""
+        return {name: tip.cube for name, tip in self.tips.items()}
+
+
+def detect_fingers(
+    image: np.ndarray, intrinsics: dict[str, Any], fingers: dict[str, Finger],
+    hints: dict[str, CubePose] | None = None,
+) -> View:  # fmt: skip
+    """Return the fingertips that an image shows; a finger needs one tag that can be read.
+
+    Args:
+        image: Grey (height, width) or BGR (height, width, 3), uint8.
+        intrinsics: A rig file's ``intrinsics`` [px].
+        fingers: The fingers, from `read_fingers`.
+        hints: Poses of the cubes just before, by finger; decide only where the image does not.
+
+    Raises:
+        UsageError: If the image is no image or of another size than the intrinsics.
+        FormatError: If the intrinsics contradict themselves.
+    """
+    grey, camera = to_grey(image), Camera.from_document(intrinsics)
+    camera.check(grey)
+    return view_of(grey, detect_tags(grey, whole=False), camera, fingers, hints or {})
+
+
+def view_of(
+    grey: np.ndarray, tags: list[Tag], camera: Camera, fingers: dict[str, Finger], hints: dict[str, CubePose]
+) -> View:
+    """Return the fingertips from tags that were read in an image, uint8, shape (height, width)."""
+    cubes = {}
+    for name, finger in fingers.items():
+        pose = solve_cube(grey, tags, finger.cube, camera, hints.get(name))
+        if pose is not None:
+            cubes[name] = pose
+    tips = {name: tip_of(pose, fingers[name]) for name, pose in cubes.items()}
+    return View(tips, tuple(tags), mixups(fingers, cubes))
+
+
+def tip_of(pose: CubePose, finger: Finger) -> TipPose:
+    """Return a fingertip's pose from its cube's, with the covariance that the lever between them gives."""
+    from scipy.spatial.transform import Rotation
+
+    matrix = pose.matrix @ finger.tip
+    x, y, z = matrix[:3, 3] - pose.position
+    lever = np.eye(6)
+    # A small turn w moves the tip by w x arm.
+    lever[3:, :3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+    covariance = lever @ pose.covariance @ lever.T if np.isfinite(pose.covariance).all() else pose.covariance
+    covariance = covariance + np.diag([0.0] * 3 + [finger.tip_spread**2] * 3)
+    return TipPose(matrix[:3, 3], Rotation.from_matrix(matrix[:3, :3]).as_quat(), covariance, pose)

@@ -1,0 +1,211 @@
+"""Many presses at once: each as if it were alone, with its own material, thickness, shape and pose."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from skin_examples import box_mesh, slab_sensor
+
+from tacdata.errors import SolveError
+from tacdata.indenters.cylinder import Cylinder
+from tacdata.indenters.flat_punch import FlatPunch
+from tacdata.indenters.sphere import Sphere
+from tacdata.skin.conditions import conditions
+from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.skin.newton import SolverSettings
+from tacdata.skin.pose import turned
+from tacdata.skin.press import PressRequest
+
+SENSOR = slab_sensor(size=4.0, friction=0.2, pixels=9)
+SETTINGS = ModelSettings(solver=SolverSettings(residual=1e-6), error_estimate=False)
+"""Tight, so that what is compared is not the tolerance."""
+PRESSES = [
+    PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.2, 0.4, 0.2)),
+    PressRequest(Sphere(1.0), -0.5, 0.4, 0.0, (0.3,)),
+    PressRequest(Sphere(2.0), 0.0, 0.6, 0.0, (0.1, 0.5, 0.0)),
+    PressRequest(Cylinder(1.2, 2.0, 0.5), 0.1, 0.0, 20.0, (0.25,)),
+]
+
+
+@pytest.fixture(scope="module")
+def model():
+    """A slab of 4 x 4 x 2 mm; 845 nodes."""
+    return SkinModel(SENSOR, SETTINGS, mesh=box_mesh(SENSOR, 6, 6, 2))
+
+
+@pytest.fixture(scope="module")
+def alone(model):
+    return [model.solve(request) for request in PRESSES]
+
+
+def solved(model, requests, capacity):
+    """Solutions by number; every press is answered once."""
+    found = list(model.solve_many(requests, capacity))
+    assert sorted(number for number, _ in found) == list(range(len(requests)))
+    return dict(found)
+
+
+def walked(model, presses, request=PRESSES[0]):
+    """States of presses that no `PressRequest` can express, in the presses' order; ``request`` says the shape."""
+    batch, contacts = model._batch(request, len(presses))
+    states = {press.number: [] for press in presses}
+    for number, _, state in batch.run(iter(presses), lambda members: model._gauge.states(members, contacts, True)):
+        states[number].append(state)
+    return list(states.values())
+
+
+def same(ours, theirs, tolerance=1e-5):
+    assert np.abs(ours.force - theirs.force).max() < tolerance * np.abs(theirs.force).max()
+    assert np.abs(ours.surface - theirs.surface).max() < tolerance * theirs.depth.max()
+    assert ours.depth.tolist() == theirs.depth.tolist()
+    assert ours.residual.max() <= SETTINGS.solver.residual
+
+
+@pytest.mark.parametrize("capacity", [2, 3])
+def test_presses_of_several_shapes_come_out_as_one_by_one(model, alone, capacity):
+    """Three spheres share a batch (with room for two, the third follows the first that is done)."""
+    together = solved(model, PRESSES, capacity)
+    for number, single in enumerate(alone):
+        same(together[number], single)
+
+
+def test_states_come_in_the_order_of_the_path(model):
+    depths = {number: [] for number in range(3)}
+    for number, depth, state in model.walk(PRESSES[:3], 3):
+        assert state.displacement.shape == (len(model.mesh.nodes), 3)
+        depths[number].append(depth)
+    assert [tuple(d) for d in depths.values()] == [request.depths for request in PRESSES[:3]]
+    assert model.last_run["ticks"] > 0 and model.last_run["cg"] > model.last_run["ticks"]
+
+
+def test_displacements_are_left_out_where_not_wanted(model):
+    [(_, _, state)] = model.walk(PRESSES[1:2], with_displacement=False)
+    assert state.displacement.size == 0 and state.force[2] > 0
+
+
+def test_no_presses_give_nothing(model):
+    assert list(model.walk([])) == [] and list(model.solve_many([])) == []
+
+
+BLUNT = FlatPunch(1.0, 0.9)
+CRUSHING = PressRequest(FlatPunch(1.5, 0.9), 0.0, 0.0, 0.0, (0.02, 1.98))
+"""To a hundredth of the thickness of a nearly incompressible slab whose bottom is held."""
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    """The same slab in few elements, soon given up: what fails costs many attempts."""
+    solver = replace(SETTINGS.solver, patience=4, cg_limit=60)
+    return SkinModel(SENSOR, replace(SETTINGS, solver=solver), mesh=box_mesh(SENSOR, 4, 4, 1))
+
+
+def test_a_press_that_diverges_leaves_its_neighbours_alone(coarse):
+    good = [PressRequest(BLUNT, x, 0.1, 0.0, (0.15, 0.3)) for x in (-0.3, 0.2, 0.4)]
+    together = solved(coarse, [good[0], CRUSHING, *good[1:]], 3)
+    failure = together.pop(1)
+    assert isinstance(failure, SolveError)
+    assert "flat_punch at (0, 0) mm: no equilibrium beyond depth" in str(failure)
+    assert "reduce the depth" in str(failure)
+    for number, request in zip((0, 2, 3), good, strict=True):
+        same(together[number], coarse.solve(request))
+
+
+def test_a_press_that_goes_wrong_says_so_after_the_states_that_it_reached(coarse):
+    found = list(coarse.walk([CRUSHING]))
+    (number, depth, state), (_, reached, failure) = found
+    assert (number, depth) == (0, 0.02) and state.force[2] > 0
+    assert isinstance(failure, SolveError) and 0.02 <= reached < 1.98
+
+
+def test_a_material_without_numbers_is_given_up_and_its_neighbour_is_not(model, alone):
+    """Whatever makes a member's fields NaN, they stay in its own column."""
+    press = model._press(0, PRESSES[0])
+    broken = replace(press.conditions, law=torch.full_like(press.conditions.law, torch.nan), _other={})
+    sick = replace(press, conditions=broken)
+    [failed], healthy = walked(model, [sick, model._press(1, PRESSES[0])])
+    assert isinstance(failed, SolveError) and "residual is nan" in str(failed)
+    assert [state.force[2] for state in healthy] == pytest.approx(alone[0].force[:, 2], rel=1e-5)
+
+
+def test_force_is_proportional_to_each_members_modulus(model):
+    """Contact stiffness scales with it, so the displacements are the same."""
+    base = model._press(0, PRESSES[0])
+    presses = [
+        replace(
+            model._press(k, PRESSES[0]),
+            conditions=conditions(
+                replace(SENSOR.material, youngs_modulus=factor * SENSOR.material.youngs_modulus),
+                SENSOR.contact.friction,
+                PRESSES[0].indenter,
+            ),
+        )
+        for k, factor in enumerate((1.0, 0.5, 3.0))
+    ]
+    assert base.conditions.modulus.item() == SENSOR.material.youngs_modulus
+    plain, soft, stiff = walked(model, presses)
+    for one, half, triple in zip(plain, soft, stiff, strict=True):
+        assert 0.5 * one.force == pytest.approx(half.force, rel=1e-5, abs=1e-6)
+        assert 3 * one.force == pytest.approx(triple.force, rel=1e-5, abs=1e-6)
+        assert np.abs(one.displacement - triple.displacement).max() < 1e-5
+
+
+def test_a_members_thickness_is_that_of_a_mesh_so_thick(model):
+    """15 % thicker without another mesh, beside a member of the nominal thickness."""
+    request, factor = PRESSES[0], 1.15
+    thick = replace(SENSOR, skin=replace(SENSOR.skin, thickness=factor * SENSOR.skin.thickness))
+    mesh = replace(model.mesh, nodes=model.mesh.nodes * [1.0, 1.0, factor])
+    expected = [state for _, state in SkinModel(thick, SETTINGS, mesh=mesh).states(request)]
+    press = model._press(0, request)
+    own = conditions(SENSOR.material, SENSOR.contact.friction, request.indenter, thickness=factor)
+    raised = replace(press, touch=press.touch * [1.0, 1.0, factor], conditions=own)
+    found = walked(model, [raised, model._press(1, request)])
+    for ours, nominal, theirs in zip(found[0], found[1], expected, strict=True):
+        assert ours.force == pytest.approx(theirs.force, rel=1e-5, abs=1e-6)
+        assert np.abs(ours.displacement - theirs.displacement).max() < 1e-5
+        assert nominal.force[2] > 1.02 * ours.force[2]
+
+
+def test_a_yawed_cylinder_presses_along_the_other_axis(model):
+    """The mesh is the same with x and y exchanged: so are map and force of a cylinder yawed by 90 degrees."""
+    shape = Cylinder(1.2, 2.0, 0.5)
+    along, across = (
+        model.solve(PressRequest(shape, x, y, yaw, (0.3,))) for x, y, yaw in ((0.4, 0.1, 0.0), (0.1, 0.4, 90.0))
+    )
+    assert across.force[0] == pytest.approx(along.force[0, [1, 0, 2]], rel=1e-5, abs=1e-5)
+    assert np.abs(across.surface[0].T - along.surface[0]).max() < 1e-5
+    assert np.abs(along.surface[0].T - along.surface[0]).max() > 0.01
+
+
+def leaning(model, number, request, tilt_x, tilt_y):
+    angles = (torch.tensor([angle], dtype=torch.float64) for angle in (0.0, tilt_x, tilt_y))
+    return replace(model._press(number, request), turn=turned(*angles)[..., 0].numpy())
+
+
+def test_tilts_about_x_and_y_are_mirror_images(model):
+    """Exchanging x and y turns a tilt about x into the opposite one about y; a tilt drives force to its side."""
+    request = PressRequest(FlatPunch(1.0, 0.5), 0.0, 0.0, 0.0, (0.2,))
+    presses = [leaning(model, k, request, *tilt) for k, tilt in enumerate(((0.2, 0.0), (0.0, -0.2), (0.0, 0.0)))]
+    [about_x], [about_y], [upright] = walked(model, presses, request)
+    assert about_y.force == pytest.approx(about_x.force[[1, 0, 2]], rel=1e-5, abs=1e-5)
+    assert np.abs(about_x.force - upright.force).max() > 0.02 * upright.force[2]
+
+
+def test_a_sphere_tilted_about_its_centre_leaves_the_same_map(model):
+    request = PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.3,))
+    plain, tilted = model._press(0, request), leaning(model, 1, request, 0.3, -0.2)
+    centre = plain.touch + np.array([0.0, 0.0, 1.5])
+    tilted = replace(tilted, touch=centre - 1.5 * tilted.turn[:, 2])
+    [one], [other] = walked(model, [plain, tilted])
+    assert np.abs(tilted.touch - plain.touch).max() > 0.2
+    assert other.force == pytest.approx(one.force, rel=1e-5, abs=1e-5)
+    assert np.abs(other.displacement - one.displacement).max() < 1e-5
+
+
+def test_an_impossible_press_is_named_and_takes_no_other_along(model):
+    good = PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.2,))
+    beside = PressRequest(Sphere(1.5), 99.0, 0.0, 0.0, (0.2,))
+    answers = dict(model.solve_many([good, beside, good], 2))
+    assert isinstance(answers[1], SolveError) and "99" in str(answers[1])
+    assert answers[0].force[0, 2] == pytest.approx(answers[2].force[0, 2], rel=1e-6)
+    assert answers[0].force[0, 2] > 0.01

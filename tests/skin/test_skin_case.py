@@ -1,0 +1,86 @@
+"""`tacdata solve`: what its files hold, what it refuses."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from skin_examples import bumps_sensor
+from typer.testing import CliRunner
+
+from tacdata import cli, documents
+from tacdata.errors import FormatError, UsageError
+from tacdata.skin.case import read_case
+
+MESH = {"outer": 0.6, "interior": 1.0, "protrusion": 0.8}
+CASE = {
+    "version": "1.1",
+    "name": "small",
+    "sensor": {**bumps_sensor().document, "version": "1.1"},
+    "indenter": {"shape": "sphere", "radius": 2.0},
+    "x": 0.4,
+    "y": 0.3,
+    "depths": [0.0, 0.3],
+    "mesh": MESH,
+}
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """The example, solved with everything that can be asked for: its folder and document."""
+    folder = tmp_path_factory.mktemp("case")
+    (folder / "case.yaml").write_text(yaml.safe_dump(CASE))
+    arguments = ["solve", str(folder / "case.yaml"), "--out", str(folder / "out"), "--picture"]
+    shown = CliRunner().invoke(cli.application(), arguments)
+    assert shown.exit_code == 0, shown.output
+    return folder / "out", documents.read(folder / "out" / "small.json", "case_result")
+
+
+def test_every_state_says_forces_areas_readings_and_errors(solved):
+    _, document = solved
+    rest, pressed = document["results"]
+    assert pressed["force_N"][2] > 0.05 and max(pressed["protrusion_contact_area_mm2"]) > 0.02
+    assert np.argmax(pressed["protrusion_force_N"]) == np.argmax(pressed["readings"]["counts"]) == 3
+    described = bumps_sensor().transduction
+    assert described is not None
+    offset = np.ravel(described.offset)
+    assert rest["readings"]["counts"] == pytest.approx(np.broadcast_to(offset, 4))
+    error = pressed["numerical_error"]
+    assert 0 < error["force_N"] < 0.3 * pressed["force_N"][2]
+    assert 0 < error["map_rms_mm"] <= error["map_max_mm"] < 0.3
+    assert rest["numerical_error"]["map_max_mm"] == 0
+    assert document["error_seconds"] > 0 and len(error["protrusion_force_N"]) == 4
+
+
+def test_the_table_has_a_row_for_every_node_of_the_face_and_state(solved):
+    folder, document = solved
+    table = pq.read_table(folder / document["displacements"]).to_pandas()
+    assert list(table.columns) == ["case", "depth", "x", "y", "ux", "uy", "uz"]
+    deep = table[table.depth == 0.3]
+    assert len(deep) == len(table) / 2 and not table[table.depth == 0.0][["ux", "uy", "uz"]].any(axis=None)
+    nearest = deep.iloc[np.hypot(deep.x - 0.4, deep.y - 0.3).argmin()]
+    assert nearest.uz == pytest.approx(-0.3, abs=0.06)
+
+
+def test_the_picture_is_drawn(solved):
+    folder, document = solved
+    assert (folder / document["picture"]).read_bytes().startswith(b"\x89PNG")
+    assert not list(folder.glob(".*"))
+
+
+def test_results_are_not_overwritten(solved):
+    folder, _ = solved
+    before = (folder / "small.json").read_bytes()
+    shown = CliRunner().invoke(cli.application(), ["solve", str(folder.parent / "case.yaml"), "--out", str(folder)])
+    assert isinstance(shown.exception, UsageError) and "never overwritten" in shown.exception.allowed
+    assert (folder / "small.json").read_bytes() == before
+
+
+def test_the_estimate_is_on_unless_the_case_says_no(tmp_path):
+    for given, wanted in (({}, True), ({"error_estimate": False}, False), ({"version": "1.0"}, True)):
+        (tmp_path / "case.json").write_text(json.dumps({**CASE, **given}))
+        assert read_case(tmp_path / "case.json").error_estimate is wanted
+    (tmp_path / "case.json").write_text(json.dumps({**CASE, "error_estimate": "yes"}))
+    with pytest.raises(FormatError, match="error_estimate"):
+        read_case(tmp_path / "case.json")

@@ -1,0 +1,123 @@
+"""The same presses on the CPU and on a card: one algorithm, other precision of the preconditioner."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from skin_examples import HeldSlab, batch, box_mesh, bumps_sensor, slab_sensor
+
+from tacdata.errors import SolveError
+from tacdata.indenters.cylinder import Cylinder
+from tacdata.indenters.flat_punch import FlatPunch
+from tacdata.indenters.sphere import Sphere
+from tacdata.skin.batched_inverse import contact_transfer
+from tacdata.skin.conditions import conditions
+from tacdata.skin.elasticity import Elasticity
+from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.skin.press import PressRequest
+from tacdata.skin.rest import SparseRest, rest_solver
+
+pytestmark = [pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")]
+CARD = "cuda:0"
+PLAIN = ModelSettings(error_estimate=False)
+
+
+@pytest.fixture(scope="module")
+def held():
+    return HeldSlab()
+
+
+def pair(sensor, settings=PLAIN, mesh=None):
+    """The same model on both devices."""
+    there = SkinModel(sensor, settings, mesh=mesh)
+    return there, SkinModel(sensor, settings, CARD, there.mesh)
+
+
+def close(card, cpu):
+    """Forces within 0.2 % of the largest, maps within 0.1 % of the depth, both within the solver's settings."""
+    limit = PLAIN.solver
+    assert np.abs(card.force - cpu.force).max() < 2e-3 * np.abs(cpu.force).max()
+    assert np.abs(card.surface - cpu.surface).max() < 1e-3 * cpu.depth.max()
+    assert card.residual.max() <= limit.residual
+    assert np.all(card.penetration <= limit.penetration * np.maximum(card.depth, 0.1))
+
+
+def test_presses_on_a_slab_agree():
+    sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
+    cpu, card = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
+    requests = [
+        PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.2, 0.4, 0.2, 0.0)),
+        PressRequest(Cylinder(1.2, 2.0, 0.5), 0.1, 0.0, 30.0, (0.3,)),
+        PressRequest(FlatPunch(1.0, 0.9), -0.1, 0.2, 0.0, (0.3,)),
+        PressRequest(Sphere(1.0), -0.4, 0.4, 0.0, (0.3,)),
+    ]
+    found = dict(card.solve_many(requests, 4))
+    for number, request in enumerate(requests):
+        close(found[number], cpu.solve(request))
+
+
+def test_presses_on_protrusions_agree():
+    settings = replace(PLAIN, mesh=MeshSettings(outer=0.9, interior=1.5, protrusion=1.0))
+    cpu, card = pair(bumps_sensor(), settings)
+    request = PressRequest(Sphere(2.0), 0.5, 0.45, 0.0, (0.2, 0.4, 0.2))
+    ours, theirs = card.solve(request), cpu.solve(request)
+    close(ours, theirs)
+    assert np.abs(ours.taxel_force - theirs.taxel_force).max() < 2e-3 * theirs.taxel_force.max()
+
+
+def test_a_press_that_diverges_leaves_its_neighbours_alone_on_a_card_too():
+    sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
+    cpu, card = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
+    good = PressRequest(FlatPunch(1.0, 0.9), 0.2, 0.1, 0.0, (0.15, 0.3))
+    crushing = PressRequest(FlatPunch(1.5, 0.9), 0.0, 0.0, 0.0, (1.98,))
+    found = dict(card.solve_many([crushing, good], 2))
+    assert isinstance(found[0], SolveError) and "no equilibrium" in str(found[0])
+    close(found[1], cpu.solve(good))
+
+
+def test_kernels_agree_to_rounding(held):
+    u = 0.05 * np.sin(held.mesh.nodes @ np.random.default_rng(1).uniform(-1, 1, (3, 3)))
+    p = np.random.default_rng(2).normal(size=u.shape)
+    found = []
+    for device in ("cpu", CARD):
+        body = Elasticity(held.mesh, "neo_hookean", device)
+        own = conditions(slab_sensor().material, 0.0, device=device).repeat(2)
+        field, along = batch(u, 2 * u).to(device), batch(p, p).to(device)
+        product = torch.zeros_like(field)
+        body.tangent_product(field, along, own, product)
+        found.append((body.internal_force(field, own)[0].cpu(), product.cpu(), body.energy(field, own).cpu()))
+    for cpu, card in zip(*found, strict=True):
+        assert (cpu - card).abs().max() < 1e-11 * cpu.abs().max()
+
+
+def test_the_dense_inverse_is_a_good_preconditioner_and_its_compliance_is_its_own(held):
+    """Half precision costs digits; that the compliance is read off the same rounded matrix costs none."""
+    material, m = slab_sensor().material, len(held.loadable)
+    dense = rest_solver(held.mesh, material, held.mesh.bottom, held.loadable, CARD)
+    sparse = SparseRest(held.stiffness, held.free, held.loadable)
+    r = held.random(2, 3)
+    ours, theirs = dense.apply(r.to(CARD)).cpu(), sparse.apply(r)
+    assert ((ours - theirs).norm(dim=0) < 2e-2 * theirs.norm(dim=0)).all()
+    assert not ours[held.held].any()
+    # Rows of the same matrix, whether taken by themselves or with the rest.
+    part = dense.loadable(r.to(CARD)).cpu() - ours[held.loadable]
+    assert part.abs().max() < 1e-5 * ours.abs().max()
+    every = torch.arange(m, device=CARD)[None]
+    matrix = dense.compliance(every)[0].cpu()
+    unit = torch.zeros(3 * held.count, 1)
+    unit[held.loadable[5]] = 1.0
+    moved = dense.loadable(unit.to(CARD))[:, 0].cpu()
+    assert (matrix[5] - moved).abs().max() < 1e-3 * moved.abs().max()
+    assert torch.equal(matrix, matrix.T)
+    assert torch.linalg.eigvalsh(matrix.double()).min() > 0
+
+
+def test_the_contact_transfer_is_that_of_the_cpu():
+    random = np.random.default_rng(4)
+    root = torch.as_tensor(random.normal(size=(2, 2, 150, 150))) / 12
+    compliance, stiffness = root @ root.transpose(2, 3) + 0.2 * torch.eye(150)
+    here = contact_transfer(stiffness.float(), compliance.float())
+    there = contact_transfer(stiffness.float().to(CARD), compliance.float().to(CARD)).cpu()
+    assert (here - there).abs().max() < 1e-3 * here.abs().max()

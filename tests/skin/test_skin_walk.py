@@ -1,0 +1,150 @@
+"""One press on its way: which depth to try next, when a state counts as found, when to give up."""
+
+import math
+
+import pytest
+
+from tacdata.errors import SolveError
+from tacdata.skin.newton import SolverSettings
+from tacdata.skin.walk import Walk
+
+LIMIT = SolverSettings()
+GOOD = (LIMIT.residual / 2, 0.0, 1.0)
+"""Error, penetration and volume of a state that is found."""
+
+
+def walk(*depths, longest=0.25):
+    return Walk(depths, longest, "sphere at (1, 2) mm")
+
+
+def path(way):
+    """Every depth tried, all found at once; and those that are handed out."""
+    tried, wanted = [], []
+    while not way.finished:
+        assert way.judge(*GOOD, LIMIT) == "found"
+        tried.append(way.attempt)
+        if way.found():
+            wanted.append(way.depth)
+        if not way.finished:
+            way.go_on()
+    return tried, wanted
+
+
+def test_steps_are_bounded_and_end_at_the_depths_wanted():
+    tried, wanted = path(walk(0.6, 0.1))
+    assert tried == pytest.approx([0.25, 0.5, 0.6, 0.35, 0.1])
+    assert wanted == [0.6, 0.1]
+
+
+def test_a_depth_wanted_twice_is_found_twice():
+    tried, wanted = path(walk(0.0, 0.2, 0.2, 0.0))
+    assert tried == wanted == [0.0, 0.2, 0.2, 0.0]
+
+
+def test_the_direction_is_that_of_the_last_movement():
+    way = walk(0.2, 0.2, 0.1)
+    directions = []
+    while not way.finished:
+        way.found()
+        directions.append(math.copysign(1, way.direction))
+        if not way.finished:
+            way.go_on()
+    assert directions == [1, 1, -1]
+
+
+def test_a_state_is_found_only_if_balanced_and_without_penetration():
+    way = walk(0.2)
+    balanced, tight = LIMIT.residual, LIMIT.penetration * 0.2
+    assert way.judge(1.01 * balanced, tight, 1.0, LIMIT) == "go on"
+    assert way.judge(balanced, 1.01 * tight, 1.0, LIMIT) == "augment"
+    assert way.judge(balanced, tight, 1.0, LIMIT) == "found"
+
+
+def test_penetration_is_judged_by_a_tenth_of_a_millimetre_where_a_press_is_shallower():
+    allowed = LIMIT.penetration * 0.1
+    assert walk(0.01).judge(0.0, allowed, 1.0, LIMIT) == "found"
+    assert walk(0.01).judge(0.0, 1.01 * allowed, 1.0, LIMIT) == "augment"
+
+
+def test_multipliers_wait_until_the_forces_nearly_balance():
+    way = walk(0.2)
+    assert way.judge(21 * LIMIT.residual, 1.0, 1.0, LIMIT) == "go on"
+    assert way.judge(19 * LIMIT.residual, 1.0, 1.0, LIMIT) == "augment"
+
+
+def test_iterations_without_progress_end_the_attempt():
+    way = walk(0.2)
+    verdicts = [way.judge(1.0, 0.0, 0.5, LIMIT) for _ in range(LIMIT.patience + 2)]
+    assert verdicts[:-1] == ["go on"] * (LIMIT.patience + 1)
+    assert verdicts[-1] == "failed"
+    assert "residual is 1.0e+00" in way.reason and "det F 0.50" in way.reason
+
+
+def test_slow_progress_is_let_go_on_up_to_the_limit():
+    way, error, count = walk(0.2), 1.0, 0
+    while way.judge(error, 0.0, 1.0, SolverSettings(residual=1e-30)) == "go on":
+        error, count = 0.8 * error, count + 1
+    assert count == LIMIT.newton_limit
+    assert f"{LIMIT.newton_limit} Newton iterations" in way.reason
+
+
+def test_augmenting_forgives_the_growth_that_it_causes():
+    """The residual jumps with the multipliers: what counts as progress starts anew."""
+    way, small = walk(0.2), 2 * LIMIT.residual
+    way.judge(small, 0.0, 1.0, LIMIT)
+    for _ in range(LIMIT.patience):
+        assert way.judge(small, 1.0, 1.0, LIMIT) == "augment"
+    for _ in range(LIMIT.patience):
+        assert way.judge(100 * small, 1.0, 1.0, LIMIT) == "go on"
+
+
+@pytest.mark.parametrize("error", [math.nan, math.inf])
+def test_a_state_that_is_no_number_fails_at_once(error):
+    way = walk(0.2)
+    assert way.judge(error, 0.0, 1.0, LIMIT) == "failed"
+    assert way.judge(0.0, math.nan, 1.0, LIMIT) != "found"
+
+
+def test_iterations_are_counted_over_failed_attempts():
+    way = walk(0.2)
+    for _ in range(3):
+        way.judge(1.0, 0.0, 1.0, LIMIT)
+    way.halve()
+    way.judge(1.0, 0.0, 1.0, LIMIT)
+    assert (way.newton, way.spent) == (1, 4)
+
+
+def test_a_failed_step_is_halved_and_grows_again_after_the_depth_wanted():
+    way = walk(0.4, 0.8)
+    way.halve()
+    assert way.attempt == pytest.approx(0.125)
+    tried, wanted = path(way)
+    assert tried == pytest.approx([0.125, 0.25, 0.375, 0.4, 0.65, 0.8])
+    assert wanted == [0.4, 0.8]
+
+
+def test_a_step_on_the_way_back_is_halved_too():
+    way = walk(0.2, 0.0)
+    way.found()
+    way.go_on()
+    way.halve()
+    assert way.attempt == pytest.approx(0.1)
+
+
+def test_a_press_is_given_up_in_words_when_steps_become_tiny():
+    way = walk(0.25, 0.5)
+    way.found()
+    way.go_on()
+    way.judge(math.nan, 0.0, 0.3, LIMIT)
+    for _ in range(3):
+        way.halve()
+    words = r"sphere at \(1, 2\) mm: no equilibrium beyond depth 0\.250 mm; after"
+    with pytest.raises(SolveError, match=words) as caught:
+        for _ in range(3):
+            way.halve()
+    assert "reduce the depth" in str(caught.value)
+
+
+def test_a_depth_that_is_where_it_stands_cannot_be_approached_in_smaller_steps():
+    with pytest.raises(SolveError, match="no equilibrium"):
+        walk(0.0).halve()

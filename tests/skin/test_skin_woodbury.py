@@ -1,0 +1,130 @@
+"""The contact's share of the preconditioner by the Woodbury identity, and the batched inverse under it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from skin_examples import MATERIAL, HeldSlab, batch, joined
+
+from tacdata.indenters.sphere import Sphere
+from tacdata.skin.batched_inverse import contact_transfer, inverse
+from tacdata.skin.conditions import conditions
+from tacdata.skin.contact import Contact
+from tacdata.skin.pose import Pose
+from tacdata.skin.rest import rest_solver
+from tacdata.skin.woodbury import ContactPreconditioner
+
+PENALTY, STICK = 3000.0, 100.0
+"""Over Young's modulus [1/mm]: stiff, so that the contact's share matters."""
+SPHERE = Sphere(2.0)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return HeldSlab()
+
+
+@pytest.fixture(scope="module")
+def rest(body):
+    return rest_solver(body.mesh, MATERIAL, body.mesh.bottom, body.loadable, "cpu")
+
+
+def pressed(body, rest, friction, places, moduli):
+    """A contact with one sphere a member, evaluated at rest, and its preconditioner."""
+    nodes, faces = torch.as_tensor(body.mesh.nodes), torch.as_tensor(body.mesh.outer)
+    contact = Contact(nodes, faces, 1, SPHERE.distance_function(), friction > 0, PENALTY, STICK)
+    members = joined(*(conditions(replace(MATERIAL, youngs_modulus=e), friction, SPHERE) for e in moduli))
+    turn = torch.eye(3, dtype=torch.float64)[:, :, None].repeat(1, 1, len(places))
+    pose = Pose(torch.tensor(places, dtype=torch.float64).T.contiguous(), turn)
+    u = batch(*[np.zeros_like(body.mesh.nodes)] * len(places))
+    contact.add_force(u, pose, contact.start(pose), members, torch.zeros_like(u))
+    made = ContactPreconditioner(
+        rest, [contact], torch.as_tensor(body.loadable), 3 * body.count, MATERIAL.youngs_modulus
+    )
+    made.update(members.modulus)
+    return contact, made
+
+
+def tangent_times(body, contact, x, moduli):
+    """Rest stiffness of each member plus its contact's, times fields (3n, b)."""
+    field = x.double().reshape(body.count, 3, -1)
+    r = body.times(x) * torch.tensor(moduli, dtype=torch.float64) / MATERIAL.youngs_modulus
+    product = torch.zeros_like(field)
+    contact.add_product(field.contiguous(), product)
+    r += product.reshape(r.shape)
+    r[body.held] = 0
+    return r.float()
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_with_contact_the_preconditioner_inverts_rest_plus_contact_stiffness(body, rest, friction):
+    contact, preconditioner = pressed(body, rest, friction, [(0.1, -0.2, 1.9)], [0.30])
+    x = body.random(5)
+    assert (rest.apply(body.times(x).float()) - x).norm() < 1e-2 * x.norm()
+    r = tangent_times(body, contact, x, [0.30])
+    assert (preconditioner.apply(r.reshape(-1, 3, 1)).reshape(x.shape) - x).norm() < 2e-2 * x.norm()
+    assert (rest.apply(r) - x).norm() > 10 * x.norm()
+
+
+def test_members_with_other_contacts_and_moduli_are_inverted_side_by_side(body, rest):
+    """One touches little, one much, one not at all; moduli differ."""
+    places, moduli = [(0.1, -0.2, 1.98), (-0.4, 0.3, 1.9), (0.0, 0.0, 2.5)], [0.30, 0.15, 0.90]
+    contact, preconditioner = pressed(body, rest, 0.2, places, moduli)
+    touched = contact.touched.sum(dim=0)
+    assert 0 < touched[0] < touched[1] and touched[2] == 0
+    x = body.random(5, 6, 7)
+    r = tangent_times(body, contact, x, moduli)
+    back = preconditioner.apply(r.reshape(body.count, 3, 3)).reshape(x.shape)
+    assert ((back - x).norm(dim=0) < 2e-2 * x.norm(dim=0)).all()
+
+
+def test_it_is_symmetric_and_positive_as_conjugate_gradients_need(body, rest):
+    _, preconditioner = pressed(body, rest, 0.2, [(0.1, -0.2, 1.9)], [0.30])
+    a, b = body.random(8), body.random(9)
+    pa, pb = (preconditioner.apply(field.reshape(-1, 3, 1)).reshape(-1, 1) for field in (a, b))
+    assert (b * pa).sum().item() == pytest.approx((a * pb).sum().item(), abs=1e-3 * (pa.norm() * b.norm()).item())
+    assert (a * pa).sum() > 0 and (b * pb).sum() > 0
+
+
+def test_without_contact_it_is_the_rest_stiffness_alone(body, rest):
+    _, preconditioner = pressed(body, rest, 0.2, [(0.0, 0.0, 2.5)], [0.60])
+    r = body.random(5)
+    assert torch.equal(preconditioner.apply(r.reshape(-1, 3, 1)).reshape(-1, 1), rest.apply(r) * 0.5)
+
+
+def spd(rows, members, condition, seed=0):
+    """Symmetric positive definite matrices of a given condition number, shape (b, m, m), float64."""
+    random = np.random.default_rng(seed)
+    made = []
+    for _ in range(members):
+        q, _ = np.linalg.qr(random.normal(size=(rows, rows)))
+        made.append(q * np.geomspace(1.0, condition, rows) @ q.T)
+    return torch.as_tensor(np.stack(made))
+
+
+@pytest.mark.parametrize("rows", [1, 63, 64, 65, 200])
+def test_the_inverse_by_blocks_is_the_inverse(rows):
+    """At any size beside the blocks' 64."""
+    matrices = spd(rows, 3, 100.0)
+    found = inverse(matrices)
+    assert found.shape == matrices.shape
+    assert (found @ matrices - torch.eye(rows)).abs().max() < 1e-11
+    single = inverse(matrices.float())
+    assert single.dtype == torch.float32
+    assert (single.double() - found).abs().max() < 1e-4 * found.abs().max()
+
+
+@pytest.mark.parametrize("rows", [40, 130])
+def test_both_formulas_for_the_contact_transfer_agree(rows):
+    """(I + S G)^-1 S, as the CPU has it, is P - P (P + S)^-1 P with P = G^-1, as a card has it."""
+    compliance, stiffness = spd(rows, 2, 50.0, seed=1), spd(rows, 2, 30.0, seed=2)
+    stiffness[:, : rows // 2] = 0.0  # Most points of a face do not touch.
+    stiffness[:, :, : rows // 2] = 0.0
+    direct = contact_transfer(stiffness, compliance)
+    held = inverse(compliance)
+    by_inverses = held - held @ inverse(held + stiffness) @ held
+    expected = torch.linalg.inv(torch.eye(rows, dtype=torch.float64) + stiffness @ compliance) @ stiffness
+    assert (direct - expected).abs().max() < 1e-10 * expected.abs().max()
+    assert (by_inverses - expected).abs().max() < 1e-10 * expected.abs().max()
+    assert (contact_transfer(stiffness.float(), compliance.float()) - direct).abs().max() < 1e-4 * direct.abs().max()

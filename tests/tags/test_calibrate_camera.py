@@ -1,0 +1,106 @@
+"""`tacdata calibrate-camera` as a person uses it."""
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from board_images import BOARD, TRUTH, images
+from PIL import Image
+from typer.testing import CliRunner
+
+from tacdata import cli, documents
+from tacdata.errors import TacdataError
+from tacdata.tags.board import read_board
+from tacdata.tags.board_view import find_board
+from tacdata.tags.camera import Camera
+
+
+def calibrate(*options):
+    return CliRunner().invoke(cli.application(), ["calibrate-camera", *map(str, options)])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Images of the board, one without it, and the board's file."""
+    root = tmp_path_factory.mktemp("images")
+    (root / "taken").mkdir()
+    for k, image in enumerate(images(12)):
+        cv2.imwrite(str(root / "taken" / f"{k:02}.png"), image)
+    cv2.imwrite(str(root / "taken" / "empty.png"), np.full((480, 640), 90, np.uint8))
+    documents.write(root / "board.yaml", BOARD.document, "calibration_board")
+    return root
+
+
+def test_images_become_a_calibration_that_a_rig_file_takes(folder, tmp_path):
+    out = tmp_path / "camera.yaml"
+    options = ("--board", folder / "board.yaml", "--source", folder / "taken", "--model", "k1k2p1p2")
+    shown = calibrate(*options, "--out", out)
+    assert shown.exit_code == 0, shown.output
+    assert "13 images, the board in 12" in shown.output
+    document = documents.read(out, "camera_calibration")
+    assert abs(document["intrinsics"]["fx"] - TRUTH["fx"]) < 3 and document["rms"] < 0.2
+    assert len(document["views"]) == 12 and document["board"] == BOARD.document
+    assert cv2.imread(str(out.with_suffix(".png"))) is not None
+    printed = yaml.safe_load(shown.output[shown.output.index("intrinsics:") :])
+    assert printed["intrinsics"] == document["intrinsics"]
+    assert Camera.from_document(printed["intrinsics"]).width == 640
+    again = calibrate(*options, "--out", out)
+    assert isinstance(again.exception, TacdataError) and "not overwritten" in str(again.exception)
+
+
+def test_a_drawn_board_has_its_size_on_paper_and_a_file(tmp_path):
+    board = tmp_path / "board.yaml"
+    shown = calibrate("--board", board, "--draw", tmp_path / "board.png")
+    assert shown.exit_code == 0, shown.output
+    sheet = Image.open(tmp_path / "board.png")
+    assert sheet.info["dpi"][0] == pytest.approx(600, abs=0.1)
+    assert np.allclose(np.array(sheet.size) * 25.4 / 600, (297, 210), atol=0.05)
+    wanted = read_board(board)
+    small = np.asarray(sheet.convert("L").resize((sheet.width // 4, sheet.height // 4), Image.Resampling.BOX))
+    view = find_board(small, wanted)
+    assert view is not None and len(view.ids) == (wanted.columns - 1) * (wanted.rows - 1)
+    assert calibrate("--board", tmp_path / "b.yaml", "--draw", tmp_path / "b.pdf").exit_code == 0
+    assert (tmp_path / "b.pdf").read_bytes().startswith(b"%PDF")
+    assert isinstance(calibrate("--board", board, "--draw", tmp_path / "c.png").exception, TacdataError)
+
+
+def test_a_film_gives_its_still_and_different_images(folder, tmp_path):
+    shots = [cv2.imread(str(p)) for p in sorted((folder / "taken").glob("[01]*.png"))]
+    film = cv2.VideoWriter(str(tmp_path / "film.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (640, 480))
+    for shot in [*shots[:10], shots[9]]:  # each twice: held still; the last one longer
+        film.write(shot)
+        film.write(shot)
+    film.release()
+    options = ("--board", folder / "board.yaml", "--source", tmp_path / "film.avi", "--out", tmp_path / "c.yaml")
+    shown = calibrate(*options, "--model", "k1k2p1p2")
+    assert "22 images, the board in 22, 10 views taken" in shown.output
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({"source": "nothing"}, "no file or folder"),
+    ({"source": "text.mp4"}, "no video"),
+    ({"source": "mixed"}, "images of one size"),
+    ({"source": "broken"}, "cannot be read as an image"),
+    ({"source": "blank"}, "0 views"),
+    ({"source": "nobody"}, "holds no image"),
+    ({"model": "fisheye"}, "rational"),
+    ({"board": "none.yaml"}, "none.yaml"),
+    ({"source": "97"}, "no camera 97"),
+    ({"source": "0", "size": "large"}, "WIDTHxHEIGHT"),
+    ({"source": None}, "--source with --out"),
+])  # fmt: skip
+def test_what_cannot_be_used_is_refused_in_words(folder, tmp_path, monkeypatch, change, words):
+    monkeypatch.chdir(tmp_path)
+    grey = np.full((480, 640), 90, np.uint8)
+    for name in ("mixed", "broken", "blank", "nobody"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "text.mp4").write_text("no film")
+    (tmp_path / "broken" / "a.png").write_text("no image")
+    for name, shape in (("mixed", (480, 640)), ("blank", (480, 640))):
+        cv2.imwrite(str(tmp_path / name / "a.png"), grey[: shape[0]])
+    cv2.imwrite(str(tmp_path / "mixed" / "b.png"), grey[:100])
+    values = {"board": folder / "board.yaml", "source": folder / "taken", "out": "c.yaml", **change}
+    shown = calibrate(*(part for k, v in values.items() if v is not None for part in (f"--{k}", v)))
+    assert isinstance(shown.exception, TacdataError), shown.output
+    assert words in str(shown.exception)
+    assert not (tmp_path / "c.yaml").exists()
