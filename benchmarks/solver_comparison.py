@@ -177,6 +177,7 @@ def draw(rows: list[dict], path: Path) -> None:
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import NullFormatter
 
     presses = sorted({r["press"] for r in rows}, reverse=True)
     measures = (("force", "force error [%]"), ("top", "depth field, rms [% of depth]"))
@@ -191,8 +192,12 @@ def draw(rows: list[dict], path: Path) -> None:
                 for r, a, b in zip(own, x, y, strict=True):
                     axis.annotate(f"{r['depth']:g}", (a, b), fontsize=7, xytext=(3, 3), textcoords="offset points")
             axis.set(title=press, xlabel="CPU seconds per equilibrium", ylabel=label)
+            axis.margins(0.15)
             axis.grid(alpha=0.3, which="both")
-    axes[0, 0].legend(fontsize=8)
+            for one, low, high in ((axis.xaxis, *axis.get_xlim()), (axis.yaxis, *axis.get_ylim())):
+                one.set_major_formatter("{x:g}")
+                one.set_minor_formatter("{x:g}" if high < 10 * low else NullFormatter())
+        row[0].legend(fontsize=8)
     figure.savefig(path, dpi=110)
 
 

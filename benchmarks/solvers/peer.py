@@ -134,7 +134,7 @@ def within_reach(case: Case, mesh: SkinMesh) -> np.ndarray:
     c, s = np.cos(np.radians(request.yaw)), np.sin(np.radians(request.yaw))
     dx, dy = mesh.nodes[:, 0] - request.x, mesh.nodes[:, 1] - request.y
     height = request.indenter.profile(c * dx + s * dy, -s * dx + c * dy)
-    return (height < max(request.depths) + 0.3)[mesh.outer].any(axis=1)
+    return np.any((height < max(request.depths) + 0.3)[mesh.outer], axis=1)
 
 
 def main_interpreter() -> str:

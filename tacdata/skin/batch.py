@@ -41,7 +41,7 @@ class Press:
     touch: np.ndarray
     """Place of the indenter's origin at depth 0 [mm], shape (3,)."""
     turn: np.ndarray
-    """Orientation of the indenter, shape (3, 3)."""
+    """Rotation from the indenter's frame to the sensor's [1], shape (3, 3)."""
     conditions: Conditions
     """Of one member."""
 

@@ -28,7 +28,7 @@ class Places:
     """Nearest places of some points."""
 
     face: np.ndarray
-    """Triangle, shape (n,)."""
+    """Triangle, shape (n,), int32."""
     point: np.ndarray
     """Nearest point on it [mm], shape (n, 3)."""
     distance: np.ndarray

@@ -33,7 +33,7 @@ class Smooth:
     vertices: np.ndarray
     """Its vertices [mm], shape (v, 3)."""
     faces: np.ndarray
-    """Its triangles, shape (f, 3)."""
+    """Its triangles, shape (f, 3), int64."""
     middles: np.ndarray
     """Where the middle of each triangle's edges 01, 12, 20 lies on the smooth surface [mm], shape (f, 3, 3)."""
 

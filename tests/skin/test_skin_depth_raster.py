@@ -140,6 +140,16 @@ def test_the_height_of_a_curved_pad_is_that_of_its_formula(mesh):
     assert OuterFace(curved).height(points) == pytest.approx(skin.outer_height(*points.T), abs=4e-3)
 
 
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
+def test_maps_on_cuda_are_those_of_the_cpu(mesh):
+    factors = torch.linspace(-1, 1, 40, dtype=torch.float64)
+    u = state(mesh, lambda x, y: -0.9 * np.sin(1.5 * x), lambda x, y: 0.05 * x * y, bowl) * factors
+    for sampling in ("point", "area"):
+        here, there = (DepthRaster(mesh, X, Y, sampling, device) for device in ("cpu", "cuda:0"))
+        assert there.depth(u.cuda()).cpu().numpy() == pytest.approx(here.depth(u).numpy(), abs=1e-10)
+
+
 def test_an_unknown_sampling_is_refused(mesh):
     with pytest.raises(UsageError, match="point, area"):
         DepthRaster(mesh, X, Y, "median")

@@ -27,11 +27,11 @@ class Snapped:
     vertices: np.ndarray
     """Positions [mm], shape (v, 3)."""
     tets: np.ndarray
-    """Tetrahedra, shape (e, 4)."""
+    """Tetrahedra, shape (e, 4), int32."""
     faces: np.ndarray
-    """Triangles of the surface, normals outward, shape (f, 3)."""
+    """Triangles of the surface, normals outward, shape (f, 3), int32."""
     taxel: np.ndarray
-    """Taxel on whose protrusion a vertex lies, or -1, shape (v,)."""
+    """Taxel on whose protrusion a vertex lies, or -1, shape (v,), int64."""
 
 
 def snap(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> Snapped:

@@ -40,7 +40,7 @@ class Quadratic:
     tets: np.ndarray
     """Nodes of each tetrahedron, shape (e, 10), int32."""
     edges: np.ndarray
-    """Corners of each edge in the order of the mid-side nodes, shape (m, 2)."""
+    """Corners of each edge in the order of the mid-side nodes, shape (m, 2), int32."""
 
     def triangles(self, corners: np.ndarray) -> np.ndarray:
         """Return triangles (f, 3) with their mid-side nodes, shape (f, 6), int32."""
