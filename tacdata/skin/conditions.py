@@ -68,7 +68,7 @@ def conditions(
     return Conditions(
         _column(load_law(material.law).parameters(material), device),
         _scalar(material.youngs_modulus, device), _scalar(thickness, device), _scalar(friction, device),
-        _column(indenter.parameters if indenter else (), device),
+        _column(indenter.device_parameters(device) if indenter else (), device),
     )
 
 

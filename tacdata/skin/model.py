@@ -81,7 +81,7 @@ class SkinModel:
         self.mesh = mesh or build_mesh(sensor, self.settings.mesh)
         self._companion_mesh = companion
         self._nodes = torch.as_tensor(self.mesh.nodes, device=device)
-        self._fixed = self.mesh.fixed(sensor.contact.bonded)
+        self._fixed = self.mesh.fixed(sensor.contact.bonded, sensor.contact.rim_width)
         if not self._fixed.any():
             raise SolveError(
                 "no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file"
@@ -169,7 +169,7 @@ class SkinModel:
         preconditioner = ContactPreconditioner(self._rest, contacts, loadable, size, modulus)
         newton = Newton(self._body, contacts, fixed, preconditioner, self.settings.solver)
         idle = conditions(self.sensor.material, self.sensor.contact.friction, request.indenter, device=self.device)
-        floor = -self.sensor.skin.protrusion_radius
+        floor = -self.sensor.skin.protrusion_tip
         return Batch(newton, idle, len(self.mesh.nodes), capacity, floor), contacts
 
     def walk(
