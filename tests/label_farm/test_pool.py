@@ -50,7 +50,7 @@ def pool_of_one(tmp_path, factory, version):
 
 
 def test_workers_of_other_code_are_refused(tmp_path, solves, monkeypatch):
-    version = model.version("fast_model:FastModel", SENSOR)
+    version = model.version("fast_model:FastModel", SENSOR).content_hash
     monkeypatch.setenv("FAST_MODEL_VERSION", "2")
     pool, job = pool_of_one(tmp_path, "fast_model:FastModel", version)
     with pytest.raises(UsageError, match="other code"):
