@@ -137,9 +137,7 @@ def test_a_surface_from_a_file_is_meshed_on_the_smooth_surface_behind_its_facets
     assert abs(volume_error(sensor, mesh)) < 1e-3
     assert quality(mesh).worst_ratio > 0.05
     assert mesh.nodes[mesh.bottom, 2] == pytest.approx(np.zeros(mesh.bottom.sum()), abs=1e-6)
-    # fTetWild cuts another mesh at every run: a vertex whose move would flatten an element stays in its envelope.
-    beside = np.abs(np.abs(mesh.nodes[mesh.sides][:, :2]).max(axis=1) - 2.5)
-    assert np.quantile(beside, 0.9) < 1e-6 and beside.max() < MeshSettings().envelope * np.linalg.norm([5.0, 5.0, 2.0])
+    assert np.abs(np.abs(mesh.nodes[mesh.sides][:, :2]).max(axis=1) - 2.5).max() < 1e-6, "sharp edges stay sharp"
     assert len(mesh.protrusions) == 0
 
 

@@ -17,6 +17,7 @@ from tacdata.skin.meshing.settings import MeshSettings
 from tacdata.skin.meshing.tetrahedralize import tetrahedralize
 from tacdata.skin.meshing.topology import Quadratic, boundary, oriented, volumes, with_middles
 from tacdata.surfaces.closed import read_closed
+from tacdata.surfaces.creases import Creases
 from tacdata.surfaces.nearest import Nearest
 from tacdata.surfaces.smooth import smooth
 from tacdata.surfaces.store import find
@@ -48,6 +49,8 @@ class _Target:
     """Volume within the smooth surface [mm^3]."""
     outer: np.ndarray
     """Points on the outer face [mm], shape (p, 3)."""
+    creases: Creases
+    """Its sharp edges."""
 
 
 def own_mesh(sensor: Sensor, own: OwnSurface, settings: MeshSettings) -> SkinMesh:
@@ -63,7 +66,7 @@ def own_mesh(sensor: Sensor, own: OwnSurface, settings: MeshSettings) -> SkinMes
     vertices, tets = oriented(
         *tetrahedralize(target.hull, sensor.skin, settings, lambda points: tree.query(points, workers=1)[0])
     )
-    vertices = _on_surface(target.nearest, vertices, tets)
+    vertices = _on_surface(target, vertices, tets, 2 * settings.envelope * float(target.hull.scale))
     found = float(volumes(vertices, tets).sum())
     if abs(found - target.volume) > _VOLUME * target.volume:
         raise SolveError(
@@ -91,14 +94,20 @@ def _target(sensor: Sensor, own: OwnSurface) -> _Target:
     a, b, c = (points[triangles[:, k]] for k in range(3))
     outer = points[triangles[part[parent] == PARTS.index("outer")]].reshape(-1, 3)
     volume = float(np.einsum("ij,ij->", np.cross(a, b), c) / 6)
-    return _Target(hull, Nearest(points, triangles), parent, part, volume, outer)
+    creases = Creases.of(corners, np.asarray(hull.faces))
+    return _Target(hull, Nearest(points, triangles), parent, part, volume, outer, creases)
 
 
-def _on_surface(nearest: Nearest, vertices: np.ndarray, tets: np.ndarray) -> np.ndarray:
-    """Return vertices with those of the boundary on the surface, but for those that would flatten an element."""
+def _on_surface(target: _Target, vertices: np.ndarray, tets: np.ndarray, reach: float) -> np.ndarray:
+    """Return vertices with those of the boundary on the surface, but for those that would flatten an element.
+
+    Those within ``reach`` [mm] of a sharp edge go to it: the nearest face alone would round the edge off.
+    """
     surface = np.unique(boundary(tets))
+    place, sharp = target.creases.snapped(vertices[surface], reach)
+    place[~sharp] = target.nearest.places(vertices[surface[~sharp]]).point
     moved = vertices.copy()
-    moved[surface] = nearest.places(vertices[surface]).point
+    moved[surface] = place
     for _ in range(10):
         flat = volumes(moved, tets) < _SLIVER * volumes(vertices, tets)
         if not flat.any():
