@@ -72,19 +72,39 @@ class Phase(_message.Message):
     start_ns: int
     def __init__(self, name: _Optional[str] = ..., start_ns: _Optional[int] = ...) -> None: ...
 
+class ImageTime(_message.Message):
+    __slots__ = ("arrival_ns", "sample_ns", "sequence", "device_ns")
+    ARRIVAL_NS_FIELD_NUMBER: _ClassVar[int]
+    SAMPLE_NS_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_NS_FIELD_NUMBER: _ClassVar[int]
+    arrival_ns: int
+    sample_ns: int
+    sequence: int
+    device_ns: int
+    def __init__(self, arrival_ns: _Optional[int] = ..., sample_ns: _Optional[int] = ..., sequence: _Optional[int] = ..., device_ns: _Optional[int] = ...) -> None: ...
+
 class CubeView(_message.Message):
-    __slots__ = ("arrival_ns", "sample_ns", "sequence", "faces", "reprojection")
+    __slots__ = ("arrival_ns", "sample_ns", "sequence", "faces", "reprojection", "ids", "ambiguous", "covariance", "strays")
     ARRIVAL_NS_FIELD_NUMBER: _ClassVar[int]
     SAMPLE_NS_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     FACES_FIELD_NUMBER: _ClassVar[int]
     REPROJECTION_FIELD_NUMBER: _ClassVar[int]
+    IDS_FIELD_NUMBER: _ClassVar[int]
+    AMBIGUOUS_FIELD_NUMBER: _ClassVar[int]
+    COVARIANCE_FIELD_NUMBER: _ClassVar[int]
+    STRAYS_FIELD_NUMBER: _ClassVar[int]
     arrival_ns: int
     sample_ns: int
     sequence: int
     faces: int
     reprojection: float
-    def __init__(self, arrival_ns: _Optional[int] = ..., sample_ns: _Optional[int] = ..., sequence: _Optional[int] = ..., faces: _Optional[int] = ..., reprojection: _Optional[float] = ...) -> None: ...
+    ids: _containers.RepeatedScalarFieldContainer[int]
+    ambiguous: bool
+    covariance: _containers.RepeatedScalarFieldContainer[float]
+    strays: _containers.RepeatedScalarFieldContainer[int]
+    def __init__(self, arrival_ns: _Optional[int] = ..., sample_ns: _Optional[int] = ..., sequence: _Optional[int] = ..., faces: _Optional[int] = ..., reprojection: _Optional[float] = ..., ids: _Optional[_Iterable[int]] = ..., ambiguous: _Optional[bool] = ..., covariance: _Optional[_Iterable[float]] = ..., strays: _Optional[_Iterable[int]] = ...) -> None: ...
 
 class Measured(_message.Message):
     __slots__ = ("arrival_ns", "sample_ns", "values")

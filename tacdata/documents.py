@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ from jsonschema import Draft202012Validator
 
 import schemas
 from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.replacement import replacement
 
 
 def read(path: Path, schema: str) -> dict[str, Any]:
@@ -25,11 +24,19 @@ def read(path: Path, schema: str) -> dict[str, Any]:
     if not path.is_file():
         raise UsageError(f"no file {path}", f"a {schema} file (YAML or JSON)", "check the path")
     try:
-        document = yaml.safe_load(path.read_text())
+        document = _parsed(path.read_text())
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise FormatError(f"{path} is not readable as YAML: {error}", f"a {schema} file", "fix the syntax") from None
     check(document, schema, str(path))
     return document
+
+
+def _parsed(text: str) -> Any:
+    """Return JSON as JSON: YAML 1.1 takes its ``1e-07`` for a text."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return yaml.safe_load(text)
 
 
 def check(document: Any, schema: str, origin: str) -> None:
@@ -66,19 +73,10 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         DeviceError: If the disk refuses it.
     """
-    temporary = None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "w") as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        with replacement(path) as stream:
+            stream.write(text.encode())
     except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
         raise DeviceError(
             f"writing {path} failed: {error}", "a folder that may be written, on a disk with room",
             "make room or choose another folder",

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.labels import Label
 from tacdata.recording.episode import PHASES, Episode, Phase, TagStream
-from tacdata.rig import Registration
+from tacdata.rig import registration_for
 from tacdata.sensor import Sensor
 from viewers.color_scale import ColorScale, scale_of
 from viewers.scene import Curves, Span, TaxelArray
@@ -84,7 +84,7 @@ def episode_curves(episode: Episode) -> tuple[Curves, ...]:
         ),
     ]
     if len(episode.cnc.sample_ns) and "registration" in episode.rig:
-        reported = Registration.from_document(episode.rig["registration"]).to_sensor(episode.cnc.position)
+        reported = registration_for(episode.rig, episode.press.indenter_name).to_sensor(episode.cnc.position)
         curves.append(tip_curves("reported", episode.cnc.sample_ns, reported))
     for tags in episode.tags:
         curves += tag_curves(tags)

@@ -64,6 +64,8 @@ class _Place:
         return ["virtual-rig", str(self.rig.parent), "--speed", f"{speed:g}", "--seed", str(seed)]
 
     def recording(self, presses: int, seed: int) -> list[tuple[str, list[str]]]:
+        # One approach to a place and two taxels: enough for this, and half of the time.
+        register = ["register", "--rig", str(self.rig), "--yes", "--repeats", "1", "--taxel", "7", "--taxel", "16"]
         plan = ["plan", "--presses", str(presses), "--seed", str(seed), "--out", str(self.plan)]
         record = [
             "record",
@@ -75,14 +77,18 @@ class _Place:
             str(self.session),
             "--yes",
         ]
-        return [("make a press plan", plan), ("record every press of the plan", record)]
+        return [
+            ("find where the sensor lies, by touching it", register),
+            ("make a press plan", plan),
+            ("record every press of the plan", record),
+        ]
 
     def learning(self, epochs: int, seed: int) -> list[tuple[str, list[str]]]:
         session, dataset, network = str(self.session), str(self.dataset), str(self.network)
         train = ["train", dataset, "--out", network, "--epochs", str(epochs), "--seed", str(seed)]
         return [
             ("check what was recorded", ["check", session]),
-            ("label every frame by finite elements", ["label", session]),
+            ("label every frame by finite elements", ["label", session, "--no-uncertainty"]),
             ("pack recordings and labels as a LeRobot dataset", ["pack", session, "--out", dataset]),
             ("train the paper's network", train),
             ("score it on presses that it has not seen", ["evaluate", network]),

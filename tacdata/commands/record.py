@@ -49,9 +49,11 @@ def run(
     from tacdata.registration.chosen import chosen_registration
     from tacdata.rig import read_rig
     from tacdata.sensor import default_sensor, read_sensor
-    from tacdata.tags import detect_cube
+    from tacdata.tags import look
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop from outside is a Ctrl-C
+    # A stop from outside is a Ctrl-C, also where a script started this in the background and its shell ignores Ctrl-C.
+    for stop in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(stop, signal.default_int_handler)
     hang_up = getattr(signal, "SIGHUP", None)  # so is a closed terminal, but not under nohup; Windows has none
     if hang_up is not None and signal.getsignal(hang_up) == signal.SIG_DFL:
         signal.signal(hang_up, signal.default_int_handler)
@@ -71,7 +73,7 @@ def run(
     else:
         view = nullcontext()
     bar = _Bar()
-    with view as watch, bar as progress, in_background(detect_cube) as detect:
+    with view as watch, bar as progress, in_background(look) as detect:
         recorder = Recorder(
             bench,
             skin,

@@ -43,7 +43,9 @@ def run(
     from tacdata.rig import read_rig
     from tacdata.sensor import default_sensor, read_sensor
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a stop from outside is a Ctrl-C
+    # A stop from outside is a Ctrl-C, also where a script started this in the background and its shell ignores Ctrl-C.
+    for stop in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(stop, signal.default_int_handler)
     bench, skin = read_rig(rig), read_sensor(sensor) if sensor else default_sensor()
     target = out or rig.with_name("registration.yaml")
     settings = Settings(above, limit, depth, repeats, tuple(taxel or ()))

@@ -217,6 +217,11 @@ class MotionController(Device):
 class Camera(Device):
     """A camera."""
 
+    @property
+    def counts(self) -> StreamCounts:
+        """What came so far: ``lost`` are images that nobody fetched in time, ``corrupt`` those that were damaged."""
+        return StreamCounts()
+
     @abstractmethod
     def read(self, timeout: float) -> list[ImageFrame]:
         """Return the images that have arrived, waiting at most ``timeout`` [s of the host's clock]; may be empty."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.clock import Clock
-from tacdata.devices.device import Camera, ImageFrame
+from tacdata.devices.device import Camera, ImageFrame, StreamCounts
 from tacdata.errors import DeviceError, UsageError
 
 FIRST_IMAGE = 5.0
@@ -102,6 +102,12 @@ class OpencvCamera(Camera):
         if self.exposure != "auto" and not is_time:
             given = f"{where}: exposure {self.exposure!r}"
             raise UsageError(given, "auto, or a time above 0 ms", "correct the rig file")
+
+    @property
+    def counts(self) -> StreamCounts:
+        """Images received, not fetched in time (lost) and damaged (corrupt); what it did not do as asked, in words."""
+        with self._changed:
+            return StreamCounts(self._sequence, self.dropped, 0, self.damaged, 0, list(self.notes))
 
     def describe(self) -> dict[str, Any]:
         """Return size, rate and source."""
@@ -235,8 +241,8 @@ class OpencvCamera(Camera):
         elif not self._live and self.rate is None:
             self.rate = capture.get(cv2.CAP_PROP_FPS) or 30.0
         raw = self._ask_for_jpeg(capture)
-        # A stream over HTTP has no clock: its back-end makes times up at 25 Hz.
-        timed = not str(self.source).startswith("http")
+        # A stream over HTTP has no clock: its back-end makes times up at 25 Hz. One in a loop begins again and again.
+        timed = not str(self.source).startswith("http") and not self.loop
 
         def grab() -> _Grabbed | None:
             good, image = capture.read()

@@ -21,10 +21,22 @@ class CameraStream:
     Images are in the file, so the search can be redone on those that were passed over.
     """
 
-    def __init__(self, name: str, entry: dict[str, Any], detect: Detect | None) -> None:
-        """Keep the camera's name, its rig file's entry and the detector, if tags are to be searched."""
-        self.name, self._intrinsics, self._cube = name, entry.get("intrinsics"), entry.get("cube")
-        self._detect = detect if self._cube is not None else None
+    def __init__(
+        self, name: str, entry: dict[str, Any], detect: Detect | None, fingers: dict[str, Any] | None = None
+    ) -> None:
+        """Prepare.
+
+        Args:
+            name: The camera's name.
+            entry: Its entry in the rig file; its ``cube`` is what is looked for.
+            detect: The detector, if tags are to be searched.
+            fingers: What a camera without ``cube`` looks for (`schemas/fingers.schema.json`).
+        """
+        self.name, self._intrinsics = name, entry.get("intrinsics")
+        self._cube = entry.get("cube")
+        self._fingers = fingers if self._cube is None else None
+        self._detect = detect if self._cube is not None or self._fingers is not None else None
+        self._remarks: set[str] = set()
         self._search: tuple[Future, ImageFrame, int, EpisodeWriter | None] | None = None
         self._last, self._asked = None, False
         self.ready = self._detect is None
@@ -39,10 +51,11 @@ class CameraStream:
             DeviceError: If the image is none.
         """
         if sink:
-            sink.image(self.name, frame.arrival_ns, sample_ns, frame.sequence, self._jpeg(frame))
+            jpeg = frame.jpeg or self._jpeg(frame)
+            sink.image(self.name, frame.arrival_ns, sample_ns, frame.sequence, jpeg, frame.device_ns)
         self.collect(0.0)
         if self._detect is not None and self._search is None and (sink or not self._asked):
-            search = self._detect(frame.image, self._intrinsics, self._cube, self._last)
+            search = self._detect(frame.image, self._intrinsics, self._fingers or self._cube, self._last)
             self._search, self._asked = (search, frame, sample_ns, sink), True
 
     def collect(self, patience: float) -> None:
@@ -59,7 +72,8 @@ class CameraStream:
             return
         self._search, self.ready = None, True
         try:
-            self._last = search.result()
+            found = search.result()
+            self._last = found.cubes if self._fingers else found
         except Exception as error:  # whatever breaks in a detector, the press goes on
             self._detect = None
             if sink:
@@ -69,7 +83,17 @@ class CameraStream:
                 )
             return
         if sink:
-            sink.cube(self.name, frame.arrival_ns, sample_ns, frame.sequence, _record(self._last))
+            self._write(sink, (frame.arrival_ns, sample_ns, frame.sequence), found)
+
+    def _write(self, sink: EpisodeWriter, stamps: tuple[int, int, int], found: Any) -> None:
+        if self._fingers is None:
+            sink.cube(self.name, *stamps, _record(found))
+            return
+        for finger in self._fingers["fingers"]:
+            sink.cube(self.name, *stamps, _record(found.tips.get(finger)), finger)
+        for remark in set(found.remarks) - self._remarks:
+            sink.note(f"camera {self.name}: {remark}", "warning")
+            self._remarks.add(remark)
 
     def _jpeg(self, frame: ImageFrame) -> bytes:
         import cv2
@@ -88,8 +112,16 @@ class CameraStream:
 
 
 def _record(pose: Any) -> CubePoseRecord | None:
+    """Return a cube's or a fingertip's pose as it is stored; what a detector does not say stays empty."""
     if pose is None:
         return None
     x, y, z = (float(value) for value in pose.position)
     qx, qy, qz, qw = (float(value) for value in pose.quaternion)
-    return CubePoseRecord((x, y, z), (qx, qy, qz, qw), float(pose.reprojection), int(pose.faces))
+    cube = getattr(pose, "cube", pose)
+    covariance = np.asarray(getattr(pose, "covariance", np.inf), float)
+    return CubePoseRecord(
+        (x, y, z), (qx, qy, qz, qw), float(cube.reprojection), int(cube.faces),
+        tuple(getattr(cube, "ids", ())), bool(getattr(cube, "ambiguous", False)),
+        tuple(covariance.ravel().tolist()) if covariance.shape == (6, 6) and np.isfinite(covariance).all() else (),
+        tuple(getattr(cube, "strays", ())),
+    )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
@@ -47,6 +48,32 @@ def pose(camera: str) -> str:
     return f"/camera/{camera}/pose"
 
 
-def of_camera(camera: str) -> dict[str, Any]:
-    """Return the channels of one camera."""
-    return {image(camera): CompressedImage, cube(camera): tacdata_pb2.CubeView, pose(camera): PoseInFrame}
+def image_time(camera: str) -> str:
+    """Return the topic of when each image was taken."""
+    return f"/camera/{camera}/time"
+
+
+def finger(camera: str, name: str) -> tuple[str, str]:
+    """Return the topics of what the tag detector says of a finger, and of its tip's poses."""
+    return f"/camera/{camera}/finger/{name}/view", f"/camera/{camera}/finger/{name}/pose"
+
+
+def fingers(topics: Iterable[str], camera: str) -> tuple[str, ...]:
+    """Return the names of the fingers for which there are topics of a camera."""
+    found = (topic.split("/") for topic in topics)
+    ours = ["", "camera", camera, "finger"]
+    return tuple(sorted(parts[4] for parts in found if parts[:4] == ours and parts[5:] == ["view"]))
+
+
+def of_camera(camera: str, fingers: Iterable[str] = ()) -> dict[str, Any]:
+    """Return the channels of one camera that looks at these fingers, by name."""
+    own = {
+        image(camera): CompressedImage,
+        image_time(camera): tacdata_pb2.ImageTime,
+        cube(camera): tacdata_pb2.CubeView,
+        pose(camera): PoseInFrame,
+    }
+    for name in fingers:
+        view, tip = finger(camera, name)
+        own |= {view: tacdata_pb2.CubeView, tip: PoseInFrame}
+    return own

@@ -107,14 +107,26 @@ def _summary(documents: list[dict[str, Any]]) -> list[str]:
     ]
     for name in sorted({name for d in documents for name in d["cameras"]}):
         views = [d["cameras"][name] for d in documents if name in d["cameras"]]
-        searched = sum(v["searched"] for v in views)
-        seen = sum(v["searched"] * (v["seen"] or 0.0) for v in views)
         lines.append(
-            f"  camera {name}: {sum(v['images'] for v in views)} images, {searched} searched, "
-            f"tags in view in {100 * seen / max(searched, 1):.0f} %, {_middle(v['rate'] for v in views):.1f} Hz"
+            f"  camera {name}: {sum(v['images'] for v in views)} images, "
+            f"{_middle(v['rate'] for v in views):.1f} Hz, {_seen(views)}"
         )
         lines.append(f"          {clock_words(views[-1]['clock'])}")
     return lines
+
+
+def _seen(views: list[dict[str, Any]]) -> str:
+    """Return in words what one camera saw of its cube and of fingers, over several recordings."""
+    fingers = sorted({finger for view in views for finger in view["fingers"]})
+    looked = {finger: [v["fingers"][finger] for v in views if finger in v["fingers"]] for finger in fingers}
+    if any(view["searched"] for view in views) or not fingers:
+        looked = {"tags": views, **looked}
+    words = []
+    for what, entries in looked.items():
+        searched = sum(entry["searched"] for entry in entries)
+        seen = sum(entry["searched"] * (entry["seen"] or 0.0) for entry in entries)
+        words.append(f"{what} in view in {100 * seen / max(searched, 1):.0f} % of {searched} searched")
+    return ", ".join(words)
 
 
 def _middle(values: Any) -> float:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.recording.anchoring import RESOLUTION
 from tacdata.recording.camera_figures import camera_figures
 from tacdata.recording.channel_health import (
     frozen_channels,
@@ -99,7 +98,9 @@ def hold_response(episode: Episode) -> np.ndarray:
 
 
 def _cnc(recording: Recording) -> dict[str, Any]:
-    stream, moves = recording.episode.cnc, recording.moves
+    stream = recording.episode.cnc
+    # A move that was broken off did not run to its end: its profile cannot be compared.
+    moves = recording.moves if recording.episode.complete else recording.moves[:-1]
     loaded = [move for move in moves if move.command.phase in ("press", "release")]
     slack = [(move.uncertainty_ns + move.contradiction_ns) * 1e-9 * move.profile.peak for move in loaded]
     return {
@@ -108,7 +109,7 @@ def _cnc(recording: Recording) -> dict[str, Any]:
         "longest_gap": _longest(stream.arrival_ns),
         "round_trip": round_trip(recording),
         "start_uncertainty": _rounded(max((move.uncertainty_ns for move in moves), default=0) / 1e6),
-        "depth_uncertainty": _rounded(max(slack, default=0.0) + RESOLUTION),
+        "depth_uncertainty": _rounded(max(slack, default=0.0) + recording.height_resolution),
         "contradiction": _rounded(max((move.contradiction_ns for move in moves), default=0) / 1e6),
         "hold_error": _hold_error(recording),
         "states": sorted(set(stream.state)),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tacdata.recording.camera_findings import camera_doubts
 from tacdata.recording.check_clocks import clock_doubts
 from tacdata.recording.check_figures import Figures
 from tacdata.recording.check_imported import imported_findings, is_imported
@@ -27,12 +28,8 @@ HOLD_MM = 0.05
 """Distance of the guide from the commanded position in the hold that makes a recording unusable [mm]."""
 NOISE_RATIO = 5.0
 """How much noisier than the median a channel may be [1]."""
-IMAGE_GAP_MS = 1000.0
-"""Time without an image, or with the same one, that is worth a word [ms of real time]; at least ten periods."""
 DEAD_DEPTH = 0.3
 """Depth of a press from which a board with all channels at rest is dead [mm]."""
-SEEN_SHARE = 0.5
-"""Share of images with a face in view under which it is worth a word [1]."""
 
 
 @dataclass(frozen=True)
@@ -172,33 +169,9 @@ def _cnc(figures: Figures) -> list[Judgement]:
 
 
 def _cameras(figures: Figures) -> list[Judgement]:
-    found = []
     entries = figures.recording.episode.rig.get("cameras", {})
-    for name, entry in entries.items():
-        values = figures.document["cameras"].get(name)
-        stream = f"camera {name}"
-        if values is None or not values["images"]:
-            found.append((WARNING, stream, "no image"))
-            continue
-        found += [(WARNING, stream, text) for text in _still(values, _rate_of_clock(figures))]
-        if "cube" in entry and not values["searched"]:
-            found.append((WARNING, stream, f"{values['images']} images, none searched for tags"))
-        elif "cube" in entry and values["seen"] < SEEN_SHARE:
-            text = f"tags in view in {100 * values['seen']:.0f} % of {values['searched']} images"
-            found.append((WARNING, stream, "no tag in view in any image" if values["seen"] == 0 else text))
-    return found
-
-
-def _still(values: dict, rate_of_clock: float) -> list[str]:
-    """Return in words whether a camera stopped sending, or sent the same image again and again."""
-    period = 1000 / (values["nominal_rate"] or values["rate"] or 1.0)
-    limit = max(IMAGE_GAP_MS * rate_of_clock, 10 * period)
-    found = []
-    if values["longest_gap"] > limit:
-        found.append(f"no image for {values['longest_gap'] / 1000:.1f} s")
-    if values["longest_still"] > limit:
-        found.append(f"the same image for {values['longest_still'] / 1000:.1f} s: it hangs")
-    return found
+    doubts = camera_doubts(entries, figures.document["cameras"], _rate_of_clock(figures))
+    return [(WARNING, stream, text) for stream, text in doubts]
 
 
 def _jumps(found: list[dict], channels: int) -> list[str]:

@@ -5,7 +5,8 @@ A least squares line would be late by the mean delay (9 ms behind an FTDI adapte
 convex hull under the mean counter (Moon, Skelly and Towsley, INFOCOM 1999).
 
 Frames that arrive late for a moment (a stalled host) come back to the line; frames that stay late for seconds,
-or come before they can have been sent, say that the device's clock stepped, and a new line begins there.
+or come before they can have been sent, say that the device's clock stepped, and a new line begins there. A line over
+few seconds knows its slope badly: until the arrivals contradict it, the nominal period bounds the slope.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ TYPICAL = 1.2
 """Root mean square over median of a delay spread evenly from 0 [1]."""
 HIDDEN = 0.1
 """Share of the usual delay that may never be seen missing [1]: 1.6 ms of a 16 ms timer."""
+CRYSTAL = 250e-6
+"""By how much a crystal may be off its nominal rate [1]: three times what a poor one has."""
 KEPT = 32
 """Arrivals of a block that are kept for the usual delay [count]."""
 EARLIER = 16
@@ -75,7 +78,8 @@ class _Block:
 class _Stretch:
     """Arrivals between two steps of the device's clock."""
 
-    def __init__(self) -> None:
+    def __init__(self, nominal_ns: float | None = None) -> None:
+        self.nominal_ns = nominal_ns
         self.blocks: list[_Block] = []
         self.hull: list[Point] = []
         self.origin: Point = (0, 0)
@@ -83,6 +87,7 @@ class _Stretch:
         self.frames = 0
         self._total = 0  # of the counters beyond the origin's, within the blocks
         self._count = 0
+        self._doubt = (0, math.inf)  # frames at the last look, and what it gave [ns]
 
     def add(self, point: Point) -> None:
         if not self.frames:
@@ -116,8 +121,34 @@ class _Stretch:
         """Mean time between frames [ns]."""
         return (self.last[1] - self.origin[1]) / max(self.frames - 1, 1)
 
+    @property
+    def span_ns(self) -> int:
+        """Time over which arrivals are remembered [ns], at least 1."""
+        return max(self.last[1] - self.blocks[0].begin_ns, 1) if self.blocks else 1
+
+    def doubt_ns(self) -> float:
+        """Return how far the line may be off within its span [ns], looked at again from time to time."""
+        frames, doubt = self._doubt
+        if self.frames >= frames + max(frames // 16, LASTING_FRAMES):
+            line = self._free_line()
+            _, jitter, doubt = (0.0, 0.0, math.inf) if line is None else self._spread(line)
+            # While there are few stretches to compare, all of them may have been late.
+            self._doubt = self.frames, doubt if len(self.blocks) > 3 else max(doubt, jitter)
+        return doubt
+
     def line(self) -> tuple[int, int, float] | None:
         """Return a point on the line and its slope, or None before two different counters are known."""
+        free = self._free_line()
+        if free is None or self.nominal_ns is None:
+            return free
+        slope = min(max(free[2], self.nominal_ns * (1 - CRYSTAL)), self.nominal_ns * (1 + CRYSTAL))
+        off = abs(slope - free[2])
+        if off == 0 or off > self.nominal_ns * 2 * self.doubt_ns() / self.span_ns:
+            return free  # what the arrivals say for certain counts more than what the device is said to do
+        x0, y0 = min(self.hull, key=lambda point: point[1] - self.origin[1] - slope * (point[0] - self.origin[0]))
+        return x0, y0, slope
+
+    def _free_line(self) -> tuple[int, int, float] | None:
         hull = self.hull
         if len(hull) < 2:
             return None
@@ -132,35 +163,46 @@ class _Stretch:
         if line is None:
             return None
         x0, y0, slope = line
+        delay, jitter, uncertainty = self._spread(line)
+        free = line == self._free_line()
+        drift = 2 * uncertainty / self.span_ns
+        return ClockModel(
+            x0, y0, slope, self.frames, self.origin[1], max(delay, 0.0), jitter, uncertainty,
+            drift if free else min(drift, 2 * CRYSTAL), axis,
+        )  # fmt: skip
+
+    def _spread(self, line: tuple[int, int, float]) -> tuple[float, float, float]:
+        """Return mean and standard deviation of the delays over a line, and its uncertainty [ns]."""
+        x0, y0, slope = line
         n, sx, sy, sxx, sxy, syy = (sum(parts) for parts in zip(*(b.sums for b in self.blocks), strict=True))
         variance = ((n * syy - sy * sy) - 2 * slope * (n * sxy - sx * sy) + slope**2 * (n * sxx - sx * sx)) / n**2
+        jitter = math.sqrt(max(variance, 0.0))
         delay = sy / n + self.origin[1] - y0 - slope * (sx / n + self.origin[0] - x0)
         whole = self.blocks[:-1] or self.blocks
         least = [min(y - y0 - slope * (x - x0) for x, y in block.hull) for block in whole]
         usual = np.median([y - y0 - slope * (x - x0) for block in self.blocks for x, y in block.first])
         # Delays that come in steps (a latency timer) can all hide the same part of one from every block.
         uncertainty = max(TYPICAL * float(np.median(least)), HIDDEN * float(usual))
-        span = max(self.last[1] - self.blocks[0].begin_ns, 1)
-        if len(whole) < 3:  # too short to compare stretches: the scatter itself is the bound
-            uncertainty = max(uncertainty, math.sqrt(max(variance, 0.0) / n))
-        return ClockModel(
-            x0, y0, slope, self.frames, self.origin[1], max(delay, 0.0), math.sqrt(max(variance, 0.0)),
-            uncertainty, 2 * uncertainty / span, axis,
-        )  # fmt: skip
+        if len(whole) < 3:  # too short to compare stretches: what the scatter makes of a mean is the bound
+            uncertainty = max(uncertainty, jitter / math.sqrt(n))
+        return delay, jitter, uncertainty
 
 
 class EnvelopeFit:
     """A fit that goes on while frames arrive; memory and time stay small, as only hulls and sums are kept."""
 
-    def __init__(self, axis: str = "counter", rate: float = 1.0) -> None:
+    def __init__(self, axis: str = "counter", rate: float = 1.0, nominal_ns: float | None = None) -> None:
         """Begin without arrivals.
 
         Args:
             axis: What `add` is given: ``counter``, ``device_ns`` or ``order`` (see `ClockModel`).
             rate: Seconds that the host's clock shows per real second; a host's delays grow with it.
+            nominal_ns: What a crystal is said to keep: time per count [ns], or 1 on the device's own time; None
+                if nothing is known.
         """
         self.axis, self._rate = axis, rate
-        self._stretch = _Stretch()
+        self._nominal_ns = 1.0 if axis == "device_ns" else nominal_ns
+        self._stretch = _Stretch(self._nominal_ns)
         self._before: _Stretch | None = None  # the stretch that lasting lateness ended, while it may come back
         self._late: list[Point] = []
         self._earlier: list[ClockModel] = []
@@ -183,9 +225,10 @@ class EnvelopeFit:
             return
         error = arrival_ns - line[1] - line[2] * (counter - line[0])
         period = now.frame_ns()
-        if error < -max(EARLY_NS * self._rate, 2.5 * period) - DRIFT * (arrival_ns - now.last[1]):
+        doubt = now.doubt_ns() * (1 + 2 * (arrival_ns - now.last[1]) / now.span_ns)
+        if error < -max(EARLY_NS * self._rate, 2.5 * period) - DRIFT * (arrival_ns - now.last[1]) - doubt:
             self._begin([(counter, arrival_ns)])
-        elif error > max(LATE_NS * self._rate, 0.6 * period):
+        elif error > max(LATE_NS * self._rate, 0.6 * period) + doubt:
             self._wait_for_return((counter, arrival_ns))
         else:
             self._returned()
@@ -224,9 +267,19 @@ class EnvelopeFit:
     def _begin(self, points: list[Point]) -> None:
         if (model := self._stretch.model(self.axis)) is not None:
             self._earlier = [*self._earlier[-EARLIER + 1 :], model]
-        self._stretch, self._late, self._before = _Stretch(), [], None
+        self._stretch, self._late, self._before = _Stretch(self._nominal_ns), [], None
         for point in points:
             self._stretch.add(point)
+
+    @property
+    def last_counter(self) -> int:
+        """Counter of the latest arrival on the line [frames], or device time [ns]; -1 before one."""
+        return self._stretch.last[0]
+
+    def remembers(self, counter: int) -> bool:
+        """Say whether arrivals as old as a counter [frames] still take part in the present line."""
+        blocks = self._stretch.blocks
+        return bool(blocks) and blocks[0].hull[0][0] <= counter
 
     def line(self) -> tuple[int, int, float] | None:
         """Return (counter, host time [ns], period [ns]) of the present line, quickly; None before there is one."""
@@ -240,7 +293,10 @@ class EnvelopeFit:
         return replace(model, earlier=tuple(self._earlier))
 
 
-def fit(arrival_ns: np.ndarray, counter: np.ndarray, axis: str = "counter", rate: float = 1.0) -> ClockModel | None:
+def fit(
+    arrival_ns: np.ndarray, counter: np.ndarray, axis: str = "counter", rate: float = 1.0,
+    nominal_ns: float | None = None,
+) -> ClockModel | None:  # fmt: skip
     """Fit a whole stream at once.
 
     Args:
@@ -248,8 +304,9 @@ def fit(arrival_ns: np.ndarray, counter: np.ndarray, axis: str = "counter", rate
         counter: Device counters [frames], or device times [ns], shape (n,); -1 without one.
         axis: Which of the two.
         rate: Seconds that the host's clock shows per real second.
+        nominal_ns: As in `EnvelopeFit`.
     """
-    running = EnvelopeFit(axis, rate)
+    running = EnvelopeFit(axis, rate, nominal_ns)
     for arrival, count in zip(np.asarray(arrival_ns).tolist(), np.asarray(counter).tolist(), strict=True):
         running.add(arrival, count)
     running._returned()

@@ -15,7 +15,8 @@ from multiprocessing import get_context
 from typing import Any
 
 Detect = Callable[..., Future]
-"""``detect(image, intrinsics, cube, hint)`` -> a future of the pose or None."""
+"""``detect(image, intrinsics, cube, hint)`` -> a future of the pose or None; with a fingers document instead of a cube,
+of a view with ``tips``, ``cubes`` (the next hint) and ``remarks`` (`tacdata.tags.look`)."""
 NICENESS = 10
 """By how much the process gives way to others (Unix)."""
 
@@ -25,7 +26,7 @@ def in_background(detect: Callable[..., Any]) -> Iterator[Detect]:
     """Run a detector in a process of its own while the context lasts.
 
     Args:
-        detect: A function at a module's top level, as `tacdata.tags.detect_cube`.
+        detect: A function at a module's top level, as `tacdata.tags.look`.
     """
     pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_give_way)
     try:
@@ -39,3 +40,6 @@ def _give_way() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(NICENESS)
+    import cv2
+
+    cv2.setNumThreads(1)  # the other cores belong to the streams

@@ -44,20 +44,28 @@ class CncStream:
 
 @dataclass(frozen=True)
 class TagStream:
-    """Poses of the AprilTag cube seen by one camera."""
+    """Poses of the AprilTag cube, or of the fingertip that carries one, seen by one camera."""
 
     camera: str
     """Name of the camera in the rig file."""
     sample_ns: np.ndarray
     """Estimated time of exposure [ns], shape (p,), int64."""
     position: np.ndarray
-    """Cube origin in the camera frame [m], shape (p, 3); NaN where no tag was seen."""
+    """Origin of cube or tip in the camera frame [m], shape (p, 3); NaN where no tag was seen."""
     quaternion: np.ndarray
-    """Cube orientation in the camera frame, xyzw [1], shape (p, 4)."""
+    """Orientation of cube or tip in the camera frame, xyzw [1], shape (p, 4)."""
     reprojection: np.ndarray
     """Reprojection error, root mean square [px], shape (p,)."""
     faces: np.ndarray
     """Faces seen [count], shape (p,), int64."""
+    covariance: np.ndarray | None = None
+    """Of a small turn in the camera frame [rad] and the position [m], shape (p, 6, 6); NaN where it is not known."""
+    ambiguous: np.ndarray | None = None
+    """Whether a second pose explains the image about as well, shape (p,), bool."""
+    ids: tuple[tuple[int, ...], ...] = ()
+    """Tags read on the cube in each image, ascending."""
+    finger: str = ""
+    """Name of the finger; empty for the cube that the camera's entry in the rig file names."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +127,8 @@ class Episode:
     """What a person should know of it, in words."""
     measured: tuple[MeasuredStream, ...] = ()
     """Further quantities, each with times of its own."""
+    fingers: tuple[TagStream, ...] = ()
+    """Poses of fingertips, one stream for each camera and finger."""
 
     @property
     def number(self) -> int:

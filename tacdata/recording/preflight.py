@@ -42,6 +42,8 @@ class Preflight:
     """What a person should know of the controller's settings before the first move."""
     tap: str = ""
     """What the sync tap before them does, in words; empty without one."""
+    tools: str = ""
+    """Tool offsets that are used, in words; empty without any."""
 
     @property
     def text(self) -> str:
@@ -54,6 +56,7 @@ class Preflight:
             f"plan {self.plan}: {self.presses} of {self.total} presses, deepest {self.deepest:.2f} mm\n"
             f"indenters in order: {', '.join(self.indenters)}\n"
             + (f"first {self.tap}\n" if self.tap else "")
+            + (f"tool offsets [mm]: {self.tools}\n" if self.tools else "")
             + f"machine bounds [mm]: {bounds}\n"
             f"time: about {minutes} min {seconds:02d} s" + "".join(f"\ncaution: {caution}" for caution in self.cautions)
         )
@@ -89,7 +92,7 @@ def preflight(
     corners, seconds, indenters = [], [], []
     position: Position | None = None
     if tap is not None:
-        path = sync_tap_motion.steps(tap, plan, rig.registration)
+        path = sync_tap_motion.steps(tap, plan, rig.registration_for(tap.indenter_name))
         corners += [step.target for step in path if step.target is not None]
         for target in corners:
             _refuse_outside(f"plan {plan.name}: the sync tap", target, rig.envelope, travel)
@@ -97,7 +100,7 @@ def preflight(
         seconds.append(needed)
         indenters.append(tap.indenter_name)
     for press in (plan.presses[k] for k in wanted):
-        path = steps(press, plan.motion, rig.registration)
+        path = steps(press, plan.motion, rig.registration_for(press.indenter_name))
         for target in (step.target for step in path if step.target is not None):
             _refuse_outside(f"plan {plan.name}: presses/{press.index}", target, rig.envelope, travel)
             corners.append(target)
@@ -105,6 +108,8 @@ def preflight(
         seconds.append(needed + SECONDS_PER_PRESS)
         if not indenters or indenters[-1] != press.indenter_name:
             indenters.append(press.indenter_name)
+            change = (*(corners[-1] if len(indenters) > 1 else corners[0])[:2], safe_height(plan, rig))
+            _refuse_outside(f"plan {plan.name}: mounting {press.indenter_name}", change, rig.envelope, travel)
     bounds = np.array(corners) if corners else np.full((1, 3), np.nan)
     return Preflight(
         plan.name,
@@ -115,9 +120,28 @@ def preflight(
         tuple(bounds.min(axis=0).tolist()),
         tuple(bounds.max(axis=0).tolist()),
         tuple(seconds),
-        cautions,
+        (*cautions, *_unknown_tools(rig, indenters)),
         _described(tap),
+        "; ".join(f"{name} {_text(tuple(rig.document['tools'][name]['offset']))}" for name in _tools(rig, indenters)),
     )
+
+
+def safe_height(plan: Plan, rig: Rig) -> float:
+    """Return the machine height [mm] at which every indenter of a plan clears the skin."""
+    names = {press.indenter_name for press in plan.presses}
+    return max(rig.registration_for(name).origin[2] for name in names) + plan.motion.clearance
+
+
+def _tools(rig: Rig, indenters: list[str]) -> list[str]:
+    return [name for name in dict.fromkeys(indenters) if name in rig.document.get("tools", {})]
+
+
+def _unknown_tools(rig: Rig, indenters: list[str]) -> list[str]:
+    """Say which indenters have no tool offset where others have one."""
+    names = [name for name in dict.fromkeys(indenters) if name not in _tools(rig, indenters)]
+    if not names or "tools" not in rig.document:
+        return []
+    return [f"no tool offset for {', '.join(names)}: its tip has to sit where that of the registered indenter sat"]
 
 
 def _described(tap: Press | None) -> str:

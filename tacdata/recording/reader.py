@@ -9,33 +9,22 @@ from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.Log_pb2 import Log
-from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from schemas import tacdata_pb2 as pb
 from tacdata.errors import FormatError
 from tacdata.plans import Press
 from tacdata.recording import anchoring, channels
 from tacdata.recording.anchoring import AnchoredMove, Command, StatusTimes
+from tacdata.recording.camera_records import ImageTimes, cube_stream, finger_streams, image_stamps, image_times
 from tacdata.recording.clock_fit import fit
 from tacdata.recording.clock_model import ClockModel, Latency
-from tacdata.recording.episode import CncStream, Episode, TagStream, TaxelStream
+from tacdata.recording.episode import CncStream, Episode, TaxelStream
 from tacdata.recording.mcap_records import Records, read_records
 from tacdata.recording.measured import marked_phases, measured_streams
 from tacdata.recording.motion_profile import AxisLimits
-from tacdata.rig import Registration
+from tacdata.recording.stream_clock import nominal_period_ns
+from tacdata.rig import registration_for
 from tacdata.sensor import Sensor
-
-
-@dataclass(frozen=True)
-class ImageTimes:
-    """When one camera's images came, and which of them are the same."""
-
-    arrival_ns: np.ndarray
-    """Host times of receipt [ns], shape (n,), int64."""
-    sample_ns: np.ndarray
-    """Estimated times of exposure [ns], shape (n,), int64."""
-    digest: np.ndarray
-    """CRC32 of each compressed picture, shape (n,), int64."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +50,8 @@ class Recording:
     """Camera name -> its images' times."""
     polled: dict[str, str]
     """What the file says of the motion controller's clock (`polled_clock`)."""
+    height_resolution: float
+    """What the controller's reported height may be off its command [mm]."""
 
 
 def read_episode(path: Path) -> Episode:
@@ -91,13 +82,14 @@ def _recording(records: Records) -> Recording:
     sensor = Sensor.from_document(_attachment(records, "sensor.json"), f"{records.path}: sensor.json")
     rig, controller = _attachment(records, "rig.json"), _attachment(records, "controller.json")
     end = records.metadata.get("episode", {})
-    complete = json.loads(end.get("complete", "false")) and not records.damage
+    complete = bool(json.loads(end.get("complete", "false"))) and not records.damage
     statuses = _statuses(records)
     commands = [_command(message.data) for message in records.of_topic(channels.MOTION)]
     limits = AxisLimits(np.array(controller["acceleration"], float), np.array(controller["max_rate"], float))
-    moves = anchoring.anchor(commands, statuses, limits)
+    resolution = anchoring.report_resolution(controller.get("settings", {}))
+    moves = anchoring.anchor(commands, statuses, limits, resolution)
     tip_ns, machine = anchoring.machine_path(moves, statuses.stream, complete)
-    registration = Registration.from_document(rig["registration"])
+    registration = registration_for(rig, press.indenter_name)
     log = tuple(entry.message for entry in map(_log, records.of_topic(channels.LOG)) if entry.level > Log.Level.INFO)
     cameras = [t.split("/")[2] for t in (c.topic for c in records.channels.values()) if t.endswith("/image")]
     clocks = _clocks(records, cameras, float(rig.get("clock", {}).get("rate", 1.0)))
@@ -109,16 +101,17 @@ def _recording(records: Records) -> Recording:
         taxels=_taxels(records, sensor.taxels.count, clocks.get("taxels")),
         cnc=statuses.stream,
         tags=tuple(
-            _tags(records, camera, clocks.get(f"camera {camera}"))
+            cube_stream(records, camera, clocks.get(f"camera {camera}"))
             for camera in cameras
             if rig.get("cameras", {}).get(camera, {}).get("cube")
         ),
         phases=anchoring.phases(commands, moves) if commands else marked_phases(records),
         tip_ns=tip_ns,
         tip=registration.to_sensor(machine),
-        complete=bool(complete),
-        notes=_notes(records, end, moves, log),
+        complete=complete,
+        notes=_notes(records, complete, moves, log),
         measured=measured_streams(records),
+        fingers=tuple(stream for c in cameras for stream in finger_streams(records, c, clocks.get(f"camera {c}"))),
     )
     counts = {
         name.removeprefix("stream_counts/"): {key: json.loads(value) for key, value in values.items()}
@@ -135,8 +128,9 @@ def _recording(records: Records) -> Recording:
         images,
         log,
         clocks,
-        {camera: _image_times(records, camera, clocks.get(f"camera {camera}")) for camera in cameras},
+        {camera: image_times(records, camera, clocks.get(f"camera {camera}")) for camera in cameras},
         records.metadata.get("clock_model/cnc", {}),
+        float(resolution[2]),
     )
 
 
@@ -150,13 +144,15 @@ def _attachment(records: Records, name: str) -> Any:
     return json.loads(records.attachments[name].data)
 
 
-def _notes(records: Records, end: dict[str, str], moves: list[AnchoredMove], log: tuple[str, ...]) -> tuple[str, ...]:
-    notes = [*records.damage]
+def _notes(records: Records, complete: bool, moves: list[AnchoredMove], log: tuple[str, ...]) -> tuple[str, ...]:
+    notes, end = [*records.damage], records.metadata.get("episode", {})
     if not end:
         notes.append("the recording was never closed; everything up to its last chunk is here")
     elif end.get("reason"):
         notes.append(end["reason"])
-    clashes = [move.contradiction_ns for move in moves if move.contradiction_ns > 0]
+    # What was broken off (a hold, an alarm) did not run to its end: nothing contradicts its profile.
+    judged = moves if complete else moves[:-1]
+    clashes = [move.contradiction_ns for move in judged if move.contradiction_ns > 0]
     if clashes:
         notes.append(f"status reports contradict the commanded profile by up to {max(clashes) / 1e6:.0f} ms")
     return (*notes, *log)
@@ -186,12 +182,14 @@ def _fitted(records: Records, stream: str, rate: float) -> ClockModel | None:
     latency = json.loads(attached.data).get(stream) if attached else None
     if stream == "taxels":
         frames = [pb.Taxels.FromString(message.data) for message in records.of_topic(channels.TAXELS)]
-        axis = "device_ns" if _attachment(records, "board.json").get("clock") == "device_ns" else "counter"
+        board = _attachment(records, "board.json")
+        axis = "device_ns" if board.get("clock") == "device_ns" else "counter"
         arrival = _array([f.arrival_ns for f in frames])
-        model = fit(arrival, _array([getattr(f, axis) for f in frames]), axis, rate)
+        model = fit(arrival, _array([getattr(f, axis) for f in frames]), axis, rate, nominal_period_ns(board))
     else:
-        messages = records.of_topic(channels.image(stream.removeprefix("camera ")))
-        model = fit(_array([m.log_time for m in messages]), _array([m.sequence for m in messages]), "order", rate)
+        arrival, sequence, device = image_stamps(records, stream.removeprefix("camera "))
+        on_device = len(device) > 0 and bool((device >= 0).all())
+        model = fit(arrival, device if on_device else sequence, "device_ns" if on_device else "order", rate)
     return model.with_latency(Latency.from_document(latency)) if model and latency else model
 
 
@@ -212,13 +210,6 @@ def _taxels(records: Records, count: int, clock: ClockModel | None) -> TaxelStre
     return TaxelStream(arrival, sample, counter, counts, device)
 
 
-def _image_times(records: Records, camera: str, clock: ClockModel | None) -> ImageTimes:
-    messages = records.of_topic(channels.image(camera))
-    arrival = _array([m.log_time for m in messages])
-    sample = arrival if clock is None else clock.sample_times(arrival, _array([m.sequence for m in messages]))
-    return ImageTimes(arrival, sample, _array([int.from_bytes(m.data, "little") for m in messages]))
-
-
 def _statuses(records: Records) -> StatusTimes:
     reports = [pb.CncStatus.FromString(message.data) for message in records.of_topic(channels.STATUS)]
     sent, arrival = _array([r.sent_ns for r in reports]), _array([r.arrival_ns for r in reports])
@@ -231,25 +222,3 @@ def _command(data: bytes) -> Command:
     m = pb.Motion.FromString(data)
     start, target = (np.array([v.x, v.y, v.z]) for v in (m.start, m.target))
     return Command(m.phase, start, target, m.speed, m.dwell, m.sent_ns, m.acknowledged_ns, m.line)
-
-
-def _tags(records: Records, camera: str, clock: ClockModel | None) -> TagStream:
-    views = [pb.CubeView.FromString(message.data) for message in records.of_topic(channels.cube(camera))]
-    poses = {m.sequence: PoseInFrame.FromString(m.data).pose for m in records.of_topic(channels.pose(camera))}
-    position, quaternion = np.full((len(views), 3), np.nan), np.full((len(views), 4), np.nan)
-    for row, view in enumerate(views):
-        pose = poses.get(view.sequence & 0xFFFFFFFF)
-        if pose is not None:
-            p, q = pose.position, pose.orientation
-            position[row], quaternion[row] = (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)
-    reprojection = np.array([v.reprojection if v.faces else np.nan for v in views], dtype=float)
-    arrival = _array([v.arrival_ns for v in views])
-    sample = arrival if clock is None else clock.sample_times(arrival, _array([v.sequence for v in views]))
-    return TagStream(
-        camera,
-        sample,
-        position,
-        quaternion,
-        reprojection,
-        _array([v.faces for v in views]),
-    )

@@ -17,7 +17,7 @@ from tacdata.recording.detection_process import Detect
 from tacdata.recording.guarded_motion import WATCH, GuardedMotion
 from tacdata.recording.live_feed import Watch
 from tacdata.recording.motion_profile import AxisLimits
-from tacdata.recording.preflight import Preflight, preflight
+from tacdata.recording.preflight import Preflight, preflight, safe_height
 from tacdata.recording.press_steps import Position, Step, steps
 from tacdata.recording.reader import read_recording
 from tacdata.recording.rig_devices import RigDevices
@@ -76,7 +76,7 @@ class Recorder:
         self.devices = devices or RigDevices.of(rig)
         self._mount, self._detect, self._progress = mount, detect, progress
         self._mounted: tuple[str, float] | None = None
-        self._height = rig.registration.origin[2] + plan.motion.clearance
+        self._height = safe_height(plan, rig)
         self._motion = GuardedMotion(self.devices.cnc, rig.clock)
         self._tap = sync_tap_motion.touch(plan, sensor) if sync_tap else None
         self._say, self._watch = say or (lambda words: None), watch
@@ -111,7 +111,9 @@ class Recorder:
             if not confirm(summary):
                 raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
             session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
-            with Streams(devices, self.rig.cameras, self._motion.stop, self._detect, self._watch) as streams:
+            with Streams(
+                devices, self.rig.cameras, self._motion.stop, self._detect, self._watch, self.rig.fingers
+            ) as streams:
                 try:
                     self._record_all(session, streams, limits, summary, wanted)
                 except BaseException:
@@ -148,7 +150,7 @@ class Recorder:
         left = summary.seconds[-len(wanted) :]  # what comes before belongs to the sync tap
         for done, number in enumerate(wanted, start=1):
             press = self.plan.presses[number]
-            self._change_indenter(press)
+            position = self._change_indenter(press, position, streams)
             position = self._record(press, position, streams, limits)
             refresh(session)
             if self._progress:
@@ -190,21 +192,26 @@ class Recorder:
                 raise
         return here
 
-    def _change_indenter(self, press: Press) -> None:
+    def _change_indenter(self, press: Press, position: Position, streams: Streams) -> Position:
+        """Have the press's indenter mounted, high enough for the longest; return where the guide stands [mm]."""
         wanted = (press.indenter_name, press.yaw)
         if wanted != self._mounted and self._mount:
+            if position[2] < self._height:
+                up = Step("", (*position[:2], self._height), self.plan.motion.approach_speed)
+                position = self._motion.drive((up,), position, streams, None)
             self._mount(press)
         self._mounted = wanted
+        return position
 
     def _touch(
         self, session: Session, tap: Press, position: Position, streams: Streams, limits: AxisLimits
     ) -> tuple[Session, Position]:
         """Carry out the sync tap and take the delays that it shows; return the session and where the guide stands."""
-        self._change_indenter(tap)
+        position = self._change_indenter(tap, position, streams)
         before, self._latencies = self._latencies, {}
         streams.set_latencies({})
         path = file_names.next_sync_tap(self.out)
-        course = sync_tap_motion.steps(tap, self.plan, self.rig.registration)
+        course = sync_tap_motion.steps(tap, self.plan, self.rig.registration_for(tap.indenter_name))
         position = self._record(tap, position, streams, limits, path, course)
         found = sync_tap.measure(read_recording(path))
         for words in (*found.words, *changes(session, found.latencies)):
@@ -225,8 +232,9 @@ class Recorder:
     ) -> Position:
         """Record one press from ``position`` [mm], or another course; return where the guide stands then."""
         path = path or file_names.episode(self.out, press.index)
-        course = course or steps(press, self.plan.motion, self.rig.registration)
-        writer = EpisodeWriter(path, self._header(press, limits), self.rig.clock, tuple(self.devices.cameras))
+        course = course or steps(press, self.plan.motion, self.rig.registration_for(press.indenter_name))
+        cameras, fingers = tuple(self.devices.cameras), tuple((self.rig.fingers or {}).get("fingers", ()))
+        writer = EpisodeWriter(path, self._header(press, limits), self.rig.clock, cameras, fingers)
         streams.record_into(writer)
         try:
             position = self._motion.drive(course, position, streams, writer)

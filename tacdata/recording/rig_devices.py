@@ -22,9 +22,7 @@ class RigDevices:
     def of(cls, rig: Rig) -> RigDevices:
         """Build the drivers that the rig file names; nothing is opened yet."""
         cameras = {name: create(entry, Camera, rig.clock) for name, entry in rig.cameras.items()}
-        return cls(
-            create(rig.cnc, MotionController, rig.clock), create(rig.board, TaxelBoard, rig.clock), cameras
-        )
+        return cls(create(rig.cnc, MotionController, rig.clock), create(rig.board, TaxelBoard, rig.clock), cameras)
 
     @contextmanager
     def opened(self) -> Iterator[RigDevices]:

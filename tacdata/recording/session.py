@@ -124,6 +124,7 @@ def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
         ("plan", old["plan_hash"], provenance.content_hash(plan.document)),
         ("sensor", old["sensor_hash"], sensor.content_hash),
         ("registration", old["rig"].get("registration"), rig.get("registration")),
+        ("set of tool offsets", old["rig"].get("tools"), rig.get("tools")),
     ):
         if before != now:
             raise UsageError(
@@ -139,10 +140,12 @@ def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
 
 def refresh(session: Session) -> Session:
     """Bring the document up to the folder's finished recordings and return the session as it stands."""
-    known = {entry["number"]: entry for entry in session.document["episodes"]}
+    # What stands on the disk counts: a sync tap may have been added since this session was read.
+    document = read_session(session.folder).document
+    known = {entry["number"]: entry for entry in document["episodes"]}
     episodes = [
         known.get(number, {"number": number, "file": path.name, "code_version": provenance.code_version()})
         for number, path in file_names.finished(session.folder).items()
     ]
-    documents.write(session.folder / FILE, {**session.document, "episodes": episodes}, "session")
+    documents.write(session.folder / FILE, {**document, "episodes": episodes}, "session")
     return read_session(session.folder)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.devices.device import Camera, StreamCounts
+from tacdata.devices.device import Camera, ImageFrame, StreamCounts
 from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.camera_stream import CameraStream
 from tacdata.recording.clock_model import ClockModel, Latency
@@ -19,7 +19,7 @@ from tacdata.recording.detection_process import Detect
 from tacdata.recording.live_feed import LiveFeed, Watch
 from tacdata.recording.polled_clock import PolledClock, polled_clock
 from tacdata.recording.rig_devices import RigDevices
-from tacdata.recording.stream_clock import StreamClock
+from tacdata.recording.stream_clock import StreamClock, nominal_period_ns
 from tacdata.recording.writer import EpisodeWriter
 
 SILENCE = 3.0
@@ -44,6 +44,7 @@ class Streams:
         on_fault: Callable[[], None],
         detect: Detect | None = None,
         watch: Watch | None = None,
+        fingers: dict[str, Any] | None = None,
     ) -> None:
         """Prepare the threads.
 
@@ -53,16 +54,18 @@ class Streams:
             on_fault: Called at once, in the faulty stream's thread, before anything else: stops the motion.
             detect: Searches an image for the cube; without it images are only stored.
             watch: Is shown some of what arrives.
+            fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
         """
         self._devices, self._on_fault = devices, on_fault
         self._feed = LiveFeed(watch) if watch else None
         self._stop = threading.Event()
         self._lock = threading.Lock()
         self._sink: EpisodeWriter | None = None
-        self._before = StreamCounts()
+        self._before: dict[str, StreamCounts] = {}
         self._fault: TacdataError | None = None
-        axis = "device_ns" if devices.board.describe().get("clock") == "device_ns" else "counter"
-        self._clocks = {"taxels": StreamClock(axis, devices.board.clock.rate)}
+        board = devices.board.describe()
+        axis = "device_ns" if board.get("clock") == "device_ns" else "counter"
+        self._clocks = {"taxels": StreamClock(axis, devices.board.clock.rate, nominal_period_ns(board))}
         self._clocks |= {
             f"camera {name}": StreamClock("order", camera.clock.rate) for name, camera in devices.cameras.items()
         }
@@ -79,7 +82,7 @@ class Streams:
         ]
         self._cameras: list[CameraStream] = []
         for name, camera in devices.cameras.items():
-            self._cameras.append(CameraStream(name, cameras.get(name, {}), detect))
+            self._cameras.append(CameraStream(name, cameras.get(name, {}), detect, fingers))
             work.append((f"camera {name}", self._camera_reader(camera, self._cameras[-1])))
         self._threads = [
             threading.Thread(target=self._run, args=(name, read), name=name, daemon=True) for name, read in work
@@ -114,7 +117,9 @@ class Streams:
         """Send everything that arrives from now on into a recording, or nowhere."""
         with self._lock:
             self._sink = sink
-            self._before = copy.deepcopy(self._devices.board.counts)
+            self._before = copy.deepcopy(self._totals())
+            for name in self._devices.cameras:
+                self._before[f"camera {name}"].notes.clear()  # what a camera did not take at opening holds for all
 
     def catch_up(self, patience: float = CATCH_UP) -> None:
         """Wait at most so long [s of real time] until every stream has handed on what has arrived by now."""
@@ -143,14 +148,16 @@ class Streams:
         """Take these constant delays of streams, by name, into all sample times from now on, and no others."""
         with self._lock:
             for name, clock in self._clocks.items():
-                clock.latency = latencies.get(name)
+                clock.set_latency(latencies.get(name))
 
     @property
     def counts(self) -> dict[str, StreamCounts]:
         """What each stream has delivered since `record_into` was called last."""
-        now, before = self._devices.board.counts, self._before
-        numbers = {k: v - getattr(before, k) for k, v in vars(now).items() if isinstance(v, int)}
-        return {"taxels": StreamCounts(**numbers, notes=now.notes[len(before.notes) :])}
+        return {name: _since(self._before.get(name, StreamCounts()), now) for name, now in self._totals().items()}
+
+    def _totals(self) -> dict[str, StreamCounts]:
+        cameras = {f"camera {name}": camera.counts for name, camera in self._devices.cameras.items()}
+        return {"taxels": self._devices.board.counts, **cameras}
 
     def _fail(self, error: TacdataError) -> None:
         if self._fault is None:
@@ -209,7 +216,9 @@ class Streams:
             for frame in frames:
                 with self._lock:
                     sink = self._sink
-                    sample_ns = self._clocks[f"camera {stream.name}"].take(frame.arrival_ns, frame.sequence)
+                    clock = self._camera_clock(f"camera {stream.name}", frame)
+                    counter = frame.device_ns if clock.axis == "device_ns" else frame.sequence
+                    sample_ns = clock.take(frame.arrival_ns, counter)
                 if sink is None or frame.arrival_ns >= sink.begun_ns:
                     stream.take(frame, sample_ns, sink)
                 if self._feed:
@@ -218,3 +227,17 @@ class Streams:
             return bool(frames)
 
         return read
+
+    def _camera_clock(self, name: str, frame: ImageFrame) -> StreamClock:
+        """Return a camera's clock; its first image says whether the camera has a time of its own."""
+        clock = self._clocks[name]
+        if clock.axis == "order" and clock.frames == 0 and frame.device_ns >= 0:
+            latency, clock = clock.latency, StreamClock("device_ns", clock.rate)
+            clock.set_latency(latency)
+            self._clocks[name] = clock
+        return clock
+
+
+def _since(before: StreamCounts, now: StreamCounts) -> StreamCounts:
+    numbers = {k: v - getattr(before, k) for k, v in vars(now).items() if isinstance(v, int)}
+    return StreamCounts(**numbers, notes=now.notes[len(before.notes) :])

@@ -69,23 +69,40 @@ class Header:
 
 @dataclass(frozen=True)
 class CubePoseRecord:
-    """A cube's pose as the detector gives it."""
+    """A cube's pose, or that of the fingertip that carries it, as the detector gives it."""
 
     position: tuple[float, float, float]
-    """Cube origin in the camera frame [m]."""
+    """Origin of the cube or tip in the camera frame [m]."""
     quaternion: tuple[float, float, float, float]
-    """Cube orientation in the camera frame, xyzw [1]."""
+    """Orientation of the cube or tip in the camera frame, xyzw [1]."""
     reprojection: float
     """Reprojection error, root mean square [px]."""
     faces: int
     """Faces seen [count]."""
+    ids: tuple[int, ...] = ()
+    """Tags read on the cube, ascending."""
+    ambiguous: bool = False
+    """Whether a second pose explains the image about as well."""
+    covariance: tuple[float, ...] = ()
+    """Of a small turn in the camera frame [rad] and the position [m], 6 x 6 by rows; empty if it is not known."""
+    strays: tuple[int, ...] = ()
+    """Tags of this cube that were read where the pose has none."""
 
 
 class EpisodeWriter:
     """A recording in progress. Methods may be called from any thread; writing happens in one of its own."""
 
-    def __init__(self, path: Path, header: Header, clock: Clock, cameras: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, path: Path, header: Header, clock: Clock, cameras: tuple[str, ...] = (), fingers: tuple[str, ...] = ()
+    ) -> None:
         """Create the file under its partial name and put the attachments on disk.
+
+        Args:
+            path: The finished file's name.
+            header: What is attached to it.
+            clock: The recording's clock.
+            cameras: Names of the cameras.
+            fingers: Names of the fingers that cameras may look at.
 
         Raises:
             UsageError: If a recording of that name, finished or partial, exists.
@@ -97,7 +114,7 @@ class EpisodeWriter:
         self.begun_ns = clock.now_ns()
         """Host time of creation [ns]; what arrived before belongs to no recording or to the one before."""
         try:
-            self._file = _begun(path, header, clock, cameras)
+            self._file = _begun(path, header, clock, cameras, fingers)
         except OSError as error:
             raise DeviceError(
                 f"{path} cannot be begun: {error}", "a disk with room for the recording", "make room, then --resume"
@@ -188,27 +205,26 @@ class EpisodeWriter:
         """Mark the beginning of a phase; an empty name ends the one before."""
         self._add(channels.PHASE, start_ns, start_ns, 0, pb.Phase(name=name, start_ns=start_ns))
 
-    def image(self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, jpeg: bytes) -> None:
-        """Write one compressed image."""
+    def image(
+        self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, jpeg: bytes, device_ns: int = -1
+    ) -> None:
+        """Write one compressed image, and when it was taken."""
         message = CompressedImage(frame_id=camera, data=jpeg, format="jpeg")
         message.timestamp.FromNanoseconds(sample_ns)
+        time = pb.ImageTime(arrival_ns=arrival_ns, sample_ns=sample_ns, sequence=sequence, device_ns=device_ns)
+        self._add(channels.image_time(camera), arrival_ns, sample_ns, sequence, time)
         self._add(channels.image(camera), arrival_ns, sample_ns, sequence, message)
 
-    def cube(self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None) -> None:
-        """Write what the tag detector says of one image; ``None`` if no face was seen."""
-        view = pb.CubeView(arrival_ns=arrival_ns, sample_ns=sample_ns, sequence=sequence)
+    def cube(
+        self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None,
+        finger: str = "",
+    ) -> None:  # fmt: skip
+        """Write what the tag detector says of the cube, or of a finger, in one image; ``None`` if no face was seen."""
+        topics = channels.finger(camera, finger) if finger else (channels.cube(camera), channels.pose(camera))
+        stamps = arrival_ns, sample_ns, sequence
         if pose is not None:
-            view.faces, view.reprojection = pose.faces, pose.reprojection
-            message = PoseInFrame(frame_id=camera)
-            message.timestamp.FromNanoseconds(sample_ns)
-            for target, names, values in (
-                (message.pose.position, "xyz", pose.position),
-                (message.pose.orientation, "xyzw", pose.quaternion),
-            ):
-                for name, value in zip(names, values, strict=True):
-                    setattr(target, name, float(value))
-            self._add(channels.pose(camera), arrival_ns, sample_ns, sequence, message)
-        self._add(channels.cube(camera), arrival_ns, sample_ns, sequence, view)
+            self._add(topics[1], *stamps, _pose_message(camera, sample_ns, pose))
+        self._add(topics[0], *stamps, _view_message(stamps, pose))
 
     def note(self, text: str, level: str = "info") -> None:
         """Write a remark for a person."""
@@ -265,13 +281,33 @@ class EpisodeWriter:
         return target
 
 
-def _begun(path: Path, header: Header, clock: Clock, cameras: tuple[str, ...]) -> ChunkedFile:
+def _pose_message(frame: str, sample_ns: int, pose: CubePoseRecord) -> PoseInFrame:
+    (x, y, z), (qx, qy, qz, qw) = pose.position, pose.quaternion
+    message = PoseInFrame(frame_id=frame)
+    message.timestamp.FromNanoseconds(sample_ns)
+    message.pose.position.x, message.pose.position.y, message.pose.position.z = float(x), float(y), float(z)
+    turn = message.pose.orientation
+    turn.x, turn.y, turn.z, turn.w = float(qx), float(qy), float(qz), float(qw)
+    return message
+
+
+def _view_message(stamps: tuple[int, int, int], pose: CubePoseRecord | None) -> pb.CubeView:
+    view = pb.CubeView(arrival_ns=stamps[0], sample_ns=stamps[1], sequence=stamps[2])
+    if pose is not None:
+        view.faces, view.reprojection, view.ambiguous = pose.faces, pose.reprojection, pose.ambiguous
+        view.ids.extend(pose.ids)
+        view.covariance.extend(pose.covariance)
+        view.strays.extend(pose.strays)
+    return view
+
+
+def _begun(path: Path, header: Header, clock: Clock, cameras: tuple[str, ...], fingers: tuple[str, ...]) -> ChunkedFile:
     """Create the file with its channels and attachments and hand it to the disk."""
     file = ChunkedFile(file_names.partial(path))
     for topic, message in channels.FIXED.items():
         file.register(topic, message)
     for camera in cameras:
-        for topic, message in channels.of_camera(camera).items():
+        for topic, message in channels.of_camera(camera, fingers).items():
             file.register(topic, message)
     try:
         for name, document in header.attachments.items():

@@ -1,5 +1,5 @@
 """The rig: which devices, how the sensor lies in the guide's frame, where the guide may go."""
 
-from tacdata.rig.rig import Envelope, Registration, Rig, read_rig
+from tacdata.rig.rig import Envelope, Registration, Rig, read_rig, registration_for
 
-__all__ = ["Envelope", "Registration", "Rig", "read_rig"]
+__all__ = ["Envelope", "Registration", "Rig", "read_rig", "registration_for"]

@@ -34,6 +34,11 @@ class Registration:
         tilt = document.get("tilt", (0.0, 0.0))
         return cls(tuple(document["origin"]), document["yaw"], tuple(tilt))
 
+    def with_tool(self, offset: tuple[float, float, float]) -> Registration:
+        """Return it for an indenter whose lowest point lies ``offset`` off the registered one's [mm, machine axes]."""
+        x, y, z = (own - moved for own, moved in zip(self.origin, offset, strict=True))
+        return replace(self, origin=(x, y, z))
+
     def to_machine(self, x: float, y: float, depth: float) -> tuple[float, float, float]:
         """Return the machine position [mm] of a tip at (x, y) [mm, sensor frame], ``depth`` [mm] below the skin."""
         c, s = np.cos(np.radians(self.yaw)), np.sin(np.radians(self.yaw))
@@ -82,6 +87,12 @@ class Rig:
     clock: Clock
     document: dict[str, Any]
     """The file's document, as attached to every recording."""
+    fingers: dict[str, Any] | None = None
+    """The cubes that fingers carry and the tips on them (`schemas/fingers.schema.json`), if there are any."""
+
+    def registration_for(self, indenter: str) -> Registration:
+        """Return how the sensor lies in the guide's frame for an indenter, named as in a plan."""
+        return registration_for(self.document, indenter)
 
     def registered(self, document: dict[str, Any], sensor_hash: str, origin: str) -> Rig:
         """Return the rig with the registration that `tacdata register` measured (`schemas/registration.schema.json`).
@@ -113,13 +124,25 @@ class Rig:
         )
 
 
+def registration_for(document: dict[str, Any], indenter: str) -> Registration:
+    """Return the registration of a rig file's document with the tool offset of an indenter, if it has one."""
+    found = Registration.from_document(document["registration"])
+    tool = document.get("tools", {}).get(indenter)
+    return found.with_tool(tuple(tool["offset"])) if tool else found
+
+
 def from_document(document: dict[str, Any], origin: str) -> Rig:
-    """Build a rig from a parsed file; ``origin`` names it in errors.
+    """Build a rig from a parsed file; ``origin`` names it in errors, and says where files it names are looked for.
 
     Raises:
         FormatError: If the document breaks the schema or the envelope is empty.
     """
     documents.check(document, "rig", origin)
+    if isinstance(document.get("fingers"), str):
+        # The recording carries the fingers themselves, whatever becomes of their file.
+        document = {**document, "fingers": documents.read(Path(origin).parent / document["fingers"], "fingers")}
+    elif "fingers" in document:
+        documents.check(document["fingers"], "fingers", f"{origin}: fingers")
     envelope = Envelope(tuple(document["envelope"]["min"]), tuple(document["envelope"]["max"]))
     if any(a >= b for a, b in zip(envelope.min, envelope.max, strict=True)):
         raise FormatError(
@@ -137,6 +160,7 @@ def from_document(document: dict[str, Any], origin: str) -> Rig:
         envelope,
         clock,
         document,
+        document.get("fingers"),
     )
 
 

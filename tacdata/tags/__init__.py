@@ -5,10 +5,11 @@ from tacdata.tags.detector import detect_tags
 from tacdata.tags.fingers import Finger, fingers_of, read_fingers
 from tacdata.tags.pose import CubePose, detect_cube
 from tacdata.tags.tag import Tag
-from tacdata.tags.tips import TipPose, View, detect_fingers
+from tacdata.tags.tips import TipPose, View, detect_fingers, look
 from tacdata.tags.tracker import FingerTracker
 
 __all__ = [
     "Cube", "CubePose", "Finger", "FingerTracker", "Tag", "TipPose", "View",
-    "detect_cube", "detect_fingers", "detect_tags", "fingers_of", "read_fingers",
+    "detect_cube", "detect_fingers", "detect_tags", "fingers_of", "look",
+    "read_fingers",
 ]  # fmt: skip

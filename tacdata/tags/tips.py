@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from tacdata.tags.camera import Camera
 from tacdata.tags.detector import detect_tags, to_grey
-from tacdata.tags.fingers import Finger
+from tacdata.tags.fingers import Finger, fingers_of
 from tacdata.tags.mixups import mixups
-from tacdata.tags.pose import CubePose, solve_cube
+from tacdata.tags.pose import CubePose, detect_cube, solve_cube
 from tacdata.tags.tag import Tag
 
 
@@ -65,6 +67,32 @@ def detect_fingers(
     grey, camera = to_grey(image), Camera.from_document(intrinsics)
     camera.check(grey)
     return view_of(grey, detect_tags(grey, whole=False), camera, fingers, hints or {})
+
+
+def look(image: np.ndarray, intrinsics: dict[str, Any], what: dict[str, Any], hint: Any = None) -> Any:
+    """Return what an image shows of a rig file's ``cube``, or of its ``fingers``.
+
+    Args:
+        image: Grey (height, width) or BGR (height, width, 3), uint8.
+        intrinsics: A rig file's ``intrinsics`` [px].
+        what: A cube's or a fingers' document.
+        hint: What was seen just before: a cube's pose, or the cubes' poses by finger.
+
+    Returns:
+        `CubePose` or None of a cube, `View` of fingers.
+
+    Raises:
+        UsageError: If the image is no image or of another size than the intrinsics.
+        FormatError: If a document contradicts itself.
+    """
+    if "fingers" in what:
+        return detect_fingers(image, intrinsics, _known(json.dumps(what)), hint)
+    return detect_cube(image, intrinsics, what, hint)
+
+
+@lru_cache(maxsize=8)
+def _known(document: str) -> dict[str, Finger]:
+    return fingers_of(json.loads(document))
 
 
 def view_of(

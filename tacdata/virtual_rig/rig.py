@@ -150,7 +150,7 @@ class VirtualRig:
             "board": asdict(self.board.timing), "camera": camera,
         }  # fmt: skip
         documents.write(self.directory / "truth.yaml", truth, "virtual_truth")
-        self.mounted.path.unlink(missing_ok=True)
+        self.mounted.start()
         for device in (self.controller, self.board, self.camera):
             if device:
                 device.start()
@@ -163,11 +163,11 @@ class VirtualRig:
         for device in (self.camera, self.board, self.controller):
             if device:
                 device.stop()
+        self.mounted.stop()
         if self._lock:
             self._lock.close()
 
     def _readings(self, sampled_ns: int) -> np.ndarray:
-        self.mounted.look()
         tip = self.controller.position_at(sampled_ns)
         return self.world.readings(tip, self.mounted.indenter, self.mounted.yaw, sampled_ns)
 

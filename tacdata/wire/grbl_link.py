@@ -22,7 +22,8 @@ from tacdata.wire.serial_port import read_available
 REAL_FLOOR = 1.0
 """No wait for the controller gives up sooner than this [s, real time], however fast the clock runs."""
 SILENCE = 3.0
-"""A controller that is asked and says nothing for so long is gone [s of the clock]."""
+"""A controller that is asked and says nothing for so long is gone [s of the clock, and of real time: a fast clock is
+an emulator's, which stalls with its host]."""
 LINE_BYTES = 79
 """Longest line that Grbl 1.1 takes [bytes without its end] (``LINE_BUFFER_SIZE`` 80; grblHAL takes 256)."""
 RX_BYTES = 128
@@ -291,7 +292,7 @@ class GrblLink:
         while not self._stopped.wait(1.0 / (self.poll_rate * self.clock.rate)):
             waited = time.monotonic() - self._received_at
             # A homing controller (Grbl 1.1) answers nothing; its own time-out minds it.
-            if not self.homing and waited > max(SILENCE / self.clock.rate, REAL_FLOOR):
+            if not self.homing and waited > max(SILENCE / self.clock.rate, SILENCE):
                 self._fail(
                     f"the controller on {self.port.port} is silent for {waited * self.clock.rate:.1f} s",
                     f"an answer to ? within {SILENCE:g} s",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 
 import numpy as np
 
@@ -13,15 +14,16 @@ from tacdata.wire.grbl_lines import StatusReport
 REPORT_LAG_NS = 50_000_000
 """A report is made at most so long before it arrives [ns]: Grbl looks for queries every 50 ms of a pause."""
 REPEAT = 0.5
-"""A query without an answer is repeated after so long [s, real time]; several before one answer collapse to one."""
+"""A query without an answer is repeated after so long [s, real time]. Several before one answer may collapse to one:
+when no second answer has come for so long, none will."""
 
 
 class Statuses:
     """The reports of one connection; its user guards it with a lock.
 
     The position was read between ``sent_ns`` (the query left the host) and ``arrival_ns``. So that this is certain,
-    no query goes out while one is unanswered; a report after a repeated query may answer either. A report that
-    nobody asked for (auto-reporting) was made after the one before it.
+    no query goes out while one may be unanswered; a report after a repeated query is taken as the first one's answer. A
+    report that nobody asked for (auto-reporting) was made after the one before it.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -34,31 +36,35 @@ class Statuses:
         self.automatic = False
         """Whether the controller reports by itself; it then leaves ``?`` unanswered (grblHAL, ``$481``)."""
         self.last: CncStatus | None = None
-        self.asked_ns: int | None = None
-        """When the query went out that is not answered yet [ns]; the first, if it was repeated."""
-        self._asked_at = 0.0
-        self._repeated_ns: int | None = None
+        self._queries: deque[int] = deque()  # when those went out that may not be answered yet [ns]
+        self._asked_at = self._answered_at = 0.0
+        self._answered = False  # whether a report has come since the latest query
         self._waiting: list[CncStatus] = []
+
+    @property
+    def asked_ns(self) -> int | None:
+        """When the query went out that is not answered yet [ns]; the first, if it was repeated."""
+        return self._queries[0] if self._queries else None
 
     def ask(self) -> bool:
         """Return whether a query should go out now, and take it that it does."""
         now = time.monotonic()
-        if self.asked_ns is None:
-            self.asked_ns = self._clock.now_ns()
-        elif now - self._asked_at > REPEAT:
-            self._repeated_ns = self._clock.now_ns()
-        else:
+        if self._queries and now - max(self._asked_at, self._answered_at) <= REPEAT:
             return False
-        self._asked_at = now
+        if self._answered:
+            self._queries.clear()  # what was repeated and is not answered by now was answered together
+        self._queries.append(self._clock.now_ns())
+        self._asked_at, self._answered = now, False
         return True
 
     def forget(self) -> None:
         """A reset has thrown all queries away."""
-        self.asked_ns = self._repeated_ns = None
+        self._queries.clear()
 
     def take(self, report: StatusReport, arrival_ns: int) -> CncStatus | None:
         """Take a report; return it in mm, or None if its position cannot be known yet."""
-        sent_ns, self.asked_ns, self._repeated_ns = self.asked_ns, self._repeated_ns, None
+        sent_ns = self._queries.popleft() if self._queries else None
+        self._answered_at, self._answered = time.monotonic(), True
         if report.offset is not None:
             self.offset = report.offset
         if report.is_work and self.offset is None:

@@ -24,8 +24,11 @@ def ports() -> str:
 def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | None = None) -> serial.SerialBase:
     """Open a port for one process alone.
 
-    The kernel raises DTR when a port is opened, which resets an Arduino board only if DTR was low. Clearing
-    HUPCL keeps DTR up at closing, so that from the second opening on a board in motion is not reset.
+    Linux raises DTR whenever a port is opened, before any program can say otherwise (`tty_port_open`), and an Arduino
+    board resets if DTR was low until then: after plugging in, or after a program that lowered it at closing. That first
+    reset cannot be prevented from here; the welcome shows it, and the driver says it. Clearing HUPCL keeps DTR up at
+    closing, so that later openings do not reset a board in motion. A pseudo-terminal has no DTR. To protect a
+    board at the first opening too: a capacitor at its reset pin, or ``stty -F PORT -hupcl`` once while it stands.
 
     Args:
         port: Path, ``COM`` name or pyserial URL.

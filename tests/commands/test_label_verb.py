@@ -45,6 +45,13 @@ def test_it_labels_a_session_and_says_what_it_did(tmp_path, label):
     assert "labels written: 0 (0 without contact), already there: 3" in label().output
 
 
+def test_it_says_how_well_the_labels_are_known(label):
+    shown = label().output
+    assert "by the sensor file's spreads: ± " in shown and "a state that is left out: 0.0000 mm" in shown
+    shown = label("--no-uncertainty", "--redo", "--tolerance", "0.01").output
+    assert "not known, none stated or asked for" in shown
+
+
 def test_a_store_elsewhere_serves_as_well(tmp_path, label):
     assert label("--store", str(tmp_path / "shared")).exit_code == 0
     assert (

@@ -125,9 +125,7 @@ def test_missing_port_and_format():
     with pytest.raises(UsageError, match="no file"):
         CapacitiveBoard(Clock.start(), "p", format="missing.yaml")
     with pytest.raises(FormatError, match="channels"):
-        CapacitiveBoard(
-            Clock.start(), "p", format={"version": "1.0", "name": "x", "encoding": "ascii", "rate": 1}
-        )
+        CapacitiveBoard(Clock.start(), "p", format={"version": "1.0", "name": "x", "encoding": "ascii", "rate": 1})
 
 
 def test_read_waits_no_longer_than_asked(board):

@@ -205,7 +205,7 @@ def test_silent_controller(rig):
     with driver:
         controller.inject_silence()
         with pytest.raises(DeviceError, match="silent"):
-            wait_for_fault(driver)
+            wait_for_fault(driver, 10.0)  # it may say nothing for 3 s
 
 
 def test_garbage_on_the_line_is_survived(rig):
@@ -515,3 +515,20 @@ def test_a_grbl_too_old_is_refused(rig):
     old.start()
     with pytest.raises(DeviceError, match=r"(?s)0\.9j.*Grbl 1\.1 or grblHAL"):
         driver.open()
+
+
+def test_opening_leaves_dtr_up_for_the_next_opening():
+    import os
+    import termios
+
+    from tacdata.wire.serial_port import open_port
+
+    outer, line = os.openpty()
+    attributes = termios.tcgetattr(line)
+    attributes[2] |= termios.HUPCL
+    termios.tcsetattr(line, termios.TCSANOW, attributes)
+    for dtr in (None, False, True):
+        open_port(os.ttyname(line), 115200, "motion controller", 0.05, dtr).close()
+        assert not termios.tcgetattr(line)[2] & termios.HUPCL
+    os.close(line)
+    os.close(outer)

@@ -53,9 +53,7 @@ class Controller(MotionController):
         with self._lock:
             if self._move is None:
                 return self._at.copy()
-            share = self._move.distance((self.clock.now_ns() - self._begin) / 1e9) / max(
-                self._move.length, 1e-12
-            )
+            share = self._move.distance((self.clock.now_ns() - self._begin) / 1e9) / max(self._move.length, 1e-12)
             return self._move.start + share * (self._move.target - self._move.start)
 
     def _wait(self, until_ns):

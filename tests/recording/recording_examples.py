@@ -109,9 +109,7 @@ class Press:
                 self.free = sent + 3_000_000 + round(move.duration * 1e9)
             else:
                 acknowledged = max(self.free, now) + round(step.seconds * 1e9) + 4_000_000
-            self.commands.append(
-                Command(step.phase, at, target, step.speed, step.seconds, sent, acknowledged, "G1")
-            )
+            self.commands.append(Command(step.phase, at, target, step.speed, step.seconds, sent, acknowledged, "G1"))
             now, at = acknowledged + 1_000_000, target
 
     def report(self, time_ns):
@@ -150,16 +148,12 @@ class Press:
 
     def feed(self, writer):
         for k in range(len(self.sample)):
-            writer.taxels(
-                TaxelFrame(int(self.arrival[k]), int(self.counter[k]), self.counts[k]), int(self.sample[k])
-            )
+            writer.taxels(TaxelFrame(int(self.arrival[k]), int(self.counter[k]), self.counts[k]), int(self.sample[k]))
         for status in self.statuses:
             writer.status(status)
         for command in self.commands:
             writer.motion(command)
         for time, k in self.views:
             writer.image("side", time, time, k, b"jpeg %d" % k)
-            pose = (
-                CubePoseRecord((0.1, 0.2, 0.4 + 1e-6 * k), (0.0, 0.6, 0.0, 0.8), 0.25, 2) if k % 3 else None
-            )
+            pose = CubePoseRecord((0.1, 0.2, 0.4 + 1e-6 * k), (0.0, 0.6, 0.0, 0.8), 0.25, 2) if k % 3 else None
             writer.cube("side", time, time, k, pose)

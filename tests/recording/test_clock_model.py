@@ -113,6 +113,40 @@ def test_every_link_is_known_up_to_a_constant(kind, rate, limit):
         assert abs(model.drift(1e9 / rate) - drift * 1e6) < 3 * model.drift_uncertainty * 1e6 + 1.0
 
 
+def busy_host(rng, arrival):
+    """A host that gets 5 ms of every 35: what arrives while it waits is stamped when it runs again."""
+    late, time = arrival.copy(), START
+    while time < arrival[-1]:
+        time += int(rng.exponential(5e6))
+        runs = time + int(rng.exponential(30e6))
+        waiting = (arrival >= time) & (arrival < runs)
+        late[waiting] = np.maximum(late[waiting], runs)
+        time = runs
+    return np.maximum.accumulate(late)
+
+
+@pytest.mark.parametrize("seconds", [4.0, 20.0, 60.0])
+def test_a_host_that_hardly_runs_does_not_look_like_steps_of_the_device(seconds):
+    for seed in range(12):
+        rng, true, arrival = link(seed, 30.0, seconds, "ftdi", rng_drift(seed))
+        counter = np.arange(len(true))
+        model = fit(busy_host(rng, arrival), counter, nominal_ns=1e9 / 30)
+        assert model.earlier == ()
+        error = (model.sample_ns(counter) - true) / 1e6
+        assert np.ptp(error) / 2 < 3.0
+
+
+def rng_drift(seed):
+    return np.random.default_rng(seed).uniform(-200e-6, 200e-6)
+
+
+def test_a_board_that_is_not_what_it_is_said_to_be_is_followed_all_the_same():
+    _, true, arrival = link(4, 100.0, 10.0, "ftdi", 0.01)
+    model = fit(arrival, np.arange(1000), nominal_ns=1e7)
+    assert model.period_ns == pytest.approx(1e7 * 1.01, rel=3e-4)
+    assert np.ptp(model.sample_ns(np.arange(1000)) - true) / 2e6 < 1.6
+
+
 def test_a_stall_of_seconds_is_no_step_of_the_device():
     _, true, arrival = link(5, 100.0, 60.0, "usb", 50e-6)
     stalled = (arrival > START + 20_000_000_000) & (arrival < START + 26_000_000_000)
@@ -191,9 +225,33 @@ def test_a_stream_is_timed_while_it_arrives():
     sample = np.array([clock.take(int(a), k) for k, a in enumerate(arrival)])
     assert (sample <= arrival).all()
     assert np.abs((sample - true)[500:] / 1e6 - 3.0).max() < 2.0
-    clock.latency = Latency(2_000_000, 100_000)
+    clock.set_latency(Latency(2_000_000, 100_000))
     assert clock.model().latency == clock.latency
     assert StreamClock().take(5, -1) == 5
+
+
+def test_a_measured_delay_holds_when_the_line_finds_quicker_arrivals():
+    """Frames at 100 Hz slide through a latency timer of 16 ms within half a minute: the line sinks by up to 2 ms."""
+    worst = []
+    for seed in range(6):
+        _, true, arrival = link(seed, 100.0, 120.0, "ftdi", rng_drift(seed))
+        counter = np.arange(len(true))
+        clock, plain = StreamClock(nominal_ns=1e7), StreamClock(nominal_ns=1e7)
+        for k in range(2000):
+            clock.take(int(arrival[k]), k)
+        middle = slice(500, 1500)
+        tap = np.mean(clock.model().sample_times(arrival[middle], counter[middle]) - true[middle])
+        clock.set_latency(Latency(round(tap), 100_000))
+        for k in range(2000, len(true)):
+            clock.take(int(arrival[k]), k)
+        for k in range(len(true)):
+            plain.take(int(arrival[k]), k)
+        fixed = plain.model().with_latency(Latency(round(tap), 100_000))
+        error = [(m.sample_times(arrival, counter) - true) / 1e6 for m in (clock.model(), fixed)]
+        worst.append([np.abs(e).max() for e in error])
+    followed, kept = np.array(worst).T
+    assert followed.max() < 1.0
+    assert followed.mean() < 0.7 * kept.mean(), "a delay that does not follow the line is wrong by what it sinks"
 
 
 def test_polled_answers_lie_between_query_and_receipt():

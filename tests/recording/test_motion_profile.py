@@ -1,9 +1,10 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from tacdata.recording.anchoring import Command, StatusTimes, anchor, machine_path, phases
+from tacdata.recording.anchoring import Command, StatusTimes, anchor, machine_path, phases, report_resolution
 from tacdata.recording.episode import CncStream
 from tacdata.recording.motion_profile import AxisLimits
 
@@ -81,6 +82,24 @@ def test_anchoring_finds_the_start_within_its_stated_uncertainty(seed):
     assert move.uncertainty_ns * 1e-9 * 0.5 < 0.004
 
 
+def test_reports_bound_the_start_to_their_last_digit_and_a_step():
+    fine = report_resolution({"$100": "80", "$101": "80", "$102": "400"})
+    np.testing.assert_allclose(fine, [0.013, 0.013, 0.003])
+    assert report_resolution({"$102": "400", "$13": "1"})[2] == pytest.approx(0.00127 + 0.0025)
+    assert (report_resolution({}) > 0.0005).all()
+    commands, statuses, _ = simulate(np.random.default_rng(3), T0, 0.004)
+    late = replace(commands[0], sent_ns=T0 - 90_000_000, acknowledged_ns=T0 + 90_000_000)  # an `ok` that says little
+    commands = [late, replace(commands[1], acknowledged_ns=commands[1].acknowledged_ns + 90_000_000)]
+    coarse = anchor(commands, statuses, LIMITS, np.full(3, 0.05))
+    (move,) = anchor(commands, statuses, LIMITS, fine)
+    assert move.contradiction_ns == 0
+    assert abs(move.start_ns - T0) <= move.uncertainty_ns < 20_000_000 < coarse[0].uncertainty_ns
+    # A report that lies off the profile by more than a digit and a step contradicts it.
+    position = statuses.stream.position + np.where(statuses.stream.position[:, 2:] < 0, 0.02, 0.0)
+    off = StatusTimes(statuses.sent_ns, replace(statuses.stream, position=position))
+    assert anchor(commands, off, LIMITS, fine)[0].contradiction_ns > 10_000_000
+
+
 def test_controller_that_is_slower_than_its_settings_is_found_out():
     commands, statuses, _ = simulate(np.random.default_rng(0), T0, 0.012)
     wrong = AxisLimits(LIMITS.acceleration, np.array([50.0, 50.0, 0.4]))
@@ -115,9 +134,7 @@ def test_broken_off_press_follows_the_reports_instead_of_the_command():
     commands, statuses, down = simulate(np.random.default_rng(1), T0, 0.012)
     stream = statuses.stream
     held = np.array([0.0, 0.0, 0.123])
-    halted = CncStream(
-        stream.arrival_ns, stream.sample_ns, np.tile(held, (len(stream.arrival_ns), 1)), stream.state
-    )
+    halted = CncStream(stream.arrival_ns, stream.sample_ns, np.tile(held, (len(stream.arrival_ns), 1)), stream.state)
     moves = anchor(commands[:1], StatusTimes(statuses.sent_ns, halted), LIMITS)
     _, position = machine_path(moves, halted, complete=False)
     np.testing.assert_array_equal(np.unique(position, axis=0), held[None])

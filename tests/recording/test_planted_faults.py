@@ -13,6 +13,7 @@ from tacdata.recording import clock_fit
 from tacdata.recording.check import check
 from tacdata.recording.clock_model import Latency
 from tacdata.recording.polled_clock import polled_clock
+from tacdata.recording.reader import read_recording
 from tacdata.recording.session import create_session, refresh
 from tacdata.recording.writer import EpisodeWriter
 
@@ -32,6 +33,9 @@ class Whole(Press):
         self.driver = StreamCounts(received=len(self.sample))
         self.images = list(np.arange(T0, self.end, IMAGE_PERIOD) + 40 * MS)
         self.pictures = [b"picture %d" % k for k in range(len(self.images))]
+        self.numbers = list(range(len(self.images)))
+        self.own = None  # the camera's own times [ns], if it has a clock
+        self.eye = StreamCounts(received=len(self.images))
         self.faces, self.complete, self.reason = 2, True, ""
         self.views = []
 
@@ -40,16 +44,22 @@ class Whole(Press):
         self.feed(writer)
         for k, (time, picture) in enumerate(zip(self.images, self.pictures, strict=True)):
             time = int(time) + int(self.rng.integers(3 * MS))
-            writer.image("side", time, time, k, picture)
+            own = -1 if self.own is None else int(self.own[k])
+            writer.image("side", time, time, self.numbers[k], picture, own)
             if k % 4 == 0:
                 writer.cube("side", time, time, k, self._pose())
         sent, arrival = (np.array([getattr(s, name) for s in self.statuses]) for name in ("sent_ns", "arrival_ns"))
         models = {
             "taxels": clock_fit.fit(self.arrival, self.counter),
-            "camera side": clock_fit.fit(np.array(self.images), np.arange(len(self.images)), "order"),
+            "camera side": clock_fit.fit(
+                np.array(self.images),
+                np.array((self.numbers if self.own is None else self.own)[: len(self.images)]),
+                "order" if self.own is None else "device_ns",
+            ),
             "cnc": polled_clock(sent, arrival),
         }
-        return writer.close(self.complete, self.reason, {k: m for k, m in models.items() if m}, {"taxels": self.driver})
+        counts = {"taxels": self.driver, "camera side": self.eye}
+        return writer.close(self.complete, self.reason, {k: m for k, m in models.items() if m}, counts)
 
     def _pose(self):
         from tacdata.recording.writer import CubePoseRecord
@@ -250,6 +260,36 @@ def no_tag(p):
     p.faces = 0
 
 
+@fault(WARN, "camera side", "3 images lost: the host did not fetch them")
+def camera_not_fetched(p):
+    for name in ("images", "pictures", "numbers"):
+        del getattr(p, name)[40:43]
+
+
+@fault(WARN, "camera side", "4 damaged images")
+def camera_sends_damage(p):
+    p.eye.corrupt = 4
+
+
+@fault(WARN, "camera side", "rate 60 asked, 30 given")
+def camera_does_not_obey(p):
+    p.eye.notes.append("camera 0: rate 60 asked, 30 given")
+
+
+@fault(WARN, "camera side", r"\d+ images missing by its own times")
+def camera_drops_in_its_driver(p):
+    p.own = 7_000_000_000 + IMAGE_PERIOD * np.arange(len(p.images))
+    kept = np.flatnonzero(np.arange(len(p.images)) % 7 != 3)
+    p.images, p.pictures = [p.images[k] for k in kept], [p.pictures[k] for k in kept]
+    p.own, p.numbers = p.own[kept], list(range(len(kept)))
+
+
+@fault(WARN, "camera side", "images/s, nominal 30")
+def camera_is_slow(p):
+    p.images, p.pictures = p.images[::2], p.pictures[::2]
+    p.numbers = list(range(len(p.images)))
+
+
 @fault(WARN, "registration", "how and when")
 def no_registration(p):
     del p.header.rig["registration"]["method"]
@@ -285,6 +325,19 @@ def test_nothing_is_said_of_a_clean_recording(tmp_path, seed):
     assert judged(report) == []
     assert "drift" in report.text
     assert "record --sync-tap" in report.text
+
+
+def test_a_cameras_own_time_is_followed(tmp_path):
+    press = Whole()
+    steady = np.array(press.images)
+    press.own = steady - T0 - 40 * MS + 123_456_789
+    press.images = list(np.maximum.accumulate(steady + press.rng.integers(25 * MS, size=len(steady))))
+    path = press.write(tmp_path / "episode-000000.mcap")
+    assert judged(check(path)) == []
+    recording = read_recording(path)
+    np.testing.assert_array_equal(recording.cameras["side"].device_ns, press.own)
+    error = (recording.cameras["side"].sample_ns - steady) / MS
+    assert np.ptp(error) < 1.0 < 5.0 < np.ptp(recording.cameras["side"].arrival_ns - steady) / MS
 
 
 def test_clocks_are_shown_for_every_stream(tmp_path):

@@ -17,9 +17,7 @@ TACDATA = [sys.executable, "-m", "tacdata.cli"]
 
 
 def tacdata(*arguments, **options):
-    return subprocess.run(
-        [*TACDATA, *map(str, arguments)], capture_output=True, text=True, check=False, **options
-    )
+    return subprocess.run([*TACDATA, *map(str, arguments)], capture_output=True, text=True, check=False, **options)
 
 
 @pytest.fixture

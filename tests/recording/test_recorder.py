@@ -221,12 +221,19 @@ def test_what_a_kill_left_is_put_aside_on_resuming(bench):
     with pytest.raises(FormatError, match=r"names episode-000001\.mcap"):
         read_session(bench.folder)
     document = documents.read(bench.folder / "session.json", "session")
-    documents.write(
-        bench.folder / "session.json", {**document, "episodes": document["episodes"][:1]}, "session"
-    )
+    documents.write(bench.folder / "session.json", {**document, "episodes": document["episodes"][:1]}, "session")
     session = Bench(bench.folder).run(resume=True)
     assert len(session.episodes) == 2
     assert [p.name for p in session.unfinished] == ["episode-000001.interrupted-0.mcap"]
+
+
+def test_a_session_on_a_level_skin_is_taken_up_again(tmp_path):
+    bench = Bench(tmp_path / "session", presses=1)
+    registration = {**bench.rig.document["registration"], "tilt": [-3.95e-05, 1e-07]}
+    level = replace(bench.rig, document={**bench.rig.document, "registration": registration})
+    bench.run(rig=level)
+    assert read_session(bench.folder).document["rig"]["registration"]["tilt"] == [-3.95e-05, 1e-07]
+    assert bench.run(rig=level, resume=True).remaining == ()
 
 
 def test_another_plan_or_registration_cannot_continue_a_session(bench):

@@ -14,7 +14,7 @@ from tacdata.recording import sync_tap, sync_tap_motion
 from tacdata.recording.clock_model import Latency
 from tacdata.recording.reader import read_recording
 from tacdata.recording.recorder import Recorder
-from tacdata.recording.session import create_session, read_session
+from tacdata.recording.session import create_session, read_session, refresh, resume_session
 from tacdata.recording.session_sync import add_sync, changes, latencies
 from tacdata.rig import read_rig
 from tacdata.virtual_rig.mounting import mount
@@ -41,6 +41,7 @@ def test_sample_times_on_the_emulated_rig_agree_with_its_truth(tmp_path, rate, d
         ).run(lambda summary: "sync tap" in summary.text)  # fmt: skip
     finally:
         virtual.stop()
+    assert set(latencies(read_session(session.folder))) == {"taxels"}
     taxels = read_recording(session.episodes[0]).episode.taxels
     true = np.array([virtual.board.timing.sample_ns(int(k)) for k in taxels.counter])
     assert ((taxels.arrival_ns - true) / MS).min() > 1e3 * delay
@@ -111,7 +112,7 @@ def test_touches_are_no_deeper_than_the_plan_and_lie_on_a_taxel():
 
 
 def test_the_session_keeps_the_delays_and_says_when_they_change(tmp_path):
-    session = create_session(tmp_path / "session", plan(1), SENSOR, rig_document())
+    session = before = create_session(tmp_path / "session", plan(1), SENSOR, rig_document())
     assert latencies(session) == {}
     first = sync_tap.SyncTap({"taxels": Latency(6_000_000, 300_000)}, ("camera side: no tag",))
     session = add_sync(session, tmp_path / "sync_tap-000.mcap", first)
@@ -121,3 +122,7 @@ def test_the_session_keeps_the_delays_and_says_when_they_change(tmp_path):
     assert "+10.0 ms" in words
     kept = json.loads((session.folder / "session.json").read_text())["sync"][0]
     assert kept["remarks"] == ["camera side: no tag"]
+    # The recorder looks at the folder again at its end, whatever it knew at its beginning.
+    assert latencies(refresh(before)) == first.latencies
+    resumed = resume_session(session.folder, plan(1), SENSOR, rig_document())
+    assert latencies(resumed) == first.latencies

@@ -2,16 +2,18 @@
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 
 from tacdata import documents
 from tacdata.clock import Clock
 from tacdata.devices.device import Camera, MotionController, TaxelBoard, create
 from tacdata.errors import DeviceError, UsageError
+from tacdata.indenters import from_document
 from tacdata.rig import read_rig
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig import mount
-from tacdata.virtual_rig.mounting import Mounted
+from tacdata.virtual_rig.mounting import Lowest, Mounted
 from tacdata.virtual_rig.rig import NOMINAL, VirtualRig, board_format, running
 from tacdata.virtual_rig.scene import CUBE, INTRINSICS, draw_scene
 
@@ -99,6 +101,22 @@ def test_mounting(tmp_path):
         mount({"name": "real"}, SPHERE)
 
 
+def test_a_solid_from_a_file_is_in_place_when_mounting_returns(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=2.0)
+    ball.apply_translation([0, 0, 7.5])
+    ball.export(tmp_path / "ball.stl")
+    solid = from_document({"shape": "mesh", "file": "ball.stl"}, "plan", tmp_path)
+    with running(tmp_path / "rig", speed=1.0, camera=False) as path:
+        mount(read_rig(path).document, solid.document)
+        assert (tmp_path / "rig" / "mounted.taken").exists()
+    assert not (tmp_path / "rig" / "mounted.taken").exists()
+    lowest = Lowest.of(solid)
+    x, y = np.random.default_rng(0).uniform(-1.9, 1.9, (2, 400))
+    x, y = x[x**2 + y**2 < 1.7**2], y[x**2 + y**2 < 1.7**2]
+    np.testing.assert_allclose(lowest.profile(x, y), 2 - np.sqrt(4 - x**2 - y**2), atol=0.02)
+    assert (lowest.profile(np.array([2.5, 0.0]), np.array([0.0, -9.0])) >= 100).all()
+
+
 def test_another_sensor_gives_another_board(tmp_path):
     document = default_sensor().document
     document["taxels"].update(columns=4, rows=3, rate=1000.0)
@@ -127,9 +145,7 @@ def test_cube_is_in_the_picture_wherever_the_carriage_may_be(tmp_path):
         rotation = scene.camera_cube(corners[0])[:3, :3]
         assert np.allclose(rotation @ rotation.T, np.eye(3))
         assert np.linalg.det(rotation) == pytest.approx(1.0)
-        assert (
-            scene.camera_cube(corners[0])[1, 3] < scene.camera_cube(corners[0] - (0, 0, 20))[1, 3]
-        )  # up is up
+        assert scene.camera_cube(corners[0])[1, 3] < scene.camera_cube(corners[0] - (0, 0, 20))[1, 3]  # up is up
 
 
 def test_camera_shows_the_cube_over_http(tmp_path):

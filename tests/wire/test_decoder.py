@@ -145,9 +145,7 @@ def test_ascii_line_by_hand():
     for byte in b"17,100,200,65535":
         value ^= byte
     line = b"$C,17,100,200,65535*%02X\r\n" % value
-    got = decoder.feed(
-        b"noise" + line + b"$C,18,1,2\r\n$C,18,$C,19,1,2,3*00\r\n" + line.replace(b"100", b"101"), 3
-    )
+    got = decoder.feed(b"noise" + line + b"$C,18,1,2\r\n$C,18,$C,19,1,2,3*00\r\n" + line.replace(b"100", b"101"), 3)
     assert [(f.counter, f.counts.tolist()) for f in got] == [(17, [100.0, 200.0, 65535.0])]
     assert (decoder.counts.corrupt, decoder.counts.garbage_bytes) == (3, 5 + 6)
 
@@ -162,9 +160,7 @@ def test_ascii_lines_that_are_no_frames(line):
     assert len(decoder.feed(b"9,1,2,3\n", 0)) == 1
 
 
-@pytest.mark.parametrize(
-    "kind", ["uint8", "int8", "uint16", "int16", "uint24", "int24", "uint32", "int32", "float32"]
-)
+@pytest.mark.parametrize("kind", ["uint8", "int8", "uint16", "int16", "uint24", "int24", "uint32", "int32", "float32"])
 @pytest.mark.parametrize("changes", [
     {
         "encoding": "binary", "sync": [1, 2, 3], "endianness": "big", "trailer": [13, 10],

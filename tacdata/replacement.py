@@ -1,0 +1,47 @@
+"""A file that takes the place of another whole: written beside it, brought to the disk, renamed."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+
+@contextmanager
+def replacement(path: Path, beside: Path | None = None) -> Iterator[BinaryIO]:
+    """Give a stream whose bytes become the file ``path`` when the block ends; until then the old file stays.
+
+    A crash or a full disk leaves the old file or the new one, never a half. If the block raises, nothing is left.
+
+    Args:
+        path: The file; its folder is made if it is missing.
+        beside: Folder of the unfinished file, on the same file system; by default the file's own, under a hidden name.
+
+    Raises:
+        OSError: If the disk refuses it.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=beside or path.parent, prefix=f".{path.name}." if beside is None else None)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    _settle(path.parent)
+
+
+def _settle(folder: Path) -> None:
+    """Bring a folder's entries to the disk, so that a rename outlives a loss of power."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
