@@ -36,6 +36,27 @@ class Branch:
         """
         return PchipInterpolator(self.depth, self.values, axis=0)(np.clip(depth, 0.0, self.depth[-1]))
 
+    def left_out(self) -> np.ndarray:
+        """Return how far each state lies from what `at` says of it without it, shape (k, m).
+
+        The first and the deepest state, which have neighbours on one side only, take the larger of the two nearest.
+        Of a branch without a state between these, all of the change is in doubt.
+        """
+        inner = range(1, len(self.depth) - 1)
+        if not inner:
+            return np.repeat(np.abs(self.values[-1:] - self.values[:1]), len(self.depth), axis=0)
+        without = [Branch(np.delete(self.depth, k), np.delete(self.values, k, axis=0)) for k in inner]
+        missed = [
+            np.abs(rest.at(self.depth[k]) - self.values[k]) for k, rest in zip(inner, without, strict=True)
+        ]
+        return np.stack([np.max(missed[:2], axis=0), *missed, np.max(missed[-2:], axis=0)])
+
+    def left_out_beside(self, depth: np.ndarray) -> np.ndarray:
+        """Return the largest `left_out` of the two states beside each of the depths [mm], shape (n,), as shape (n,)."""
+        worst = self.left_out().max(axis=1)
+        after = np.clip(np.searchsorted(self.depth, depth), 1, len(worst) - 1)
+        return np.maximum(worst[after - 1], worst[after])
+
     def bound(self, depth: np.ndarray) -> np.ndarray:
         """Return how far `at` can be off at depths [mm], shape (n,), as shape (n, m).
 

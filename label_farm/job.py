@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
 import schemas
+from label_farm.tolerance import Tolerance
 from tacdata import documents, provenance
 
 
@@ -28,6 +29,8 @@ class Job:
     """Rotation of the indenter about z [deg]."""
     depths: tuple[float, ...]
     """Depths of the states [mm]: from 0 rising to the deepest, then falling to 0."""
+    tolerance: Tolerance | None = None
+    """Where states are to be added; None for these depths alone."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -44,6 +47,7 @@ class Job:
             "y": self.y,
             "yaw": self.yaw,
             "depths": list(self.depths),
+            **({"tolerance": asdict(self.tolerance)} if self.tolerance else {}),
         }
 
     @cached_property
@@ -60,7 +64,8 @@ class Job:
         """
         documents.check(document, "label_job", origin)
         values = {k: v for k, v in document.items() if k != "version"}
-        return cls(**{**values, "depths": tuple(document["depths"])})
+        tolerance = Tolerance(**document["tolerance"]) if "tolerance" in document else None
+        return cls(**{**values, "depths": tuple(document["depths"]), "tolerance": tolerance})
 
     @property
     def deepest(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections import defaultdict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from label_farm import environment, model
@@ -13,10 +13,12 @@ from label_farm.failure import Failure
 from label_farm.job import Job
 from label_farm.ladder import Ladder
 from label_farm.ledger import LEASE_SECONDS, Change, Ledger
+from label_farm.margin import Margin
 from label_farm.plan import LabelRequest, request
 from label_farm.pool import Pool
 from label_farm.session_labels import SessionLabels
 from label_farm.store import Store
+from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
@@ -33,6 +35,8 @@ class FarmSettings:
     """Dotted path of what builds the skin model from a sensor."""
     ladder: Ladder = field(default_factory=Ladder)
     """How the states of a path are spaced."""
+    uncertainty: bool = True
+    """Whether labels say what the spreads that the sensor file states make of them; costs about as much again."""
     workers: int = field(default_factory=environment.cores)
     """Number of worker processes."""
     redo: bool = False
@@ -57,6 +61,8 @@ class Summary:
     """Time of each path solved in this run [s]."""
     found: int = 0
     """Paths that the store held already."""
+    margins: list[Margin] = field(default_factory=list)
+    """How well each written label with contact is known."""
     remarks: list[str] = field(default_factory=list)
     """What a user should know of the models, in words."""
 
@@ -129,6 +135,7 @@ class Labelling:
                 unfit[number] = Failure("recording", str(error))
                 continue
             skin = sensor or episode.sensor
+            skin = skin if self.settings.uncertainty else replace(skin, uncertainty={})
             version = self._version(skin)
             try:
                 requests.append(request(episode, skin, version, self.settings.ladder))
@@ -138,7 +145,7 @@ class Labelling:
         return requests, unfit
 
     def _version(self, sensor: Sensor) -> str:
-        key = sensor.content_hash
+        key = provenance.content_hash([sensor.content_hash, sensor.uncertainty])
         if key not in self._versions:
             found = model.version(self.settings.factory, sensor)
             self._versions[key] = found.content_hash
@@ -211,11 +218,13 @@ class Labelling:
             self._fail(wish.episode, Failure("crash", reason), wish.job)
             return
         try:
-            self.labels.write(wish, solution)
+            label = self.labels.write(wish, solution)
         except FormatError as error:
             self._fail(wish.episode, Failure("recording", str(error)), wish.job)
             return
         self.summary.written.append(wish.episode)
+        if (margin := Margin.of(label)) is not None:
+            self.summary.margins.append(margin)
 
     def _fail(self, episode: int, failure: Failure, job: Job | None) -> None:
         self.labels.write_failure(episode, failure, job)

@@ -1,11 +1,15 @@
-"""The depths at which a press is solved: fine where contact begins, then in steps of at most a limit."""
+"""The depths at which a press is solved: fine where contact begins, then in steps of at most a limit.
+
+The model adds states where these turn out too few (`Tolerance`).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from label_farm.tolerance import Tolerance
 from tacdata.errors import UsageError
 
 
@@ -21,6 +25,8 @@ class Ladder:
     """Largest step while loading [mm]."""
     unload_step: float = 0.25
     """Largest step while unloading [mm]."""
+    tolerance: Tolerance | None = field(default_factory=Tolerance)
+    """Where states are to be added; None for nowhere."""
 
     def __post_init__(self) -> None:
         """Refuse settings that make no ladder.

@@ -81,6 +81,7 @@ def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> Lab
             y=y,
             yaw=float(episode.press.yaw),
             depths=ladder.depths(_settled_depth(episode)),
+            tolerance=ladder.tolerance,
         )
     return LabelRequest(
         episode=episode.number,

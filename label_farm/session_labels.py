@@ -10,7 +10,7 @@ from label_farm.label import make_label, parents
 from label_farm.plan import LabelRequest
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
-from tacdata.labels import PathSolution, read_label, table, write_label
+from tacdata.labels import Label, PathSolution, read_label, table, write_label
 
 
 class SessionLabels:
@@ -68,11 +68,13 @@ class SessionLabels:
         """Return whether the label lies there, made from exactly what this request would be made from."""
         return self.parents(request.episode) == parents(request)
 
-    def write(self, request: LabelRequest, solution: PathSolution | None) -> None:
-        """Make and write a label, and forget an earlier failure."""
-        write_label(self.path(request.episode), make_label(request, solution))
+    def write(self, request: LabelRequest, solution: PathSolution | None) -> Label:
+        """Make and write a label, and forget an earlier failure; return the label."""
+        label = make_label(request, solution)
+        write_label(self.path(request.episode), label)
         self._parents.pop(request.episode, None)
         self.failure_path(request.episode).unlink(missing_ok=True)
+        return label
 
     def write_failure(self, episode: int, failure: Failure, job: Job | None) -> None:
         """Write why an episode has no label; an older label, no longer current, becomes ``.superseded``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from label_farm import solution_file
 from label_farm.job import Job
 from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
@@ -29,8 +30,14 @@ def check_solution(job: Job, solution: PathSolution, sensor: Sensor) -> None:
         "force_error": (states,),
         "residual": (states,),
         "penetration": (states,),
+        "uncertainty": (states, *sensor.map.shape),
+        "force_uncertainty": (states, 3),
+        "taxel_force_uncertainty": (states, sensor.taxels.count),
+        "taxel_closure_uncertainty": (states, sensor.taxels.count),
     }
     for name, shape in shapes.items():
+        if name in solution_file.OPTIONAL and getattr(solution, name) is None:
+            continue
         values = np.asarray(getattr(solution, name))
         if values.shape != shape or not np.isfinite(values).all():
             raise SolveError(

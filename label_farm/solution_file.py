@@ -31,6 +31,13 @@ UNITS = {
     "residual": "1",
     "penetration": "mm",
 }
+OPTIONAL = {
+    "uncertainty": "mm",
+    "force_uncertainty": "N",
+    "taxel_force_uncertainty": "N",
+    "taxel_closure_uncertainty": "mm",
+}
+"""Units of arrays that are there where the sensor file states spreads."""
 REMEDY = "remove it and run `tacdata label` again: results can always be made anew"
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -42,7 +49,9 @@ class VersionError(FormatError):
 def encode(job: Job, solution: PathSolution) -> bytes:
     """Return the file's bytes; the same arrays give the same members whenever they are written."""
     members, arrays = {}, {}
-    for name, unit in UNITS.items():
+    for name, unit in {**UNITS, **OPTIONAL}.items():
+        if name in OPTIONAL and getattr(solution, name) is None:
+            continue
         values = np.ascontiguousarray(getattr(solution, name), dtype=np.float64)
         stream = io.BytesIO()
         np.save(stream, values, allow_pickle=False)
@@ -78,7 +87,8 @@ def decode(data: bytes, origin: str) -> tuple[Job, PathSolution]:
             header = json.loads(archive.read(HEADER))
             _check_version(header, origin)
             documents.check(header, "path_solution", origin)
-            arrays = {name: _array(archive, name, header["arrays"][name], origin) for name in UNITS}
+            names = [*UNITS, *(name for name in OPTIONAL if name in header["arrays"])]
+            arrays = {name: _array(archive, name, header["arrays"][name], origin) for name in names}
     except (
         zipfile.BadZipFile,
         zlib.error,

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 import time
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from label_farm.solution_check import check_solution
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import PathSolution
+from tacdata.replacement import replacement
 from tacdata.sensor import Sensor
 
 MARK = "store.json"
@@ -132,23 +131,8 @@ class Store:
         self.failure_path(key).unlink(missing_ok=True)
 
     def _write(self, path: Path, data: bytes) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=self.folder / WRITING)
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        with replacement(path, self.folder / WRITING) as stream:
+            stream.write(data)
 
     def _sweep(self) -> None:
         """Remove what killed writers left; a young file may belong to a living one."""

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ import pyarrow.parquet as pq
 import schemas
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
+from tacdata.replacement import replacement
 
 HEADER = b"tacdata.prediction"
 UNITS = {"time_ns": "ns", "depth": "mm"}
@@ -81,18 +80,8 @@ def write_prediction(path: Path, prediction: Prediction) -> None:
             "depth": pa.FixedSizeListArray.from_arrays(pa.array(depth.reshape(-1)), pixels_x * pixels_y),
         }
     ).replace_schema_metadata({HEADER: json.dumps(header)})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with replacement(path) as stream:
+        pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
 
 
 def read_prediction(path: Path) -> Prediction:

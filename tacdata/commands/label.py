@@ -32,6 +32,14 @@ def run(
     ] = False,
     load_step: Annotated[float, typer.Option(help="Largest depth step while loading [mm].")] = 0.25,
     unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
+    uncertainty: Annotated[
+        bool,
+        typer.Option(help="Say what the spreads that the sensor file states make of each pixel; costs as much again."),
+    ] = True,
+    tolerance: Annotated[
+        float,
+        typer.Option(min=0.0, help="Add states where maps between them would be off by more [mm], or by 1 %; 0: none."),
+    ] = 0.005,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> None:
     """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
@@ -42,6 +50,7 @@ def run(
     from label_farm.ladder import Ladder
     from label_farm.model import FACTORY
     from label_farm.store import Store
+    from label_farm.tolerance import Tolerance
     from tacdata.recording.reader import read_episode
     from tacdata.recording.session import read_session
     from tacdata.sensor import read_sensor
@@ -51,7 +60,10 @@ def run(
         raise UsageError(f"{session} holds no finished recording", "at least one", "record: `tacdata record`")
     settings = FarmSettings(
         factory=factory or FACTORY,
-        ladder=Ladder(load_step=load_step, unload_step=unload_step),
+        ladder=Ladder(
+            load_step=load_step, unload_step=unload_step, tolerance=Tolerance(least=tolerance) if tolerance else None
+        ),
+        uncertainty=uncertainty,
         workers=workers or cores(),
         redo=redo,
     )
@@ -119,9 +131,8 @@ def _report(summary: Summary, labels: Path, session: Path) -> None:
     if summary.found:
         print(f"presses taken from the store: {summary.found}")
     if summary.seconds:
-        print(
-            f"presses solved: {len(summary.seconds)}, {statistics.median(summary.seconds):.1f} s each, median"
-        )
+        print(f"presses solved: {len(summary.seconds)}, {statistics.median(summary.seconds):.1f} s each, median")
+    _report_margins(summary)
     for episode, reason in sorted(summary.failed.items()):
         print(f"episode {episode}: no label: {reason.splitlines()[0]}")
     print(f"labels lie in {labels}")
@@ -133,3 +144,19 @@ def _report(summary: Summary, labels: Path, session: Path) -> None:
             f"read {labels}/episode-*.failure.json; `tacdata label {session} --redo` tries again",
         )
     print(f"next: tacdata pack {session} --out DATASET")
+
+
+def _report_margins(summary: Summary) -> None:
+    """Say how well the labels are known."""
+    from statistics import median
+
+    margins = summary.margins
+    if not margins:
+        return
+    known = [margin.uncertainty for margin in margins if margin.uncertainty is not None]
+    numerical, between = (median(getattr(margin, name) for margin in margins) for name in ("numerical", "between"))
+    spread = f"± {median(known):.4f} mm" if known else "not known, none stated or asked for"
+    print(f"medians inside contact: numerical error ± {numerical:.4f} mm; by the sensor file's spreads: {spread}")
+    print(f"largest error of a state that is left out: {between:.4f} mm, median of the labels")
+    if 0 < len(known) < len(margins):
+        print(f"{len(margins) - len(known)} labels know of no spread: their provenance says why")

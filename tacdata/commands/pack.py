@@ -17,20 +17,22 @@ def run(
     session: Annotated[Path, typer.Argument(help="Folder of recordings, from `tacdata record`.")],
     out: Annotated[Path, typer.Option(help="Folder of the dataset; must not exist, unless --append.")],
     labels: Annotated[Path | None, typer.Option(help="Folder of labels; without it SESSION/labels.")] = None,
-    append: Annotated[
-        bool, typer.Option("--append", help="Add to the dataset what it does not hold.")
-    ] = False,
-    sensor: Annotated[
-        Path | None, typer.Option(help="Sensor file of the labels, if not the recorded one.")
+    append: Annotated[bool, typer.Option("--append", help="Add to the dataset what it does not hold.")] = False,
+    sensor: Annotated[Path | None, typer.Option(help="Sensor file of the labels, if not the recorded one.")] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(help="Column of the labels to carry along, such as uncertainty (mm a pixel); give it repeatedly."),
     ] = None,
     model: Annotated[str | None, typer.Option(help="Content hash of the skin model to insist on.")] = None,
 ) -> None:
     """Write the recordings and their labels as a LeRobot v3 dataset."""
+    from tacdata.dataset.features import asked_for
     from tacdata.dataset.pack import LabelFiles, pack, refuse_existing
     from tacdata.recording.reader import read_episode
     from tacdata.recording.session import read_session
     from tacdata.sensor import read_sensor
 
+    extra = asked_for(column or [])
     refuse_existing(out, append)
     found = read_session(session)
     files = LabelFiles(labels or session / "labels")
@@ -41,7 +43,7 @@ def run(
     def done(episode, reason: str) -> None:
         print(f"  {episode.path.name}  " + (f"left out: {reason}" if reason else "packed"), flush=True)
 
-    packed = pack(episodes, files, out, append=append, sensor=skin, model=model, done=done)
+    packed = pack(episodes, files, out, append=append, sensor=skin, model=model, extra=extra, done=done)
     for name, _ in packed.left_out:
         why = files.failure(session / name)
         if why:

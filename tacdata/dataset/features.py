@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
+from tacdata.errors import UsageError
+from tacdata.labels import columns
 from tacdata.sensor import Sensor
 
 STATE = "observation.state"
@@ -62,6 +65,12 @@ UNITS = {
 }
 """Unit of every column as `read_dataset` gives it."""
 
+EXTRA = {f"tacdata.{name}": name for name in columns.OPTIONAL}
+"""Columns that a dataset has only where they were asked for -> the label's column that they hold, as float32.
+
+Maps, such as the uncertainty of each pixel, are stored flat, shape (pixels_x * pixels_y,), x slowest: LeRobot would
+take another depth image for a camera."""
+
 DTYPES = {
     STATE: "float32",
     RAW: "float32",
@@ -84,8 +93,31 @@ def short_hash(digest: str) -> int:
     return int(digest[:15], 16)
 
 
-def shapes(sensor: Sensor) -> dict[str, tuple[int, ...]]:
-    """Return the shape of one frame of every own column; scalars are ``()``."""
+def unit(key: str) -> str:
+    """Return the unit of a column as `read_dataset` gives it; "1" of one that is not ours."""
+    return columns.UNITS[EXTRA[key]] if key in EXTRA else UNITS.get(key, "1")
+
+
+def asked_for(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the columns for names that a person gave: those of the label's columns.
+
+    Raises:
+        UsageError: If a label has no such optional column.
+    """
+    keys = {name: key for key, name in EXTRA.items()}
+    for name in names:
+        if name not in keys:
+            raise UsageError(f"no column {name!r} to carry along", ", ".join(keys), "name one of them")
+    return tuple(dict.fromkeys(keys[name] for name in names))
+
+
+def extra_of(described: Iterable[str]) -> tuple[str, ...]:
+    """Return those of some columns that were asked for."""
+    return tuple(key for key in described if key in EXTRA)
+
+
+def shapes(sensor: Sensor, extra: Iterable[str] = ()) -> dict[str, tuple[int, ...]]:
+    """Return the shape of one frame of every own column and of some of `EXTRA`; scalars are ``()``."""
     taxels = (sensor.taxels.count,)
     vectors = {
         STATE: taxels,
@@ -95,12 +127,16 @@ def shapes(sensor: Sensor) -> dict[str, tuple[int, ...]]:
         FORCE: (3,),
         TAXEL_FORCE: taxels,
     }
-    return {key: vectors.get(key, ()) for key in DTYPES}
+    given = {key: columns.shape(EXTRA[key], 1, sensor.map.shape, sensor.taxels.count)[1:] for key in extra}
+    flat = {key: (int(np.prod(shape)),) if shape else () for key, shape in given.items()}
+    return {key: vectors.get(key, ()) for key in DTYPES} | flat
 
 
 def _names(key: str, sensor: Sensor) -> list[str] | None:
-    columns = sensor.taxels.columns
-    taxels = [f"taxel_{k % columns}_{k // columns}" for k in range(sensor.taxels.count)]
+    across = sensor.taxels.columns
+    taxels = [f"taxel_{k % across}_{k // across}" for k in range(sensor.taxels.count)]
+    if key in EXTRA:
+        return taxels if columns.ALL[EXTRA[key]][2] == "taxels" else None
     return {
         STATE: taxels,
         RAW: taxels,
@@ -111,15 +147,15 @@ def _names(key: str, sensor: Sensor) -> list[str] | None:
     }.get(key)
 
 
-def lerobot_features(sensor: Sensor) -> dict[str, dict[str, Any]]:
+def lerobot_features(sensor: Sensor, extra: Iterable[str] = ()) -> dict[str, dict[str, Any]]:
     """Return the ``features`` entry of info.json. Units stand under ``info``, which LeRobot's edits keep."""
     features: dict[str, dict[str, Any]] = {}
-    for key, shape in shapes(sensor).items():
-        info: dict[str, Any] = {"unit": UNITS[key]}
+    for key, shape in shapes(sensor, extra).items():
+        info: dict[str, Any] = {"unit": unit(key)}
         if key == DEPTH:
             shape, info = (*shape, 1), {"is_depth_map": True, "depth_unit": "m", "unit": "m"}
         features[key] = {
-            "dtype": DTYPES[key],
+            "dtype": DTYPES.get(key, "float32"),
             "shape": list(shape or (1,)),
             "names": _names(key, sensor),
             "info": info,
@@ -131,4 +167,5 @@ def lerobot_features(sensor: Sensor) -> dict[str, dict[str, Any]]:
 
 def cast(key: str, values: np.ndarray) -> np.ndarray:
     """Return ``values`` in the column's own type (the depth map as float32)."""
-    return np.ascontiguousarray(values, dtype="float32" if DTYPES[key] == "image" else DTYPES[key])
+    dtype = DTYPES.get(key, "float32")
+    return np.ascontiguousarray(values, dtype="float32" if dtype == "image" else dtype)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ import pyarrow.parquet as pq
 from tacdata import documents
 from tacdata.dataset.statistics import STATISTICS, Statistics, merge
 from tacdata.errors import FormatError, UsageError
+from tacdata.replacement import replacement
 
 CODEBASE_VERSION = "v3.0"
 FILES_PER_CHUNK = 1000
@@ -109,18 +108,8 @@ def read_info(root: Path) -> dict[str, Any]:
 
 def write_parquet(path: Path, table: pa.Table) -> None:
     """Write a Parquet file beside, bring it to the disk, rename it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            pq.write_table(table, stream, compression="snappy", write_page_checksum=True)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with replacement(path) as stream:
+        pq.write_table(table, stream, compression="snappy", write_page_checksum=True)
 
 
 def write_row(root: Path, row: EpisodeRow, stats: dict[str, Statistics], own: dict[str, Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -86,11 +87,16 @@ def valid(episode: Episode) -> np.ndarray:
     return follows & (times >= episode.tip_ns[0]) & (times <= episode.tip_ns[-1])
 
 
-def episode_columns(episode: Episode, label: Label) -> dict[str, np.ndarray]:
+def episode_columns(episode: Episode, label: Label, extra: Iterable[str] = ()) -> dict[str, np.ndarray]:
     """Return the columns that `DatasetWriter.append` takes, for an episode and its label.
 
+    Args:
+        episode: The recording.
+        label: Its label.
+        extra: Which of `features.EXTRA` too.
+
     Raises:
-        FormatError: If the readings cannot be tared.
+        FormatError: If the readings cannot be tared, or the label lacks what is asked for.
     """
     counts = episode.taxels.counts
     return {
@@ -104,7 +110,18 @@ def episode_columns(episode: Episode, label: Label) -> dict[str, np.ndarray]:
         features.TIME: label.time_ns,
         features.PHASE: episode.phase_at(label.time_ns),
         features.VALID: valid(episode),
+        **{key: _extra(label, key) for key in extra},
     }
+
+
+def _extra(label: Label, key: str) -> np.ndarray:
+    values = getattr(label, features.EXTRA[key])
+    if values is None:
+        raise FormatError(
+            f"its label has no {features.EXTRA[key]}", "a label that knows it", "see `tacdata label --help`"
+        )
+    flat = values.reshape(len(values), -1) if values.ndim > 1 else values
+    return flat.astype(np.float32)
 
 
 def episode_record(episode: Episode, label: Label, recording: str, sensor: Sensor) -> EpisodeRecord:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from tacdata import documents, provenance
-from tacdata.dataset import frames
+from tacdata.dataset import features, frames
 from tacdata.dataset.writer import DatasetWriter
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import Label, read_label, table
@@ -37,6 +37,7 @@ def pack(
     append: bool = False,
     sensor: Sensor | None = None,
     model: str | None = None,
+    extra: Sequence[str] = (),
     done: Callable[[Episode, str], None] = lambda episode, reason: None,
 ) -> Packed:
     """Write the labelled episodes as a dataset, one by one; an interruption keeps what is finished.
@@ -51,6 +52,7 @@ def pack(
         append: Add to the dataset if it exists.
         sensor: The sensor that the labels must be made for; None takes each recording's own.
         model: Content hash of the skin model that all labels must be made with; None takes the first label's.
+        extra: Optional columns of the labels (`features.EXTRA`) that the dataset is to have.
         done: Called after each episode with the reason for leaving it out, or "".
 
     Raises:
@@ -74,7 +76,7 @@ def pack(
             )
             if writer is None or writer.sensor != skin:
                 again = out.exists() and (append or writer is not None)
-                writer = DatasetWriter.open(out, skin) if again else DatasetWriter.create(out, skin)
+                writer = (DatasetWriter.open if again else DatasetWriter.create)(out, skin, extra)
             reason = _append(writer, episode, label, recording)
         if reason:
             left_out.append((episode.path.name, reason))
@@ -98,7 +100,8 @@ def _append(writer: DatasetWriter, episode: Episode, label: Label, recording: st
     try:
         record = frames.episode_record(episode, label, recording, writer.sensor)
         task = f"press the skin with {episode.press.indenter_name}"
-        writer.append(frames.episode_columns(episode, label), record, task)
+        extra = features.extra_of(writer.info["features"])
+        writer.append(frames.episode_columns(episode, label, extra), record, task)
     except FormatError as error:
         return error.given
     return ""

@@ -82,7 +82,7 @@ class Dataset:
     @property
     def units(self) -> dict[str, str]:
         """Unit of every column."""
-        return {key: features.UNITS.get(key, "1") for key in self.columns}
+        return {key: features.unit(key) for key in self.columns}
 
     @cached_property
     def sensor(self) -> Sensor:
@@ -165,8 +165,8 @@ def _check_columns(root: Path, info: dict[str, Any]) -> None:
             "a dataset that `tacdata pack` wrote",
             "name such a dataset; others have no labels to train on",
         )
-    for key, unit in features.UNITS.items():
-        stored = "m" if key == features.DEPTH else unit
+    for key in (*features.UNITS, *features.extra_of(info["features"])):
+        stored = "m" if key == features.DEPTH else features.unit(key)
         said = (info["features"][key].get("info") or {}).get("unit", stored)
         if said != stored:
             raise FormatError(

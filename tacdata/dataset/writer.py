@@ -8,6 +8,7 @@ the dataset and is replaced by the next append.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -46,8 +47,8 @@ class DatasetWriter:
     """Whether rows get columns of ours: LeRobot wants the first file's in all, and its edits drop them."""
 
     @classmethod
-    def create(cls, root: Path, sensor: Sensor) -> DatasetWriter:
-        """Start a dataset; its folder is made by the first append.
+    def create(cls, root: Path, sensor: Sensor, extra: Iterable[str] = ()) -> DatasetWriter:
+        """Start a dataset, with some of `features.EXTRA` if asked for; its folder is made by the first append.
 
         Raises:
             UsageError: If the folder exists.
@@ -58,12 +59,17 @@ class DatasetWriter:
                 "a folder that does not exist yet",
                 "name another folder, or append to this dataset",
             )
-        info = folder.empty_info(features.lerobot_features(sensor), sensor.taxels.rate, sensor.name)
+        info = folder.empty_info(features.lerobot_features(sensor, extra), sensor.taxels.rate, sensor.name)
         return cls(root, sensor, info)
 
     @classmethod
-    def open(cls, root: Path, sensor: Sensor) -> DatasetWriter:
+    def open(cls, root: Path, sensor: Sensor, extra: Iterable[str] | None = None) -> DatasetWriter:
         """Open an existing dataset to append episodes of ``sensor`` to it.
+
+        Args:
+            root: The folder.
+            sensor: Whose episodes.
+            extra: Which of `features.EXTRA` it must have; None takes what it has.
 
         Raises:
             UsageError: If there is none.
@@ -72,13 +78,13 @@ class DatasetWriter:
         """
         if not (root / folder.INFO).exists() and (root / metadata.MAIN).exists():
             # The very first append never finished: nothing counts yet.
-            info = folder.empty_info(features.lerobot_features(sensor), sensor.taxels.rate, sensor.name)
-            return cls(root, sensor, info)
+            described = features.lerobot_features(sensor, extra or ())
+            return cls(root, sensor, folder.empty_info(described, sensor.taxels.rate, sensor.name))
         info = folder.read_info(root)
         main = metadata.read_main(root)
         if main is None:
             raise metadata.lost(root)
-        _same_columns(root, info, sensor)
+        _same_columns(root, info, sensor, extra)
         rows = folder.read_rows(root, info)
         if sensor.content_hash not in main["sensors"]:
             metadata.write_main(root, {**main["sensors"], sensor.content_hash: sensor.document}, main["rate"])
@@ -100,8 +106,8 @@ class DatasetWriter:
         """Append one episode and bring it to the disk.
 
         Args:
-            columns: Every column of `features.DTYPES` but the two hashes, frames first, in the units of
-                `features.UNITS`; shapes as `features.shapes`.
+            columns: Every column of `features.DTYPES` but the two hashes, and those of `features.EXTRA` that the
+                dataset has, frames first, in the units of `features.unit`; shapes as `features.shapes`.
             record: Where the episode comes from.
             task: What is done in it, in words.
 
@@ -122,7 +128,7 @@ class DatasetWriter:
                 f"sensor {self.sensor.content_hash[:8]} ({self.sensor.name})",
                 "pack each sensor with a writer of its own",
             )
-        frames = _check(columns, self.sensor, record.recording_file)
+        frames = _check(columns, self.sensor, features.extra_of(self.info["features"]), record.recording_file)
         episode, first = self.info["total_episodes"], self.info["total_frames"]
         tasks = self.tasks if task in self.tasks else [*self.tasks, task]
         whole = {
@@ -207,8 +213,16 @@ def _record_keys(paths: list[Path], info: dict[str, Any]) -> set[int]:
     return found
 
 
-def _same_columns(root: Path, info: dict[str, Any], sensor: Sensor) -> None:
-    for key, feature in features.lerobot_features(sensor).items():
+def _same_columns(root: Path, info: dict[str, Any], sensor: Sensor, extra: Iterable[str] | None) -> None:
+    present = features.extra_of(info["features"])
+    if extra is not None and set(extra) != set(present):
+        raise UsageError(
+            f"{root} holds {', '.join(present) or 'no columns beyond the usual'}, asked for are "
+            f"{', '.join(extra) or 'none'}",
+            "the same columns in all episodes of a dataset",
+            "ask for the columns that it has, or pack into a new folder",
+        )
+    for key, feature in features.lerobot_features(sensor, present).items():
         have = info["features"].get(key, {})
         if (have.get("dtype"), have.get("shape")) != (feature["dtype"], feature["shape"]):
             raise FormatError(
@@ -218,8 +232,8 @@ def _same_columns(root: Path, info: dict[str, Any], sensor: Sensor) -> None:
             )
 
 
-def _check(columns: dict[str, np.ndarray], sensor: Sensor, origin: str) -> int:
-    wanted = {k: v for k, v in features.shapes(sensor).items() if k not in (features.SENSOR, features.RECORD)}
+def _check(columns: dict[str, np.ndarray], sensor: Sensor, extra: tuple[str, ...], origin: str) -> int:
+    wanted = {k: v for k, v in features.shapes(sensor, extra).items() if k not in (features.SENSOR, features.RECORD)}
     if set(columns) != set(wanted):
         difference = sorted(set(columns) ^ set(wanted))
         raise FormatError(

@@ -38,6 +38,15 @@ class PathSolution:
     """Largest penetration of the indenter at a contact point [mm], shape (k,)."""
     provenance: dict[str, Any]
     """What made it: key, sensor, material law, mesh, solver settings, code version, seconds."""
+    uncertainty: np.ndarray | None = None
+    """One standard deviation of ``surface`` by the spreads that the sensor file states [mm], shape (k, pixels_x,
+    pixels_y); None if it states none or none was asked for. So are the three below."""
+    force_uncertainty: np.ndarray | None = None
+    """The same of ``force`` [N], shape (k, 3)."""
+    taxel_force_uncertainty: np.ndarray | None = None
+    """The same of ``taxel_force`` [N], shape (k, taxels)."""
+    taxel_closure_uncertainty: np.ndarray | None = None
+    """The same of ``taxel_closure`` [mm], shape (k, taxels)."""
 
 
 @dataclass(frozen=True)
@@ -66,16 +75,39 @@ class Label:
     """Estimated numerical error of each pixel [mm], shape (n, pixels_x, pixels_y), float16: three digits suffice.
 
     Root sum of squares of the bound on what is lost between states and of the error by the mesh; the spread of
-    material, thickness and registration is not in it."""
+    material, thickness and registration is not in it: that is ``uncertainty``."""
     error: np.ndarray
     """Root mean square of ``error_map`` over the pixels [mm], shape (n,), float32."""
     force_error: np.ndarray
     """Estimated numerical error of ``force``, all components together [N], shape (n,), float32; made up alike."""
     provenance: dict[str, Any]
     """What made it: recording, path solution, sensor, code."""
+    interpolation_error: np.ndarray | None = None
+    """How far, at the pixel where it is most, the states beside each frame lie from what their neighbours say of them
+    [mm], shape (n,), float32. A state is left out at twice the distance, so this bounds what is lost at the frame."""
+    uncertainty: np.ndarray | None = None
+    """One standard deviation of each pixel by the spreads that the sensor file states [mm], shape (n, pixels_x,
+    pixels_y), float16; None where the label knows of none. So are the three below."""
+    force_uncertainty: np.ndarray | None = None
+    """The same of ``force`` [N], shape (n, 3), float32."""
+    taxel_force_uncertainty: np.ndarray | None = None
+    """The same of ``taxel_force`` [N], shape (n, taxels), float32."""
+    taxel_closure_uncertainty: np.ndarray | None = None
+    """The same of ``taxel_closure`` [mm], shape (n, taxels), float32."""
+    taxel_capacitance: np.ndarray | None = None
+    """Capacitance of each taxel that the sensor file's transduction makes of its loads [pF], shape (n, taxels),
+    float32; None if the file says nothing of it."""
+    taxel_counts: np.ndarray | None = None
+    """The readings that go with it [counts], shape (n, taxels), float32: neither rounded nor noisy, not tared."""
 
     @property
     def depth(self) -> np.ndarray:
         """The label proper: the signed map clipped at 0 [mm], shape (n, pixels_x, pixels_y), float32."""
         return np.maximum(self.signed, 0.0)
+
+    @property
+    def dented(self) -> np.ndarray:
+        """Pixels that lie deeper than a tenth of the nominal depth, in frames that touch, shape as `depth`, bool."""
+        nominal = self.tip[:, 2, None, None]
+        return (self.signed > 0.1 * nominal) & (nominal > 0)
 

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,25 @@ def test_lerobot_opens_it_and_gives_the_same_windows(lerobot, packed: Path) -> N
     for frame in (*range(2 * FRAMES), len(ours) - 1):
         equal(ours[frame], theirs[frame])
     same_as_recorded(lerobot.open(packed), range(COUNT))
+
+
+def test_columns_that_were_asked_for_open_and_outlive_an_edit(lerobot, tmp_path: Path) -> None:
+    def knowing(episode):
+        label = example.label(episode)
+        maps = np.random.default_rng(episode.number).random(label.signed.shape).astype(np.float16)
+        return replace(label, uncertainty=maps, interpolation_error=label.error)
+
+    extra = features.asked_for(["uncertainty", "interpolation_error"])
+    pack([example.episode(n, FRAMES) for n in range(2)], knowing, tmp_path / "d", extra=extra)
+    whole = lerobot.open(tmp_path / "d")
+    frame = WindowDataset(tmp_path / "d", {features.STATE: (0,)})[FRAMES + 3]
+    for key in extra:
+        assert torch.equal(frame[key], whole[FRAMES + 3][key]), key
+    fewer = lerobot.tools.delete_episodes(whole, [0], output_dir=tmp_path / "fewer", repo_id="local/fewer")
+    maps = knowing(example.episode(1, FRAMES)).uncertainty.reshape(FRAMES, -1).astype(np.float32)
+    assert np.array_equal(fewer[3]["tacdata.uncertainty"].numpy(), maps[3])
+    kept = read_after_edit(tmp_path / "fewer", tmp_path / "d")
+    assert np.array_equal(kept["tacdata.uncertainty"], maps) and kept.units["tacdata.uncertainty"] == "mm"
 
 
 def test_lerobot_streams_it(lerobot, packed: Path) -> None:

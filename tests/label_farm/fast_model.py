@@ -2,6 +2,7 @@
 
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ class FastModel:
         self.sensor = sensor
         self.remarks = tuple(filter(None, [os.environ.get("FAST_MODEL_REMARK")]))
         self.content_hash = provenance.content_hash(
-            [sensor.content_hash, os.environ.get("FAST_MODEL_VERSION", "1")]
+            [sensor.content_hash, sensor.uncertainty, os.environ.get("FAST_MODEL_VERSION", "1")]
         )
 
     def solve(self, job):
@@ -36,7 +37,20 @@ class FastModel:
             if not mark.exists():
                 mark.touch()
                 os.kill(os.getpid(), 9)
-        return path(self.sensor, job.depths, lambda d: d, job.x, bad=os.environ.get("FAST_MODEL_NAN") == "1")
+        solution = path(self.sensor, job.depths, lambda d: d, job.x, bad=os.environ.get("FAST_MODEL_NAN") == "1")
+        # A tenth of everything for every spread that the sensor states.
+        return with_spread(solution, 0.1 * len(self.sensor.uncertainty)) if self.sensor.uncertainty else solution
+
+
+def with_spread(solution, share):
+    """The path with standard deviations that are a share of its values."""
+    return replace(
+        solution,
+        uncertainty=share * np.abs(solution.surface),
+        force_uncertainty=share * np.abs(solution.force),
+        taxel_force_uncertainty=share * solution.taxel_force,
+        taxel_closure_uncertainty=share * solution.taxel_closure,
+    )
 
 
 def path(sensor, depths, answer, x=0.0, bad=False, numerical=0.0):

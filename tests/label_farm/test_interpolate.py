@@ -10,7 +10,10 @@ from fast_model import path
 from label_farm.interpolate import Branch
 from label_farm.label import make_label
 from label_farm.ladder import Ladder
+from label_farm.margin import Margin
 from label_farm.plan import request
+from tacdata.labels import columns
+from tacdata.transduction import Loads, Transducer
 
 DEPTH = np.linspace(0.0, 1.5, 401)
 CURVES = {
@@ -72,6 +75,75 @@ def test_without_contact_there_is_neither_a_map_nor_a_doubt(tmp_path):
     wish = request(press_episode(tmp_path, depth=-0.2), SENSOR, "0" * 64, Ladder())
     label = make_label(wish, None)
     assert not label.signed.any() and not label.error_map.any() and not label.taxel_area.any()
+
+
+@pytest.mark.parametrize("name", set(CURVES) - {"late contact"})
+@pytest.mark.parametrize("loading", [True, False])
+def test_a_state_left_out_is_missed_by_more_than_what_is_lost_between(name, loading):
+    """At twice the spacing: four times for a smooth curve, hardly more where it is steepest, at first contact."""
+    states = path(SENSOR, Ladder().depths(1.5), CURVES[name])
+    branch = Branch.of(states, "surface", loading)
+    lost = np.abs(branch.at(DEPTH) - Branch.of(path(SENSOR, DEPTH, CURVES[name]), "surface", True).values)
+    bound = branch.left_out_beside(DEPTH)
+    assert (lost.max(axis=1) <= bound + 1e-12).all()
+    assert bound.max() < 0.08 * np.abs(branch.values).max(), "a bound that says nothing"
+
+
+def test_a_state_on_a_straight_path_is_foretold_and_one_on_a_kink_is_not():
+    depth = np.array([0.0, 0.2, 0.5, 1.0])
+    straight = Branch(depth, np.stack([depth, -2 * depth], axis=1))
+    assert straight.left_out().max() < 1e-15
+    kinked = Branch(depth, np.maximum(depth - 0.2, 0.0)[:, None])
+    assert kinked.left_out()[1, 0] > 0.05
+    alone = Branch(np.array([0.0, 1.0]), np.array([[0.0], [0.7]]))
+    assert alone.left_out().tolist() == [[0.7], [0.7]], "nothing foretells it"
+
+
+def test_frames_that_do_not_touch_are_exactly_zero_and_others_are_not(tmp_path):
+    episode = press_episode(tmp_path, depth=1.0, frames=300)
+    wish = request(episode, SENSOR, "0" * 64, Ladder())
+    states = path(SENSOR, wish.job.depths, lambda d: d**1.5, numerical=0.02)
+    spread = {"uncertainty": 0.1 * states.surface, "force_uncertainty": 0.1 * np.abs(states.force)}
+    label = make_label(wish, replace(states, **spread))
+    apart = wish.tip[:, 2] <= 0
+    assert 50 < apart.sum() < 250
+    rest = SENSOR.transduction.offset[0]
+    for name in columns.present(label):
+        values = getattr(label, name)[apart]
+        if name not in ("time_ns", "tip", "taxel_capacitance"):
+            assert (values == (rest if name == "taxel_counts" else 0)).all(), name
+            assert getattr(label, name)[~apart].any(), name
+    assert len(np.unique(label.taxel_capacitance[apart])) == 1
+
+
+def test_standard_deviations_follow_the_frames(tmp_path):
+    episode = press_episode(tmp_path, depth=1.0, frames=200)
+    wish = request(episode, SENSOR, "0" * 64, Ladder())
+    states = path(SENSOR, wish.job.depths, lambda d: d)
+    label = make_label(wish, replace(states, uncertainty=0.1 * states.surface))
+    np.testing.assert_allclose(label.uncertainty, 0.1 * label.signed, rtol=6e-4, atol=1e-6)
+    assert label.uncertainty.dtype == np.float16 and label.force_uncertainty is None
+    margin = Margin.of(label)
+    dented = label.signed > 0.1 * np.maximum(wish.tip[:, 2], 1e-9)[:, None, None]
+    assert margin.uncertainty == pytest.approx(np.median(0.1 * label.signed[dented]), rel=1e-2)
+    assert margin.between < 1e-9
+    assert Margin.of(make_label(wish, states)).uncertainty is None
+
+
+def test_a_label_says_what_the_taxels_would_read(tmp_path):
+    wish = request(press_episode(tmp_path, depth=1.0, frames=200), SENSOR, "0" * 64, Ladder())
+    states = path(SENSOR, wish.job.depths, lambda d: 0.05 * d**1.5)
+    label = make_label(wish, states)
+    loads = Loads(*(getattr(label, name).astype(float) for name in ("taxel_force", "taxel_closure", "taxel_area")))
+    expected = Transducer.of(SENSOR).read(loads)
+    np.testing.assert_allclose(label.taxel_counts, expected.counts, rtol=1e-6)
+    np.testing.assert_allclose(label.taxel_capacitance, expected.capacitance, rtol=1e-6)
+    assert np.ptp(label.taxel_counts) > 10
+    assert label.provenance["parents"]["transduction"] == SENSOR.transduction.content_hash
+    assert label.provenance["parameters"]["transduction"] == SENSOR.transduction.document
+    silent = replace(wish, sensor=replace(SENSOR, transduction=None))
+    label = make_label(silent, states)
+    assert label.taxel_counts is None and "transduction" not in label.provenance["parents"]
 
 
 def test_finer_steps_shrink_the_bound_at_second_order():

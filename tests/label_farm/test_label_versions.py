@@ -47,6 +47,37 @@ def test_labels_of_another_model_version_are_not_touched_unless_asked(
     assert len(solves()) == 2
 
 
+def test_labels_say_what_the_spreads_make_of_them_unless_told_not_to(tmp_path, label_all, solves):
+    episodes = [press_episode(tmp_path, 0), press_episode(tmp_path, 1, depth=-0.4)]
+    one = replace(SENSOR, uncertainty={"thickness": 0.2})
+    summary = label_all(episodes, sensor=one)
+    label = read_label(tmp_path / "labels" / "episode-000000.parquet")
+    np.testing.assert_allclose(label.uncertainty, 0.1 * label.signed, rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(label.force_uncertainty, 0.1 * np.abs(label.force), rtol=1e-5, atol=1e-9)
+    assert [margin.uncertainty for margin in summary.margins] == [pytest.approx(0.05, abs=0.03)]
+    apart = read_label(tmp_path / "labels" / "episode-000001.parquet")
+    assert apart.uncertainty.shape == apart.signed.shape and not apart.uncertainty.any()
+    with pytest.raises(UsageError, match="from another model version"):
+        label_all(episodes, sensor=replace(one, uncertainty={"thickness": 0.1}))
+    assert label_all(episodes, sensor=one, uncertainty=False, redo=True).written == [1, 0]
+    plain = read_label(tmp_path / "labels" / "episode-000000.parquet")
+    assert plain.uncertainty is None and np.array_equal(plain.signed, label.signed)
+    assert label_all(episodes, sensor=one, redo=True).found == 1 and len(solves()) == 2
+
+
+def test_other_transduction_changes_the_readings_without_a_solve(tmp_path, label_all, solves):
+    episode = press_episode(tmp_path)
+    label_all([episode])
+    path = tmp_path / "labels" / "episode-000000.parquet"
+    before = read_label(path)
+    louder = replace(SENSOR, transduction=replace(SENSOR.transduction, gain=(20_000.0,)))
+    assert label_all([episode], sensor=louder).written == [0] and len(solves()) == 1
+    after = read_label(path)
+    rest = SENSOR.transduction.offset[0]
+    np.testing.assert_allclose(after.taxel_counts - rest, 2 * (before.taxel_counts - rest), rtol=1e-3, atol=1e-2)
+    assert np.array_equal(after.signed, before.signed)
+
+
 def test_a_label_of_an_older_format_is_not_replaced_unasked(tmp_path, label_all):
     episode = press_episode(tmp_path)
     label_all([episode])

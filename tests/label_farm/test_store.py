@@ -54,6 +54,20 @@ def test_a_solution_comes_back_bit_for_bit(tmp_path):
     assert store.path(JOB.key) == tmp_path / "store" / JOB.key[:2] / f"{JOB.key}.npz"
 
 
+def test_standard_deviations_come_back_where_they_are_known(tmp_path):
+    store = Store(tmp_path / "store")
+    known = replace(
+        SOLUTION, uncertainty=0.1 * SOLUTION.surface, force_uncertainty=np.abs(SOLUTION.force),
+        taxel_force_uncertainty=SOLUTION.taxel_force, taxel_closure_uncertainty=SOLUTION.taxel_closure,
+    )
+    store.put(JOB, known, SENSOR)
+    found = Store(tmp_path / "store").get(JOB)
+    for name in solution_file.OPTIONAL:
+        assert np.array_equal(getattr(found, name), getattr(known, name))
+    store.put(JOB, SOLUTION, SENSOR)
+    assert store.get(JOB).uncertainty is None
+
+
 def test_any_tool_can_read_a_result_without_pickle(tmp_path):
     store = Store(tmp_path / "store")
     store.put(JOB, SOLUTION, SENSOR)
@@ -121,6 +135,8 @@ def test_a_header_that_contradicts_its_arrays_is_damage(tmp_path):
     [
         ({"surface": np.full_like(SOLUTION.surface, np.nan)}, "finite"),
         ({"surface": SOLUTION.surface[:, :-1]}, "shape"),
+        ({"uncertainty": SOLUTION.surface * np.nan}, "returned uncertainty"),
+        ({"force_uncertainty": SOLUTION.force[:, :2]}, "returned force_uncertainty"),
         ({"depth": np.array([0.0, 0.3, 0.9, 0.4, 0.0])}, "path from 0 to 1 mm"),
         ({"depth": np.array([0.0, 1.0, 0.5, 0.7, 0.0])}, "path from 0"),
         ({"depth": np.array([0.1, 0.3, 1.0, 0.4, 0.0])}, "path from 0"),

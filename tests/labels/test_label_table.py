@@ -10,9 +10,9 @@ import pytest
 import schemas
 from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
-from tacdata.labels import Label, read_label, table, write_label
+from tacdata.labels import Label, columns, read_label, table, write_label
 
-ARRAYS = tuple(table.COLUMNS)
+ARRAYS = tuple(columns.ALL)
 
 
 def example(frames: int = 7, **changes) -> Label:
@@ -34,8 +34,18 @@ def example(frames: int = 7, **changes) -> Label:
     return Label(**{**values, **changes})
 
 
+def whole(frames: int = 7, **changes) -> Label:
+    """The same with everything that a label may know."""
+    random = np.random.default_rng(4)
+    known = {
+        name: random.random(columns.shape(name, frames, (35, 26), 24)).astype(columns.DTYPES[name])
+        for name in columns.OPTIONAL
+    }
+    return example(frames, **{**known, **changes})
+
+
 def test_round_trip_is_exact(tmp_path: Path) -> None:
-    label = example(
+    label = whole(
         signed=np.nextafter(np.float32(0.1), np.float32(1), dtype=np.float32)
         * np.ones((7, 35, 26), np.float32)
     )
@@ -48,6 +58,23 @@ def test_round_trip_is_exact(tmp_path: Path) -> None:
     assert back.episode == 4
     assert back.depth.min() >= 0
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["label.parquet"]
+
+
+def test_a_label_that_knows_no_more_has_no_column_for_it(tmp_path: Path) -> None:
+    write_label(tmp_path / "l.parquet", example(taxel_counts=np.ones((7, 24), np.float32)))
+    back = read_label(tmp_path / "l.parquet")
+    assert back.uncertainty is None and back.taxel_counts is not None and back.taxel_counts.sum() == 7 * 24
+    assert set(pq.read_schema(tmp_path / "l.parquet").names) == {*columns.REQUIRED, "taxel_counts"}
+
+
+def test_a_label_of_format_2_0_is_still_read(tmp_path: Path) -> None:
+    path = tmp_path / "l.parquet"
+    write_label(path, example())
+    content = pq.read_table(path)
+    header = json.loads(content.schema.metadata[table.HEADER])
+    header["version"] = "2.0"
+    pq.write_table(content.replace_schema_metadata({table.HEADER: json.dumps(header)}), path)
+    assert read_label(path).interpolation_error is None
 
 
 def test_header_says_units_and_is_checked(tmp_path: Path) -> None:
@@ -67,6 +94,10 @@ def test_header_says_units_and_is_checked(tmp_path: Path) -> None:
         ({"error_map": np.full((7, 35, 25), 0.01, np.float16)}, "one error a pixel"),
         ({"taxel_area": np.zeros((7, 23), np.float32)}, "same number of taxels"),
         ({"force_error": np.zeros((7, 1), np.float32)}, "label.force_error"),
+        ({"uncertainty": np.full((7, 35, 26), np.inf, np.float16)}, "uncertainty holds values that are not finite"),
+        ({"uncertainty": np.zeros((7, 26, 35), np.float16)}, "one error a pixel"),
+        ({"taxel_counts": np.zeros((7, 23), np.float32)}, "same number of taxels"),
+        ({"interpolation_error": np.zeros((6,), np.float32)}, "label.interpolation_error"),
         ({"provenance": {"made_by": "hand"}}, "code_version"),
     ],
 )
@@ -88,16 +119,16 @@ def test_no_file(tmp_path: Path) -> None:
 def test_damaged_and_foreign_files(tmp_path: Path) -> None:
     path = tmp_path / "l.parquet"
     write_label(path, example())
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
     with pytest.raises(FormatError, match="damaged"):
         read_label(path)
-    flipped = bytearray(whole)
-    flipped[len(whole) // 2] ^= 0xFF
+    flipped = bytearray(content)
+    flipped[len(content) // 2] ^= 0xFF
     path.write_bytes(bytes(flipped))
     with pytest.raises(FormatError, match="damaged"):
         read_label(path)
-    pq.write_table(pq.read_table(_saved(path, whole)).replace_schema_metadata({}), path)
+    pq.write_table(pq.read_table(_saved(path, content)).replace_schema_metadata({}), path)
     with pytest.raises(FormatError, match=r"no key tacdata\.label"):
         read_label(path)
 

@@ -1,0 +1,115 @@
+"""Standard deviations of a whole path: whose mesh, which branch, and what happens where derivatives are of no use."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from skin_examples import box_mesh, slab_sensor
+
+from tacdata.errors import SolveError, UsageError
+from tacdata.indenters.sphere import Sphere
+from tacdata.sensor import default_sensor
+from tacdata.skin import path_uncertainty
+from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.skin.path_uncertainty import check_spreads, spreads_of, with_uncertainty
+from tacdata.skin.press import PressRequest
+from tacdata.skin.uncertainty import uncertainties
+
+SIZES = {"indenter/radius": 0.01, "indenter/length": 1.0}
+SPREADS = {"x": 0.05, "z": 0.02, "youngs_modulus": 0.03, "friction": 0.05, **SIZES}
+PRESS = PressRequest(Sphere(2.0), 0.13, -0.21, 0.0, (0.0, 0.15, 0.4, 0.25, 0.0))
+
+
+@pytest.fixture(scope="module")
+def skin():
+    sensor = replace(slab_sensor(size=4.0, pixels=9), uncertainty=SPREADS)
+    settings = ModelSettings(error_estimate=False, step=0.45)
+    return SkinModel(sensor, settings, mesh=box_mesh(sensor, 6, 6, 2), companion=box_mesh(sensor, 5, 5, 2))
+
+
+@pytest.fixture(scope="module")
+def solved(skin):
+    return skin.solve(PRESS)
+
+
+def test_a_press_takes_the_spreads_that_it_has(skin):
+    assert set(spreads_of(skin.sensor, PRESS.indenter)) == {"x", "z", "youngs_modulus", "indenter/radius"}
+    rough = replace(skin.sensor, contact=replace(skin.sensor.contact, friction=0.2), uncertainty={**SPREADS, "z": 0.0})
+    assert set(spreads_of(rough, PRESS.indenter)) == {"x", "youngs_modulus", "friction", "indenter/radius"}
+    check_spreads(skin.sensor, PRESS.indenter)
+    with pytest.raises(UsageError, match="uncertainty of glue") as refusal:
+        check_spreads(replace(rough, uncertainty={"glue": 0.1}), PRESS.indenter)
+    assert "thickness" in refusal.value.allowed
+
+
+def test_all_states_get_the_companions_loading_branch(skin, solved):
+    known = with_uncertainty(skin, PRESS, solved)
+    assert np.array_equal(known.surface, solved.surface)
+    spreads = spreads_of(skin.sensor, PRESS.indenter)
+    first, second = (u for _, _, u in uncertainties(skin.companion, replace(PRESS, depths=(0.15, 0.4)), spreads))
+    np.testing.assert_allclose(known.uncertainty[1], first.surface, rtol=1e-4, atol=1e-7)
+    np.testing.assert_allclose(known.uncertainty[2], second.surface, rtol=1e-4, atol=1e-7)
+    np.testing.assert_allclose(known.force_uncertainty[3], 0.6 * first.force + 0.4 * second.force, rtol=1e-4, atol=1e-7)
+    assert not known.uncertainty[0].any() and not known.uncertainty[-1].any() and not known.force_uncertainty[-1].any()
+    assert 0.018 < known.uncertainty[2].max() < 0.04, "under the tip at least the spread of the height"
+    said = known.provenance["uncertainty"]
+    assert said["mesh"] == skin.companion.mesh.content_hash and said["method"] == "first_order"
+    assert said["spreads"] == spreads and said["units"]["youngs_modulus"] == "MPa"
+
+
+def test_the_companions_spread_is_nearly_the_meshs_own(skin, solved):
+    known = with_uncertainty(skin, PRESS, solved)
+    [(_, _, own)] = uncertainties(skin, replace(PRESS, depths=(0.4,)), spreads_of(skin.sensor, PRESS.indenter))
+    difference = np.sqrt(((known.uncertainty[2] - own.surface) ** 2).mean() / (own.surface**2).mean())
+    assert 0 < difference < 0.25
+    assert known.force_uncertainty[2, 2] == pytest.approx(own.force[2], rel=0.1)
+
+
+def test_without_spreads_or_contact_nothing_is_said(skin, solved):
+    blank = replace(solved)
+    silent = SkinModel(replace(skin.sensor, uncertainty={}), skin.settings, mesh=skin.mesh)
+    assert with_uncertainty(silent, PRESS, blank).uncertainty is None
+    apart = with_uncertainty(skin, replace(PRESS, depths=(0.0,)), blank)
+    assert apart.uncertainty is None and apart.provenance["uncertainty"]["remark"] == "no contact"
+
+
+def test_derivatives_steeper_than_the_shape_give_way_to_whole_presses(skin, solved, monkeypatch):
+    monkeypatch.setattr(path_uncertainty, "_STEEPER", 0.5)
+    drawn = with_uncertainty(skin, PRESS, solved)
+    monkeypatch.undo()
+    said = drawn.provenance["uncertainty"]
+    assert said["method"] == "sampled" and said["remark"].count("mm a mm of") == 2
+    assert said["mesh"] == skin.companion.mesh.content_hash
+    first = with_uncertainty(skin, PRESS, solved)
+    assert drawn.force_uncertainty[2, 2] == pytest.approx(first.force_uncertainty[2, 2], rel=0.6)
+    assert drawn.uncertainty[2].mean() == pytest.approx(first.uncertainty[2].mean(), rel=0.6)
+
+
+def test_what_is_not_found_is_said_and_the_path_kept(skin, solved, monkeypatch):
+    def fails(*_, **__):
+        raise SolveError("the linear solve stalls", "a residual", "none")
+
+    monkeypatch.setattr(path_uncertainty, "sensitivities", fails)
+    monkeypatch.setattr(path_uncertainty, "sampled_spread", fails)
+    kept = with_uncertainty(skin, PRESS, solved)
+    assert kept.uncertainty is None and np.array_equal(kept.surface, solved.surface)
+    assert kept.provenance["uncertainty"]["remark"].count("the linear solve stalls") == 3
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_on_the_default_skin_mesh_and_branch_matter_little():
+    """As the module's docstring says: `pytest -m slow -s -k matter_little` prints them."""
+    skin = SkinModel(default_sensor())
+    press = PressRequest(Sphere(3.0), 1.1, -0.7, 0.0, (0.25, 0.5, 0.25))
+    spreads = spreads_of(skin.sensor, press.indenter)
+    coarse, fine = (list(uncertainties(model, press, spreads)) for model in (skin.companion, skin))
+
+    def differ(one, other):
+        return np.sqrt(((one.surface - other.surface) ** 2).mean() / (other.surface**2).mean())
+
+    meshes = [differ(a[2], b[2]) for a, b in zip(coarse, fine, strict=True)]
+    forces = [a[2].force[2] / b[2].force[2] - 1 for a, b in zip(coarse, fine, strict=True)]
+    branch = differ(coarse[0][2], coarse[2][2])
+    print(f"\nmeshes {np.round(meshes, 3)}, forces {np.round(forces, 3)}, branch {branch:.3f}")
+    assert max(meshes) < 0.25 and np.abs(forces).max() < 0.1 and branch < 0.1
