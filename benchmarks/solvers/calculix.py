@@ -36,6 +36,8 @@ class CalculiX(Peer):
         if case.sensor.material.law != "neo_hookean":
             raise PeerError(f"law {case.sensor.material.law}: only neo_hookean is written for CalculiX")
         folder.mkdir(parents=True, exist_ok=True)
+        if case.request.tilt_x or case.request.tilt_y or case.sensor.skin.curved:
+            raise PeerError("tilted indenters and curved pads are not written in the deck (solvers/calculix_deck.py)")
         depths = [d for d in case.request.depths if d > 0]
         (folder / "press.inp").write_text("\n".join(self._deck(case, mesh, depths)) + "\n")
         (folder / "press.dat").unlink(missing_ok=True)
@@ -70,7 +72,7 @@ class CalculiX(Peer):
         lines = deck.skin(mesh)
         next_node, next_element = len(mesh.nodes) + 1, len(mesh.tets) + 1
         plates = {
-            t: deck.board_plate(center, 0.9, -case.sensor.skin.protrusion_radius)
+            t: deck.board_plate(center, 0.9, -case.sensor.skin.protrusion_tip)
             for t, center in _plates(case, mesh).items()
         }
         bodies = {"TIP": deck.shell(deck.indenter_grid(case, self.indenter_spacing), 0.5)}

@@ -13,6 +13,8 @@ from solvers.peer import ALONE, Answer, Peer, PeerError, outer_face, run_alone, 
 
 from tacdata.skin.case import Case
 from tacdata.skin.mesh import SkinMesh
+from tacdata.skin.raster import OuterFace
+from tacdata.skin.touch import rotation, touch
 
 PYTHON = "/usr/bin/python3"
 
@@ -38,6 +40,9 @@ class GetFEM(Peer):
     """Quadrature with "penalty", outer face and board: the 6 points of degree 4, and those on 4 sub-triangles."""
     step: float = 0.25
     """Longest load step [mm]."""
+    hydro: str = ""
+    """Finite element of a pressure of its own (mixed form, which does not lock), such as "FEM_PK(3,1)", Taylor and
+    Hood's; empty for displacements alone."""
     residual: float = 1e-9
     """Largest out-of-balance nodal force [N] at which Newton's method stops."""
     limit: float = 3600.0
@@ -65,7 +70,7 @@ class GetFEM(Peer):
             taxel=mesh.protrusion_taxel,
             fixed=mesh.fixed(case.sensor.contact.bonded),
         )
-        files[1].write_text(json.dumps(self._press(case), indent=1) + "\n")
+        files[1].write_text(json.dumps(self._press(case, mesh), indent=1) + "\n")
         run_alone([PYTHON, str(ALONE / "getfem_press.py"), *map(str, files)], folder, self.limit)
         with np.load(files[2], allow_pickle=False) as found:
             top, triangles = outer_face(mesh)
@@ -83,9 +88,10 @@ class GetFEM(Peer):
                 int(found["dofs"]),
             )
 
-    def _press(self, case: Case) -> dict:
+    def _press(self, case: Case, mesh: SkinMesh) -> dict:
         sensor, request = case.sensor, case.request
-        law, shape = gwfl.LAWS.get(sensor.material.law), gwfl.shape(request.indenter)
+        laws = gwfl.MIXED_LAWS if self.hydro else gwfl.LAWS
+        law, shape = laws.get(sensor.material.law), gwfl.shape(request.indenter)
         if law is None or shape is None:
             what = f"law {sensor.material.law}" if law is None else f"shape {request.indenter.shape}"
             raise PeerError(f"{what} is not written in GWFL (benchmarks/solvers/gwfl.py)")
@@ -100,15 +106,16 @@ class GetFEM(Peer):
         }
         return {
             "law": law,
+            "hydro": self.hydro,
             "constants": {**gwfl.constants(sensor.material), **numbers},
             "shape": shape[0],
             "edge": shape[1],
-            "tip": [request.x, request.y, sensor.skin.thickness],
-            "yaw": float(np.radians(request.yaw)),
+            "tip": touch(sensor, OuterFace(mesh), request).tolist(),
+            "turn": rotation(request).tolist(),
             "depths": [d for d in request.depths if d > 0],
             "step": self.step,
             "friction": sensor.contact.friction,
-            "board": -sensor.skin.protrusion_radius if sensor.contact.board else None,
+            "board": -sensor.skin.protrusion_tip if sensor.contact.board else None,
             "contact": self.contact,
             "volume_rule": self.volume_rule,
             "surface_rule": rules[0],

@@ -19,6 +19,8 @@ import numpy as np
 
 from tacdata.skin.case import Case
 from tacdata.skin.mesh import SkinMesh
+from tacdata.skin.raster import OuterFace
+from tacdata.skin.touch import rotation, touch
 
 ALONE = Path(__file__).parent / "alone"
 """Scripts that run in a process, often an interpreter, of their own."""
@@ -131,10 +133,9 @@ def within_reach(case: Case, mesh: SkinMesh) -> np.ndarray:
     still flat; the face bulges by less than that beside the contact.
     """
     request = case.request
-    c, s = np.cos(np.radians(request.yaw)), np.sin(np.radians(request.yaw))
-    dx, dy = mesh.nodes[:, 0] - request.x, mesh.nodes[:, 1] - request.y
-    height = request.indenter.profile(c * dx + s * dy, -s * dx + c * dy)
-    return np.any((height < max(request.depths) + 0.3)[mesh.outer], axis=1)
+    origin = touch(case.sensor, OuterFace(mesh), request) - [0.0, 0.0, max(request.depths)]
+    x, y, z = ((mesh.nodes - origin) @ rotation(request)).T
+    return np.any((request.indenter.profile(x, y) < z + 0.3)[mesh.outer], axis=1)
 
 
 def main_interpreter() -> str:

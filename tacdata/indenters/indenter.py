@@ -88,6 +88,12 @@ class Indenter(ABC):
         """How far the zero of the distance function may lie from the shape [mm]; next to nothing for closed forms."""
         return 1e-7
 
+    @property
+    def sharpest(self) -> float:
+        """The smallest radius of curvature that a skin may meet [mm]: by default the shape's smallest length."""
+        lengths = [value for name, value in asdict(self).items() if "angle" not in name]
+        return min(float(value) for value in lengths if isinstance(value, int | float))
+
     @classmethod
     def complete(cls, values: dict[str, Any], origin: str, folder: Path | None) -> dict[str, Any]:
         """Return a document's parameters with those filled in that follow from the others; a hook for shapes in files.

@@ -100,6 +100,11 @@ class Mesh(Indenter):
         return 2e-3
 
     @property
+    def sharpest(self) -> float:
+        """Three tenths of a millimetre: a file does not tell, and finer edges than about this its grid rounds."""
+        return 0.3
+
+    @property
     def parameters(self) -> tuple[float, ...]:
         """The address of the distance on the CPU, in two numbers."""
         return self.device_parameters("cpu")

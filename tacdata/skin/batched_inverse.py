@@ -7,24 +7,6 @@ import torch
 _BLOCK = 64
 
 
-def contact_transfer(stiffness: torch.Tensor, compliance: torch.Tensor) -> torch.Tensor:
-    """Return (I + S G)^-1 S, what contact forces answer to displacements of the free body, shape (b, m, m).
-
-    Args:
-        stiffness: S [N/mm], symmetric, positive semidefinite, shape (b, m, m), float32.
-        compliance: G [mm/N], symmetric, positive definite, shape (b, m, m), float32.
-    """
-    if stiffness.device.type == "cpu":
-        # In double precision: I + S G is badly conditioned where a trial state lies deep in the shape.
-        stiff = stiffness.double()
-        system = stiff @ compliance.double()
-        system.diagonal(dim1=1, dim2=2).add_(1.0)
-        return torch.linalg.solve_ex(system, stiff)[0].to(stiffness.dtype)
-    # P - P (P + S)^-1 P with P = G^-1: all that is inverted is symmetric and positive, so no pivoting is needed.
-    held = inverse(compliance)
-    return torch.baddbmm(held, held, inverse(held + stiffness) @ held, alpha=-1.0)
-
-
 def inverse(matrices: torch.Tensor) -> torch.Tensor:
     """Return the inverses of symmetric positive definite matrices, shape (b, m, m).
 

@@ -50,13 +50,15 @@ def read_case(path: Path) -> Case:
     request = PressRequest(
         from_document(document["indenter"], f"{path}: indenter", path.parent), float(document.get("x", 0.0)),
         float(document.get("y", 0.0)), float(document.get("yaw", 0.0)), tuple(float(d) for d in document["depths"]),
+        float(document.get("tilt_x", 0.0)), float(document.get("tilt_y", 0.0)),
     )
     mesh = mesh_for(sensor, request)
     if "mesh" in document:
         given = dict(document["mesh"])
         mesh = MeshSettings(**{**given, "focus": tuple(given["focus"]) if "focus" in given else None})
     # The estimate is made apart from the states, so that their times are their own.
-    settings = ModelSettings(mesh=mesh, error_estimate=False)
+    pointwise = document.get("volumes") == "points"
+    settings = ModelSettings(mesh=mesh, error_estimate=False, averaged_from=0.5 if pointwise else 0.0)
     return Case(document["name"], sensor, request, settings, document, document.get("error_estimate", True))
 
 

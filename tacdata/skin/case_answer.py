@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 import schemas
 from tacdata import provenance
 from tacdata.sensor import Sensor
+from tacdata.skin import fineness
 from tacdata.skin.mesh import quality
 from tacdata.skin.meshing.true_volume import volume_error
 from tacdata.skin.model import ModelSettings, SkinModel
@@ -67,6 +68,8 @@ class CaseAnswer:
             "remarks": [*self.model.remarks, *(self.readings.remarks if self.readings else ())],
             "provenance": stamp,
         }
+        if blunt := fineness.remark(self.model.mesh, self.model.sensor, self.request):
+            document["remarks"].append(blunt)
         if self.error is not None:
             document["error_seconds"] = round(self.error_seconds, 3)
             if self.error.remark:

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 import warp as wp
 
+from tacdata.skin.averaged_volume import AveragedVolume
 from tacdata.skin.conditions import Conditions
 from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
@@ -136,14 +137,15 @@ def _kernels(law_name: str, real: type) -> SimpleNamespace:
 class Elasticity:
     """The elastic body: a mesh and a law on one device; elastic constants and thickness are each member's own."""
 
-    def __init__(self, mesh: SkinMesh, law: str, device: str = "cpu") -> None:
-        """Place the mesh on ``device`` ("cpu" or "cuda:0")."""
+    def __init__(self, mesh: SkinMesh, law: str, device: str = "cpu", averaged: bool = False) -> None:
+        """Place the mesh on ``device`` ("cpu" or "cuda:0"); ``averaged``: see `tacdata.skin.averaged_volume`."""
         slopes, weights = mesh.shape_gradients()
         self.device, self.mesh, self.law = device, mesh, law
         self._tets = wp.array(mesh.tets, dtype=wp.int32, device=device)
         # Elements of the slab stretch with its thickness; protrusions below z = 0 keep their size.
         slab = mesh.nodes[mesh.tets[:, :4], 2].mean(axis=1) > 0
         self._slab = wp.array(slab.astype(np.int32), dtype=wp.int32, device=device)
+        self._averaged = AveragedVolume(mesh, law, slab, device) if averaged else None
         self._geometry = {
             dtype: (wp.array(slopes, dtype=real, device=device), wp.array(weights, dtype=real, device=device))
             for dtype, real in REAL.items()
@@ -154,6 +156,8 @@ class Elasticity:
         force = torch.zeros_like(u)
         ratio = torch.full((u.shape[2],), torch.inf, dtype=u.dtype, device=u.device)
         self._launch("internal_force", u, (), conditions, force, ratio)
+        if self._averaged:
+            self._averaged.add_force(u, conditions, force)
         return force, ratio
 
     def tangent_product(
@@ -161,11 +165,15 @@ class Elasticity:
     ) -> None:
         """Add K(u) p [N] to ``product``; all of shape (n, 3, b) and of one precision."""
         self._launch("tangent_product", u, (p,), conditions, product)
+        if self._averaged:
+            self._averaged.add_product(u, p, conditions, product)
 
     def energy(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor:
         """Return the strain energy [N mm], shape (b,)."""
         total = torch.zeros(u.shape[2], dtype=u.dtype, device=u.device)
         self._launch("energy", u, (), conditions, total)
+        if self._averaged:
+            self._averaged.add_energy(u, conditions, total)
         return total
 
     def _launch(

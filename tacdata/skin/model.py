@@ -16,21 +16,23 @@ from tacdata import provenance
 from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
+from tacdata.skin import fineness
 from tacdata.skin.batch import Batch, Members, Press
 from tacdata.skin.companion import CoarsePress, blind_spot, companion_mesh, edge_ratio, press_coarsely
 from tacdata.skin.conditions import conditions
 from tacdata.skin.contact import Contact, board_distance
 from tacdata.skin.elasticity import Elasticity
+from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
 from tacdata.skin.mesher import MeshSettings, build_mesh
 from tacdata.skin.newton import Newton, SolverSettings
 from tacdata.skin.numerical_error import Figures, NumericalError, estimate
-from tacdata.skin.pose import turned
 from tacdata.skin.press import PressRequest
 from tacdata.skin.raster import OuterFace
 from tacdata.skin.rest import RestSolver, rest_solver
 from tacdata.skin.stable_strain import StableStrain
 from tacdata.skin.state import Gauge, State
+from tacdata.skin.touch import reach, rotation, touch
 from tacdata.skin.walk import Walk
 from tacdata.skin.woodbury import ContactPreconditioner
 
@@ -40,6 +42,13 @@ _ROWS = ("surface", "taxel_force", "taxel_closure", "force", "residual", "penetr
 _TIP = 0.4
 """Height of a protrusion's tip region, over its radius, that the preconditioner knows as possible contact [1]. Contact
 beyond costs iterations, not accuracy."""
+
+
+_FIRST = 0.3
+"""Longest first load step over the smallest radius of curvature of the shape [1]."""
+
+_NEARLY_INCOMPRESSIBLE = 0.495
+"""Poisson's ratio from which on the sparse preconditioner knows of averaged volume changes [1]."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +63,9 @@ class ModelSettings:
     """Tangential stiffness of sticking points over Young's modulus [1/mm]."""
     step: float = 0.25
     """Longest load step [mm]."""
+    averaged_from: float = 0.0
+    """Poisson's ratio from which on volume changes are averaged at the corners (`tacdata.skin.averaged_volume`) [1]:
+    0 always, 0.5 never. Laws whose volumetric part is no term of its own take them at the points in any case."""
     error_estimate: bool = True
     """Whether `SkinModel.solve` also presses a coarser mesh, to say how far the mesh leaves the result off."""
 
@@ -86,7 +98,9 @@ class SkinModel:
             raise SolveError(
                 "no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file"
             )
-        self._body = Elasticity(self.mesh, sensor.material.law, device)
+        near = sensor.material.poisson_ratio >= self.settings.averaged_from
+        self._averaged = near and load_law(sensor.material.law).splits_volume
+        self._body = Elasticity(self.mesh, sensor.material.law, device, self._averaged)
         self._outer = torch.as_tensor(self.mesh.outer, device=device)
         self._bumps = torch.as_tensor(self.mesh.protrusions, device=device)
         self._on_board = sensor.contact.board and len(self._bumps) > 0
@@ -111,7 +125,10 @@ class SkinModel:
 
     @cached_property
     def _rest(self) -> RestSolver:
-        return rest_solver(self.mesh, self.sensor.material, self._fixed, self._loadable, self.device)
+        # The averaged one costs several times the fill of a sparse factor, and pays where the other is far too stiff.
+        dense, nu = self.device != "cpu", self.sensor.material.poisson_ratio
+        known = self._averaged and (dense or nu >= _NEARLY_INCOMPRESSIBLE)
+        return rest_solver(self.mesh, self.sensor.material, self._fixed, self._loadable, self.device, known)
 
     @cached_property
     def companion(self) -> SkinModel | None:
@@ -152,14 +169,13 @@ class SkinModel:
 
     def _press(self, number: int, request: PressRequest) -> Press:
         walk = Walk(
-            request.depths, self.settings.step, f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
+            request.depths, self.settings.step, f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm",
+            _FIRST * request.indenter.sharpest,
         )
-        angles = [torch.tensor([np.radians(angle)]) for angle in (request.yaw, 0.0, 0.0)]
         own = conditions(
             self.sensor.material, self.sensor.contact.friction, request.indenter, device=self.device
         )
-        touch = np.array([request.x, request.y, self.sensor.skin.thickness])
-        return Press(number, walk, touch, turned(*angles)[:, :, 0].numpy(), own)
+        return Press(number, walk, touch(self.sensor, self._face, request), rotation(request), own)
 
     def _batch(self, request: PressRequest, capacity: int) -> tuple[Batch, list[Contact]]:
         contacts = self._contacts(request)
@@ -264,7 +280,7 @@ class SkinModel:
     def figures(self, depths: Sequence[float], states: list[State]) -> Figures:
         """Return what states (with displacements) at depths [mm] say."""
         grid = self.sensor.map
-        maps = [self._face.depth_map(grid.x, grid.y, state.displacement) for state in states]
+        maps = [self._face.depth_map(grid.x, grid.y, state.displacement, grid.sampling) for state in states]
         return Figures(
             np.array(depths, dtype=float), np.array(maps).reshape(-1, *grid.shape),
             np.array([state.force for state in states]).reshape(-1, 3),
@@ -285,10 +301,10 @@ class SkinModel:
             return estimate(self.sensor, fine, fine.first(0), 0.0, 1.0, "no coarser mesh can be made")
         if coarse is None:
             [coarse] = press_coarsely(self.companion, [request])
-        reach = max(request.indenter.footprint(max(request.depths), request.yaw))
+        half = max(reach(self.sensor, request))
         ratio = edge_ratio(self.mesh, self.companion.mesh)
         remarks = (blind_spot(self.mesh, self.companion.mesh) if self._on_board else "", coarse.remark)
-        return estimate(self.sensor, fine, coarse.figures, reach, ratio, "; ".join(filter(None, remarks)))
+        return estimate(self.sensor, fine, coarse.figures, half, ratio, "; ".join(filter(None, remarks)))
 
     def _answer(
         self, request: PressRequest, states: list[State], coarse: CoarsePress | None, seconds: float
@@ -303,6 +319,7 @@ class SkinModel:
     ) -> PathSolution:
         parameters = {
             "indenter": request.indenter.document, "x": request.x, "y": request.y, "yaw": request.yaw,
+            **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(request, name))},
             "depths": list(request.depths), "settings": asdict(self.settings), "law": self.sensor.material.law,
             "device": self.device, "seconds": round(seconds, 3), "newton": sum(state.newton for state in states),
         }
@@ -314,6 +331,8 @@ class SkinModel:
         else:
             error = NumericalError.none(fine)
         parameters["numerical"] = error.remark
+        if blunt := fineness.remark(self.mesh, self.sensor, request):
+            parameters["remarks"] = [blunt]
         return PathSolution(
             depth=fine.depth,
             surface=fine.surface,

@@ -19,7 +19,7 @@ from tacdata.skin.woodbury import ContactPreconditioner
 _LEAST_VOLUME = 0.1
 """Volume ratio det F below which a Newton step is shortened [1]."""
 
-_NEAR = 3e-2
+_NEAR = 0.1
 """Relative residual below which the tangent of friction replaces its secant [1]."""
 
 _STRAGGLERS, _LONG = 0.06, 12

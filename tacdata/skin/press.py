@@ -9,6 +9,10 @@ import numpy as np
 from tacdata.errors import SolveError
 from tacdata.indenters import Indenter
 from tacdata.sensor import Sensor
+from tacdata.skin.touch import reach, room
+
+_STEEPEST = 30.0
+"""Largest tilt [deg]; beyond, the depth of the lowest point says little of a press."""
 
 
 @dataclass(frozen=True)
@@ -18,13 +22,19 @@ class PressRequest:
     indenter: Indenter
     """What presses."""
     x: float
-    """Place of its lowest point [mm]."""
+    """Place of its origin, which is its lowest point when upright [mm]."""
     y: float
-    """Place of its lowest point [mm]."""
+    """Place of its origin [mm]."""
     yaw: float
-    """Rotation about z [deg]."""
+    """Rotation about its own axis [deg]."""
     depths: tuple[float, ...]
-    """Depths of the states to report [mm]: 0, rising to the deepest, then falling to 0 (or ending at the deepest)."""
+    """Depths of the states to report [mm]: 0, rising to the deepest, then falling to 0 (or ending at the deepest).
+
+    Counted from the undeformed face at (x, y) to the lowest point of the indenter as it is turned."""
+    tilt_x: float = 0.0
+    """How far its axis leans about the sensor's x [deg], after the yaw and the tilt about y."""
+    tilt_y: float = 0.0
+    """How far its axis leans about the sensor's y [deg], after the yaw."""
 
     def check(self, sensor: Sensor) -> None:
         """Refuse a press that misses the skin or goes through it.
@@ -35,27 +45,29 @@ class PressRequest:
         skin = sensor.skin
         if not self.depths or not np.all(np.isfinite(self.depths)) or min(self.depths) < 0:
             raise SolveError(f"depths {self.depths} mm", "one or more depths of 0 mm or more", "correct the press")
-        if max(self.depths) >= skin.thickness:
-            raise SolveError(
-                f"depth {max(self.depths):g} mm in a skin {skin.thickness:g} mm thick",
-                f"less than {skin.thickness:g} mm", "reduce the depth",
-            )
-        if not np.all(np.isfinite([self.x, self.y, self.yaw])):
-            raise SolveError(
-                f"press at ({self.x}, {self.y}) mm, yaw {self.yaw} deg", "finite numbers", "correct the press"
-            )
+        angles = f"yaw {self.yaw} deg, tilts {self.tilt_x} and {self.tilt_y} deg"
+        if not np.all(np.isfinite([self.x, self.y, self.yaw, self.tilt_x, self.tilt_y])):
+            raise SolveError(f"press at ({self.x}, {self.y}) mm, {angles}", "finite numbers", "correct the press")
+        if max(abs(self.tilt_x), abs(self.tilt_y)) > _STEEPEST:
+            raise SolveError(f"a press with {angles}", f"tilts of at most {_STEEPEST:g} deg", "reduce the tilt")
         if abs(self.x) > skin.size_x / 2 or abs(self.y) > skin.size_y / 2:
             raise SolveError(
                 f"press at ({self.x:g}, {self.y:g}) mm, the skin spans {skin.size_x:g} x {skin.size_y:g} mm",
                 "a place on the skin", "move the press",
             )
-        reach = self.indenter.footprint(max(self.depths), self.yaw)
+        thick = room(sensor, self)
+        if max(self.depths) >= thick:
+            raise SolveError(
+                f"depth {max(self.depths):g} mm in a skin {thick:.3g} mm thick at ({self.x:g}, {self.y:g}) mm",
+                f"less than {thick:.3g} mm", "reduce the depth",
+            )
+        half_x, half_y = reach(sensor, self)
         over = [abs(place) + half - size / 2 for place, half, size in
-                zip((self.x, self.y), reach, (skin.size_x, skin.size_y), strict=True)]
+                zip((self.x, self.y), (half_x, half_y), (skin.size_x, skin.size_y), strict=True)]
         if "sides" in sensor.contact.bonded and max(over) > 0 and max(self.depths) > 0:
             raise SolveError(
                 f"{self.indenter.shape} at ({self.x:g}, {self.y:g}) mm, {max(self.depths):g} mm deep, reaches "
                 f"{max(over):.2f} mm over the rim, which is bonded to the frame",
-                f"a footprint of {reach[0]:.2f} x {reach[1]:.2f} mm around the press inside the rim",
+                f"a footprint of {half_x:.2f} x {half_y:.2f} mm around the press inside the rim",
                 "move the press inward, press less deep, or describe another bonding in the sensor file",
             )

@@ -10,13 +10,17 @@ import torch
 
 from tacdata.errors import SolveError
 from tacdata.sensor import Material
+from tacdata.skin.averaged_volume import averaged_stiffness
 from tacdata.skin.mesh import SkinMesh
 
 
-def rest_stiffness(mesh: SkinMesh, material: Material) -> sp.csr_matrix:
-    """Assemble the linear-elastic stiffness [N/mm], shape (3n, 3n): every law's tangent at F = I."""
+def rest_stiffness(mesh: SkinMesh, material: Material, averaged: bool = False) -> sp.csr_matrix:
+    """Assemble the linear-elastic stiffness [N/mm], shape (3n, 3n): every law's tangent at F = I.
+
+    With ``averaged`` volume changes (`tacdata.skin.averaged_volume`) it is near it, as the average is lumped.
+    """
     mu = material.shear_modulus
-    lam = material.bulk_modulus - 2 * mu / 3
+    lam = (0.0 if averaged else material.bulk_modulus) - 2 * mu / 3
     slopes, weights = mesh.shape_gradients()
     count = len(mesh.tets)
     blocks = np.zeros((count, 10, 3, 10, 3))
@@ -31,7 +35,8 @@ def rest_stiffness(mesh: SkinMesh, material: Material) -> sp.csr_matrix:
     rows = np.repeat(dofs, 30, axis=1).ravel()
     columns = np.tile(dofs, (1, 30)).ravel()
     size = 3 * len(mesh.nodes)
-    return sp.csr_matrix(sp.coo_matrix((blocks.ravel(), (rows, columns)), shape=(size, size)))
+    stiffness = sp.csr_matrix(sp.coo_matrix((blocks.ravel(), (rows, columns)), shape=(size, size)))
+    return stiffness + averaged_stiffness(mesh, material.bulk_modulus) if averaged else stiffness
 
 
 class RestSolver(Protocol):
@@ -58,7 +63,7 @@ class RestSolver(Protocol):
 
 
 def rest_solver(
-    mesh: SkinMesh, material: Material, fixed: np.ndarray, loadable: np.ndarray, device: str
+    mesh: SkinMesh, material: Material, fixed: np.ndarray, loadable: np.ndarray, device: str, averaged: bool = False
 ) -> RestSolver:
     """Prepare K0^-1: a sparse factor on the CPU, the dense inverse on a card.
 
@@ -68,11 +73,12 @@ def rest_solver(
         fixed: Which nodes are held, shape (n,), bool.
         loadable: Free degrees of freedom (3 node + axis) that contact may load, ascending, shape (m,).
         device: "cpu" or "cuda:0".
+        averaged: Whether volume changes are averaged at the corners.
 
     Raises:
         SolveError: If the inverse does not fit onto the card.
     """
-    stiffness = rest_stiffness(mesh, material)
+    stiffness = rest_stiffness(mesh, material, averaged)
     free = np.flatnonzero(~np.repeat(fixed, 3))
     return (SparseRest if device == "cpu" else DenseRest)(stiffness, free, loadable, device)
 
@@ -172,8 +178,7 @@ class DenseRest:
         self._inverse = inverse.to(torch.float16)
         del inverse
         part = self._inverse[: self._count, : self._count].to(torch.float32)
-        part *= self._scale[: self._count]
-        part *= self._scale[: self._count].T
+        part *= self._scale[: self._count] * self._scale[: self._count].T
         self._table = torch.nn.functional.pad(part, (0, 1, 0, 1))
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:

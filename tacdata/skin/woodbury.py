@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import torch
 
-from tacdata.skin.batched_inverse import contact_transfer
 from tacdata.skin.contact import Contact
 from tacdata.skin.rest import RestSolver
+from tacdata.skin.transfer import Transfer, contact_transfer
 
 _GROUP = 32
 """Members whose small systems are padded to one size: those of similar size go together."""
@@ -27,8 +27,8 @@ class _Group:
     """Their columns, shape (g,)."""
     which: torch.Tensor
     """Numbers among the loadable degrees of freedom, shape (g, m); the count of all stands for none."""
-    transfer: torch.Tensor
-    """(I + S G)^-1 S [N/mm], shape (g, m, m)."""
+    transfer: Transfer
+    """(I + S G)^-1 S [N/mm]."""
 
 
 class ContactPreconditioner:
@@ -111,7 +111,7 @@ class ContactPreconditioner:
             r = torch.cat([r, torch.zeros_like(r[:1])])
             for group in self._groups:
                 own = z[group.which, group.member[:, None]]
-                y = (group.transfer @ own[:, :, None])[:, :, 0]
+                y = group.transfer.times(own)
                 # A member's degrees of freedom are all different, the one that stands for none aside.
                 r.index_put_((self._dof[group.which], group.member[:, None].expand_as(y)), -y, accumulate=True)
             r = r[:-1]

@@ -11,13 +11,13 @@ from tacdata.errors import SolveError
 from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.batched_inverse import contact_transfer
 from tacdata.skin.conditions import conditions
 from tacdata.skin.elasticity import Elasticity
 from tacdata.skin.mesher import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 from tacdata.skin.rest import SparseRest, rest_solver
+from tacdata.skin.transfer import contact_transfer
 
 pytestmark = [pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")]
 CARD = "cuda:0"
@@ -118,6 +118,7 @@ def test_the_contact_transfer_is_that_of_the_cpu():
     random = np.random.default_rng(4)
     root = torch.as_tensor(random.normal(size=(2, 2, 150, 150))) / 12
     compliance, stiffness = root @ root.transpose(2, 3) + 0.2 * torch.eye(150)
-    here = contact_transfer(stiffness.float(), compliance.float())
-    there = contact_transfer(stiffness.float().to(CARD), compliance.float().to(CARD)).cpu()
+    moved = torch.as_tensor(random.normal(size=(2, 150))).float()
+    here = contact_transfer(stiffness.float(), compliance.float()).times(moved)
+    there = contact_transfer(stiffness.float().to(CARD), compliance.float().to(CARD)).times(moved.to(CARD)).cpu()
     assert (here - there).abs().max() < 1e-3 * here.abs().max()

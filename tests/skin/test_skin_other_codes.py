@@ -39,7 +39,8 @@ def rows(folder, peer, sensor, mesh, depths, radius=4.0):
     sphere = {"shape": "sphere", "radius": radius}
     document = {"version": "1.0", "name": "press", "sensor": sensor.document, "indenter": sphere, "x": 0.2, "y": 0.1}
     path = folder / "case.json"
-    documents.write(path, {**document, "depths": list(depths), "mesh": mesh}, "case")
+    # The others know displacements alone: their volumes are taken at the points.
+    documents.write(path, {**document, "depths": list(depths), "mesh": mesh, "volumes": "points"}, "case")
     case = read_case(path)
     skin = build_mesh(case.sensor, case.settings.mesh)
     theirs = peer.solve(case, skin, folder / "theirs")

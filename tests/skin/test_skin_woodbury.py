@@ -8,11 +8,12 @@ import torch
 from skin_examples import MATERIAL, HeldSlab, batch, joined
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.batched_inverse import contact_transfer, inverse
+from tacdata.skin.batched_inverse import inverse
 from tacdata.skin.conditions import conditions
 from tacdata.skin.contact import Contact
 from tacdata.skin.pose import Pose
 from tacdata.skin.rest import rest_solver
+from tacdata.skin.transfer import DenseTransfer, FactoredTransfer
 from tacdata.skin.woodbury import ContactPreconditioner
 
 PENALTY, STICK = 3000.0, 100.0
@@ -121,10 +122,12 @@ def test_both_formulas_for_the_contact_transfer_agree(rows):
     compliance, stiffness = spd(rows, 2, 50.0, seed=1), spd(rows, 2, 30.0, seed=2)
     stiffness[:, : rows // 2] = 0.0  # Most points of a face do not touch.
     stiffness[:, :, : rows // 2] = 0.0
-    direct = contact_transfer(stiffness, compliance)
-    held = inverse(compliance)
-    by_inverses = held - held @ inverse(held + stiffness) @ held
+    moved = torch.as_tensor(np.random.default_rng(3).normal(size=(2, rows)))
     expected = torch.linalg.inv(torch.eye(rows, dtype=torch.float64) + stiffness @ compliance) @ stiffness
-    assert (direct - expected).abs().max() < 1e-10 * expected.abs().max()
-    assert (by_inverses - expected).abs().max() < 1e-10 * expected.abs().max()
-    assert (contact_transfer(stiffness.float(), compliance.float()) - direct).abs().max() < 1e-4 * direct.abs().max()
+    expected = (expected @ moved[:, :, None])[:, :, 0]
+    for transfer in (FactoredTransfer, DenseTransfer):
+        found = transfer(stiffness, compliance).times(moved)
+        assert (found - expected).abs().max() < 1e-10 * expected.abs().max()
+        single = transfer(stiffness.float(), compliance.float()).times(moved.float())
+        assert single.dtype == torch.float32
+        assert (single - expected).abs().max() < 1e-4 * expected.abs().max()

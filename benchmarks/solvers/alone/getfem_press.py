@@ -95,6 +95,10 @@ class Press:
         for name, value in press["constants"].items():
             self.model.add_initialized_data(name, [value])
         self.model.add_macro("F", "(Id(3)+Grad_u)")
+        if press.get("hydro"):
+            hydro = getfem.MeshFem(self.mesh, 1)
+            hydro.set_fem(getfem.Fem(press["hydro"]))
+            self.model.add_fem_variable("hydro", hydro)
         self.model.add_nonlinear_term(self.inside, press["law"])
         self.taxels = [] if press["board"] is None else sorted(np.unique(arrays["taxel"]).tolist())
         self.penalty = press["contact"] == "penalty"
@@ -134,8 +138,8 @@ class Press:
         for name in ("tip", "moved"):
             model.add_initialized_data(name, self.tip if name == "tip" else np.zeros(3))
         model.add_fem_data("u_before", self.space)
-        c, s = np.cos(press["yaw"]), np.sin(press["yaw"])
-        model.add_initialized_data("turn", np.array([c, -s, 0, s, c, 0, 0, 0, 1.0]), [3, 3])  # column by column
+        # To the indenter's frame; the rotation from it, row by row, is its inverse column by column.
+        model.add_initialized_data("turn", np.ravel(press["turn"]), [3, 3])
         moved, test = ("Interpolate(u,body)", "Interpolate(Test_u,body)") if self.penalty else ("u", "Test_u")
         model.add_macro("p", f"(turn*(X+{moved}-tip))")
         for name, text in press["shape"]:

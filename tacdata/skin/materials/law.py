@@ -14,7 +14,7 @@ displacement gradient H = F - I (``of``). From H they keep all digits at small s
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import warp as wp
 
@@ -47,6 +47,10 @@ class LawFunctions(NamedTuple):
 class Law(ABC):
     """A strain energy density W(F), isotropic, with W = 0 and P = 0 at F = I; NaN where det F <= 0."""
 
+    splits_volume: ClassVar[bool] = True
+    """Whether the volumetric part is kappa/2 (J - 1)^2 by itself. Only then may it be averaged over elements: what is
+    left of another form without it is unbounded below at single points."""
+
     @classmethod
     def example(cls) -> Self:
         """Return a typical one, unlike the default if there are parameters; conformance tests use it."""
@@ -60,6 +64,12 @@ class Law(ABC):
     @abstractmethod
     def functions(real: type) -> LawFunctions:
         """Return the law's Warp functions for ``real``, the same objects at every call (``@staticmethod @cache``)."""
+
+    @staticmethod
+    @cache
+    def bulk_function(real: type) -> wp.Function:
+        """Return ``f(m)``: the bulk modulus at small strain [MPa] from the law's numbers; kappa is usually m[1]."""
+        return _second(real)
 
     def complaint(self) -> str:
         """Return in words what is wrong with the parameters; empty if nothing is."""
@@ -121,6 +131,17 @@ class Law(ABC):
     def isochoric_tangent_function(self, real: type | None = None, of: Gradient = "F") -> wp.Function:
         """Return ``f(F, dF, m) -> mat33``: directional derivative of the isochoric part along dF [MPa]."""
         return _function(type(self), "isochoric_tangent", real, of)
+
+
+@cache
+def _second(real: type) -> wp.Function:
+    numbers = kinematics.parameters(real)
+
+    @wp.func
+    def second(m: numbers):
+        return m[1]
+
+    return second
 
 
 def _function(kind: type[Law], quantity: str, real: type | None, of: Gradient) -> wp.Function:

@@ -5,6 +5,7 @@
 
 from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar
 
 import warp as wp
 
@@ -17,9 +18,24 @@ from tacdata.skin.materials.neo_hookean import NeoHookean
 class NeoHookeanLog(Law):
     """The textbook form (Bonet and Wood 2008, eq. 6.27); its isochoric part is that of the split form."""
 
+    splits_volume: ClassVar[bool] = False
+
     def numbers(self, shear_modulus: float, bulk_modulus: float) -> tuple[float, ...]:
         """Return mu and lambda = kappa - 2 mu / 3 [MPa]."""
         return shear_modulus, bulk_modulus - 2 * shear_modulus / 3
+
+    @staticmethod
+    @cache
+    def bulk_function(real: type) -> wp.Function:
+        """Return kappa = lambda + 2 mu / 3 [MPa]."""
+        numbers = kinematics.parameters(real)
+        share = wp.constant(real(2.0 / 3.0))
+
+        @wp.func
+        def bulk(m: numbers):
+            return m[1] + share * m[0]
+
+        return bulk
 
     @staticmethod
     @cache
