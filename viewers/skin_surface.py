@@ -49,7 +49,7 @@ def surfaces(
 def footprint(sensor: Sensor) -> np.ndarray:
     """Return the corners of the skin's block with its protrusions [mm], shape (2, 3)."""
     half = np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2
-    return np.array([[*-half, -sensor.skin.protrusion_radius], [*half, sensor.skin.thickness]])
+    return np.array([[*-half, -sensor.skin.protrusion_tip], [*half, sensor.skin.thickness]])
 
 
 def indenter_body(sensor: Sensor, press: Press, time_ns: np.ndarray, tip: np.ndarray) -> Body:

@@ -27,8 +27,8 @@ def run(
     report = check(path)
     folder = out or (path if path.is_dir() else path.parent)
     stem = "check" if path.is_dir() else f"{path.stem}.check"
+    print(report.text, flush=True)  # whatever becomes of the files beside it
     documents.write(folder / f"{stem}.json", report.document, "check")
-    print(report.text)
     if report.episodes:
         draw(report, folder / f"{stem}.png")
         print(f"picture: {folder / f'{stem}.png'}")

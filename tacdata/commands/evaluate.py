@@ -14,9 +14,7 @@ PANEL = PIPELINE
 
 
 def run(
-    network: Annotated[
-        Path, typer.Argument(metavar="RUN", help="Folder of a training run, or a checkpoint file.")
-    ],
+    network: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a training run, or a checkpoint file.")],
     dataset: Annotated[
         Path | None, typer.Option(help="Dataset folder; default: the one that the network was trained on.")
     ] = None,
@@ -25,9 +23,7 @@ def run(
         typer.Option(help="Folder of the scores; default: RUN/scores, predictions in RUN/predictions."),
     ] = None,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")
-    ] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
 ) -> None:
     """Score a network on its test episodes (or on another dataset): table, JSON, picture, predictions.
 
@@ -46,9 +42,7 @@ def run(
     trained = checkpoint.load(network)
     recorded = Path(trained.document["dataset"]["path"])
     if dataset is None and not recorded.is_dir():
-        raise UsageError(
-            f"the dataset {recorded} of {network} is not there", "a dataset folder", "give --dataset"
-        )
+        raise UsageError(f"the dataset {recorded} of {network} is not there", "a dataset folder", "give --dataset")
     frames = read_frames(dataset or recorded)
     with Progress(transient=True) as bar:
         task = bar.add_task("predict", total=None)

@@ -14,9 +14,7 @@ PANEL = TOOLS
 
 
 def run(
-    room: Annotated[
-        str, typer.Argument(metavar="[ROOM]", help="A folder of members; without it, all folders.")
-    ] = "",
+    room: Annotated[str, typer.Argument(metavar="[ROOM]", help="A folder of members; without it, all folders.")] = "",
 ) -> None:
     """List indenters, devices, verbs and every other folder of members, with units."""
     if not room:

@@ -33,7 +33,9 @@ def run(
     console.print(
         f"mesh: {mesh['elements']:.0f} elements, radius ratio {mesh['worst_ratio']:.2f} at worst, "
         f"{mesh['median_ratio']:.2f} in the median (1 is best), volume {100 * mesh['volume_error']:+.2f} %",
-        markup=False, highlight=False, soft_wrap=True,
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
     )
     for remark in answer["remarks"]:
         console.print(f"warning: {remark}", markup=False, highlight=False, soft_wrap=True)

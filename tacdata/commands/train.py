@@ -28,9 +28,7 @@ def run(
     split: Annotated[str, typer.Option(help="A file name in training/splits.")] = "episode",
     seed: Annotated[int, typer.Option(help="Seed of the split, the weights and the order of frames.")] = 0,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")
-    ] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the run's last epoch.")] = False,
 ) -> None:
     """Train a network that maps taxel signals to depth maps; keeps the best and the last epoch.

@@ -24,16 +24,10 @@ def run(
         Path, typer.Argument(help="A recording (.mcap), a session or dataset folder, or a saved .rrd file.")
     ],
     labels: Annotated[Path | None, typer.Option(help="Folder of labels; without it SESSION/labels.")] = None,
-    predictions: Annotated[
-        Path | None, typer.Option(help="Folder of predictions, or a training run.")
-    ] = None,
+    predictions: Annotated[Path | None, typer.Option(help="Folder of predictions, or a training run.")] = None,
     episode: Annotated[int | None, typer.Option(min=0, help="Its number there; else the first.")] = None,
-    save: Annotated[
-        Path | None, typer.Option(help="Write a Rerun file (.rrd) instead of opening a window.")
-    ] = None,
-    picture: Annotated[
-        Path | None, typer.Option(help="Write one page (.png) instead of opening a window.")
-    ] = None,
+    save: Annotated[Path | None, typer.Option(help="Write a Rerun file (.rrd) instead of opening a window.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write one page (.png) instead of opening a window.")] = None,
     web: Annotated[bool, typer.Option("--web", help="Serve Rerun's web viewer on this machine.")] = False,
 ) -> None:
     """Look at an episode (skin, maps, signals, cameras) in a window or browser, or save it."""
@@ -48,9 +42,7 @@ def run(
         rerun_window.require_display()
     if path.suffix == output_file.RERUN and path.is_file():
         if save or picture:
-            raise UsageError(
-                f"{path} with --save or --picture", "a recording, session or dataset", "leave them out"
-            )
+            raise UsageError(f"{path} with --save or --picture", "a recording, session or dataset", "leave them out")
         _show(path, web)
         return
     scene = scene_at(path, labels, predictions, episode)

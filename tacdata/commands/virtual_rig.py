@@ -15,9 +15,7 @@ ORDER, PANEL = 110, TOOLS
 
 
 def run(
-    directory: Annotated[
-        Path, typer.Argument(metavar="DIR", help="where rig.yaml and truth.yaml are written")
-    ],
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="where rig.yaml and truth.yaml are written")],
     speed: Annotated[float, typer.Option(help="seconds of the rig per real second")] = 8.0,
     seed: Annotated[int, typer.Option(help="which world: registration error, gains, noise")] = 0,
     camera: Annotated[bool, typer.Option(help="with a camera that watches the AprilTag cube")] = True,

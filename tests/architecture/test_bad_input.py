@@ -109,6 +109,12 @@ CASES = [
     ("view", "words.txt --save new.rrd", "words.txt", {2, 3}),
     ("view", "words.mcap --save taken.rrd", "taken.rrd", {2}),
     ("demo", "--out words.txt/demo", "words.txt", {2}),
+    ("discrepancy", "nothing --out new", "nothing", {2}),
+    ("discrepancy", "empty --out new", "empty", {2, 3}),
+    ("discrepancy", "words.mcap --out new", "words.mcap", {2, 3}),
+    ("discrepancy", "words.mcap --out taken", "taken", {2}),
+    ("discrepancy", "words.mcap --out new --spec broken.yaml", "broken.yaml", {3}),
+    ("discrepancy", "words.mcap --out new --spec plan.yaml", "plan.yaml", {3}),
 ]
 
 

@@ -1,0 +1,130 @@
+"""What was done to a sensor and what it said, over whole sessions: the table that the chain works on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Tool:
+    """An indenter as far as the chain needs it."""
+
+    name: str
+    """The specimen's name."""
+    shape: str
+    """Its shape: a member of the indenters, or "unknown"."""
+    radius: float
+    """Radius at the tip [mm]; NaN where it has none or is not known."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """Rows in the order of time, one a reading; episodes and sessions one after the other."""
+
+    time: np.ndarray
+    """Time since the first row, sessions laid end to end [s], shape (n,), increasing."""
+    episode: np.ndarray
+    """Episode of each row, from 0, shape (n,), int64, not falling."""
+    tip: np.ndarray
+    """Commanded x, y and depth below the undeformed outer face [mm], shape (n, 3)."""
+    tool: np.ndarray
+    """Index into ``tools`` of each row, shape (n,), int64."""
+    readings: np.ndarray
+    """Un-tared readings [counts or the source's unit], shape (n, channels); NaN where missing."""
+    averaged: np.ndarray
+    """How many readings each row is the mean of [1], shape (n,); 0 in between, where only the path is known."""
+    session: np.ndarray
+    """Session of each episode, from 0, shape (episodes,), int64."""
+    site: np.ndarray
+    """Place that each episode presses, from 0, shape (episodes,), int64."""
+    tools: tuple[Tool, ...]
+    names: tuple[str, ...]
+    """Name of each episode, as a person knows it."""
+    centers: np.ndarray | None = None
+    """Place of each channel on the sensor [mm], shape (channels, 2); None if they form no known array."""
+    force: np.ndarray | None = None
+    """Measured normal force, pressing positive [N], shape (n,); NaN where missing."""
+    tag: np.ndarray | None = None
+    """Tip as a second, independent observation saw it (x, y, depth) [mm], shape (n, 3); NaN where missing."""
+    temperature: np.ndarray | None = None
+    """Measured temperature [degC], shape (n,)."""
+    notes: tuple[str, ...] = ()
+    """What a person should know of these data, in words."""
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.time)
+
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+        return self.readings.shape[1]
+
+    @property
+    def episodes(self) -> int:
+        """Number of episodes."""
+        return len(self.session)
+
+    @cached_property
+    def read(self) -> np.ndarray:
+        """Rows at which something was read, shape (m,), int64."""
+        return np.flatnonzero(self.averaged > 0)
+
+    @cached_property
+    def reduced(self) -> Self:
+        """The course with only those rows."""
+        rows = self.read
+        if len(rows) == self.rows:
+            return self
+        kept = {
+            name: value[rows]
+            for name in ("time", "episode", "tip", "tool", "readings", "averaged", "force", "tag", "temperature")
+            if (value := getattr(self, name)) is not None
+        }
+        return replace(self, **kept)
+
+    @cached_property
+    def step(self) -> np.ndarray:
+        """Time since the row before [s], shape (n,); the first is 0."""
+        return np.diff(self.time, prepend=self.time[:1])
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """Whether a row is the first of its episode, shape (n,), bool."""
+        return np.diff(self.episode, prepend=-1) != 0
+
+    @cached_property
+    def speed(self) -> np.ndarray:
+        """Commanded rate of depth, from the row before [mm/s], shape (n,); 0 in first rows."""
+        rate = np.diff(self.tip[:, 2], prepend=self.tip[:1, 2]) / np.maximum(self.step, 1e-9)
+        return np.where(self.first, 0.0, rate)
+
+    @cached_property
+    def row_site(self) -> np.ndarray:
+        """Place of each row's episode, shape (n,), int64."""
+        return self.site[self.episode]
+
+    @cached_property
+    def span(self) -> float:
+        """Deepest commanded depth [mm], at least a thousandth."""
+        return float(max(self.tip[:, 2].max(), 1e-3))
+
+    @cached_property
+    def stroke(self) -> float:
+        """Range of commanded depth [mm], at least a thousandth."""
+        return float(max(np.ptp(self.tip[:, 2]), 1e-3))
+
+    def of(self, episodes: np.ndarray) -> np.ndarray:
+        """Return which rows belong to some episodes, shape (n,), bool."""
+        chosen = np.zeros(self.episodes, dtype=bool)
+        chosen[episodes] = True
+        return chosen[self.episode]
+
+    def with_readings(self, readings: np.ndarray) -> Self:
+        """Return the same course with other readings, shape (n, channels)."""
+        return replace(self, readings=readings)

@@ -1,0 +1,37 @@
+"""What a chain starts from: loads on the channels by the pose of the tip alone, without memory."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from tacdata.chain.course import Course
+
+
+class Response(ABC):
+    """A response without memory: pose to loads, loads to readings."""
+
+    fitted = False
+    """Whether it was fitted to the recordings that are judged; then only what has memory can be judged."""
+
+    @abstractmethod
+    def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return the load on each channel, shape (n, channels); 0 without contact.
+
+        Args:
+            pose: x, y, depth of the tip [mm], shape (n, 3).
+            tool: Index of the tool, shape (n,), int64.
+        """
+
+    @abstractmethod
+    def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return the normal force [N, or in arbitrary units where none is known], shape (n,)."""
+
+    @abstractmethod
+    def signal(self, load: np.ndarray) -> np.ndarray:
+        """Return the readings of loads, shape (n, channels)."""
+
+    def features(self, course: Course) -> np.ndarray | None:
+        """Return columns of pose alone that the response could be corrected by, shape (n, k); None for none."""
+        return None

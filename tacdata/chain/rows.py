@@ -1,0 +1,87 @@
+"""Rows of a course from a stream and a path: dense where the tip moves, averaged where it rests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+BETWEEN = 0.03
+"""Longest way between rows [mm]: readings of a fast press lie farther apart than effects of timing can bear."""
+FEW_BETWEEN = 4
+"""Most rows put between two readings, and as many where the speed changes."""
+SETTLED = 0.4
+"""Time after the last motion from which readings are averaged [s]."""
+WIDEST = 0.12
+"""Share of the time at rest that an average may span [1]."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """One episode's rows."""
+
+    time: np.ndarray
+    """[s], shape (n,)."""
+    tip: np.ndarray
+    """x, y, depth [mm], shape (n, 3)."""
+    values: np.ndarray
+    """Streams [their own units], shape (n, k); NaN in rows in between."""
+    averaged: np.ndarray
+    """Readings behind each row [1], shape (n,); 0 in between."""
+
+
+def rows_of(time: np.ndarray, values: np.ndarray, path_time: np.ndarray, path: np.ndarray) -> Rows:
+    """Lay out the rows of one episode.
+
+    Args:
+        time: Times of the readings [s], shape (m,), increasing.
+        values: Readings and whatever else belongs to those times, shape (m, k).
+        path_time: Times of the commanded path [s], shape (p,), increasing.
+        path: x, y, depth [mm], shape (p, 3), linear in between.
+    """
+
+    def tip_at(when: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(when, path_time, path[:, axis]) for axis in range(3)], axis=-1)
+
+    tip = tip_at(time)
+    moving = np.abs(np.diff(tip, axis=0, prepend=tip[:1])).max(axis=1) > 1e-5
+    last = np.maximum.accumulate(np.where(moving, time, time[0] - SETTLED if not moving[0] else time[0]))
+    group = _groups(time, last)
+    count = np.bincount(group).astype(float)
+    mean_time = np.bincount(group, time) / count
+    mean = np.stack([np.bincount(group, column) / count for column in values.T], axis=-1)
+    between = _between(mean_time, tip_at(mean_time)) if len(mean_time) > 1 else np.zeros(0)
+    every = np.concatenate([mean_time, between])
+    order = np.argsort(every, kind="stable")
+    filled = np.concatenate([mean, np.full((len(between), values.shape[1]), np.nan)])[order]
+    weight = np.concatenate([count, np.zeros(len(between))])[order]
+    return Rows(every[order], tip_at(every[order]), filled, weight)
+
+
+def _groups(time: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Number the groups of readings that become one row."""
+    result, number, begin = np.zeros(len(time), dtype=np.int64), 0, 0
+    for i in range(1, len(time)):
+        rest = time[begin] - last[begin]
+        wide = max(rest, 0.0) * WIDEST
+        if rest < SETTLED or last[i] != last[begin] or time[i] - time[begin] > wide:
+            number, begin = number + 1, i
+        result[i] = number
+    return result
+
+
+def _between(time: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """Return times of rows put between readings where the tip moves fast or changes its speed."""
+    gap = np.maximum(np.diff(time), 1e-9)
+    way = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+    speed = way / gap
+    change = np.abs(np.diff(speed, prepend=speed[:1], append=speed[-1:])) > 0.05 * max(
+        float(speed.max(initial=0)), 1e-9
+    )
+    kink = change[:-1] | change[1:]
+    wanted = np.where(kink & (gap < 0.2), FEW_BETWEEN, np.ceil(way / BETWEEN) - 1)
+    parts = []
+    for i in np.flatnonzero(wanted > 0):
+        count = int(min(wanted[i], FEW_BETWEEN))
+        parts.append(time[i] + gap[i] * np.arange(1, count + 1) / (count + 1))
+    return np.concatenate(parts) if parts else np.zeros(0)

@@ -1,0 +1,142 @@
+"""A response from solved presses on a grid: cubic splines over place and the root of depth."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import spline_filter
+
+from tacdata.chain.response import Response
+from tacdata.errors import FormatError, UsageError
+
+FIELDS = ("x", "y", "depth", "load", "force", "curve_load", "curve_signal", "gain", "offset", "tools")
+
+KEPT = 12
+"""Evaluations remembered: most candidates leave the pose alone."""
+
+
+class TableResponse(Response):
+    """Loads solved on x, y, depth for each tool, and the curve from load to reading."""
+
+    def __init__(
+        self, x: np.ndarray, y: np.ndarray, depth: np.ndarray, load: np.ndarray, force: np.ndarray,
+        curve_load: np.ndarray, curve_signal: np.ndarray, gain: np.ndarray, offset: np.ndarray, tools: tuple[str, ...],
+    ) -> None:  # fmt: skip
+        """Keep the table.
+
+        Args:
+            x: Places solved [mm], shape (a,), equally spaced.
+            y: Places solved [mm], shape (b,), equally spaced.
+            depth: Depths solved [mm], shape (d,), from 0, equally spaced in their root.
+            load: Loads, shape (tools, a, b, d, channels).
+            force: Normal force [N], shape (tools, a, b, d).
+            curve_load: Loads at which the curve is given, shape (m,), increasing.
+            curve_signal: Reading above idle over gain at those loads, shape (m,).
+            gain: Gain of each channel, shape (channels,).
+            offset: Reading without load, shape (channels,).
+            tools: Name of each tool.
+        """
+        self.x, self.y, self.depth, self.tools = x, y, depth, tools
+        self._curve = curve_load, curve_signal
+        self.gain, self.offset = gain, offset
+        both = np.concatenate([load, force[..., None]], axis=-1)
+        # Splines with mirrored ends, one more node around, so that the four nodes of a place always exist.
+        self._splines = [
+            np.pad(
+                np.stack([spline_filter(both[t, ..., c], order=3) for c in range(both.shape[-1])], axis=-1),
+                ((1, 2), (1, 2), (1, 2), (0, 0)), mode="reflect",
+            )
+            for t in range(len(both))
+        ]  # fmt: skip
+        self._kept: dict[int, np.ndarray] = {}
+
+    @classmethod
+    def read(cls, path: Path) -> TableResponse:
+        """Read a table.
+
+        Raises:
+            UsageError: If there is no such file.
+            FormatError: If it is no such table.
+        """
+        if not path.is_file():
+            raise UsageError(f"no file {path}", "a response table (.npz)", "check response/file in the model spec")
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                values = {name: data[name] for name in FIELDS}
+        except (ValueError, KeyError, OSError) as error:
+            raise FormatError(
+                f"{path} is no response table ({error})", f"an .npz file with {', '.join(FIELDS)}", "make it again"
+            ) from None
+        tools = tuple(str(name) for name in values.pop("tools"))
+        return cls(**values, tools=tools)
+
+    def idling_at(self, offset: np.ndarray) -> TableResponse:
+        """Return the same response with other readings without load, shape (channels,)."""
+        other = copy.copy(self)
+        other.offset = offset
+        return other
+
+    def with_tools(self, order: list[int]) -> TableResponse:
+        """Return the same response with its tools in another order, or fewer."""
+        other = copy.copy(self)
+        other._splines, other.tools = [self._splines[k] for k in order], tuple(self.tools[k] for k in order)
+        other._kept = {}
+        return other
+
+    def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return the load on each channel, shape (n, channels)."""
+        return self._both(pose, tool)[:, :-1]
+
+    def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return the normal force [N], shape (n,)."""
+        return self._both(pose, tool)[:, -1]
+
+    def signal(self, load: np.ndarray) -> np.ndarray:
+        """Return readings, shape (n, channels); the curve is continued straight beyond its ends."""
+        at, value = self._curve
+        low, high = (value[1] - value[0]) / (at[1] - at[0]), (value[-1] - value[-2]) / (at[-1] - at[-2])
+        inside = np.interp(load, at, value)
+        inside += low * np.minimum(load - at[0], 0.0) + high * np.maximum(load - at[-1], 0.0)
+        return self.offset + self.gain * inside
+
+    def _both(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        key = hash((pose.tobytes(), tool.tobytes()))
+        if key in self._kept:
+            return self._kept[key]
+        result = np.zeros((len(pose), self._splines[0].shape[-1]))
+        touching = pose[:, 2] > 0
+        for t, spline in enumerate(self._splines):
+            rows = np.flatnonzero(touching & (tool == t))
+            if len(rows):
+                result[rows] = _cubic(spline, self._places(pose[rows]))
+        if len(self._kept) >= KEPT:
+            self._kept.pop(next(iter(self._kept)))
+        self._kept[key] = result
+        return result
+
+    def _places(self, pose: np.ndarray) -> np.ndarray:
+        """Return places in units of nodes, kept inside the table, shape (n, 3)."""
+        root = np.sqrt(np.maximum(pose[:, 2], 0.0)) / np.sqrt(self.depth[-1]) * (len(self.depth) - 1)
+        column = (pose[:, 0] - self.x[0]) / (self.x[1] - self.x[0])
+        row = (pose[:, 1] - self.y[0]) / (self.y[1] - self.y[0])
+        last = np.array([len(self.x), len(self.y), len(self.depth)]) - 1.0
+        return np.clip(np.stack([column, row, root], axis=-1), 0.0, last)
+
+
+def _cubic(spline: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return cubic B-spline values of a padded coefficient array at places [nodes], shape (n, channels)."""
+    node = np.floor(place).astype(np.int64)
+    t = place - node
+    weights = np.stack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]) / 6
+    _, b, c, channels = spline.shape
+    flat = spline.reshape(-1, channels)
+    result = np.zeros((len(place), channels))
+    for i in range(4):
+        for j in range(4):
+            plane = weights[i, :, 0] * weights[j, :, 1]
+            for k in range(4):
+                at = ((node[:, 0] + i) * b + node[:, 1] + j) * c + node[:, 2] + k
+                result += (plane * weights[k, :, 2])[:, None] * flat[at]
+    return result

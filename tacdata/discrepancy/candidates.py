@@ -1,0 +1,129 @@
+"""What every effect would add to these recordings, as columns beside the residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from tacdata.chain import Course, Response, predict
+from tacdata.discrepancy.streams import Streams
+from tacdata.effects import Effect, Placed
+
+MOST_CHANNELS = 32
+"""Up to so many channels, parameters that every channel has of its own get a column each; beyond, one for all."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at one choice of its shapes."""
+
+    effect: Effect
+    shapes: dict[str, float]
+    columns: np.ndarray
+    """Its columns, from 0, shape (k,), int64."""
+    low: np.ndarray
+    """Least coefficients [typical sizes], shape (k,)."""
+    high: np.ndarray
+    """Largest coefficients [typical sizes], shape (k,)."""
+
+    @property
+    def called(self) -> str:
+        """The mechanism's name."""
+        return self.effect.called
+
+    def placed(self, coefficients: np.ndarray, channels: int) -> Placed:
+        """Return the effect with the parameters that coefficients stand for."""
+        values = {name: np.array(value) for name, value in self.shapes.items()}
+        at = 0
+        for p in self.effect.amplitudes:
+            width = channels if p.per_channel and channels <= MOST_CHANNELS else 1
+            taken = coefficients[at : at + width] * p.typical
+            if p.per_channel:
+                values[p.name] = np.broadcast_to(taken, (channels,)).copy()
+            else:
+                values[p.name] = np.array(float(taken[0]))
+            at += width
+        return Placed(self.effect, values)
+
+
+@dataclass(frozen=True)
+class Board:
+    """All candidates with their columns."""
+
+    values: np.ndarray
+    """Residual first, then columns [each stream's unit], shape (n, streams, 1 + columns), float32."""
+    candidates: list[Candidate]
+    unjudgeable: dict[str, str]
+    """Effect -> why these recordings cannot tell of it."""
+
+
+def build(
+    course: Course,
+    response: Response,
+    placed: Sequence[Placed],
+    effects: Sequence[Effect],
+    nuisance: Sequence[str] = (),
+) -> Board:
+    """Predict, and differentiate the chain by every effect at its typical size.
+
+    Args:
+        course: The recordings.
+        response: What the chain starts from.
+        placed: Effects that the model has already.
+        effects: Effects to try.
+        nuisance: Effects that calibration takes up.
+    """
+    streams = Streams.of(course)
+    now = streams.predicted(predict(course, response, placed))
+    columns = [(streams.measured(course) - now).astype(np.float32)]
+    candidates: list[Candidate] = []
+    unjudgeable: dict[str, str] = {}
+    for effect in effects:
+        reason = effect.unjudgeable(course, response) or _absorbed(effect, nuisance)
+        if reason:
+            unjudgeable[effect.name] = reason
+            continue
+        for shapes in _shapes(effect):
+            made, low, high = _columns(effect, shapes, course, response, placed, streams, now)
+            index = np.arange(len(columns) - 1, len(columns) - 1 + len(made))
+            columns += made
+            candidates.append(Candidate(effect, shapes, index, np.array(low), np.array(high)))
+    return Board(np.stack(columns, axis=-1), candidates, unjudgeable)
+
+
+def _absorbed(effect: Effect, nuisance: Sequence[str]) -> str:
+    """Return why an effect is not tried by itself: what calibration takes up cannot be tested beside it."""
+    return "read off the calibration of each channel's gain" if effect.name in nuisance else ""
+
+
+def _shapes(effect: Effect) -> list[dict[str, float]]:
+    names = [p.name for p in effect.shapes]
+    return [dict(zip(names, values, strict=True)) for values in product(*(p.grid for p in effect.shapes))]
+
+
+def _columns(
+    effect: Effect, shapes: dict[str, float], course: Course, response: Response, placed: Sequence[Placed],
+    streams: Streams, now: np.ndarray,
+) -> tuple[list[np.ndarray], list[float], list[float]]:  # fmt: skip
+    made, low, high = [], [], []
+    rest = {p.name: np.full(course.channels, p.default) if p.per_channel else np.array(p.default)
+            for p in effect.amplitudes}  # fmt: skip
+    rest |= {name: np.array(value) for name, value in shapes.items()}
+    for p in effect.amplitudes:
+        values = {**rest, p.name: rest[p.name] + p.typical}
+        change = streams.predicted(predict(course, response, [*placed, Placed(effect, values)])) - now
+        change = change.astype(np.float32)
+        if p.per_channel and course.channels <= MOST_CHANNELS:
+            for channel in range(course.channels):
+                own = np.zeros_like(change)
+                own[:, channel] = change[:, channel]
+                made.append(own)
+        else:
+            made.append(change)
+        count = len(made) - len(low)
+        low += [p.low / p.typical] * count
+        high += [p.high / p.typical] * count
+    return made, low, high

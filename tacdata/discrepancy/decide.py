@@ -1,0 +1,84 @@
+"""From what was found to what may be said: named, ambiguous, unknown or none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.discrepancy.excitation import inseparable
+from tacdata.discrepancy.judge import ALPHA, Judgement, Member
+from tacdata.effects import Placed, load
+
+LEFT = 0.05
+"""Share of the explainable that may be left before no name is given [1]."""
+LEFT_T = 2.0
+"""Leftovers count when they show over episodes by so many standard errors [1]."""
+FAR = 5.0
+"""A rival beaten by so many standard errors over episodes is out, whatever the answer leaves [1]."""
+SURE = 3.0
+"""Without any effect that helps, leftovers must show by so many standard errors to be called a gap [1]."""
+BEYOND = 3.0
+"""A channel's gain is more than calibration's business beyond so many of its standard deviations [1]."""
+COMMON = ("modulus", "thickness")
+"""What a common gain cannot be told from without a force reading."""
+
+
+def adequate(found: Judgement) -> bool:
+    """Return whether nothing much is left to explain."""
+    return found.left.t < LEFT_T or found.share_left < LEFT
+
+
+def members(found: Judgement) -> list[Member]:
+    """Return the effects of the answer, those that calibration shows among them."""
+    course = found.problem.setting.course
+    own = []
+    for m in found.members:
+        called = m.placed.effect.called
+        more = [*m.rivals, *inseparable(course, called), *_hidden(found, m)]
+        own.append(replace(m, rivals=tuple(name for name in dict.fromkeys(more) if name != called)))
+    return [*own, *calibrated(found)]
+
+
+def _hidden(found: Judgement, member: Member) -> list[str]:
+    """Return rivals that are worse by less than what the answer itself leaves: another form may turn them around."""
+    if found.left.t < LEFT_T:
+        return []
+    near = [name for name, loss in member.losses.items() if loss < found.left.gain]
+    return [load(name).called for name in near if member.margins[name] < FAR]
+
+
+def calibrated(found: Judgement) -> list[Member]:
+    """Return gains that are beyond what calibration leaves open: common to all channels, or of some."""
+    prior = found.problem.setting.nuisance.get("channel_gain")
+    if prior is None or not np.any(found.gains):
+        return []
+    made = []
+    common = float(np.median(found.gains))
+    if abs(common) > BEYOND * prior / np.sqrt(len(found.gains)) * 2:
+        placed = Placed(load("gain"), {"e": np.array(common)})
+        error = float(1.25 * np.std(found.gains) / np.sqrt(len(found.gains)))
+        made.append(Member(placed, {"e": error}, (), COMMON, {}, abs(common) / max(error, 1e-9)))
+    own = found.gains - common
+    far = np.abs(own) > BEYOND * prior
+    if far.any():
+        placed = Placed(load("channel_gain"), {"e": np.where(far, own, 0.0)})
+        made.append(Member(placed, {"e": prior}, (), (), {}, float(np.abs(own).max() / prior)))
+    return made
+
+
+def status(found: Judgement) -> str:
+    """Return the verdict: none, named, ambiguous or unknown."""
+    answer = members(found)
+    if not found.gap and not answer:
+        return "none"
+    if not answer and found.tested.p_generic > ALPHA and found.left.t < SURE:
+        return "none"  # one effect in a hundred flips, and nothing that bears it out
+    if not answer or not adequate(found):
+        return "unknown"
+    return "ambiguous" if any(settled(m) != "named" for m in answer) else "named"
+
+
+def settled(member: Member) -> str:
+    """Return whether one effect may be named: named or ambiguous."""
+    return "ambiguous" if member.rivals or member.at_bound else "named"

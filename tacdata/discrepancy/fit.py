@@ -1,0 +1,94 @@
+"""Fits, folds and flips on Gram matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+FOLDS = 5
+
+
+def solve(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return the bounded least-squares coefficients of some columns.
+
+    Args:
+        gram: Residual first, shape (1 + p, 1 + p).
+        columns: Which columns, shape (k,), counted from 0 without the residual.
+        ridge: Weight of a zero-mean prior on each, shape (k,).
+        low: Least value of each, shape (k,).
+        high: Largest value of each, shape (k,).
+    """
+    index = columns + 1
+    matrix = gram[np.ix_(index, index)] + np.diag(ridge)
+    matrix = matrix + 1e-9 * np.eye(len(index)) * max(float(np.trace(matrix)) / max(len(index), 1), 1e-12)
+    target = gram[index, 0]
+    free = np.linalg.solve(matrix, target)
+    if np.all(free >= low) and np.all(free <= high):
+        return free
+    factor = np.linalg.cholesky(matrix).T
+    rest = np.linalg.solve(factor.T, target)
+    return lsq_linear(factor, rest, bounds=(low, np.maximum(high, low + 1e-12)), method="bvls").x
+
+
+def gains(gram: np.ndarray, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return by how much coefficients lower half the whitened energy of each episode, shape (episodes,)."""
+    index = columns + 1
+    linear = gram[:, 0, :][:, index] @ values
+    square = np.einsum("i,eij,j->e", values, gram[:, index][:, :, index], values)
+    return linear - 0.5 * square
+
+
+def fold_of(episodes: int, seed: int = 0) -> np.ndarray:
+    """Return the fold of each episode, shape (episodes,): all folds of a size, shuffled."""
+    folds = min(FOLDS, max(episodes, 1))
+    return np.random.default_rng([seed, 5]).permutation(np.arange(episodes) % folds)
+
+
+def flips(episodes: int, count: int, seed: int = 0) -> np.ndarray:
+    """Return signs for a randomization test, shape (count, episodes), the first row all +1."""
+    signs = np.random.default_rng([seed, 7]).choice([-1.0, 1.0], size=(count, episodes))
+    signs[0] = 1.0
+    return signs
+
+
+BLOCKS = 10
+"""Stretches of successive episodes that flip together where these have something in common."""
+
+
+def block_flips(episodes: int, count: int, seed: int = 0) -> np.ndarray:
+    """Return signs that are the same within stretches of successive episodes, shape (count, episodes)."""
+    block = np.arange(episodes) * min(BLOCKS, episodes) // max(episodes, 1)
+    return flips(min(BLOCKS, max(episodes, 1)), count, seed + 1)[:, block]
+
+
+def eliminated(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:
+    """Return each episode's Gram matrix with some columns regressed out by the fit to all episodes.
+
+    Rows and columns of what was taken out become 0.
+    """
+    if not len(columns):
+        return gram
+    index = columns + 1
+    total = gram.sum(axis=0)
+    matrix = total[np.ix_(index, index)] + np.diag(ridge)
+    matrix = matrix + 1e-9 * np.eye(len(index)) * max(float(np.trace(matrix)) / len(index), 1e-12)
+    change = np.eye(gram.shape[1])
+    change[index] = -np.linalg.solve(matrix, total[index])
+    change[:, index] = 0.0
+    return np.einsum("ji,ejk,kl->eil", change, gram, change, optimize=True)
+
+
+def t_value(values: np.ndarray) -> float:
+    """Return the mean over its standard error, 0 where there is no spread to speak of."""
+    spread = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    mean = float(np.mean(values)) if len(values) else 0.0
+    return mean / (spread / np.sqrt(len(values))) if spread > 1e-12 else (0.0 if abs(mean) < 1e-12 else np.inf * mean)
+
+
+CLIP = 6.0
+"""Most that one episode may say for or against [nats]: one that is wrong must not decide."""
+
+
+def clipped_t(values: np.ndarray) -> float:
+    """Return the mean over its standard error with every episode's say bounded."""
+    return t_value(np.clip(values, -CLIP, CLIP))

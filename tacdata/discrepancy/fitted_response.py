@@ -1,0 +1,172 @@
+"""A response without memory fitted to the recordings themselves: for sensors that no model exists of."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from tacdata.chain import Course, Response
+
+KNOTS = (5, 9, 14, 22, 34, 50)
+"""Intervals of the splines in depth to choose from, by what they say of episodes left out. They know nothing of
+direction, rate or time, so history stays out however many they are."""
+FINER = 2
+"""Steps beyond the number that predicts best [1]."""
+BETTER = 0.9999
+"""More intervals must lower the error of episodes left out at all (this share or less) [1]."""
+ROWS_EACH = 12
+"""Rows of a place that a spline must have at least."""
+SMOOTH = 1e-5
+"""Weight of the splines' bending, over the mean diagonal: what no row decides goes on straight."""
+RIDGE = 1e-8
+"""Share of the mean diagonal added to it."""
+
+
+class FittedResponse(Response):
+    """Splines in depth for every place and tool; works on the rows of its own course."""
+
+    fitted = True
+
+    def __init__(self, course: Course, knots: int | None = None) -> None:
+        """Lay out splines and fit them to the course's readings.
+
+        Args:
+            course: The recordings, without missing readings.
+            knots: Most inner intervals of a spline; chosen by episodes left out, unless given.
+        """
+        self._course = course
+        self._read = course.read
+        reduced = course.reduced
+        quiet = reduced.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.02 * course.stroke)
+        self.idle = np.median(reduced.readings[quiet], axis=0)
+        self.context = contexts(course)
+        streams = reduced.readings - self.idle
+        self._has_force = course.force is not None
+        if reduced.force is not None:
+            streams = np.column_stack([streams, reduced.force])
+        count = knots or self._chosen(streams)
+        self._bases = [self._basis(reduced.tip[self._within(k), 2], count) for k in range(self.context.max() + 1)]
+        self._weights: list[np.ndarray] = []
+        self._fit(streams)
+
+    def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return readings above idle, shape (n, channels); rows must be the course's."""
+        return self._both(pose)[:, : self._course.channels]
+
+    def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return the force as measured [N]; without one, the root mean square of the loads."""
+        both = self._both(pose)
+        return both[:, -1] if self._has_force else np.sqrt(np.mean(np.square(both), axis=1))
+
+    def signal(self, load: np.ndarray) -> np.ndarray:
+        """Return readings, shape (n, channels)."""
+        return self.idle + load
+
+    def features(self, course: Course) -> np.ndarray:
+        """Return the splines at the course's rows, shape (n, most splines of a place)."""
+        width = max(len(b.t) - b.k - 1 for b in self._bases)
+        result = np.zeros((course.rows, width))
+        context = contexts(course)
+        for k, basis in enumerate(self._bases):
+            rows = context == k
+            design = self._design(basis, course.tip[rows, 2])
+            result[np.ix_(rows, np.arange(design.shape[1]))] = design
+        return result
+
+    def correct(self, residual: np.ndarray) -> None:
+        """Add to the response what of a residual (rows read, channels [+ force]) its splines can follow."""
+        for k, basis in enumerate(self._bases):
+            rows = self._within(k)
+            self._weights[k] = self._weights[k] + self._solve(basis, rows, residual[rows])
+
+    def _chosen(self, streams: np.ndarray) -> int:
+        """Return the number of intervals that says most of episodes left out, the same for all places."""
+        best, chosen = np.inf, KNOTS[1]
+        for count in KNOTS:
+            error = self._left_out(streams / np.maximum(streams.std(axis=0), 1e-12), count)
+            if error < BETTER * best:
+                best, chosen = error, count
+        # What predicts best still bends too little: a bias below the noise of one row is far above that of a test.
+        return KNOTS[min(KNOTS.index(chosen) + FINER, len(KNOTS) - 1)]
+
+    def _left_out(self, streams: np.ndarray, count: int) -> float:
+        """Return the squared error of every other episode of each place, from the rest and around its own mean."""
+        reduced, total = self._course.reduced, 0.0
+        for k in range(self.context.max() + 1):
+            within = self._within(k)
+            numbers = np.unique(reduced.episode[within])
+            if len(numbers) < 2:
+                continue
+            basis = self._basis(reduced.tip[within, 2], count)
+            for part in (numbers[::2], numbers[1::2]):
+                out = within & np.isin(reduced.episode, part)
+                weights = self._solve(basis, within & ~out, streams[within & ~out])
+                wrong = streams[out] - self._design(basis, reduced.tip[out, 2]) @ weights
+                for number in part:
+                    own = wrong[reduced.episode[out] == number]
+                    # By absolute value: what is history is large and the same for every count.
+                    total += float(np.abs(own - own.mean(axis=0)).sum())
+        return total
+
+    def _fit(self, streams: np.ndarray) -> None:
+        self._weights = [
+            self._solve(basis, self._within(k), streams[self._within(k)]) for k, basis in enumerate(self._bases)
+        ]
+
+    def _within(self, k: int) -> np.ndarray:
+        """Return which of the rows read belong to a context, shape (m,), bool."""
+        return self.context[self._read] == k
+
+    def _solve(self, basis: BSpline, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return spline weights, with an offset for every episode fitted beside and left out."""
+        reduced = self._course.reduced
+        design = self._design(basis, reduced.tip[rows, 2])
+        episode = reduced.episode[rows]
+        own = (episode[:, None] == np.unique(episode)[None]).astype(float)
+        matrix = np.column_stack([design, own])
+        gram = matrix.T @ matrix
+        scale = float(np.mean(np.diag(gram)))
+        penalty = np.full(len(gram), RIDGE * scale)
+        penalty[design.shape[1] :] = 1e-2 * scale  # offsets are small: the spline takes what they share
+        bend = np.zeros((max(design.shape[1] - 2, 0), len(gram)))
+        for k in range(len(bend)):
+            bend[k, k : k + 3] = 1.0, -2.0, 1.0
+        gram = gram + np.diag(penalty) + SMOOTH * scale * bend.T @ bend
+        return np.linalg.solve(gram, matrix.T @ values)[: design.shape[1]]
+
+    def _both(self, pose: np.ndarray) -> np.ndarray:
+        if len(pose) != len(self.context):
+            pose = np.broadcast_to(pose, (len(self.context), 3))
+        result = np.empty((len(pose), self._weights[0].shape[1]))
+        for k, basis in enumerate(self._bases):
+            rows = self.context == k
+            result[rows] = self._design(basis, pose[rows, 2]) @ self._weights[k]
+        return result
+
+    @staticmethod
+    def _basis(depth: np.ndarray, knots: int) -> BSpline:
+        low, high = float(depth.min()), float(depth.max())
+        high = max(high, low + 1e-6)
+        count = int(np.clip(len(depth) // ROWS_EACH, 1, knots))
+        inner = np.linspace(low, high, count + 1)
+        ends = np.concatenate([[low] * 3, inner, [high] * 3])
+        return BSpline(ends, np.zeros(len(ends) - 4), 3)
+
+    @staticmethod
+    def _design(basis: BSpline, depth: np.ndarray) -> np.ndarray:
+        low, high = basis.t[0], basis.t[-1]
+        inside = np.clip(depth, low, high)
+        design = BSpline.design_matrix(inside, basis.t, 3).toarray()
+        beyond = depth - inside
+        if np.any(beyond):
+            step = 1e-3 * (high - low)
+            near = BSpline.design_matrix(np.where(depth > high, high - step, low + step), basis.t, 3).toarray()
+            slope = (design - near) / np.where(depth > high, step, -step)[:, None]
+            design = design + slope * beyond[:, None]
+        return design
+
+
+def contexts(course: Course) -> np.ndarray:
+    """Return the place-and-tool of every row, numbered from 0, shape (n,), int64."""
+    key = course.row_site * (int(course.tool.max()) + 1) + course.tool
+    return np.unique(key, return_inverse=True)[1].astype(np.int64)

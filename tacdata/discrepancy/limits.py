@@ -1,0 +1,34 @@
+"""How large an effect would have had to be to be seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.discrepancy.fit import eliminated
+from tacdata.discrepancy.problem import Problem
+
+SEEN = 4.0
+"""Standard errors over episodes at which the sign flips find an effect about half the time [1]."""
+
+
+def limits(problem: Problem) -> dict[str, float]:
+    """Return for each effect the size at which it would be found about half the time, in typical sizes.
+
+    The error of an amplitude is told from how the episodes' scores scatter, so that whatever an episode's rows have in
+    common counts once. Of several shapes or directions the easiest counts. inf: these episodes do not excite it.
+    """
+    fixed = np.concatenate([problem.nuisances, problem.tangent.columns]).astype(int)
+    ridge = np.concatenate([problem.ridge, np.zeros(len(problem.tangent.columns))])
+    gram = eliminated(problem.evidence.gram, fixed, ridge)
+    total = gram.sum(axis=0)
+    result: dict[str, float] = {}
+    for candidate in problem.candidates:
+        for column in candidate.columns + 1:
+            information = float(total[column, column])
+            scores = gram[:, column, 0]
+            # No smaller than noise of known size makes it: few episodes scatter less by chance.
+            spread = max(float(np.sqrt(np.sum(np.square(scores)))), float(np.sqrt(max(information, 0.0))))
+            limit = SEEN * spread / information if information > 1e-9 else np.inf
+            name = candidate.effect.name
+            result[name] = min(result.get(name, np.inf), limit)
+    return result

@@ -1,0 +1,206 @@
+"""A course, a response and a model spec's effects, ready to be tested: columns, noise, Gram matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tacdata.chain import Course, Response, predict
+from tacdata.discrepancy import evidence, noise
+from tacdata.discrepancy.candidates import Board, Candidate, build
+from tacdata.discrepancy.evidence import Evidence, Noise
+from tacdata.discrepancy.fit import fold_of, solve
+from tacdata.discrepancy.fitted_response import contexts
+from tacdata.discrepancy.generic import depth_slope, generic
+from tacdata.discrepancy.streams import Streams
+from tacdata.discrepancy.tangent import Tangent, tangents
+from tacdata.effects import Effect, Placed, load
+
+NUISANCE = {"channel_gain": 0.05}
+"""What calibration leaves open of a response that was not fitted: standard deviations in the effects' own units."""
+AMPLITUDES = ("gain", "modulus")
+"""What all channels' gains have in common: read off their calibration too, and not to be told apart."""
+JITTER = (0.02, 0.02, 0.01)
+"""Standard deviation of an episode's own errors of x, y and depth [mm] where the response is not fitted."""
+FITTED_JITTER = 0.01
+"""The same of depth for a fitted response, over the stroke [1]."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is judged, and with what."""
+
+    course: Course
+    response: Response
+    effects: Sequence[Effect]
+    """The library."""
+    nuisance: dict[str, float] = field(default_factory=lambda: dict(NUISANCE))
+    """Effect -> prior standard deviation, for a response that is not fitted."""
+    given: tuple[Placed, ...] = ()
+    """Effects that the model has already, with their numbers fixed."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What stays the same while effects come and go: nuisances and noise, of the model as it was given."""
+
+    context: np.ndarray
+    """Group of rows that share features, of the rows read, shape (m,), int64."""
+    features: np.ndarray | None
+    """What the response may take up [1], shape (m, k)."""
+    errors: np.ndarray
+    """What an episode's own errors of pose change [each stream's unit], shape (m, streams, kinds)."""
+    ridge: np.ndarray
+    """Weights of their priors [1], shape (k,)."""
+    beside: np.ndarray
+    """Columns of nuisances, then those that belong to no effect, whitened and cleaned [1], shape (m, streams, k)."""
+    noise: Noise
+    """Noise as an over-rich fit leaves it."""
+    folds: np.ndarray
+    """Fold of each episode, shape (episodes,), int64."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One state of the model with everything that may be missing beside it."""
+
+    setting: Setting
+    frame: Frame
+    placed: tuple[Placed, ...]
+    board: Board
+    evidence: Evidence
+    tangent: Tangent
+    """Columns by which what is placed already may still move."""
+    nuisances: np.ndarray
+    """Columns of nuisances, from 0, shape (k,), int64."""
+    generic: np.ndarray
+    """Columns that belong to no effect, from 0, shape (k,), int64."""
+
+    @property
+    def candidates(self) -> list[Candidate]:
+        """Everything that may be missing."""
+        return self.board.candidates
+
+    @property
+    def ridge(self) -> np.ndarray:
+        """Weight of each nuisance's prior, shape (k,)."""
+        return self.frame.ridge
+
+    @property
+    def folds(self) -> np.ndarray:
+        """Fold of each episode, shape (episodes,)."""
+        return self.frame.folds
+
+
+def frame(setting: Setting) -> Frame:
+    """Return what stays the same, for a model without further effects."""
+    course, response = setting.course, setting.response
+    reduced, streams = course.reduced, Streams.of(course)
+    context, features = contexts(reduced), response.features(reduced)
+    errors = jitter(setting, setting.given)
+    extra, ridge = nuisance_columns(setting, setting.given)
+    rich = generic(course, response, list(setting.given))
+    residual = streams.measured(course) - streams.predicted(predict(course, response, setting.given))
+    every = np.concatenate([extra, rich], axis=2)
+    known = told(residual.astype(np.float32), every, reduced, context, features, errors)
+    if response.fitted:
+        rise = streams.predicted(predict(course, response, setting.given)).astype(np.float32)
+        rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
+        rise[:, course.channels + (course.force is not None) :] = 0.0
+        local = noise.number_within(context, reduced.episode)
+        apart = rise[:, :, None] * (local[:, None, None] == np.arange(local.max() + 1))
+        bare = _rich_left(residual, every, reduced, known, context, features, errors)
+        both = np.concatenate([bare[:, :, None], apart], axis=2)
+        white = evidence.cleaned(both, reduced, known, context, features, errors)
+        spread = noise.gain_spread(white[:, :, 0], white[:, :, 1:], context)
+        known = replace(known, swing=(rise * spread).astype(np.float32))
+    beside = evidence.cleaned(every, reduced, known, context, features, errors)
+    return Frame(context, features, errors, ridge, beside, known, fold_of(course.episodes))
+
+
+def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Problem:
+    """Build columns beside what is placed and reduce them.
+
+    Args:
+        setting: What is judged.
+        frame: Its nuisances and noise.
+        placed: Effects that the model has.
+    """
+    course, response = setting.course, setting.response
+    taken = () if response.fitted else (*setting.nuisance, *AMPLITUDES)
+    board = build(course, response, [*setting.given, *placed], setting.effects, taken)
+    moving = tangents(course, response, placed, setting.given)
+    count = board.values.shape[2] - 1
+    first = count + moving.values.shape[2]
+    values = np.concatenate([board.values, moving.values], axis=2)
+    found = evidence.collect(
+        values, course.reduced, frame.noise, frame.context, frame.features, frame.errors, frame.beside
+    )
+    second = first + len(frame.ridge)
+    nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
+    board = replace(board, values=board.values[:, :, :1])
+    return Problem(setting, frame, tuple(placed), board, found, moving.at(count), nuisances, rich)
+
+
+def _rich_left(
+    residual: np.ndarray, rich: np.ndarray, course: Course, known: Noise, context: np.ndarray,
+    features: np.ndarray | None, errors: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Return what an over-rich fit leaves of a residual, shape (m, streams)."""
+    columns = np.concatenate([residual[:, :, None].astype(np.float32), rich], axis=2)
+    gram = evidence.collect(columns, course, known, context, features, errors).of(np.arange(course.episodes))
+    free = np.full(rich.shape[2], np.inf)
+    best = solve(gram, np.arange(rich.shape[2]), np.full(rich.shape[2], 1.0), -free, free)
+    return residual - rich @ best.astype(np.float32)
+
+
+def told(
+    residual: np.ndarray, rich: np.ndarray, course: Course, context: np.ndarray, features: np.ndarray | None,
+    errors: np.ndarray,
+) -> Noise:  # fmt: skip
+    """Return the noise, told from what an over-rich fit of columns that belong to no effect leaves of a residual."""
+    known = noise.first_guess(residual, course)
+    columns = np.concatenate([residual[:, :, None], rich], axis=2)
+    every = np.arange(rich.shape[2])
+    free = np.full(len(every), np.inf)
+    for _ in range(2):
+        gram = evidence.collect(columns, course, known, context, features, errors).of(np.arange(course.episodes))
+        best = solve(gram, every, np.full(len(every), 1.0), -free, free)
+        left = (residual - rich @ best.astype(np.float32)) / known.scale
+        still = noise.still(known, left.shape[1])
+        bare = evidence.leftover(left, course, still, context, features, errors / known.scale[None, :, None])
+        known = noise.refined(bare * known.scale, course, known)
+    return replace(known, offset=noise.wander(residual - rich @ best.astype(np.float32), course, known))
+
+
+def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nuisances' columns (n, streams, k) and the weights of their priors (k,); none if fitted."""
+    course, response = setting.course, setting.response
+    if response.fitted:
+        width = course.channels + (course.force is not None) + 3 * (course.tag is not None)
+        return np.zeros((len(course.read), width, 0), dtype=np.float32), np.zeros(0)
+    effects = [load(name) for name in setting.nuisance]
+    board = build(course, response, placed, effects)
+    weights = [
+        (p.typical / setting.nuisance[c.effect.name]) ** 2
+        for c in board.candidates
+        for p in c.effect.amplitudes
+        for _ in range(len(c.columns) // len(c.effect.amplitudes))
+    ]
+    return board.values[:, :, 1:], np.array(weights)
+
+
+def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
+    """Return what an episode's own errors of pose change, at one standard deviation, shape (n, streams, kinds)."""
+    course, response = setting.course, setting.response
+    slope = depth_slope(course, response, list(placed))
+    if response.fitted:
+        return slope[:, :, None] * FITTED_JITTER * course.stroke
+    sideways = build(course, response, placed, [load("xy_offset")])
+    shift = sideways.candidates[0].effect.amplitudes[0].typical if sideways.candidates else 1.0
+    parts = [slope[:, :, None] * JITTER[2]]
+    if sideways.candidates:
+        parts.append(sideways.values[:, :, 1:] * (JITTER[0] / shift))
+    return np.concatenate(parts, axis=2)

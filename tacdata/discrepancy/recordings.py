@@ -1,0 +1,211 @@
+"""Recordings (MCAP) become a course."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.chain import Course, Tool
+from tacdata.chain.rows import Rows, rows_of
+from tacdata.discrepancy.strokes import strokes
+from tacdata.errors import FormatError, UsageError
+from tacdata.recording import Episode, read_episode, read_session
+from tacdata.recording.session import FILE
+
+SAME_PLACE = 0.15
+"""Presses no farther apart count as one place [mm]."""
+FEW_ROWS = 8
+"""A stroke with fewer readings is left out."""
+MISSING = 0.3
+"""A channel that lacks a larger share of its readings is left out [1]."""
+HELD = 1.0
+"""Gaps of a measured quantity up to so long are bridged by a straight line [s]."""
+LONG_PAUSE = 36000.0
+"""Sessions farther apart are laid end to end as if so far apart [s]."""
+
+
+@dataclass(frozen=True)
+class _Stroke:
+    name: str
+    session: int
+    begin: float
+    rows: Rows
+    tool: Tool
+    place: np.ndarray
+
+
+def course_of(paths: list[Path]) -> Course:
+    """Read recordings, in the order of their time.
+
+    Args:
+        paths: Recordings, or folders of sessions.
+
+    Raises:
+        UsageError: If there is none, or a path is neither.
+        FormatError: If they do not have the same channels, or hold no readings.
+    """
+    found: list[tuple[int, Episode]] = []
+    notes: list[str] = []
+    for number, path in enumerate(paths):
+        found += [(number, read_episode(file)) for file in _files(path)]
+    found = [(number, e) for number, e in found if len(e.taxels.sample_ns) > 1]
+    if not found:
+        raise UsageError(
+            f"no readings in {', '.join(map(str, paths))}", "recordings with taxel readings", "record some"
+        )
+    found.sort(key=lambda item: int(item[1].taxels.sample_ns[0]))
+    counts = {e.taxels.counts.shape[1] for _, e in found}
+    if len(counts) > 1:
+        raise FormatError(
+            f"recordings of {', '.join(map(str, sorted(counts)))} channels", "the same channels throughout",
+            "judge sensors one at a time",
+        )  # fmt: skip
+    kept, left_out = _channels(np.concatenate([e.taxels.counts for _, e in found]))
+    notes += left_out
+    names = sorted({m.name for _, e in found for m in e.measured})
+    force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
+    parts: list[_Stroke] = []
+    for number, episode in found:
+        parts += _strokes_of(episode, number, kept, force, temperature)
+    if not parts:
+        raise FormatError("no stretch with enough readings", f"{FEW_ROWS} or more readings a press", "record again")
+    if len(parts) > len(found):
+        notes.append(f"{len(found)} recordings hold {len(parts)} strokes; each counts as an episode")
+    if any(e.tags for _, e in found):
+        notes.append("tag poses are not used yet")
+    return _joined(parts, kept, found[0][1], bool(force), bool(temperature), notes)
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        if not (path / FILE).is_file():
+            loose = sorted(path.glob("*.mcap"))
+            if loose:
+                return loose
+        return list(read_session(path).episodes)
+    if not path.is_file():
+        raise UsageError(f"no file or folder {path}", "a recording (.mcap) or a session's folder", "check the path")
+    return [path]
+
+
+def _channels(counts: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Return which channels can be used, and in words why others cannot."""
+    notes, kept = [], []
+    for channel, values in enumerate(counts.T):
+        good = values[np.isfinite(values)]
+        if len(good) < (1 - MISSING) * len(values):
+            notes.append(f"channel {channel}: {100 * (1 - len(good) / len(values)):.0f} % missing, left out")
+        elif len(good) == 0 or np.ptp(good) == 0:
+            notes.append(f"channel {channel}: always {good[0] if len(good) else 'nothing'}, stuck or dead, left out")
+        else:
+            top = np.mean(good == good.max())
+            if top > 0.05 and len(np.unique(good)) > 20:
+                notes.append(f"channel {channel}: {100 * top:.0f} % of its readings are its largest: clipped")
+            kept.append(channel)
+    if not kept:
+        raise FormatError("no channel with usable readings", "at least one that changes", "; ".join(notes[:3]))
+    return np.array(kept), notes
+
+
+def _named(names: list[str], *words: str) -> str:
+    return next((name for word in words for name in names if word in name), "")
+
+
+def _measured(episode: Episode, name: str, time_ns: np.ndarray) -> np.ndarray:
+    """Return a measured quantity at the readings' times, NaN where it is too far away."""
+    stream = next((m for m in episode.measured if m.name == name), None)
+    if stream is None or len(stream.sample_ns) < 2:
+        return np.full(len(time_ns), np.nan)
+    values = stream.values
+    column = next(
+        (k for k, n in enumerate(stream.names) if n.lower().endswith("z")), int(np.argmax(np.nanstd(values, 0)))
+    )
+    good = np.isfinite(values[:, column])
+    if good.sum() < 2:
+        return np.full(len(time_ns), np.nan)
+    at, value = stream.sample_ns[good], values[good, column]
+    result = np.interp(time_ns, at, value)
+    behind = np.clip(np.searchsorted(at, time_ns), 1, len(at) - 1)
+    far = np.minimum(np.abs(time_ns - at[behind - 1]), np.abs(time_ns - at[behind])) > HELD * 1e9
+    result[far] = np.nan
+    return result
+
+
+def _strokes_of(episode: Episode, session: int, kept: np.ndarray, force: str, temperature: str) -> list[_Stroke]:
+    time_ns = episode.taxels.sample_ns
+    order = np.argsort(time_ns, kind="stable")
+    time_ns = time_ns[order]
+    columns = [episode.taxels.counts[order][:, kept]]
+    columns += [_measured(episode, name, time_ns)[:, None] for name in (force, temperature) if name]
+    values = np.column_stack(columns)
+    good = np.isfinite(values).all(axis=1) & np.concatenate([[True], np.diff(time_ns) > 0])
+    time_ns, values = time_ns[good], values[good]
+    if len(time_ns) < FEW_ROWS or len(episode.tip_ns) < 2:
+        return []
+    radius = getattr(episode.press.indenter, "radius", np.nan)
+    tool = Tool(episode.press.indenter_name, episode.press.indenter.shape, float(radius))
+    made = []
+    spans = strokes(episode.tip_ns, episode.tip[:, 2])
+    for number, (first, last) in enumerate(spans):
+        rows = (time_ns >= first) & (time_ns < last)
+        if rows.sum() < FEW_ROWS:
+            continue
+        origin = time_ns[0]
+        path_time = (episode.tip_ns - origin) * 1e-9
+        laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, episode.tip)
+        deepest = laid.tip[np.argmax(laid.tip[:, 2])]
+        name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
+        made.append(_Stroke(name, session, float(origin) * 1e-9, laid, tool, deepest[:2]))
+    return made
+
+
+def _joined(
+    parts: list[_Stroke], kept: np.ndarray, example: Episode, force: bool, temperature: bool, notes: list[str]
+) -> Course:
+    tools = tuple(dict.fromkeys(p.tool for p in parts))
+    clock, last = [], None
+    for part in parts:
+        begin = part.begin + part.rows.time[0]
+        if last is not None and not 0 <= begin - last[0] < LONG_PAUSE:
+            begin = last[0] + (LONG_PAUSE if begin - last[0] >= LONG_PAUSE else 1.0)
+        shift = begin - part.rows.time[0] if last is None else last[1] + (begin - last[0]) - part.rows.time[0]
+        clock.append(part.rows.time + shift)
+        last = part.begin + part.rows.time[-1], float(clock[-1][-1])
+    count = [len(p.rows.time) for p in parts]
+    episode = np.repeat(np.arange(len(parts)), count)
+    values = np.concatenate([p.rows.values for p in parts])
+    channels = len(kept)
+    centers = example.sensor.taxels.centers
+    numbers = {s: k for k, s in enumerate(dict.fromkeys(p.session for p in parts))}
+    time = np.concatenate(clock)
+    return Course(
+        time=time - time[0], episode=episode, tip=np.concatenate([p.rows.tip for p in parts]),
+        tool=np.array([tools.index(p.tool) for p in parts])[episode], readings=values[:, :channels],
+        averaged=np.concatenate([p.rows.averaged for p in parts]),
+        session=np.array([numbers[p.session] for p in parts]), site=places(np.array([p.place for p in parts])),
+        tools=tools, names=tuple(p.name for p in parts),
+        centers=centers[kept] if len(centers) > int(kept.max()) else None,
+        force=values[:, channels] if force else None,
+        temperature=_filled(values[:, channels + force]) if temperature else None, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _filled(values: np.ndarray) -> np.ndarray:
+    good = np.flatnonzero(np.isfinite(values))
+    return np.interp(np.arange(len(values)), good, values[good])
+
+
+def places(at: np.ndarray) -> np.ndarray:
+    """Return the number of the place of each press: those within `SAME_PLACE` of a place's first belong to it."""
+    known: list[np.ndarray] = []
+    result = np.zeros(len(at), dtype=np.int64)
+    for k, place in enumerate(at):
+        near = [n for n, other in enumerate(known) if np.linalg.norm(place - other) < SAME_PLACE]
+        if near:
+            result[k] = near[0]
+        else:
+            result[k] = len(known)
+            known.append(place)
+    return result

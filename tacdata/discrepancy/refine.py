@@ -1,0 +1,132 @@
+"""From the linear picture to the model itself: Gauss-Newton steps on the chain."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.chain import Response, predict
+from tacdata.discrepancy import evidence
+from tacdata.discrepancy.evidence import Evidence
+from tacdata.discrepancy.fit import solve
+from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.discrepancy.problem import Frame, Setting
+from tacdata.discrepancy.streams import Streams
+from tacdata.discrepancy.tangent import Tangent, tangents
+from tacdata.effects import Placed
+
+STEPS = 5
+SMALL = 0.2
+"""Gain in half the whitened energy below which no further step is made [nats]."""
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A model with its parameters at the optimum."""
+
+    placed: tuple[Placed, ...]
+    response: Response
+    tangent: Tangent
+    energy: np.ndarray
+    """Half the whitened energy of each episode, nuisances fitted [nats], shape (episodes,)."""
+    covariance: np.ndarray
+    """Of the knobs [their steps], robust to what episodes have in common, shape (knobs, knobs)."""
+
+
+def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int = STEPS) -> Refined:
+    """Fit the numbers of placed effects on the chain itself.
+
+    Args:
+        setting: What is judged.
+        placed: Effects with a first guess of their numbers.
+        frame: Frame model, kept.
+        steps: Most Gauss-Newton steps.
+    """
+    response = copy.deepcopy(setting.response) if setting.response.fitted else setting.response
+    now = list(placed)
+    state = _evaluate(setting, response, now, frame)
+    for _ in range(steps):
+        best = None
+        for share in (1.0, 0.3):
+            there = now
+            for knob, by in zip(state.tangent.knobs, share * state.move, strict=True):
+                there = knob.moved(there, float(np.clip(by, -1.5, 1.5) if knob.shape else by))
+            fresh = copy.deepcopy(response)
+            if isinstance(fresh, FittedResponse):
+                _correct(fresh, setting, there)
+            tried = _evaluate(replace(setting, response=fresh), fresh, there, frame)
+            if tried.energy.sum() < state.energy.sum() - 1e-6:
+                best = tried, there, fresh
+                break
+        if best is None:
+            break
+        gained = state.energy.sum() - best[0].energy.sum()
+        state, now, response = best
+        if gained < SMALL:
+            break
+    return Refined(tuple(now), response, state.tangent, state.energy, state.covariance)
+
+
+@dataclass(frozen=True)
+class _State:
+    tangent: Tangent
+    move: np.ndarray
+    energy: np.ndarray
+    covariance: np.ndarray
+
+
+def _evaluate(setting: Setting, response: Response, placed: list[Placed], frame: Frame) -> _State:
+    course, streams = setting.course, Streams.of(setting.course)
+    moving = tangents(course, response, placed, setting.given)
+    residual = streams.measured(course) - streams.predicted(predict(course, response, [*setting.given, *placed]))
+    values = np.concatenate([residual[:, :, None].astype(np.float32), moving.values], axis=2)
+    ridge = frame.ridge
+    found = evidence.collect(
+        values, course.reduced, frame.noise, frame.context, frame.features, frame.errors,
+        frame.beside[:, :, : len(ridge)],
+    )  # fmt: skip
+    k = len(moving.knobs)
+    rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
+    weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
+    free = np.full(len(ridge), np.inf)
+    low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -free])
+    high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), free])
+    every = np.arange(k + len(ridge))
+    total = found.gram.sum(axis=0)
+    best = solve(total, every, weight, low, high)
+    still = np.concatenate([np.zeros(k), _without(total, every[k:], ridge)])
+    return _State(moving, best[:k], _energy(found, still), _covariance(found, best, weight)[:k, :k])
+
+
+def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:
+    free = np.full(len(columns), np.inf)
+    return solve(total, columns, ridge, -free, free) if len(columns) else np.zeros(0)
+
+
+def _energy(found: Evidence, values: np.ndarray) -> np.ndarray:
+    whole = np.concatenate([[1.0], -values])
+    return 0.5 * np.einsum("i,eij,j->e", whole, found.gram, whole)
+
+
+def _covariance(found: Evidence, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Sandwich over episodes: errors within an episode may depend on each other in any way."""
+    total = found.gram.sum(axis=0)[1:, 1:] + np.diag(weight)
+    if not len(total):
+        return np.zeros((0, 0))
+    inverse = np.linalg.pinv(total, hermitian=True)
+    scores = found.gram[:, 1:, 0] - np.einsum("eij,j->ei", found.gram[:, 1:, 1:], values)
+    count = len(scores)
+    middle = scores.T @ scores * (count / max(count - 1, 1))
+    return inverse @ np.maximum(middle, 0) @ inverse if count < 2 else inverse @ middle @ inverse
+
+
+def _correct(response: FittedResponse, setting: Setting, placed: Sequence[Placed]) -> None:
+    """Let a fitted response take up what the effects leave to it, twice: they act on it."""
+    course, streams = setting.course, Streams.of(setting.course)
+    keep = streams.channels + streams.force
+    for _ in range(2):
+        residual = streams.measured(course) - streams.predicted(predict(course, response, [*setting.given, *placed]))
+        response.correct(residual[:, :keep])

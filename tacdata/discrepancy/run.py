@@ -1,0 +1,74 @@
+"""From recordings and a spec to a folder with the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tacdata import documents, provenance
+from tacdata.discrepancy import decide, verdict
+from tacdata.discrepancy.judge import judge
+from tacdata.discrepancy.located import residual, slices
+from tacdata.discrepancy.picture import draw
+from tacdata.discrepancy.problem import Setting
+from tacdata.discrepancy.recordings import course_of
+from tacdata.discrepancy.spec import Spec
+from tacdata.effects import library
+from tacdata.errors import UsageError
+
+VERDICT, TEXT, PICTURE, SPEC = "verdict.json", "verdict.txt", "verdict.png", "spec.json"
+"""Files of the folder; the new spec only where something was named."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was found, and where it lies."""
+
+    verdict: dict[str, Any]
+    text: str
+    folder: Path
+
+
+def run(paths: list[Path], spec: Spec, out: Path, note: Callable[[str], None] = lambda text: None) -> Written:
+    """Judge recordings and write the verdict, a picture and, if effects were named, the next spec.
+
+    Args:
+        paths: Recordings or folders of sessions.
+        spec: The model.
+        out: Folder to create.
+        note: Is told what is being done.
+
+    Raises:
+        UsageError: If ``out`` exists, or there is nothing to read.
+        FormatError: If recordings and spec do not fit together.
+    """
+    if out.exists():
+        raise UsageError(f"{out} exists", "a new folder", "choose another --out")
+    note("reading")
+    course = course_of(paths)
+    response = spec.response(course)
+    placed = spec.effects()
+    known = {p.effect.called for p in placed}
+    setting = Setting(course, response, [e for e in library() if e.called not in known], spec.nuisance, placed)
+    found = judge(setting, note)
+    before, after = slices(found.problem, residual(found.problem)), slices(found.final, residual(found.final))
+    parents = {"spec": spec.content_hash, **{f"recording {p.name}": _hash(p) for p in paths}}
+    answer = verdict.document(found, before, parents)
+    out.mkdir(parents=True)
+    documents.write(out / VERDICT, answer, "verdict")
+    text = verdict.in_text(answer)
+    documents.write_text(out / TEXT, text)
+    draw(found, before, after, answer, out / PICTURE)
+    if answer["status"] == "named":
+        members = decide.members(found)
+        following = spec.with_effects([m.placed for m in members], [m.error for m in members], VERDICT)
+        documents.write(out / SPEC, following, "model_spec")
+    return Written(answer, text, out)
+
+
+def _hash(path: Path) -> str:
+    if path.is_file():
+        return provenance.file_hash(path)
+    return provenance.content_hash({p.name: provenance.file_hash(p) for p in sorted(path.glob("*.mcap"))})

@@ -1,0 +1,190 @@
+"""Which missing effect the residual asks for: tests by episode-wise sign flips, fits, rivals, leftovers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.discrepancy import evidence
+from tacdata.discrepancy.candidates import Candidate
+from tacdata.discrepancy.evidence import Noise
+from tacdata.discrepancy.fit import block_flips, eliminated, flips, gains, solve, t_value
+from tacdata.discrepancy.generic import histories
+from tacdata.discrepancy.problem import Problem
+from tacdata.effects import Effect
+
+FLIPS = 999
+
+
+@dataclass(frozen=True)
+class Tested:
+    """What the sign flips say of every candidate."""
+
+    z: np.ndarray
+    """Standard score of each candidate's gain among its flips [1], shape (candidates,)."""
+    p: np.ndarray
+    """Share of flips in which any candidate does as well [1], shape (candidates,): corrected for their number."""
+    gain: np.ndarray
+    """By how much half the whitened energy falls [nats], shape (candidates,)."""
+    p_generic: float
+    """The same for columns that belong to no effect."""
+
+
+def test(problem: Problem, seed: int = 0) -> Tested:
+    """Test every candidate against flips of whole episodes' residuals.
+
+    An episode's residual has, without a missing effect, no preferred sign; whatever memory or tails its noise has,
+    flipping whole episodes keeps them.
+    """
+    fixed = np.concatenate([problem.nuisances, problem.tangent.columns]).astype(int)
+    ridge = np.concatenate([problem.ridge, np.zeros(len(problem.tangent.columns))])
+    gram = eliminated(problem.evidence.gram, fixed, ridge)
+    signs = flips(len(gram), FLIPS + 1, seed)
+    total = gram.sum(axis=0)
+    slow = block_flips(len(gram), FLIPS + 1, seed)
+    stats = [_flipped(gram, total, c.columns, slow if follows_clock(c.effect) else signs) for c in problem.candidates]
+    groups = np.array_split(problem.generic, 6)
+    stats += [_flipped(gram, total, g, signs, rich=True) for g in groups]
+    table = np.stack(stats, axis=1)
+    spread = table[1:].std(axis=0) + 1e-12
+    z = (table - table[1:].mean(axis=0)) / spread
+    count = len(problem.candidates)
+    top = z[1:].max(axis=1)
+    p = (1 + (top[:, None] >= z[0]).sum(axis=0)) / (FLIPS + 1)
+    return Tested(z[0, :count], p[:count], table[0, :count], float(p[count:].min()))
+
+
+def follows_clock(effect: Effect) -> bool:
+    """Return whether an effect is told from how episodes follow each other: a slow wander looks like it."""
+    return effect.group == "clock" or effect.name in ("thermal_growth", "lost_steps", "clock_skew")
+
+
+def _flipped(
+    gram: np.ndarray, total: np.ndarray, columns: np.ndarray, signs: np.ndarray, rich: bool = False
+) -> np.ndarray:
+    index = columns + 1
+    matrix = total[np.ix_(index, index)]
+    weight = 1e-9 * max(float(np.trace(matrix)) / len(index), 1e-12) + (1.0 if rich else 0.0)
+    target = signs @ gram[:, index, 0]
+    return 0.5 * np.einsum("fi,fi->f", target, np.linalg.solve(matrix + weight * np.eye(len(index)), target.T).T)
+
+
+def fitted(problem: Problem, chosen: Sequence[Candidate], episodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Fit some candidates, with nuisances and what is placed, to some episodes.
+
+    Returns:
+        Columns (from 0) and their coefficients; the candidates' first.
+    """
+    own = [c.columns for c in chosen]
+    moving = problem.tangent
+    columns = np.concatenate([*own, moving.columns, problem.nuisances]).astype(int)
+    wide = sum(map(len, own))
+    rooms = [k.room(problem.placed) for k in moving.knobs]
+    low = np.concatenate([*(c.low for c in chosen), [r[0] for r in rooms], np.full(len(problem.nuisances), -np.inf)])
+    high = np.concatenate([*(c.high for c in chosen), [r[1] for r in rooms], np.full(len(problem.nuisances), np.inf)])
+    ridge = np.concatenate([np.full(wide, 1e-6), np.full(len(rooms), 1.0), problem.ridge])
+    low, high = np.minimum(low, -1e-12), np.maximum(high, 1e-12)
+    return columns, solve(problem.evidence.of(episodes), columns, ridge, low, high)
+
+
+def held_out(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
+    """Return each episode's gain over the model as it is, fitted to the other folds, shape (episodes,)."""
+    result = np.zeros(len(problem.folds))
+    for fold in np.unique(problem.folds):
+        train, rest = np.flatnonzero(problem.folds != fold), np.flatnonzero(problem.folds == fold)
+        columns, values = fitted(problem, chosen, train)
+        empty, start = fitted(problem, [], train)
+        gram = problem.evidence.gram[rest]
+        result[rest] = gains(gram, columns, values) - gains(gram, empty, start)
+    return result
+
+
+def best_shapes(problem: Problem, among: np.ndarray | None = None) -> dict[str, Candidate]:
+    """Return each effect's candidate with the largest gain in a fit with its bounds."""
+    everything = np.arange(len(problem.folds)) if among is None else among
+    best: dict[str, tuple[float, Candidate]] = {}
+    for candidate in problem.candidates:
+        columns, values = fitted(problem, [candidate], everything)
+        gain = float(gains(problem.evidence.gram[everything], columns, values).sum())
+        name = candidate.effect.name
+        if name not in best or gain > best[name][0]:
+            best[name] = gain, candidate
+    return {name: candidate for name, (_, candidate) in best.items()}
+
+
+@dataclass(frozen=True)
+class Left:
+    """What columns of no effect still predict of held-out episodes."""
+
+    gain: float
+    """Summed held-out gain [nats], 0 or more."""
+    t: float
+    """Its mean over episodes in standard errors."""
+
+
+def leftovers(problem: Problem) -> Left:
+    """Say how much of the residual is still predictable by anything."""
+    best = Left(0.0, 0.0)
+    fixed = np.concatenate([problem.nuisances, problem.tangent.columns]).astype(int)
+    ridge = np.concatenate([problem.ridge, np.full(len(problem.tangent.columns), 1.0)])
+    gram = eliminated(problem.evidence.gram, fixed, ridge)
+    everything = np.concatenate([*(c.columns for c in problem.candidates), problem.generic]).astype(int)
+    for columns in (problem.generic, everything):
+        scale = float(np.mean([gram[:, c + 1, c + 1].sum() for c in columns]))
+        for strength in (1e-4, 1e-2, 1e-1, 1.0):
+            each = _ridge_gains(problem, gram, columns, strength * scale)
+            if each.sum() > best.gain:
+                best = Left(float(each.sum()), t_value(each))
+    for strength in (1e-3, 1e-2, 1e-1, 1.0):
+        each = _stream_gains(problem, strength)
+        if each.sum() > best.gain:
+            best = Left(float(each.sum()), t_value(each))
+    return best
+
+
+def _stream_gains(problem: Problem, strength: float) -> np.ndarray:
+    """Return held-out gains of histories with weights of their own in every stream, shape (episodes,)."""
+    same, course = problem.frame, problem.setting.course.reduced
+    residual = evidence.leftover(
+        problem.board.values[:, :, 0], course, same.noise, same.context, same.features, same.errors
+    )
+    if len(problem.nuisances):
+        _, values = fitted(problem, [], np.arange(len(problem.folds)))
+        weights = values[len(problem.tangent.columns) :].astype(np.float32)
+        residual = residual - same.beside[:, :, : len(weights)] @ weights
+    columns = own_histories(problem)
+    weight = strength * float(np.mean(np.einsum("ij,ij->j", columns, columns)))
+    result = np.zeros(len(problem.folds))
+    for fold in np.unique(problem.folds):
+        train = problem.folds[course.episode] != fold
+        matrix = columns[train].T @ columns[train] + weight * np.eye(columns.shape[1])
+        values = np.linalg.solve(matrix, columns[train].T @ residual[train])
+        said = columns[~train] @ values
+        gain = np.sum(said * residual[~train] - 0.5 * said**2, axis=1)
+        result += np.bincount(course.episode[~train], gain, minlength=len(result))
+    return result
+
+
+def own_histories(problem: Problem) -> np.ndarray:
+    """Return what a path remembers, alone and times depth, whitened and without nuisances, shape (m, k)."""
+    same, course = problem.frame, problem.setting.course
+    own = histories(course)[course.read]
+    depth = course.reduced.tip[:, 2]
+    share = np.clip((depth - max(0.0, float(depth.min()))) / course.span, 0, 1)[:, None]
+    columns = np.column_stack([own * np.minimum(share * 10, 1), own * share])[:, None, :]
+    plain = Noise(np.ones(1), same.noise.memory, same.noise.offset)
+    none = np.zeros((len(depth), 1, 1))
+    made = evidence.cleaned(columns, course.reduced, plain, same.context, same.features, none)[:, 0].astype(float)
+    return made / np.maximum(np.sqrt(np.mean(made**2, axis=0)), 1e-9)
+
+
+def _ridge_gains(problem: Problem, gram: np.ndarray, columns: np.ndarray, weight: float) -> np.ndarray:
+    free = np.full(len(columns), np.inf)
+    result = np.zeros(len(problem.folds))
+    for fold in np.unique(problem.folds):
+        train, rest = problem.folds != fold, problem.folds == fold
+        values = solve(gram[train].sum(axis=0), columns, np.full(len(columns), weight), -free, free)
+        result[rest] = gains(gram[rest], columns, values)
+    return result

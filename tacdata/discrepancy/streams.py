@@ -1,0 +1,53 @@
+"""The measured streams side by side, and what a model says of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.chain import Course, Prediction
+
+
+@dataclass(frozen=True)
+class Streams:
+    """Which columns of the stacked streams are what: readings first, then force, then the tag's x, y and depth."""
+
+    channels: int
+    force: bool
+    tag: bool
+    rows: np.ndarray
+    """Rows of the course at which something was read, shape (m,), int64."""
+
+    @classmethod
+    def of(cls, course: Course) -> Streams:
+        """Return the streams that a course holds."""
+        return cls(course.channels, course.force is not None, course.tag is not None, course.read)
+
+    @property
+    def count(self) -> int:
+        """Number of streams."""
+        return self.channels + self.force + 3 * self.tag
+
+    @property
+    def kinds(self) -> list[str]:
+        """Kind of each stream."""
+        return ["signal"] * self.channels + ["force"] * self.force + ["tag"] * (3 * self.tag)
+
+    def measured(self, course: Course) -> np.ndarray:
+        """Return what was measured at the rows that were read, shape (m, streams); NaN where missing."""
+        parts = [course.readings]
+        if self.force and course.force is not None:
+            parts.append(course.force[:, None])
+        if self.tag and course.tag is not None:
+            parts.append(course.tag)
+        return np.column_stack(parts)[self.rows]
+
+    def predicted(self, prediction: Prediction) -> np.ndarray:
+        """Return what a model says at the rows that were read, shape (m, streams)."""
+        parts = [prediction.signal]
+        if self.force:
+            parts.append(prediction.force[:, None])
+        if self.tag:
+            parts.append(prediction.tag)
+        return np.column_stack(parts)[self.rows]

@@ -1,0 +1,41 @@
+"""One recording may hold many strokes: each is an episode of its own to the statistics."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+UP, DOWN = 0.6, 0.25
+"""Shares of the range of depth that a stroke must pass on its way down and up again [1]."""
+
+
+def strokes(time_ns: np.ndarray, depth: np.ndarray) -> list[tuple[int, int]]:
+    """Return the time spans of strokes [ns], touching one another, from the shallowest point between them.
+
+    Args:
+        time_ns: Times of the path [ns], shape (k,), int64.
+        depth: Depth of the tip [mm], shape (k,).
+    """
+    whole = (int(time_ns[0]), int(time_ns[-1]) + 1)
+    low, high = float(depth.min()), float(depth.max())
+    if high - low <= 0:
+        return [whole]
+    share = (depth - low) / (high - low)
+    tops, deep = [], False
+    for i, value in enumerate(share.tolist()):
+        if value > UP and not deep:
+            deep = True
+            tops.append(i)
+        elif value < DOWN:
+            deep = False
+    if len(tops) < 2:
+        return [whole]
+    cuts = []
+    for first, second in pairwise(tops):
+        between = depth[first:second]
+        lowest = np.flatnonzero(between <= between.min() + 1e-9)
+        middle = first + int(lowest[len(lowest) // 2])
+        cuts.append(int(time_ns[middle]))
+    edges = [whole[0], *cuts, whole[1]]
+    return list(pairwise(edges))

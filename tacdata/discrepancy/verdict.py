@@ -1,0 +1,160 @@
+"""The verdict as a document, and in words."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import yaml
+
+import schemas
+from tacdata import provenance
+from tacdata.chain import Course
+from tacdata.discrepancy import decide
+from tacdata.discrepancy.amiss import FEWEST, amiss
+from tacdata.discrepancy.judge import Judgement, Member
+from tacdata.discrepancy.limits import limits
+from tacdata.discrepancy.located import Slice, in_words
+from tacdata.effects import load
+
+Z90 = 1.645
+"""Standard errors either way of a 90 % interval."""
+
+
+def document(found: Judgement, sliced: list[Slice], parents: dict[str, str]) -> dict[str, Any]:
+    """Return the verdict (`schemas/verdict.schema.json`).
+
+    Args:
+        found: What was found.
+        sliced: Where the residual lives, before anything is added.
+        parents: Name to content hash of what was judged.
+    """
+    course = found.problem.setting.course
+    answer, status = decide.members(found), decide.status(found)
+    remarks = amiss(course)
+    if course.episodes < FEWEST and status != "unknown":
+        status = "unknown"
+    effects = [_effect(m) for m in answer]
+    tested = found.tested
+    values = max(float(found.values.sum()), 1.0)
+    return {
+        "version": schemas.version("verdict"), "status": status, "why": why(status, found, answer, course),
+        "effects": effects,
+        "gate": {"gap": found.gap, "p": float(tested.p.min(initial=1.0)), "p_generic": tested.p_generic,
+                 "noise": [float(v) for v in found.problem.frame.noise.scale],
+                 "memory": found.problem.frame.noise.memory},
+        "left": {"share": float(found.share_left), "t": float(np.clip(found.left.t, -99, 99)),
+                 "before": float(2 * found.energy[0].sum() / values),
+                 "after": float(2 * found.energy[1].sum() / values), "floor": 1.0},
+        "located": in_words(sliced), "unjudgeable": found.problem.board.unjudgeable,
+        "limits": {k: (round(v, 4) if np.isfinite(v) and v < 1e3 else None) for k, v in limits(found.final).items()},
+        "untested": untested(answer), "data": data(course), "remarks": remarks, "next": following(answer, status),
+        "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": 999}),
+    }  # fmt: skip
+
+
+def _effect(member: Member) -> dict[str, Any]:
+    effect = member.placed.effect
+    parameters = {}
+    for p in effect.parameters:
+        value = np.asarray(member.placed.values[p.name], dtype=float)
+        error = member.error.get(p.name)
+        entry: dict[str, Any] = {"value": value.tolist(), "unit": p.unit, "error": error}
+        if error is not None and value.ndim == 0:
+            entry["interval"] = [float(value) - Z90 * error, float(value) + Z90 * error]
+        parameters[p.name] = entry
+    return {
+        "mechanism": effect.called, "effect": effect.name, "title": effect.title, "stage": effect.stage,
+        "moves": list(effect.moves), "status": decide.settled(member), "alternatives": list(member.rivals),
+        "parameters": parameters, "margins": {k: float(np.clip(v, -99, 99)) for k, v in member.margins.items()},
+        "necessity": float(np.clip(member.necessity, -99, 99)), "at_bound": list(member.at_bound),
+        "experiment": effect.experiment,
+    }  # fmt: skip
+
+
+def why(status: str, found: Judgement, answer: list[Member], course: Course) -> str:
+    """Return the verdict in a sentence."""
+    names = " and ".join(m.placed.effect.title.lower() for m in answer)
+    sets = "; ".join(
+        f"{m.placed.effect.called} or {' or '.join(m.rivals)}" if m.rivals else m.placed.effect.called for m in answer
+    )
+    if course.episodes < FEWEST:
+        return f"{course.episodes} episodes cannot carry a verdict" + (f"; they point to {sets}" if answer else "")
+    if status == "none":
+        return "nothing is missing that these recordings would show; see the detection limits"
+    if status == "named":
+        more = "" if found.left.t < decide.LEFT_T else f"; {100 * found.share_left:.1f} % of it is another form"
+        return f"{names}: nothing else explains the episodes as well{more}"
+    if status == "ambiguous":
+        bounds = [m.placed.effect.called for m in answer if m.at_bound]
+        told = f"these recordings cannot tell {sets} apart" if any(m.rivals for m in answer) else f"{sets}"
+        return told + (f"; {', '.join(bounds)} would need an unphysical size" if bounds else "")
+    if answer:
+        closest = " with ".join(m.placed.effect.called for m in answer)
+        return (
+            f"something is missing; {closest} comes closest and leaves {100 * found.share_left:.0f} % of what could be "
+            "explained, so it is not the name, or not all of it"
+        )
+    return "something is missing that no modelled effect explains"
+
+
+def untested(answer: list[Member]) -> list[str]:
+    """Return effects that are known and not modelled, of the answer's ambiguity groups; all, without an answer."""
+    groups = {m.placed.effect.group for m in answer}
+    groups |= {load(name).group for m in answer for name in m.margins}
+    listed = yaml.safe_load(resources.files("tacdata.effects").joinpath("not_modelled.yaml").read_text())
+    return [f"{e['id']}: {e['title']}" for e in listed if not groups or e["group"] in groups]
+
+
+def following(answer: list[Member], status: str) -> list[str]:
+    """Return experiments, the most useful first."""
+    told = [f"{m.placed.effect.called}: {m.placed.effect.experiment}" for m in answer if m.rivals or m.at_bound]
+    if status == "unknown":
+        told += [f"{m.placed.effect.called}: {m.placed.effect.experiment}" for m in answer]
+        told.append("the diagnostic plan on this rig: `tacdata plan diagnostic --out diagnostic.yaml`")
+    return list(dict.fromkeys(told))
+
+
+def data(course: Course) -> dict[str, Any]:
+    """Return what was judged, in numbers."""
+    return {
+        "episodes": course.episodes, "rows": len(course.read), "channels": course.channels,
+        "places": len(np.unique(course.site)), "tools": [t.name for t in course.tools],
+        "sessions": len(np.unique(course.session)), "force": course.force is not None, "tag": course.tag is not None,
+        "temperature": course.temperature is not None, "seconds": float(course.time[-1]),
+    }  # fmt: skip
+
+
+def in_text(verdict: dict[str, Any]) -> str:
+    """Return a verdict for reading."""
+    lines = [f"{verdict['status'].upper()}: {verdict['why']}", ""]
+    for e in verdict["effects"]:
+        lines.append(f"  {e['mechanism']} ({e['effect']}, {e['stage']}): {e['status']}")
+        for name, p in e["parameters"].items():
+            if isinstance(p["value"], list):
+                lines.append(
+                    f"    {name}: {min(p['value']):.4g} to {max(p['value']):.4g} {p['unit']} over the channels"
+                )
+            else:
+                spread = f" +- {p['error']:.2g}" if p["error"] is not None else ""
+                lines.append(f"    {name} = {p['value']:.4g}{spread} {p['unit']}")
+        if e["margins"]:
+            shown = ", ".join(f"{k} {v:.1f}" for k, v in sorted(e["margins"].items(), key=lambda kv: kv[1])[:6])
+            lines.append(f"    better, in standard errors over episodes, than: {shown}")
+    gate, left = verdict["gate"], verdict["left"]
+    lines += ["", f"gate: p = {gate['p']:.3f} over all effects, {gate['p_generic']:.3f} for patterns of no effect"]
+    lines.append(f"residual: {left['before']:.3f} before, {left['after']:.3f} after; 1 is the noise floor")
+    lines.append(f"left of what could be explained: {100 * left['share']:.1f} % ({left['t']:.1f} standard errors)")
+    lines += ["where it lives:", *(f"  {words}" for words in verdict["located"])]
+    if verdict["next"]:
+        lines += ["next:", *(f"  {words}" for words in verdict["next"])]
+    if verdict["remarks"]:
+        lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
+    lines.append("cannot be judged here: " + ", ".join(sorted(verdict["unjudgeable"])))
+    weak = [k for k, v in verdict["limits"].items() if v is None or v > 3]
+    if weak:
+        lines.append("would be seen only at more than three times their usual size: " + ", ".join(sorted(weak)))
+    if verdict["untested"]:
+        lines.append("known, not modelled: " + "; ".join(verdict["untested"][:12]))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,38 @@
+"""Play of the depth drive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import State
+from tacdata.chain.memory import play
+from tacdata.effects.effect import Effect, Parameter
+
+
+class Backlash(Effect):
+    """Play of the depth drive."""
+
+    title = "Play of the depth drive"
+    catalogue = ("K7",)
+    stage = "kinematics"
+    moves = ("tag", "label", "signal", "force")
+    group = "loading and unloading"
+    equation = "d = play_{b/2}(z) + b/2: after reversal nothing moves for b"
+    source = "play operator; Brokate & Sprekels, Hysteresis and Phase Transitions, ch. 2"
+    experiment = (
+        "overshoot and return to the same depth; three rates: constant in depth units, whatever rate, load "
+        "and indenter; a tag sees it"
+    )
+    parameters = (Parameter("b", "mm", "play", 0.03, 0.0, 0.6),)
+    seen_by_tag = True
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        half = 0.5 * float(values["b"])
+        if half == 0.0:
+            return state
+        pose = state.pose.copy()
+        pose[:, 2] = play(pose[:, 2], half) + half
+        return replace(state, pose=pose)

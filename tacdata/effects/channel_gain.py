@@ -1,0 +1,33 @@
+"""Channels have gains of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import Course, Response, State
+from tacdata.effects.effect import Effect, Parameter
+
+
+class ChannelGain(Effect):
+    """Channels have gains of their own."""
+
+    title = "Channels have gains of their own"
+    catalogue = ("T3",)
+    stage = "taxel"
+    moves = ("signal",)
+    group = "per channel"
+    equation = "s_i = (1 + e_i) s_i above idle"
+    source = "standard form"
+    experiment = "uniform pressure, or presses between taxels: a gain follows the channel, inhomogeneity the place"
+    parameters = (Parameter("e", "1", "relative excess of the channel", 0.1, -0.95, 3.0, per_channel=True),)
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        idle = state.response.signal(np.zeros_like(state.load[:1]))
+        return replace(state, signal=idle + (state.signal - idle) * (1 + values["e"]))
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        """Return why such recordings cannot tell of it; empty if they may."""
+        return "a fitted response takes up whatever has no memory" if response.fitted else ""

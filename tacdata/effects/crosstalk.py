@@ -1,0 +1,39 @@
+"""Neighbours in the wiring speak to each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import Course, Response, State
+from tacdata.effects.effect import Effect, Parameter
+
+
+class Crosstalk(Effect):
+    """Neighbours in the wiring speak to each other."""
+
+    title = "Neighbours in the wiring speak to each other"
+    catalogue = ("T10",)
+    stage = "readout"
+    moves = ("signal",)
+    group = "lateral spread"
+    equation = "s_i = s_i + k (s_{i-1} + s_{i+1}) above idle"
+    source = "standard form"
+    experiment = "charge one channel electrically: traces, not distance"
+    parameters = (Parameter("k", "1", "share of each neighbour", 0.03, -0.4, 0.4),)
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        idle = state.response.signal(np.zeros_like(state.load[:1]))
+        rise = state.signal - idle
+        both = np.zeros_like(rise)
+        both[:, 1:] += rise[:, :-1]
+        both[:, :-1] += rise[:, 1:]
+        return replace(state, signal=state.signal + values["k"] * both)
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        """Return why such recordings cannot tell of it; empty if they may."""
+        if course.channels < 2:
+            return "one channel"
+        return "a fitted response takes up whatever has no memory" if response.fitted else ""

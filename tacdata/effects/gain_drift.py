@@ -1,0 +1,30 @@
+"""Gain drifts with the clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import State
+from tacdata.effects.effect import Effect, Parameter
+
+
+class GainDrift(Effect):
+    """Gain drifts with the clock."""
+
+    title = "Gain drifts with the clock"
+    catalogue = ("T25", "M13")
+    stage = "readout"
+    moves = ("signal",)
+    group = "clock"
+    equation = "s = s (1 + k (t / T - 1/2)) above idle"
+    source = "standard form"
+    experiment = "the same reference press through the session; a reference capacitor"
+    parameters = (Parameter("k", "1", "relative change over all recordings", 0.05, -1.5, 1.5),)
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        idle = state.response.signal(np.zeros_like(state.load[:1]))
+        clock = state.course.time / max(float(state.course.time[-1]), 1e-9) - 0.5
+        return replace(state, signal=idle + (state.signal - idle) * (1 + values["k"] * clock)[:, None])

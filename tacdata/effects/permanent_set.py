@@ -1,0 +1,45 @@
+"""The skin keeps a dent where it was pressed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import Course, Response, State
+from tacdata.effects.effect import Effect, Parameter
+
+
+class PermanentSet(Effect):
+    """The skin keeps a dent where it was pressed."""
+
+    title = "The skin keeps a dent where it was pressed"
+    catalogue = ("M5",)
+    stage = "mechanics"
+    moves = ("label", "signal", "force")
+    group = "depth offset"
+    equation = "d -> d - e D_k / D (1 - exp(-k / 5)), k presses before at that place, D_k the deepest of them"
+    source = "standard form"
+    experiment = "return to a place after a long rest; compare with one never pressed"
+    parameters = (Parameter("e", "mm", "final dent", 0.03, 0.0, 0.5),)
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        course = state.course
+        depth = np.maximum(state.depth, 0.0)
+        deepest = np.zeros(course.episodes)
+        np.maximum.at(deepest, course.episode, depth)
+        dent = np.zeros(course.episodes)
+        for k in range(course.episodes):
+            same = np.flatnonzero(course.site[:k] == course.site[k])
+            if len(same):
+                dent[k] = -np.expm1(-len(same) / 5.0) * deepest[same].max() / course.span
+        shallower = state.pose - np.array([0.0, 0.0, 1.0]) * (values["e"] * dent[course.episode])[:, None]
+        response, tool = state.response, course.tool
+        load = response.load(shallower, tool) - response.load(state.pose, tool)
+        force = response.force(shallower, tool) - response.force(state.pose, tool)
+        return replace(state, load=state.load + load, force=state.force + force)
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        """Return why such recordings cannot tell of it; empty if they may."""
+        return "no place was pressed twice" if len(set(course.site.tolist())) == course.episodes else ""

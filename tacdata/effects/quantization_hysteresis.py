@@ -1,0 +1,34 @@
+"""Readings change only in steps, late both ways."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import State
+from tacdata.chain.memory import play
+from tacdata.effects.effect import Effect, Parameter
+
+
+class QuantizationHysteresis(Effect):
+    """Readings change only in steps, late both ways."""
+
+    title = "Readings change only in steps, late both ways"
+    catalogue = ("T8",)
+    stage = "readout"
+    moves = ("signal",)
+    group = "loading and unloading"
+    equation = "s = play_w(s) + w: the reading follows through a dead band of fixed width in counts"
+    source = "play operator; comparators with hysteresis"
+    experiment = "histogram of first differences; loops of any size have the same width in counts"
+    parameters = (Parameter("w", "largest rise", "half the dead band", 0.02, 0.0, 0.3),)
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        idle = state.response.signal(np.zeros_like(state.load[:1]))[0]
+        width = float(values["w"]) * np.abs(state.signal - idle).max()
+        if width <= 0.0:
+            return state
+        moved = [play(column, width) + width for column in state.signal.T]
+        return replace(state, signal=np.stack(moved, axis=-1))

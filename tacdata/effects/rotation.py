@@ -1,0 +1,34 @@
+"""Rotation of the sensor against the guide."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import Course, Response, State
+from tacdata.effects.effect import Effect, Parameter
+
+
+class Rotation(Effect):
+    """Rotation of the sensor against the guide."""
+
+    title = "Rotation of the sensor against the guide"
+    catalogue = ("K2",)
+    stage = "kinematics"
+    moves = ("label", "signal")
+    group = "lateral"
+    equation = "(x, y) -> (x - theta y, y + theta x)"
+    source = "standard form"
+    experiment = "presses far from the centre at all four corners"
+    parameters = (Parameter("theta", "rad", "turn about z", 0.02, -0.3, 0.3),)
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        x, y, depth = state.pose.T
+        turn = values["theta"]
+        return replace(state, pose=np.stack([x - turn * y, y + turn * x, depth], axis=-1))
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        """Return why such recordings cannot tell of it; empty if they may."""
+        return "a fitted response takes up whatever has no memory" if response.fitted else ""

@@ -1,0 +1,36 @@
+"""The guide follows its command late."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import State
+from tacdata.chain.memory import low_pass
+from tacdata.effects.effect import Effect, Parameter
+
+
+class ServoLag(Effect):
+    """The guide follows its command late."""
+
+    title = "The guide follows its command late"
+    catalogue = ("K15",)
+    stage = "kinematics"
+    moves = ("tag", "label", "signal", "force")
+    group = "lag"
+    equation = "(tau / 2)^2 d'' + tau d' + d = z: critically damped"
+    source = "standard form"
+    experiment = "other accelerations at the same speed; a tag sees it"
+    parameters = (Parameter("tau", "s", "time constant", 0.05, 0.0, 1.0),)
+    seen_by_tag = True
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        tau = float(values["tau"])
+        if tau <= 0.0:
+            return state
+        pose = state.pose.copy()
+        way, step = pose[:, 2] - pose[0, 2], state.course.step
+        pose[:, 2] = pose[0, 2] + low_pass(low_pass(way, step, tau / 2), step, tau / 2)
+        return replace(state, pose=pose)

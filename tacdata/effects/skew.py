@@ -1,0 +1,35 @@
+"""Axes of the guide are not at right angles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import Course, Response, State
+from tacdata.effects.effect import Effect, Parameter
+
+
+class Skew(Effect):
+    """Axes of the guide are not at right angles."""
+
+    title = "Axes of the guide are not at right angles"
+    catalogue = ("K6",)
+    stage = "kinematics"
+    moves = ("tag", "label", "signal")
+    group = "lateral"
+    equation = "x -> x + g y"
+    source = "standard form"
+    experiment = "corner presses with a tag"
+    parameters = (Parameter("g", "1", "shear of x with y", 0.02, -0.3, 0.3),)
+    seen_by_tag = True
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        pose = state.pose.copy()
+        pose[:, 0] += values["g"] * pose[:, 1]
+        return replace(state, pose=pose)
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        """Return why such recordings cannot tell of it; empty if they may."""
+        return "a fitted response takes up whatever has no memory" if response.fitted else ""

@@ -1,0 +1,31 @@
+"""Rows of an episode: none invented, none lost, dense where the tip moves fast."""
+
+import numpy as np
+
+from tacdata.chain.rows import rows_of
+
+PATH_TIME = np.array([0.0, 1.0, 1.5, 11.5, 12.0, 13.0])
+PATH = np.array([[0, 0, d] for d in (-0.5, -0.5, 1.0, 1.0, -0.5, -0.5)], dtype=float)
+
+
+def laid_out():
+    time = np.arange(0, 13, 1 / 30)
+    return time, rows_of(time, np.column_stack([time, 2 * time]), PATH_TIME, PATH)
+
+
+def test_every_reading_is_in_one_row():
+    time, rows = laid_out()
+    assert rows.averaged.sum() == len(time)
+    read = rows.averaged > 0
+    total = (rows.values[read] * rows.averaged[read, None]).sum(axis=0)
+    np.testing.assert_allclose(total, [time.sum(), 2 * time.sum()])
+
+
+def test_rests_are_averaged_and_fast_motion_is_dense():
+    _, rows = laid_out()
+    moving = (rows.time > 1.0) & (rows.time < 1.5)
+    assert np.abs(np.diff(rows.tip[moving, 2])).max() < 0.045
+    assert np.all(rows.averaged[moving] <= 1)
+    hold = (rows.time > 2.5) & (rows.time < 11.0)
+    assert rows.averaged[hold].max() > 5
+    assert np.isnan(rows.values[rows.averaged == 0]).all()

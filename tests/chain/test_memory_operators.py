@@ -1,0 +1,46 @@
+"""Operators with memory against closed forms."""
+
+import numpy as np
+import pytest
+
+from tacdata.chain.memory import delayed, low_pass, play, running_max
+
+
+@pytest.mark.parametrize("tau", [0.02, 0.3, 5.0, 400.0])
+def test_first_order_lag_of_a_ramp_is_exact_on_uneven_steps(tau):
+    rng = np.random.default_rng(0)
+    time = np.concatenate([[0.0], np.cumsum(rng.uniform(0.001, 0.4, 500))])
+    step = np.diff(time, prepend=time[0])
+    expected = time - tau * -np.expm1(-time / tau)
+    np.testing.assert_allclose(low_pass(time, step, tau), expected, atol=1e-9 * max(1, tau))
+
+
+def test_lag_forgets_across_a_long_pause():
+    time = np.concatenate([np.linspace(0, 1, 50), np.linspace(1e5, 1e5 + 1, 50)])
+    values = np.concatenate([np.ones(50), np.zeros(50)])
+    result = low_pass(values, np.diff(time, prepend=0.0), 0.5)
+    assert np.abs(result[51:]).max() < 1e-3
+
+
+def test_play_follows_through_its_dead_band():
+    depth = np.concatenate([np.linspace(0, 1, 101), np.linspace(1, 0, 101)])
+    out = play(depth, 0.1)
+    np.testing.assert_allclose(out[:101], depth[:101] - 0.1)
+    back = out[101:]
+    np.testing.assert_allclose(back[depth[101:] > 0.8 + 1e-9], 0.9)
+    assert back[-1] == pytest.approx(0.1)
+
+
+def test_delay_shifts_within_an_episode_only():
+    time = np.concatenate([np.arange(10.0), 100 + np.arange(10.0)])
+    episode = np.repeat([0, 1], 10)
+    values = time[:, None].copy()
+    late = delayed(values, time, episode, np.full(20, 2.5))
+    np.testing.assert_allclose(late[3:10, 0], time[3:10] - 2.5)
+    np.testing.assert_allclose(late[10:13, 0], 100.0)
+    np.testing.assert_allclose(delayed(values, time, episode, np.zeros(20)), values)
+
+
+def test_largest_so_far_is_kept_for_each_place():
+    result = running_max(np.array([1.0, 5.0, 2.0, 3.0, 1.0]), np.array([0, 1, 0, 0, 1]))
+    np.testing.assert_allclose(result, [1, 5, 2, 3, 5])

@@ -1,0 +1,47 @@
+"""Presses of a small made-up sensor, time-stepped apart from the library."""
+
+import numpy as np
+
+from tacdata.chain import Course, Tool
+from tacdata.chain.rows import rows_of
+
+FINE = 200
+
+
+def course(seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5):
+    """Return presses of three channels at two places; sizes in s, s, share, mm."""
+    rng = np.random.default_rng(seed)
+    parts, clock, slow, late = [], 0.0, np.zeros(3), np.zeros(3)
+    for k in range(episodes):
+        rate, depth = rng.choice(rates), rng.choice([0.6, 1.0])
+        way = (depth + 0.3) / rate
+        at = np.cumsum([0, 0.5, way, hold, way, 0.8])
+        path = np.array([-0.3, -0.3, depth, depth, -0.3, -0.3])
+        time = np.arange(0, at[-1], 1 / FINE)
+        tip, follower = np.interp(time, at, path), -0.3
+        weights = np.array([[1.0, 0.5, 0.2], [0.2, 0.6, 1.0]])[k % 2]
+        read = np.empty((len(time), 3))
+        slow, late = slow * np.exp(-1 / 2.0), late * 0
+        jitter = 0.002 * rng.normal()
+        for i, z in enumerate(tip):
+            follower = min(max(follower, z - 0.0), z + play)
+            load = weights * max(follower + jitter, 0.0) ** 1.5
+            slow += (load - slow) / (FINE * 2.0)
+            now = load - relaxed * slow
+            late = late + (now - late) / (FINE * lag) if lag > 0 else now
+            read[i] = 5000 + 800 * late
+        pick = np.arange(rng.integers(6), len(time), 6)
+        before = np.maximum(pick - round(delay * FINE), 0)
+        values = np.round(read[before] + noise * rng.normal(size=(len(pick), 3)))
+        parts.append((clock, rows_of(time[pick], values, at, np.column_stack([0 * at + k % 2, 0 * at, path]))))
+        clock += at[-1] + 1.0
+    count = [len(rows.time) for _, rows in parts]
+    episode = np.repeat(np.arange(episodes), count)
+    return Course(
+        time=np.concatenate([begin + rows.time for begin, rows in parts]), episode=episode,
+        tip=np.concatenate([rows.tip for _, rows in parts]), tool=np.zeros(len(episode), dtype=int),
+        readings=np.concatenate([rows.values for _, rows in parts]),
+        averaged=np.concatenate([rows.averaged for _, rows in parts]), session=np.zeros(episodes, dtype=int),
+        site=np.arange(episodes) % 2, tools=(Tool("ball", "sphere", 4.0),),
+        names=tuple(f"press {k}" for k in range(episodes)), centers=np.array([[-1.0, 0], [0, 0], [1, 0]]),
+    )  # fmt: skip

@@ -1,0 +1,87 @@
+"""The verb on imported recordings, and on what is not one."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import yaml
+
+from tacdata import documents
+from tacdata.discrepancy.run import run
+from tacdata.discrepancy.spec import read_spec
+from tacdata.discrepancy.strokes import strokes
+from tacdata.errors import FormatError, UsageError
+from tacdata.importing.imported_session import import_session
+
+MAPPING = {
+    "version": "1.0",
+    "name": "bench",
+    "files": {"log": {"path": "press_{trial}.csv", "time": {"column": "t", "unit": "s", "zero": "shared"}}},
+    "sensor": {"name": "two pads", "columns": 2, "rows": 1, "pitch_x": 4.0, "pitch_y": 4.0},
+    "taxels": {"file": "log", "columns": ["a", "b"], "unit": "pF"},
+    "position": {"file": "log", "depth": {"column": "depth", "unit": "mm"}},
+    "indenter": {"shape": "sphere", "radius": 3.0},
+}
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """Twelve presses at two rates whose readings come 80 ms late."""
+    folder = tmp_path_factory.mktemp("bench")
+    rng = np.random.default_rng(3)
+    clock = 0.0
+    for k in range(12):
+        way = (0.5, 1.5)[k % 2]
+        at = np.cumsum([0, 1.0, way, 1.5, way, 1.5])
+        time = np.arange(0, at[-1], 0.04)
+        depth = np.interp(time, at, [-0.3, -0.3, 1.0, 1.0, -0.3, -0.3])
+        late = np.maximum(np.interp(time - 0.08, at, [-0.3, -0.3, 1.0, 1.0, -0.3, -0.3]), 0) ** 1.5
+        lines = ["t,depth,a,b"]
+        for t, d, s in zip(time, depth, late, strict=True):
+            a, b = 100 + 50 * s + 0.1 * rng.normal(), 90 + 20 * s + 0.1 * rng.normal()
+            lines.append(f"{clock + t:.4f},{d:.5f},{a:.4f},{b:.4f}")
+        (folder / f"press_{k:02d}.csv").write_text("\n".join(lines))
+        clock += at[-1] + 2
+    (folder / "mapping.yaml").write_text(yaml.safe_dump(MAPPING))
+    return import_session(folder, folder / "mapping.yaml", folder / "session").folder
+
+
+def test_imported_recordings_are_judged_into_a_folder(session, tmp_path):
+    written = run([session], read_spec(None), tmp_path / "verdict")
+    answer = documents.read(tmp_path / "verdict" / "verdict.json", "verdict")
+    assert answer["data"]["episodes"] == 12
+    assert answer["status"] in ("named", "ambiguous")
+    assert any("latency" in (e["mechanism"], *e["alternatives"]) for e in answer["effects"])
+    assert (tmp_path / "verdict" / "verdict.png").stat().st_size > 10_000
+    assert written.text.startswith(answer["status"].upper())
+    if answer["status"] == "named":
+        following = documents.read(tmp_path / "verdict" / "spec.json", "model_spec")
+        assert following["parent"] == read_spec(None).content_hash
+        assert following["effects"][-1]["values"]["L"] == pytest.approx(0.08, abs=0.01)
+
+
+def test_nothing_is_overwritten_and_bad_input_is_answered_in_words(session, tmp_path):
+    with pytest.raises(UsageError, match="exists"):
+        run([session], read_spec(None), tmp_path)
+    with pytest.raises(UsageError, match="nothing"):
+        run([tmp_path / "nothing"], read_spec(None), tmp_path / "new")
+    (tmp_path / "spec.json").write_text(json.dumps({"version": "1.0", "name": "x"}))
+    with pytest.raises(FormatError, match="response"):
+        read_spec(tmp_path / "spec.json")
+    spec = {"version": "1.0", "name": "x", "response": {"kind": "fitted"},
+            "effects": [{"effect": "latency", "values": {"late": 1.0}}]}  # fmt: skip
+    (tmp_path / "spec.json").write_text(json.dumps(spec))
+    with pytest.raises(FormatError, match="latency"):
+        run([session], read_spec(tmp_path / "spec.json"), tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_recording_of_many_strokes_is_cut_between_them():
+    time = np.arange(0, 40, 0.1)
+    depth = 1 - np.cos(2 * np.pi * time / 10)
+    spans = strokes((time * 1e9).astype(np.int64), depth)
+    assert len(spans) == 4
+    edges = np.array([s[0] for s in spans[1:]]) / 1e9
+    np.testing.assert_allclose(edges, [10, 20, 30], atol=0.11)
+    assert all(a[1] == b[0] for a, b in pairwise(spans))

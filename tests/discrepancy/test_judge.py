@@ -1,0 +1,80 @@
+"""What is missing is named when it can be, and only then."""
+
+import numpy as np
+import pytest
+from pressing import course
+
+from tacdata import documents
+from tacdata.discrepancy import decide, verdict
+from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.discrepancy.judge import judge
+from tacdata.discrepancy.located import residual, slices
+from tacdata.discrepancy.problem import Setting
+from tacdata.effects import load
+
+FEW = ("latency", "low_pass_filter", "relaxation", "backlash", "proportional_hysteresis", "drift", "creep")
+"""Effects raced in these tests: enough to be confused, few enough to be quick."""
+
+
+def found(effects=FEW, **world):
+    made = course(**world)
+    return judge(Setting(made, FittedResponse(made), [load(name) for name in effects]))
+
+
+def names(answer):
+    return {m.placed.effect.called for m in decide.members(answer)}
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_nothing_missing_is_none(seed):
+    assert decide.status(found(seed=seed)) == "none"
+
+
+def test_a_delay_is_named_and_measured():
+    answer = found(delay=0.05)
+    assert decide.status(answer) == "named"
+    assert names(answer) == {"latency"}
+    assert answer.members[0].placed.values["L"] == pytest.approx(0.05, abs=0.006)
+
+
+def test_relaxation_is_named_and_measured():
+    answer = found(relaxed=0.15, hold=4.0)
+    assert names(answer) == {"relaxation"}
+    assert decide.status(answer) == "named"
+    assert answer.members[0].placed.values["f"] == pytest.approx(0.15, rel=0.2)
+
+
+def test_one_rate_names_no_lag():
+    answer = found(delay=0.05, rates=(1.0,))
+    assert decide.status(answer) in ("ambiguous", "unknown")
+    assert "backlash" in decide.members(answer)[0].rivals
+
+
+def test_an_effect_that_no_file_holds_is_not_named():
+    answer = found(effects=("drift", "backlash"), relaxed=0.2, hold=4.0)
+    assert answer.gap
+    assert decide.status(answer) != "named"
+
+
+def test_a_verdict_fits_its_schema_and_says_what_cannot_be_judged():
+    answer = found(effects=("latency", "gain", "backlash"), episodes=12, delay=0.05)
+    sliced = slices(answer.problem, residual(answer.problem))
+    document = verdict.document(answer, sliced, {})
+    documents.check(document, "verdict", "verdict")
+    assert "gain" in document["unjudgeable"]
+    assert document["limits"]["latency"] is not None
+    assert "latency" in verdict.in_text(document)
+
+
+def test_few_episodes_carry_no_verdict():
+    answer = found(effects=("latency", "backlash"), episodes=5, delay=0.05)
+    document = verdict.document(answer, [], {})
+    assert document["status"] == "unknown"
+    assert "5 episodes" in document["why"]
+
+
+def test_a_fitted_response_cannot_learn_history():
+    made = course(relaxed=0.2, hold=4.0, noise=0.0)
+    response = FittedResponse(made)
+    left = made.reduced.readings - response.signal(response.load(made.tip, made.tool))[made.read]
+    assert np.abs(left).max() > 0.1 * 0.2 * 800
