@@ -95,6 +95,7 @@ def _summary(documents: list[dict[str, Any]]) -> list[str]:
         return []
     taxels, cnc = [d["taxels"] for d in documents], [d["cnc"] for d in documents]
     noise = [v for t in taxels for v in t["idle_noise"] if v is not None]
+    answers = _middle(c["round_trip"] for c in cnc)
     lines = [
         f"  taxels  {_middle(t['rate'] for t in taxels):.2f} Hz, {sum(t['frames'] for t in taxels)} frames, "
         f"{sum(t['lost'] for t in taxels)} lost, jitter {_middle(t['jitter'] for t in taxels):.1f} ms, "
@@ -102,8 +103,8 @@ def _summary(documents: list[dict[str, Any]]) -> list[str]:
         f"          {clock_words(taxels[-1]['clock'])}",
         f"  cnc     {_middle(c['rate'] for c in cnc):.1f} reports/s, start of a move known to "
         f"{_middle(c['start_uncertainty'] for c in cnc):.1f} ms, depth to "
-        f"{max(c['depth_uncertainty'] for c in cnc):.3f} mm, answers within "
-        f"{_middle(c['round_trip'] for c in cnc):.1f} ms",
+        f"{max(c['depth_uncertainty'] for c in cnc):.3f} mm, "
+        + (f"answers within {answers:.1f} ms" if np.isfinite(answers) else "answers not timed"),
     ]
     for name in sorted({name for d in documents for name in d["cameras"]}):
         views = [d["cameras"][name] for d in documents if name in d["cameras"]]

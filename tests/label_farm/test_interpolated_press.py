@@ -12,6 +12,7 @@ from tacdata.sensor import default_sensor
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("indenter", [Sphere(3.0), FlatPunch(2.0, 0.2)], ids=lambda indenter: indenter.shape)
 def test_no_frame_is_further_off_than_a_state_left_out(indenter):
     """The default skin's coarser mesh, both branches; prints with -s what stands in `label_farm/tolerance.py`."""
@@ -32,7 +33,8 @@ def test_no_frame_is_further_off_than_a_state_left_out(indenter):
         print(f"\n{indenter.shape} {name}: lost at most {1e3 * lost.max():.1f} um, bound {1e3 * bound.max():.1f} um; "
               f"left out with twice the states {1e3 * whole.left_out().max():.1f} um")
         assert (lost[1::2] <= bound[1::2]).all()
-        assert bound.max() < 0.02
+        # Bounds stay near what states left out cost: a fiftieth of the depth under the sphere's moving edge.
+        assert bound.max() < 0.025
     maps = surface.reshape(len(depths), *model.sensor.map.shape)
     chosen = [*range(0, peak + 1, 2), *range(peak + 2, len(depths), 2)]
     few = Tolerance().exceeded(np.array(depths)[chosen], maps[chosen])
