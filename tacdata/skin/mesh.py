@@ -120,7 +120,7 @@ class MeshQuality:
     nodes: int
     """Number of nodes."""
     worst_ratio: float
-    """Smallest inscribed over circumscribed radius times 3 [1]; 1 for a regular tetrahedron."""
+    """Smallest inscribed over circumscribed radius times 3 [1]; 1 for a regular tetrahedron, 0 for a flat one, below it inside out."""
     median_ratio: float
     """Median of the same [1]."""
 
@@ -128,13 +128,14 @@ class MeshQuality:
 def quality(mesh: SkinMesh) -> MeshQuality:
     """Measure a mesh by the radius ratio of its straight-sided elements."""
     a, b, c, d = (mesh.nodes[mesh.tets[:, k]] for k in range(4))
-    volume = np.abs(mesh.volumes())
+    volume = mesh.volumes()
     area = sum(
         np.linalg.norm(np.cross(q - p, r - p), axis=1) / 2 for p, q, r in ((a, b, c), (a, b, d), (a, c, d), (b, c, d))
     )
-    inradius = 3 * volume / area
     lengths = [np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (c, d), (a, c), (b, d), (a, d), (b, c))]
     x, y, z = (lengths[2 * k] * lengths[2 * k + 1] for k in range(3))
-    circumradius = np.sqrt(np.maximum((x + y + z) * (x + y - z) * (x - y + z) * (-x + y + z), 0)) / (24 * volume)
-    ratio = 3 * inradius / circumradius
+    heron = np.sqrt(np.maximum((x + y + z) * (x + y - z) * (x - y + z) * (-x + y + z), 0))
+    # r = 3 V / A and R = heron / 24 |V|; four corners in one plane may leave neither.
+    below = area * heron
+    ratio = np.divide(216 * volume * np.abs(volume), below, out=np.zeros_like(volume), where=below > 0)
     return MeshQuality(len(mesh.tets), len(mesh.nodes), float(ratio.min()), float(np.median(ratio)))

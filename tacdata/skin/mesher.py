@@ -23,7 +23,7 @@ RECIPE = 2
 PINNED = Path(__file__).parent / "meshes"
 """Meshes that ship with the model; made by `python -m tacdata.skin.pin_mesh`."""
 
-_TRIES, _SLIVER = 3, 0.03
+_TRIES, _SLIVER, _FLAT = 6, 0.03, 1e-3
 """How often a slab is meshed in search of elements whose radius ratio is nowhere below this [1]."""
 
 
@@ -68,5 +68,12 @@ def make_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
     while len(found) < _TRIES and (not found or found[-1][0] < _SLIVER):
         mesh = quadratic(sensor, *tetrahedralize(surface(sensor, settings.tip), sensor.skin, settings))
         found.append((quality(mesh).worst_ratio, mesh))
-    return max(found, key=lambda pair: pair[0])[1]
+    ratio, mesh = max(found, key=lambda pair: pair[0])
+    if ratio < _FLAT:
+        raise SolveError(
+            f"{_TRIES} meshes of the skin all have flat or inverted elements (best of their worst ratios: {ratio:.2g})",
+            f"inscribed over circumscribed radius above {_FLAT:g} / 3",
+            "choose a smaller element size, or check the skin's sizes against one another",
+        )
+    return mesh
 

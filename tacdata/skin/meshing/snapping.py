@@ -16,6 +16,9 @@ SNAP = 0.1
 _SNAP_SPHERE = 0.25
 """The same for a protrusion, over its radius [1]; above the sagitta of its rings."""
 
+_ROUNDS = 12
+"""How often elements are mended at most; each round takes those that the one before left flat [1]."""
+
 _SLIVER = 0.02
 """Share of its volume that an element must keep when its corners go to the true faces [1]."""
 
@@ -42,7 +45,7 @@ def snap(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> Snapped:
         vertices: Positions [mm], shape (v, 3); inner ones may be moved.
         tets: Tetrahedra of positive volume, shape (e, 4).
     """
-    for _ in range(5):
+    for _ in range(_ROUNDS):
         faces = boundary(tets)
         surface = np.unique(faces)
         snapped, taxel = _on_faces(sensor, vertices, surface)
