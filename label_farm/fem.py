@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +19,12 @@ if TYPE_CHECKING:
 
 _ROUNDS = 3
 """How often a path is solved at most until its states are near enough to each other."""
+
+_ON_A_CARD = 256
+"""How many presses a card is given at a time (benchmarks/skin_throughput.py); a CPU solves one after the other."""
+
+DEVICE = "TACDATA_DEVICE"
+"""Variable that says where a worker solves: "cpu" or a card such as "cuda:0"."""
 
 _SOURCES = ("fem.py", "interpolate.py", "tolerance.py")
 """Files of the farm that decide which states a path gets."""
@@ -37,7 +45,9 @@ class FemModel:
         from tacdata.skin.path_uncertainty import check_spreads
 
         check_spreads(sensor, Sphere(1.0))
-        self._model = SkinModel(sensor)
+        device = os.environ.get(DEVICE, "cpu")
+        self._model = SkinModel(sensor, device=device)
+        self.batch = 1 if device == "cpu" else _ON_A_CARD
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -58,12 +68,40 @@ class FemModel:
             SolveError: If the press is impossible or an equilibrium is not found.
         """
         from tacdata.skin.path_uncertainty import with_uncertainty
-        from tacdata.skin.press import PressRequest
 
-        indenter = from_document(job.indenter, f"job {job.key[:12]}")
-        request = PressRequest(indenter=indenter, x=job.x, y=job.y, yaw=job.yaw, depths=job.depths)
-        request, solution = self._resolved(request, job)
+        request, solution = self._resolved(_request(job), job)
         return with_uncertainty(self._model, request, solution)
+
+    def solve_many(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
+        """Solve paths together; each is yielded as soon as its states are near enough to each other."""
+        requests = [_request(job) for job in jobs]
+        open_ones = list(range(len(jobs)))
+        for round_ in range(_ROUNDS):
+            again = []
+            asked = [requests[k] for k in open_ones]
+            for index, solution in self._model.solve_many(asked, capacity=min(len(asked), _ON_A_CARD)):
+                number = open_ones[index]
+                job, request = jobs[number], requests[number]
+                if isinstance(solution, SolveError):
+                    yield job, solution
+                    continue
+                depths = job.tolerance.refined(solution.depth, solution.surface) if job.tolerance else request.depths
+                if depths == request.depths or round_ == _ROUNDS - 1:
+                    yield job, self._finished(job, request, solution)
+                else:
+                    requests[number] = replace(request, depths=depths)
+                    again.append(number)
+            open_ones = again
+            if not again:
+                return
+
+    def _finished(self, job: Job, request: PressRequest, solution: PathSolution) -> PathSolution | SolveError:
+        from tacdata.skin.path_uncertainty import with_uncertainty
+
+        try:
+            return with_uncertainty(self._model, request, _with_ladder(job, request, solution))
+        except SolveError as error:
+            return error
 
     def _resolved(self, request: PressRequest, job: Job) -> tuple[PressRequest, PathSolution]:
         """Solve a path and, as long as states are missing, solve it again with them: friction remembers the path."""
@@ -77,9 +115,23 @@ class FemModel:
                 break
             request = replace(request, depths=depths)
             solution = self._model.solve(request)
-        ladder = {
-            "asked": len(job.depths),
-            "states": len(request.depths),
-            "left_out_over_tolerance": round(tolerance.exceeded(solution.depth, solution.surface), 3),
-        }
-        return request, replace(solution, provenance={**solution.provenance, "ladder": ladder})
+        return request, _with_ladder(job, request, solution)
+
+
+def _request(job: Job) -> PressRequest:
+    from tacdata.skin.press import PressRequest
+
+    indenter = from_document(job.indenter, f"job {job.key[:12]}")
+    return PressRequest(indenter=indenter, x=job.x, y=job.y, yaw=job.yaw, depths=job.depths)
+
+
+def _with_ladder(job: Job, request: PressRequest, solution: PathSolution) -> PathSolution:
+    """Say in the solution's provenance how its states were chosen."""
+    if job.tolerance is None:
+        return solution
+    ladder = {
+        "asked": len(job.depths),
+        "states": len(request.depths),
+        "left_out_over_tolerance": round(job.tolerance.exceeded(solution.depth, solution.surface), 3),
+    }
+    return replace(solution, provenance={**solution.provenance, "ladder": ladder})

@@ -55,6 +55,11 @@ class Job:
         """Hash of everything that decides the result (hex, 64 characters), not the format's version."""
         return provenance.content_hash(self._content)
 
+    @cached_property
+    def batch(self) -> str:
+        """What jobs share that may be solved together: of one model, those with equal indenters (hex)."""
+        return provenance.content_hash(self.indenter)[:16]
+
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str = "job") -> Job:
         """Rebuild a job from `document`.

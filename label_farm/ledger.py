@@ -7,40 +7,29 @@ import os
 import socket
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from label_farm.job import Job
+from label_farm.ledger_tables import (
+    FIRST_EXPIRED,
+    FIRST_WAITING,
+    GIVE_BACK,
+    LAYOUT,
+    NEXT,
+    TABLES,
+    TAKE,
+    WAITING_LIKE_IT,
+)
 from tacdata.errors import FormatError
 
 WAITING, LEASED, DONE, FAILED = range(4)
-LAYOUT = 1
 LEASE_SECONDS = 30.0
 BUSY_SECONDS = 60.0
 MAX_TRIES = 3
-
-TABLES = """
-CREATE TABLE IF NOT EXISTS job (
-    key TEXT PRIMARY KEY, model TEXT NOT NULL, document TEXT NOT NULL, state INTEGER NOT NULL,
-    rank INTEGER NOT NULL, changed INTEGER NOT NULL, owner TEXT, boot TEXT, lease REAL,
-    tries INTEGER NOT NULL DEFAULT 0, error TEXT, seconds REAL
-);
-CREATE INDEX IF NOT EXISTS waiting ON job (model, rank, changed) WHERE state = 0;
-CREATE INDEX IF NOT EXISTS leased ON job (model, lease) WHERE state = 1;
-CREATE INDEX IF NOT EXISTS owned ON job (owner) WHERE state = 1;
-CREATE INDEX IF NOT EXISTS changes ON job (changed);
-"""
-NEXT = "(SELECT coalesce(max(changed), 0) + 1 FROM job)"
-# Two statements, each served by one partial index: "state = 0 OR lease < now" in one scans the whole table.
-TAKE = (
-    "UPDATE job SET state = 1, owner = ?, boot = ?, lease = ?, tries = tries + 1"
-    " WHERE key IN ({}) RETURNING document, tries, rank, changed"
-)
-TAKE_WAITING = TAKE.format("SELECT key FROM job WHERE state = 0 AND model = ? ORDER BY rank, changed LIMIT ?")
-TAKE_EXPIRED = TAKE.format("SELECT key FROM job WHERE state = 1 AND model = ? AND lease < ? LIMIT ?")
 
 
 @dataclass(frozen=True)
@@ -79,7 +68,11 @@ def boot_name() -> str:
 
 
 class Ledger:
-    """One connection to a ledger; each process and thread opens its own. Local disks only (WAL)."""
+    """One connection to a ledger; each process and thread opens its own. Local disks only (WAL).
+
+    Leases are kept on the monotonic clock of the machine that the ledger lies on, so that a wall clock that jumps
+    neither ends nor prolongs one.
+    """
 
     def __init__(self, path: Path, lease_seconds: float = LEASE_SECONDS) -> None:
         """Open or make a ledger.
@@ -126,7 +119,9 @@ class Ledger:
         try:
             yield
         except BaseException:
-            self._db.execute("ROLLBACK")
+            # SQLite has rolled back by itself where the disk was full.
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
             raise
         self._db.execute("COMMIT")
 
@@ -149,33 +144,81 @@ class Ledger:
         """Close."""
         self.close()
 
-    def enqueue(self, jobs: Iterable[Job], priority: int = 0) -> None:
+    def rows(self, statement: str, values: Iterable[Any] = ()) -> list[tuple]:
+        """Run one statement and return its rows; for what only looks, and for the roster."""
+        return self._db.execute(statement, tuple(values)).fetchall()
+
+    def register(self, sensors: Mapping[str, dict[str, Any]]) -> None:
+        """Say of which sensor models are.
+
+        Args:
+            sensors: Content hash of a model -> document of its sensor.
+        """
+        rows = ((version, json.dumps(document)) for version, document in sensors.items())
+        with self._transaction():
+            self._db.executemany("INSERT OR REPLACE INTO model (version, sensor) VALUES (?, ?)", rows)
+
+    def sensor(self, version: str) -> dict[str, Any] | None:
+        """Return the document of a model's sensor; None if nobody registered the model."""
+        row = self._db.execute("SELECT sensor FROM model WHERE version = ?", (version,)).fetchone()
+        return json.loads(row[0]) if row else None
+
+    def offered(self) -> list[str]:
+        """Return the registered models that `claim` would find a job of, by the priority of their first."""
+        now = time.monotonic()
+        rows = self._db.execute(
+            "SELECT version,"
+            " (SELECT rank FROM job WHERE state = 0 AND model = version ORDER BY rank, changed LIMIT 1) AS first,"
+            " EXISTS (SELECT 1 FROM job WHERE state = 1 AND model = version AND lease < ?) FROM model",
+            (now,),
+        )
+        work = [(rank, version) for version, rank, expired in rows if rank is not None or expired]
+        return [version for _, version in sorted(work, key=lambda entry: (entry[0] is None, entry[0] or 0))]
+
+    def withhold(self, version: str) -> None:
+        """Offer a model's jobs no more; they stay in the queue."""
+        self._db.execute("DELETE FROM model WHERE version = ?", (version,))
+
+    def enqueue(self, jobs: Iterable[Job], priority: int = 0, run: str = "") -> None:
         """Ask for jobs whose results are missing; one that is already waiting or worked on stays as it is.
 
         Args:
             jobs: What to compute. One that the ledger holds for done or failed is computed again.
             priority: Larger comes first; raises that of a job already waiting.
+            run: Who asks, if the asking is to be taken back some day (`withdraw`).
         """
-        rows = ((job.key, job.model, json.dumps(job.document), -priority) for job in jobs)
+        listed = list(jobs) if run else jobs
+        rows = ((job.key, job.model, job.batch, json.dumps(job.document), -priority) for job in listed)
         with self._transaction():
             self._db.executemany(
-                f"INSERT INTO job (key, model, document, state, rank, changed) VALUES (?, ?, ?, 0, ?, {NEXT})"
+                f"INSERT INTO job (key, model, batch, document, state, rank, changed) VALUES (?, ?, ?, ?, 0, ?, {NEXT})"
                 " ON CONFLICT (key) DO UPDATE"
-                " SET rank = min(rank, excluded.rank), state = 0, tries = 0, error = NULL"
+                " SET rank = min(rank, excluded.rank), state = 0, error = NULL, alone = 0,"
+                " tries = CASE state WHEN 0 THEN tries ELSE 0 END"
                 " WHERE state <> 1",
                 rows,
             )
+            if run:
+                wishes = ((run, job.key, -priority) for job in listed)
+                self._db.executemany("INSERT OR REPLACE INTO wish (run, key, rank) VALUES (?, ?, ?)", wishes)
 
     def claim(self, owner: str, model: str, count: int = 1) -> list[Lease]:
-        """Take up to ``count`` jobs of one model version: waiting ones by priority, else expired ones."""
+        """Take up to ``count`` jobs of one model version that share their indenter: by priority, else an expired one.
+
+        A job in whose company a worker died is taken alone, so that it can be told which of them is to blame.
+        """
         now = time.monotonic()
-        grant = (owner, self._boot, now + self.lease_seconds)
         with self._transaction():
-            rows = self._db.execute(TAKE_WAITING, (*grant, model, count)).fetchall()
-            if not rows:
-                rows = self._db.execute(TAKE_EXPIRED, (*grant, model, now, count)).fetchall()
-        rows.sort(key=lambda row: row[2:])
-        return [_lease(document, tries) for document, tries, *_ in rows]
+            first = self._db.execute(FIRST_WAITING, (model,)).fetchone()
+            if first is None:
+                keys = [row[0] for row in self._db.execute(FIRST_EXPIRED, (model, now))]
+            elif first[3] or count == 1:
+                keys = [first[0]]
+            else:
+                keys = [row[0] for row in self._db.execute(WAITING_LIKE_IT, (model, first[1], first[2], count))]
+            grant = (owner, self._boot, now + self.lease_seconds)
+            rows = [self._db.execute(TAKE, (*grant, key)).fetchone() for key in keys]
+        return [_lease(document, tries) for document, tries in rows]
 
     def has_work(self, model: str) -> bool:
         """Return whether `claim` would find a job of a model version."""
@@ -189,8 +232,10 @@ class Ledger:
 
     def heartbeat(self, owner: str) -> None:
         """Renew every lease of a worker."""
-        lease = time.monotonic() + self.lease_seconds
+        now = time.monotonic()
+        lease = now + self.lease_seconds
         self._db.execute("UPDATE job SET lease = ? WHERE state = 1 AND owner = ?", (lease, owner))
+        self._db.execute("UPDATE worker SET seen = ? WHERE owner = ?", (now, owner))
 
     def finish(self, key: str, owner: str, seconds: float) -> bool:
         """Mark a job done; False if the worker's lease was lost meanwhile (its result still counts)."""
@@ -201,11 +246,17 @@ class Ledger:
         return self._settle(key, owner, FAILED, error, seconds)
 
     def _settle(self, key: str, owner: str, state: int, error: str | None, seconds: float) -> bool:
-        cursor = self._db.execute(
-            f"UPDATE job SET state = ?, error = ?, seconds = ?, owner = NULL, changed = {NEXT}"
-            " WHERE key = ? AND state = 1 AND owner = ?",
-            (state, error, seconds, key, owner),
-        )
+        with self._transaction():
+            cursor = self._db.execute(
+                f"UPDATE job SET state = ?, error = ?, seconds = ?, owner = NULL, changed = {NEXT}"
+                " WHERE key = ? AND state = 1 AND owner = ?",
+                (state, error, seconds, key, owner),
+            )
+            if cursor.rowcount == 1:
+                self._db.execute(
+                    "UPDATE worker SET done = done + ?, failed = failed + ?, busy = busy + ?, seen = ? WHERE owner = ?",
+                    (state == DONE, state == FAILED, seconds, time.monotonic(), owner),
+                )
         return cursor.rowcount == 1
 
     def release(self, owner: str, blame: bool) -> list[Lease]:
@@ -213,35 +264,30 @@ class Ledger:
 
         Args:
             owner: The worker, which must be dead or stopped.
-            blame: Whether the try counts against the job; one with `MAX_TRIES` such tries is not given back.
+            blame: Whether the try counts against the job. Several jobs at once share the blame: each is to be tried
+                alone, and that alone counts. One with `MAX_TRIES` such tries is not given back.
 
         Returns:
             The jobs not given back: the caller settles them with `fail`, under the same owner.
         """
-        back = "UPDATE job SET state = 0, owner = NULL"
+        held = "WHERE state = 1 AND owner = ?"
         with self._transaction():
-            if blame:
-                self._db.execute(f"{back} WHERE state = 1 AND owner = ? AND tries < ?", (owner, MAX_TRIES))
+            count = self._db.execute(f"SELECT count(*) FROM job {held}", (owner,)).fetchone()[0]
+            if not blame:
+                self._db.execute(f"{GIVE_BACK}, tries = tries - 1 {held}", (owner,))
+            elif count > 1:
+                self._db.execute(f"{GIVE_BACK}, tries = tries - 1, alone = 1 {held}", (owner,))
             else:
-                self._db.execute(f"{back}, tries = tries - 1 WHERE state = 1 AND owner = ?", (owner,))
-            kept = self._db.execute(
-                "SELECT document, tries FROM job WHERE state = 1 AND owner = ?", (owner,)
-            ).fetchall()
+                self._db.execute(f"{GIVE_BACK} {held} AND tries < ?", (owner, MAX_TRIES))
+            kept = self._db.execute(f"SELECT document, tries FROM job {held}", (owner,)).fetchall()
         return [_lease(*row) for row in kept]
 
     def release_dead(self) -> None:
         """Give back what dead processes of this machine held, and all leases from before a restart."""
-        self._db.execute(
-            "UPDATE job SET state = 0, owner = NULL WHERE state = 1 AND boot <> ?", (self._boot,)
-        )
-        owners = [row[0] for row in self._db.execute("SELECT DISTINCT owner FROM job WHERE state = 1")]
-        host = socket.gethostname()
-        for owner in owners:
-            name, _, process = owner.rpartition("/")
-            if name == host and not _alive(int(process)):
-                self._db.execute(
-                    "UPDATE job SET state = 0, owner = NULL WHERE state = 1 AND owner = ?", (owner,)
-                )
+        self._db.execute(f"{GIVE_BACK} WHERE state = 1 AND boot <> ?", (self._boot,))
+        for owner in [row[0] for row in self._db.execute("SELECT DISTINCT owner FROM job WHERE state = 1")]:
+            if is_dead(owner):
+                self._db.execute(f"{GIVE_BACK} WHERE state = 1 AND owner = ?", (owner,))
 
     def last_change(self) -> int:
         """Return the running number of the latest change."""
@@ -263,9 +309,42 @@ class Ledger:
         found = dict(self._db.execute("SELECT state, count(*) FROM job GROUP BY state").fetchall())
         return {state: found.get(state, 0) for state in (WAITING, LEASED, DONE, FAILED)}
 
+    def withdraw(self, run: str) -> int:
+        """Take back what a run asked for; what nobody else asked for and nobody works on leaves the queue.
+
+        Returns:
+            How many jobs left the queue.
+        """
+        with self._transaction():
+            keys = self._db.execute("DELETE FROM wish WHERE run = ? RETURNING key", (run,)).fetchall()
+            removed = self._db.executemany(
+                "DELETE FROM job WHERE key = ? AND state = 0 AND key NOT IN (SELECT key FROM wish)", keys
+            ).rowcount
+            self._rank(keys)
+        return max(removed, 0)
+
+    def prioritize(self, run: str, priority: int) -> None:
+        """Change the priority of what a run asked for; a job has the highest priority that is asked for."""
+        with self._transaction():
+            self._db.execute("UPDATE wish SET rank = ? WHERE run = ?", (-priority, run))
+            self._rank(self._db.execute("SELECT key FROM wish WHERE run = ?", (run,)).fetchall())
+
+    def _rank(self, keys: list[tuple[str]]) -> None:
+        self._db.executemany(
+            "UPDATE job SET rank = coalesce((SELECT min(rank) FROM wish WHERE wish.key = job.key), rank)"
+            " WHERE key = ? AND state = 0",
+            keys,
+        )
+
 
 def _lease(document: str, tries: int) -> Lease:
     return Lease(Job.from_document(json.loads(document), "ledger"), tries)
+
+
+def is_dead(owner: str) -> bool:
+    """Return whether a worker is a process of this machine that has ended; of other machines nothing is known."""
+    host, _, process = owner.rpartition("/")
+    return host == socket.gethostname() and process.isdigit() and not _alive(int(process))
 
 
 def _alive(process: int) -> bool:

@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -22,7 +23,11 @@ FACTORY = "label_farm.fem:FemModel"
 
 
 class Model(Protocol):
-    """What a factory builds."""
+    """What a factory builds. The farm knows of a solver only this: a stand-in is one class with these names.
+
+    A model may also have ``batch``, how many jobs it likes at a time (1 without it), and ``solve_many(jobs)``, which
+    yields each job with its solution or its SolveError as they are found, whatever became of the others.
+    """
 
     @property
     def content_hash(self) -> str:
@@ -46,6 +51,26 @@ def build(factory: str, sensor: Sensor) -> Model:
         return getattr(importlib.import_module(module), name)(sensor)
     except (ImportError, AttributeError) as error:
         raise UsageError(f"no model {factory!r}: {error}", "package.module:name", "check the name") from error
+
+
+def batch_size(model: Model) -> int:
+    """Return how many jobs a model likes to be given at a time."""
+    return max(1, int(getattr(model, "batch", 1)))
+
+
+def solve_each(model: Model, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
+    """Yield each job with its solution or with why it has none: one bad press does not stop the others.
+
+    Errors of other kinds end it: what the process holds is not trusted any more.
+    """
+    if len(jobs) > 1 and hasattr(model, "solve_many"):
+        yield from model.solve_many(jobs)  # pyright: ignore[reportAttributeAccessIssue]
+        return
+    for job in jobs:
+        try:
+            yield job, model.solve(job)
+        except SolveError as error:
+            yield job, error
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
-"""One worker: a long-lived process that takes jobs from the ledger and leaves results in the store.
+"""One worker: a long-lived process that takes jobs from a desk and leaves results there.
 
-It is started by `pool.py` as ``python -m label_farm.worker``, reads its assignment as one line of JSON from
-standard input, and ends when that closes: with whoever started it, however that one ended. It may be killed
-at any moment.
+`pool.py` starts it as ``python -m label_farm.worker``. It reads its assignment as one line of JSON from standard input,
+and ends when that closes: with whoever started it, however that one ended. It may be killed at any moment.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -15,25 +15,27 @@ import sys
 import threading
 import time
 import traceback
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Self
 
+from label_farm.desk import Desk, LocalDesk
 from label_farm.failure import Failure
-from label_farm.job import Job
-from label_farm.ledger import MAX_TRIES, Lease, Ledger, owner_name
-from label_farm.model import Model, build
-from label_farm.store import Store
+from label_farm.ledger import MAX_TRIES, Lease, owner_name
+from label_farm.model import Model, batch_size, build, solve_each
 from tacdata import provenance
-from tacdata.errors import SolveError
-from tacdata.sensor import Sensor
+from tacdata.errors import SolveError, TacdataError
+from tacdata.labels import PathSolution
 
 IDLE_SECONDS = 0.1
 OTHER_CODE = 14
 """Exit code of a worker whose model has another version than the one that it was started for."""
 BROKEN = 15
 """Exit code after an unexpected error: what the process holds is not trusted any more."""
+NO_ROOM = 16
+"""Exit code when the disk is full or refuses: no press is to blame, and no other worker would do better."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,12 @@ class Assignment:
     """Folder of the store; its ledger lies in it."""
     factory: str
     """Dotted path of what builds the model."""
-    sensors: dict[str, dict]
-    """Content hash of a model -> document of its sensor."""
+    versions: list[str] | None
+    """Model versions to work for; None for all that the ledger offers, passing over those of other code."""
     lease_seconds: float
     """For how long a claim holds without a sign of life [s]."""
+    device: str = "cpu"
+    """What it solves on."""
 
     def line(self) -> str:
         """Return the assignment as one line."""
@@ -58,89 +62,139 @@ class Assignment:
         """Rebuild an assignment from `line`."""
         return cls(**json.loads(line))
 
+    def desk(self) -> LocalDesk:
+        """Open the desk."""
+        return LocalDesk(Path(self.store), owner_name(), self.lease_seconds, self.versions, self.device)
+
 
 class OtherCodeError(Exception):
     """The model built here is not of the version asked for."""
 
 
 class Worker:
-    """Takes jobs one by one. Models are built when first needed and kept."""
+    """Takes jobs, a batch at a time. Models are built when first needed and kept."""
 
-    def __init__(self, assignment: Assignment) -> None:
-        """Open the store and the ledger."""
-        self.assignment, self.owner = assignment, owner_name()
-        self.store = Store(Path(assignment.store))
-        self.ledger = Ledger(self.store.ledger_path, assignment.lease_seconds)
-        self.sensors = {
-            key: Sensor.from_document(document, "sensor") for key, document in assignment.sensors.items()
-        }
+    def __init__(self, desk: Desk, factory: str, strict: bool = True) -> None:
+        """Sit down at a desk.
+
+        Args:
+            desk: Where jobs come from.
+            factory: Dotted path of what builds a model from a sensor.
+            strict: Whether a model that cannot be had here ends the worker; else it is noted and passed over.
+        """
+        self.desk, self._factory, self._strict = desk, factory, strict
         self._models: dict[str, Model] = {}
+        self._refused: dict[str, str] = {}
 
     def step(self) -> bool:
-        """Take one job and settle it; False if there is none."""
-        for version in self.sensors:
-            if self.ledger.has_work(version):
-                # Before a job is claimed: a model that cannot be built here is no fault of the press.
-                model = self._model(version)
-                for lease in self.ledger.claim(self.owner, version):
-                    self._settle(lease, model)
-                    return True
+        """Take one batch of jobs and settle it; False if there is none."""
+        for version in self.desk.offers():
+            # Before a job is claimed: a model that cannot be built here is no fault of the press.
+            model = self._model(version)
+            if model is not None and (leases := self.desk.claim(version, batch_size(model))):
+                self._settle(leases, model)
+                return True
         return False
 
-    def _settle(self, lease: Lease, model: Model) -> None:
-        job, started = lease.job, time.monotonic()
-        if self.store.intact(job):
-            self.ledger.finish(job.key, self.owner, 0.0)
-            return
-        if lease.tries > MAX_TRIES:
-            self._fail(lease, Failure("crash", f"its worker went silent {MAX_TRIES} times", tries=MAX_TRIES))
-            return
+    def _settle(self, leases: list[Lease], model: Model) -> None:
+        todo = {lease.job: lease.tries for lease in leases if self._is_open(lease)}
+        began = time.monotonic()
         try:
-            self._solve(job, model)
-        except SolveError as error:
-            self._fail(lease, Failure("solve", str(error), traceback.format_exc(), lease.tries))
-        except (OSError, MemoryError):
-            raise  # not the press's fault: the pool gives the job back
+            for job, outcome in solve_each(model, list(todo)):
+                seconds, began = time.monotonic() - began, time.monotonic()
+                self._leave(Lease(job, todo.pop(job)), outcome, seconds)
+            if todo:
+                raise RuntimeError(f"the model left {len(todo)} jobs unanswered")
+        except (OSError, MemoryError, sqlite3.OperationalError):
+            raise  # not the press's fault: the pool gives the jobs back
         except Exception as error:
-            reason = f"unexpected {type(error).__name__}: {error}"
-            self._fail(lease, Failure("crash", reason, traceback.format_exc(), lease.tries))
+            # Of several, nobody knows which one did it: each gets a try alone.
+            if len(todo) == 1:
+                [(job, tries)] = todo.items()
+                reason = f"unexpected {type(error).__name__}: {error}"
+                self.desk.fail(job, Failure("crash", reason, traceback.format_exc(), tries))
             raise
+
+    def _is_open(self, lease: Lease) -> bool:
+        if self.desk.has(lease.job):
+            self.desk.finish(lease.job, 0.0)
+            return False
+        if lease.tries > MAX_TRIES:
+            reason = f"its worker went silent {MAX_TRIES} times"
+            self.desk.fail(lease.job, Failure("crash", reason, tries=MAX_TRIES))
+            return False
+        return True
+
+    def _leave(self, lease: Lease, outcome: PathSolution | SolveError, seconds: float) -> None:
+        try:
+            if isinstance(outcome, SolveError):
+                raise outcome
+            made = {"seconds": seconds, "code_version": provenance.code_version(), "worker": owner_name()}
+            self.desk.put(lease.job, replace(outcome, provenance={**made, **outcome.provenance}))
+        except SolveError as error:
+            log = "".join(traceback.format_exception(error))
+            self.desk.fail(lease.job, Failure("solve", str(error), log, lease.tries))
         else:
-            self.ledger.finish(job.key, self.owner, time.monotonic() - started)
+            self.desk.finish(lease.job, seconds)
 
-    def _solve(self, job: Job, model: Model) -> None:
-        started = time.monotonic()
-        solution = model.solve(job)
-        made = {
-            "seconds": time.monotonic() - started,
-            "code_version": provenance.code_version(),
-            "worker": self.owner,
-        }
-        solution = replace(solution, provenance={**made, **solution.provenance})
-        self.store.put(job, solution, self.sensors[job.model])
-
-    def _fail(self, lease: Lease, failure: Failure) -> None:
-        self.store.put_failure(lease.job, failure)
-        self.ledger.fail(lease.job.key, self.owner, failure.reason)
-
-    def _model(self, version: str) -> Model:
+    def _model(self, version: str) -> Model | None:
+        if version in self._refused:
+            return None
         if version not in self._models:
-            model = build(self.assignment.factory, self.sensors[version])
-            if model.content_hash != version:
-                raise OtherCodeError(
-                    f"this worker's model is {model.content_hash[:12]}…, the jobs ask for {version[:12]}…"
-                )
-            self._models[version] = model
+            try:
+                self._models[version] = self._built(version)
+            except (OtherCodeError, TacdataError) as error:
+                if self._strict:
+                    raise
+                self._refused[version] = str(error)
+                self.desk.note(f"refuses model {version[:12]}…: {error}")
+                return None
         return self._models[version]
 
+    def _built(self, version: str) -> Model:
+        model = build(self._factory, self.desk.sensor(version))
+        if model.content_hash != version:
+            raise OtherCodeError(
+                f"this worker's model is {model.content_hash[:12]}… ({provenance.code_version()}), "
+                f"the jobs ask for {version[:12]}…"
+            )
+        return model
 
-def _beat(ledger_path: Path, lease_seconds: float) -> None:
-    with Ledger(ledger_path, lease_seconds) as ledger:
-        while True:
-            time.sleep(lease_seconds / 4)
-            # A full disk or a lock held for long must not end the beating: the next one may succeed.
-            with suppress(sqlite3.OperationalError):
-                ledger.heartbeat(owner_name())
+
+def beat(desk_of: Callable[[], Desk], lease_seconds: float) -> None:
+    """Give signs of life for ever, over a desk of this thread's own."""
+    desk = desk_of()
+    while True:
+        time.sleep(lease_seconds / 4)
+        # A full disk, a lock held for long or a cut line must not end the beating: the next one may succeed.
+        with suppress(sqlite3.OperationalError, OSError):
+            desk.beat()
+
+
+def work(worker: Worker, stopped: Callable[[], bool] = lambda: False) -> int:
+    """Take jobs until told to stop; return the exit code."""
+    try:
+        while not stopped():
+            if not worker.step():
+                time.sleep(IDLE_SECONDS)
+    except OtherCodeError as error:
+        print(error, file=sys.stderr)
+        return OTHER_CODE
+    except (OSError, sqlite3.OperationalError) as error:
+        traceback.print_exc()
+        return NO_ROOM if is_disk(error) else BROKEN
+    except Exception:
+        traceback.print_exc()
+        return BROKEN
+    return 0
+
+
+def is_disk(error: Exception) -> bool:
+    """Return whether it is the disk that refuses."""
+    numbers = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES)
+    return getattr(error, "errno", None) in numbers or any(
+        words in str(error) for words in ("disk is full", "disk I/O error", "readonly database")
+    )
 
 
 def _end_with_parent() -> None:
@@ -152,20 +206,11 @@ def main() -> int:
     """Work until standard input closes; return the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the pool's business
     assignment = Assignment.from_line(sys.stdin.readline())
-    worker = Worker(assignment)
+    desk = assignment.desk()
+    desk.enter()
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    beat = (worker.store.ledger_path, assignment.lease_seconds)
-    threading.Thread(target=_beat, args=beat, daemon=True).start()
-    try:
-        while True:
-            if not worker.step():
-                time.sleep(IDLE_SECONDS)
-    except OtherCodeError as error:
-        print(error, file=sys.stderr)
-        return OTHER_CODE
-    except Exception:
-        traceback.print_exc()
-        return BROKEN
+    threading.Thread(target=beat, args=(assignment.desk, assignment.lease_seconds), daemon=True).start()
+    return work(Worker(desk, assignment.factory, strict=assignment.versions is not None))
 
 
 if __name__ == "__main__":

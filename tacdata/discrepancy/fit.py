@@ -51,16 +51,6 @@ def flips(episodes: int, count: int, seed: int = 0) -> np.ndarray:
     return signs
 
 
-BLOCKS = 10
-"""Stretches of successive episodes that flip together where these have something in common."""
-
-
-def block_flips(episodes: int, count: int, seed: int = 0) -> np.ndarray:
-    """Return signs that are the same within stretches of successive episodes, shape (count, episodes)."""
-    block = np.arange(episodes) * min(BLOCKS, episodes) // max(episodes, 1)
-    return flips(min(BLOCKS, max(episodes, 1)), count, seed + 1)[:, block]
-
-
 def eliminated(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:
     """Return each episode's Gram matrix with some columns regressed out by the fit to all episodes.
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from tacdata.discrepancy import evidence
 from tacdata.discrepancy.candidates import Candidate
+from tacdata.discrepancy.clusters import clustered
 from tacdata.discrepancy.evidence import Noise
-from tacdata.discrepancy.fit import block_flips, eliminated, flips, gains, solve, t_value
+from tacdata.discrepancy.fit import eliminated, flips, gains, solve, t_value
 from tacdata.discrepancy.generic import histories
 from tacdata.discrepancy.problem import Problem
 from tacdata.effects import Effect
@@ -33,27 +34,36 @@ class Tested:
 
 
 def test(problem: Problem, seed: int = 0) -> Tested:
-    """Test every candidate against flips of whole episodes' residuals.
+    """Test every candidate by how the episodes' scores scatter, and all together by flips of whole episodes.
 
-    An episode's residual has, without a missing effect, no preferred sign; whatever memory or tails its noise has,
-    flipping whole episodes keeps them.
+    An episode's score has, without a missing effect, no preferred sign; whatever memory or tails its noise has,
+    flipping whole episodes (or stretches of them) keeps them.
     """
     fixed = np.concatenate([problem.nuisances, problem.tangent.columns]).astype(int)
     ridge = np.concatenate([problem.ridge, np.zeros(len(problem.tangent.columns))])
     gram = eliminated(problem.evidence.gram, fixed, ridge)
-    signs = flips(len(gram), FLIPS + 1, seed)
-    total = gram.sum(axis=0)
-    slow = block_flips(len(gram), FLIPS + 1, seed)
-    stats = [_flipped(gram, total, c.columns, slow if follows_clock(c.effect) else signs) for c in problem.candidates]
-    groups = np.array_split(problem.generic, 6)
-    stats += [_flipped(gram, total, g, signs, rich=True) for g in groups]
-    table = np.stack(stats, axis=1)
-    spread = table[1:].std(axis=0) + 1e-12
-    z = (table - table[1:].mean(axis=0)) / spread
-    count = len(problem.candidates)
-    top = z[1:].max(axis=1)
-    p = (1 + (top[:, None] >= z[0]).sum(axis=0)) / (FLIPS + 1)
-    return Tested(z[0, :count], p[:count], table[0, :count], float(p[count:].min()))
+    signs = flips(len(gram), FLIPS, seed)
+    scores = [clustered(gram, c.columns, follows_clock(c.effect)) for c in problem.candidates]
+    z = np.array([s.score() for s in scores])
+    # The same signs for all, so that candidates that look alike do so by chance as well.
+    chance = np.stack([s.by_chance(signs) for s in scores], axis=1) if scores else np.zeros((FLIPS, 1))
+    top = chance.max(axis=1)
+    p = (1 + (top[:, None] >= z).sum(axis=0)) / (FLIPS + 1)
+    gain = np.array([0.5 * float(np.sum(np.square(s.pull))) for s in scores])
+    return Tested(z, p, gain, _test_generic(problem, gram, seed, top))
+
+
+def _test_generic(problem: Problem, gram: np.ndarray, seed: int, top: np.ndarray) -> float:
+    """Return the p-value of columns of no effect, corrected for the number of everything that is tried."""
+    total, signs = gram.sum(axis=0), flips(len(gram), FLIPS + 1, seed)
+    groups = [g for g in np.array_split(problem.generic, 6) if len(g)]
+    if not groups:
+        return 1.0
+    table = np.stack([_flipped(gram, total, g, signs) for g in groups], axis=1)
+    root = np.cbrt(np.maximum(table, 0.0))  # nearly normal (Wilson & Hilferty, PNAS 17, 1931, 684)
+    z = (root - root[1:].mean(axis=0)) / (root[1:].std(axis=0) + 1e-12)
+    most = np.maximum(z[1:].max(axis=1), top)
+    return float((1 + (most >= z[0].max()).sum()) / (FLIPS + 1))
 
 
 def follows_clock(effect: Effect) -> bool:
@@ -61,12 +71,10 @@ def follows_clock(effect: Effect) -> bool:
     return effect.group == "clock" or effect.name in ("thermal_growth", "lost_steps", "clock_skew")
 
 
-def _flipped(
-    gram: np.ndarray, total: np.ndarray, columns: np.ndarray, signs: np.ndarray, rich: bool = False
-) -> np.ndarray:
+def _flipped(gram: np.ndarray, total: np.ndarray, columns: np.ndarray, signs: np.ndarray) -> np.ndarray:
     index = columns + 1
     matrix = total[np.ix_(index, index)]
-    weight = 1e-9 * max(float(np.trace(matrix)) / len(index), 1e-12) + (1.0 if rich else 0.0)
+    weight = 1e-9 * max(float(np.trace(matrix)) / len(index), 1e-12) + 1.0
     target = signs @ gram[:, index, 0]
     return 0.5 * np.einsum("fi,fi->f", target, np.linalg.solve(matrix + weight * np.eye(len(index)), target.T).T)
 

@@ -28,6 +28,11 @@ FIXED: dict[str, Any] = {
 """Channels of every recording."""
 
 
+def taxels(board: str = "") -> str:
+    """Return the topic of a board's readings; a demonstration's boards have names, those of the fingers."""
+    return f"{TAXELS}/{board}" if board else TAXELS
+
+
 def image(camera: str) -> str:
     """Return the topic of a camera's images."""
     return f"/camera/{camera}/image"

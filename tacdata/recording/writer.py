@@ -12,7 +12,7 @@ import queue
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.Log_pb2 import Log
@@ -89,12 +89,22 @@ class CubePoseRecord:
     """Tags of this cube that were read where the pose has none."""
 
 
+class Attached(Protocol):
+    """What says which documents a recording carries."""
+
+    @property
+    def attachments(self) -> dict[str, Any]:
+        """Name of each attachment and its document."""
+        ...
+
+
 class EpisodeWriter:
     """A recording in progress. Methods may be called from any thread; writing happens in one of its own."""
 
     def __init__(
-        self, path: Path, header: Header, clock: Clock, cameras: tuple[str, ...] = (), fingers: tuple[str, ...] = ()
-    ) -> None:
+        self, path: Path, header: Attached, clock: Clock, cameras: tuple[str, ...] = (),
+        fingers: tuple[str, ...] = (), boards: tuple[str, ...] = (),
+    ) -> None:  # fmt: skip
         """Create the file under its partial name and put the attachments on disk.
 
         Args:
@@ -103,6 +113,7 @@ class EpisodeWriter:
             clock: The recording's clock.
             cameras: Names of the cameras.
             fingers: Names of the fingers that cameras may look at.
+            boards: Names of several boards, where there is not just one.
 
         Raises:
             UsageError: If a recording of that name, finished or partial, exists.
@@ -114,7 +125,7 @@ class EpisodeWriter:
         self.begun_ns = clock.now_ns()
         """Host time of creation [ns]; what arrived before belongs to no recording or to the one before."""
         try:
-            self._file = _begun(path, header, clock, cameras, fingers)
+            self._file = _begun(path, header, clock, cameras, fingers, boards)
         except OSError as error:
             raise DeviceError(
                 f"{path} cannot be begun: {error}", "a disk with room for the recording", "make room, then --resume"
@@ -164,8 +175,8 @@ class EpisodeWriter:
         if self._failure is None:
             self._queue.put((topic, log_ns, publish_ns, sequence, data))
 
-    def taxels(self, frame: TaxelFrame, sample_ns: int) -> None:
-        """Write one reading of the board with its sample time as estimated so far [ns]."""
+    def taxels(self, frame: TaxelFrame, sample_ns: int, board: str = "") -> None:
+        """Write one reading of the board, or of one of several, with its sample time as estimated so far [ns]."""
         message = pb.Taxels(
             arrival_ns=frame.arrival_ns,
             sample_ns=sample_ns,
@@ -173,7 +184,7 @@ class EpisodeWriter:
             counts=frame.counts.tolist(),
             device_ns=frame.device_ns,
         )
-        self._add(channels.TAXELS, frame.arrival_ns, sample_ns, max(frame.counter, 0), message)
+        self._add(channels.taxels(board), frame.arrival_ns, sample_ns, max(frame.counter, 0), message)
 
     def status(self, status: CncStatus) -> None:
         """Write one status report; its sample time is the middle of query and answer."""
@@ -301,11 +312,16 @@ def _view_message(stamps: tuple[int, int, int], pose: CubePoseRecord | None) -> 
     return view
 
 
-def _begun(path: Path, header: Header, clock: Clock, cameras: tuple[str, ...], fingers: tuple[str, ...]) -> ChunkedFile:
+def _begun(
+    path: Path, header: Attached, clock: Clock, cameras: tuple[str, ...], fingers: tuple[str, ...],
+    boards: tuple[str, ...],
+) -> ChunkedFile:  # fmt: skip
     """Create the file with its channels and attachments and hand it to the disk."""
     file = ChunkedFile(file_names.partial(path))
     for topic, message in channels.FIXED.items():
         file.register(topic, message)
+    for board in boards:
+        file.register(channels.taxels(board), pb.Taxels)
     for camera in cameras:
         for topic, message in channels.of_camera(camera, fingers).items():
             file.register(topic, message)

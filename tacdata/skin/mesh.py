@@ -120,7 +120,8 @@ class MeshQuality:
     nodes: int
     """Number of nodes."""
     worst_ratio: float
-    """Smallest inscribed over circumscribed radius times 3 [1]; 1 for a regular tetrahedron, 0 for a flat one, below it inside out."""
+    """Smallest inscribed over circumscribed radius times 3 [1]: 1 for a regular tetrahedron, 0 for a flat one, less for
+    one that is inside out."""
     median_ratio: float
     """Median of the same [1]."""
 

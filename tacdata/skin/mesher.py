@@ -6,6 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from tacdata import provenance
+from tacdata.errors import SolveError
 from tacdata.sensor import Sensor
 from tacdata.skin.mesh import SkinMesh, quality
 from tacdata.skin.meshing.own_surface import own_mesh
