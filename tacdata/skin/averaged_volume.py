@@ -15,7 +15,6 @@ Q = sum_i (1 - D^-1 M)^i D^-1, symmetric and positive at any number of correctio
 """
 
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,167 +22,14 @@ import torch
 import warp as wp
 
 from tacdata.skin import elements
+from tacdata.skin.averaged_kernels import averaged_kernels
 from tacdata.skin.conditions import Conditions
-from tacdata.skin.constitutive import kinematics
-from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
 
 _CORRECTIONS = 3
 """Steps of Richardson's iteration; each takes two orders of the element's size off the error of lumping."""
 
-_BEARABLE = 1.0
-"""Pressure over Young's modulus beyond which the tangent no longer follows it [1]."""
-
 _REAL = {torch.float32: wp.float32, torch.float64: wp.float64}
-
-
-@cache
-def _kernels(law_name: str, real: type) -> SimpleNamespace:
-    """Compile the kernels for one law in one precision."""
-    law = load_law(law_name)
-    bulk_of, volume = law.bulk_function(real), kinematics.volume(real)
-    cofactor_change, volume_change = volume.cofactor_change, volume.change
-    cross, shifted = volume.cross, volume.shifted
-    Parameters, vec3 = kinematics.parameters(real), wp.types.vector(3, real)
-    bearable = wp.constant(real(_BEARABLE))
-    mat33, Four = kinematics.matrix(real), wp.types.vector(4, real)
-
-    @wp.func
-    def gradient(
-        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), slopes: wp.array4d(dtype=real), e: int, q: int,
-        b: int, s: real,
-    ):
-        H = mat33()
-        for a in range(10):
-            n = tets[e, a]
-            g = vec3(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2] / s)
-            H += wp.outer(vec3(u[n, 0, b], u[n, 1, b], u[n, 2, b]), g)
-        return H
-
-    @wp.func
-    def stretch(slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), e: int, b: int):
-        s = real(1.0)
-        if slab[e] == 1:
-            s = thickness[b]
-        return s
-
-    @wp.func
-    def bulk(m: wp.array2d(dtype=real), b: int):
-        values = Parameters()
-        for k in range(8):
-            values[k] = m[k, b]
-        return bulk_of(values)
-
-    @wp.func
-    def at_point(
-        field: wp.array2d(dtype=real), corners: wp.array2d(dtype=wp.int32), shapes: wp.array2d(dtype=real), e: int,
-        q: int, b: int,
-    ):
-        value = real(0.0)
-        for a in range(4):
-            value += shapes[q, a] * field[corners[e, a], b]
-        return value
-
-    @wp.func
-    def add_stress(
-        P: mat33, tets: wp.array2d(dtype=wp.int32), slopes: wp.array4d(dtype=real), e: int, q: int, b: int, s: real,
-        w: real, total: wp.array3d(dtype=real),
-    ):
-        for a in range(10):
-            f = P * (w * vec3(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2] / s))
-            for i in range(3):
-                wp.atomic_add(total, tets[e, a], i, b, f[i])
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def swelling(
-        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), corners: wp.array2d(dtype=wp.int32),
-        shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real), weights: wp.array2d(dtype=real),
-        slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), sums: wp.array2d(dtype=real),
-    ):
-        e, b = wp.tid()
-        s = stretch(slab, thickness, e, b)
-        total = Four()
-        for q in range(4):
-            H = gradient(u, tets, slopes, e, q, b, s)
-            j = volume_change(H, cofactor_change(H)) * (weights[e, q] * s)
-            for a in range(4):
-                total[a] = total[a] + shapes[q, a] * j
-        for a in range(4):
-            wp.atomic_add(sums, corners[e, a], b, total[a])
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def swelling_change(
-        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32),
-        corners: wp.array2d(dtype=wp.int32), shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real),
-        weights: wp.array2d(dtype=real), slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real),
-        sums: wp.array2d(dtype=real),
-    ):
-        e, b = wp.tid()
-        s = stretch(slab, thickness, e, b)
-        total = Four()
-        for q in range(4):
-            cof = shifted(cofactor_change(gradient(u, tets, slopes, e, q, b, s)), real(1.0))
-            j = wp.ddot(cof, gradient(p, tets, slopes, e, q, b, s)) * (weights[e, q] * s)
-            for a in range(4):
-                total[a] = total[a] + shapes[q, a] * j
-        for a in range(4):
-            wp.atomic_add(sums, corners[e, a], b, total[a])
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def force(
-        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), corners: wp.array2d(dtype=wp.int32),
-        shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real), weights: wp.array2d(dtype=real),
-        slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), m: wp.array2d(dtype=real),
-        average: wp.array2d(dtype=real), total: wp.array3d(dtype=real),
-    ):
-        e, b = wp.tid()
-        s, kappa = stretch(slab, thickness, e, b), bulk(m, b)
-        for q in range(4):
-            H = gradient(u, tets, slopes, e, q, b, s)
-            K = cofactor_change(H)
-            excess = kappa * (at_point(average, corners, shapes, e, q, b) - volume_change(H, K))
-            add_stress(excess * shifted(K, real(1.0)), tets, slopes, e, q, b, s, weights[e, q] * s, total)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def product(
-        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32),
-        corners: wp.array2d(dtype=wp.int32), shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real),
-        weights: wp.array2d(dtype=real), slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real),
-        m: wp.array2d(dtype=real), average: wp.array2d(dtype=real), change: wp.array2d(dtype=real),
-        modulus: wp.array(dtype=real), total: wp.array3d(dtype=real),
-    ):
-        e, b = wp.tid()
-        s, kappa = stretch(slab, thickness, e, b), bulk(m, b)
-        most = bearable * modulus[b] / kappa
-        for q in range(4):
-            H, D = gradient(u, tets, slopes, e, q, b, s), gradient(p, tets, slopes, e, q, b, s)
-            K = cofactor_change(H)
-            cof = shifted(K, real(1.0))
-            # Half-way through Newton's method pressures are far beyond any that will stay, and would turn the tangent
-            # indefinite.
-            excess = wp.clamp(at_point(average, corners, shapes, e, q, b), -most, most) - volume_change(H, K)
-            along = at_point(change, corners, shapes, e, q, b) - wp.ddot(cof, D)
-            dP = kappa * (along * cof + excess * cross(shifted(H, real(1.0)), D))
-            add_stress(dP, tets, slopes, e, q, b, s, weights[e, q] * s, total)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def energy(
-        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), corners: wp.array2d(dtype=wp.int32),
-        shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real), weights: wp.array2d(dtype=real),
-        slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), m: wp.array2d(dtype=real),
-        average: wp.array2d(dtype=real), total: wp.array(dtype=real),
-    ):
-        e, b = wp.tid()
-        s, kappa = stretch(slab, thickness, e, b), bulk(m, b)
-        for q in range(4):
-            H = gradient(u, tets, slopes, e, q, b, s)
-            j = volume_change(H, cofactor_change(H))
-            square = j * (at_point(average, corners, shapes, e, q, b) - j)
-            wp.atomic_add(total, b, real(0.5) * kappa * square * (weights[e, q] * s))
-
-    return SimpleNamespace(
-        swelling=swelling, swelling_change=swelling_change, force=force, product=product, energy=energy
-    )
 
 
 @cache
@@ -205,7 +51,7 @@ def _mass_kernel(real: type) -> wp.Kernel:
 
 
 class AveragedVolume:
-    """What averaging adds to forces, tangent and energy of a mesh."""
+    """Forces, tangent and energy of a mesh with averaged volume changes."""
 
     def __init__(self, mesh: SkinMesh, law: str, slab: np.ndarray, device: str = "cpu") -> None:
         """Prepare the averages.
@@ -238,19 +84,22 @@ class AveragedVolume:
         }
         self._seen: tuple | None = None
 
-    def add_force(self, u: torch.Tensor, conditions: Conditions, force: torch.Tensor) -> None:
-        """Add its share of the internal forces [N] at displacements ``u`` [mm]; both of shape (n, 3, b)."""
+    def add_force(
+        self, u: torch.Tensor, conditions: Conditions, smallest: torch.Tensor, force: torch.Tensor
+    ) -> None:
+        """Add the internal forces [N] at displacements ``u`` [mm], both of shape (n, 3, b); lower ``smallest``, shape
+        (b,), to the smallest det F [1]."""
         own = conditions.to(u.dtype)
-        self._launch("force", u, (), own, own.law, self._average_at(u, own), force)
+        self._launch("force", u, (), own, own.law, self._average_at(u, own), smallest, force)
 
     def add_product(self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor) -> None:
-        """Add its share of K(u) p [N]; all of shape (n, 3, b) and of one precision."""
+        """Add K(u) p [N]; all of shape (n, 3, b) and of one precision."""
         own = conditions.to(u.dtype)
         change = self._average(self._sums("swelling_change", u, (p,), own), own)
         self._launch("product", u, (p,), own, own.law, self._kept(u, own), change, own.modulus, product)
 
     def add_energy(self, u: torch.Tensor, conditions: Conditions, total: torch.Tensor) -> None:
-        """Add its share of the strain energy [N mm], shape (b,)."""
+        """Add the strain energy [N mm], shape (b,)."""
         own = conditions.to(u.dtype)
         self._launch("energy", u, (), own, own.law, self._average_at(u, own), total)
 
@@ -290,7 +139,7 @@ class AveragedVolume:
         """Run a kernel; ``rest`` follows the thickness, its last one receives the result."""
         tets, corners, slab = self._indices[:3]
         wp.launch(
-            getattr(_kernels(self._law, _REAL[u.dtype]), name), dim=(self._elements, u.shape[2]),
+            getattr(averaged_kernels(self._law, _REAL[u.dtype]), name), dim=(self._elements, u.shape[2]),
             inputs=[
                 *map(wp.from_torch, (u, *more)), tets, corners, *self._numbers[u.dtype][:3], slab,
                 *map(wp.from_torch, (own.thickness, *rest)),

@@ -140,13 +140,13 @@ class Batch:
         return self._newton.balance(self._u, self._poses, self._states, self._conditions)
 
     def _judge(self, now: Balance) -> list[str]:
-        figures = torch.stack([now.error, now.penetration, now.volume]).cpu().numpy()
+        figures = torch.stack([now.error, now.penetration, now.mean_penetration, now.volume]).cpu().numpy()
         self._figures = figures
         settings = self._newton.settings
         rows = figures.T.tolist()
         return [
-            "idle" if press is None else press.walk.judge(error, penetration, volume, settings)
-            for press, (error, penetration, volume) in zip(self._presses, rows, strict=True)
+            "idle" if press is None else press.walk.judge(error, penetration, mean, volume, settings)
+            for press, (error, penetration, mean, volume) in zip(self._presses, rows, strict=True)
         ]
 
     def _collect(self, verdicts: list[str], now: Balance, collect: Collect) -> Iterator[tuple[int, float, Any]]:

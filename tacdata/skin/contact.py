@@ -303,6 +303,12 @@ class Contact:
         full = six[:, :, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(-1, 6, 6, 3, 3)
         return full.permute(0, 1, 3, 2, 4).reshape(-1, 18, 18)
 
+    def weighted_stiffness(self) -> torch.Tensor:
+        """Return the stiffness of every point that carries load [N/mm], shape (f, k, 6, b), float32."""
+        loaded = (self.pressure > 0)[:, :, None]
+        weights = self._rule[torch.float32][1]
+        return torch.where(loaded, self.stiffness, 0.0).to(torch.float32) * weights[..., None, None]
+
     def augment(self, state: ContactState, which: torch.Tensor) -> None:
         """Take the present normal tractions of the marked members, shape (b,), as multipliers (Uzawa step)."""
         state.multiplier.copy_(torch.where(which, self.pressure, state.multiplier))
@@ -318,10 +324,16 @@ class Contact:
         )
         state.put(which, now)
 
-    def misfit(self) -> torch.Tensor:
-        """Return the largest |gap| among points that carry load [mm], shape (b,): penetration, or load across a gap."""
+    def misfit(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return the largest |gap| among points that carry load, and its mean weighted by the load they carry [mm].
+
+        Both of shape (b,): penetration, or load across a gap. The mean is what the force is off by; the largest is that
+        of some point at the contact's edge.
+        """
         carried = torch.where(self.pressure > 0, self.gap.abs(), torch.zeros_like(self.gap))
-        return carried.flatten(0, 1).amax(dim=0)
+        load = self.pressure * self.weights[:, :, None]
+        mean = (load * carried).sum(dim=(0, 1)) / load.sum(dim=(0, 1)).clamp_min(1e-30)
+        return carried.flatten(0, 1).amax(dim=0), mean
 
 
 def face_quadrature(nodes: torch.Tensor, faces: torch.Tensor, subdivisions: int) -> tuple[torch.Tensor, torch.Tensor]:

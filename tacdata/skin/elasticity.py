@@ -155,25 +155,28 @@ class Elasticity:
         """Return nodal forces [N], shape (n, 3, b), and the smallest det F [1], shape (b,), of displacements [mm]."""
         force = torch.zeros_like(u)
         ratio = torch.full((u.shape[2],), torch.inf, dtype=u.dtype, device=u.device)
-        self._launch("internal_force", u, (), conditions, force, ratio)
         if self._averaged:
-            self._averaged.add_force(u, conditions, force)
+            self._averaged.add_force(u, conditions, ratio, force)
+        else:
+            self._launch("internal_force", u, (), conditions, force, ratio)
         return force, ratio
 
     def tangent_product(
         self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor
     ) -> None:
         """Add K(u) p [N] to ``product``; all of shape (n, 3, b) and of one precision."""
-        self._launch("tangent_product", u, (p,), conditions, product)
         if self._averaged:
             self._averaged.add_product(u, p, conditions, product)
+        else:
+            self._launch("tangent_product", u, (p,), conditions, product)
 
     def energy(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor:
         """Return the strain energy [N mm], shape (b,)."""
         total = torch.zeros(u.shape[2], dtype=u.dtype, device=u.device)
-        self._launch("energy", u, (), conditions, total)
         if self._averaged:
             self._averaged.add_energy(u, conditions, total)
+        else:
+            self._launch("energy", u, (), conditions, total)
         return total
 
     def _launch(

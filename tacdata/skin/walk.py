@@ -58,9 +58,20 @@ class Walk:
         self.attempt = self.depth + min(max(way, -self._step), self._step)
         self.newton, self._best, self._best_at = 0, math.inf, 0
 
-    def judge(self, error: float, penetration: float, volume: float, settings: SolverSettings) -> str:
-        """Say what to do at the present iterate: "found", "failed", "augment" or "go on"."""
-        tight = penetration <= settings.penetration * max(self.attempt, _SHALLOW)
+    def judge(
+        self, error: float, penetration: float, mean: float, volume: float, settings: SolverSettings
+    ) -> str:
+        """Say what to do at the present iterate: "found", "failed", "augment" or "go on".
+
+        Args:
+            error: Out-of-balance force over the contact force [1].
+            penetration: Largest [mm].
+            mean: Mean, weighted by the load [mm].
+            volume: Smallest det F [1].
+            settings: What is allowed.
+        """
+        deep = max(self.attempt, _SHALLOW)
+        tight = penetration <= settings.penetration * deep and mean <= settings.mean_penetration * deep
         if error <= settings.residual and tight:
             return "found"
         stuck = not error < 0.9 * self._best and self.newton - self._best_at > settings.patience

@@ -119,6 +119,8 @@ def test_the_contact_transfer_is_that_of_the_cpu():
     root = torch.as_tensor(random.normal(size=(2, 2, 150, 150))) / 12
     compliance, stiffness = root @ root.transpose(2, 3) + 0.2 * torch.eye(150)
     moved = torch.as_tensor(random.normal(size=(2, 150))).float()
-    here = contact_transfer(stiffness.float(), compliance.float()).times(moved)
-    there = contact_transfer(stiffness.float().to(CARD), compliance.float().to(CARD)).times(moved.to(CARD)).cpu()
+    here, there = contact_transfer(2, "cpu"), contact_transfer(2, CARD)
+    here.put(torch.arange(2), stiffness.float(), compliance.float())
+    there.put(torch.arange(2, device=CARD), stiffness.float().to(CARD), compliance.float().to(CARD))
+    here, there = here.times(moved), there.times(moved.to(CARD)).cpu()
     assert (here - there).abs().max() < 1e-3 * here.abs().max()

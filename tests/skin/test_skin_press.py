@@ -144,7 +144,7 @@ def test_the_result_does_not_depend_on_the_states_asked_for(slab, smooth):
 
 @pytest.mark.parametrize(("name", "tolerance", "largest"), [("slab", 1.5e-3, 3e-3), ("rough_slab", 3.5e-3, 1e-2)])
 def test_other_load_steps_give_the_same_loading(name, tolerance, largest, request):
-    """The penetration allowed, a thousandth of the depth, is one and a half thousandths of the force; friction adds.
+    """The mean penetration allowed, 0.3 thousandths of the depth, is half a thousandth of the force; friction adds.
 
     The map may differ anywhere by ``largest`` [1] of the depth: points that begin to slip in another step.
     """

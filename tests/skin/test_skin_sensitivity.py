@@ -35,7 +35,8 @@ def model(friction=0.0, penetration=1.0, residual=1e-9):
     sensor = slab_sensor(size=4.0, friction=friction, pixels=9)
     # Steps are longer than the differences of PATH, so that a deeper press takes no step more.
     settings = ModelSettings(
-        solver=SolverSettings(residual=residual, penetration=penetration), step=0.11, error_estimate=False
+        solver=SolverSettings(residual=residual, penetration=penetration, mean_penetration=penetration), step=0.11,
+        error_estimate=False,
     )
     return SkinModel(sensor, settings, mesh=box_mesh(sensor, 4, 4, 2))
 
@@ -129,7 +130,8 @@ def test_multipliers_that_are_augmented_follow(monkeypatch):
 def test_taxels_feel_where_the_press_is(bumps):
     """Forces and closures of four protrusions on a board, with friction, against presses a little beside."""
     settings = replace(
-        bumps.settings, solver=SolverSettings(residual=1e-9, penetration=1.0), step=0.16, error_estimate=False
+        bumps.settings, solver=SolverSettings(residual=1e-9, penetration=1.0, mean_penetration=1.0), step=0.16,
+        error_estimate=False,
     )
     skin = SkinModel(bumps.sensor, settings, mesh=bumps.mesh)
     request = PressRequest(Sphere(2.0), 0.5, 0.45, 0.0, (0.15, 0.3))

@@ -9,8 +9,8 @@ from tacdata.skin.newton import SolverSettings
 from tacdata.skin.walk import Walk
 
 LIMIT = SolverSettings()
-GOOD = (LIMIT.residual / 2, 0.0, 1.0)
-"""Error, penetration and volume of a state that is found."""
+GOOD = (LIMIT.residual / 2, 0.0, 0.0, 1.0)
+"""Error, largest and mean penetration and volume of a state that is found."""
 
 
 def walk(*depths, longest=0.25):
@@ -60,26 +60,33 @@ def test_the_direction_is_that_of_the_last_movement():
 def test_a_state_is_found_only_if_balanced_and_without_penetration():
     way = walk(0.2)
     balanced, tight = LIMIT.residual, LIMIT.penetration * 0.2
-    assert way.judge(1.01 * balanced, tight, 1.0, LIMIT) == "go on"
-    assert way.judge(balanced, 1.01 * tight, 1.0, LIMIT) == "augment"
-    assert way.judge(balanced, tight, 1.0, LIMIT) == "found"
+    assert way.judge(1.01 * balanced, tight, 0.0, 1.0, LIMIT) == "go on"
+    assert way.judge(balanced, 1.01 * tight, 0.0, 1.0, LIMIT) == "augment"
+    assert way.judge(balanced, tight, 0.0, 1.0, LIMIT) == "found"
+
+
+def test_points_that_penetrate_together_count_for_more_than_one_at_the_edge():
+    way, mean = walk(0.2), LIMIT.mean_penetration * 0.2
+    assert LIMIT.mean_penetration < LIMIT.penetration
+    assert way.judge(LIMIT.residual, mean, 1.01 * mean, 1.0, LIMIT) == "augment"
+    assert way.judge(LIMIT.residual, mean, mean, 1.0, LIMIT) == "found"
 
 
 def test_penetration_is_judged_by_a_tenth_of_a_millimetre_where_a_press_is_shallower():
     allowed = LIMIT.penetration * 0.1
-    assert walk(0.01).judge(0.0, allowed, 1.0, LIMIT) == "found"
-    assert walk(0.01).judge(0.0, 1.01 * allowed, 1.0, LIMIT) == "augment"
+    assert walk(0.01).judge(0.0, allowed, 0.0, 1.0, LIMIT) == "found"
+    assert walk(0.01).judge(0.0, 1.01 * allowed, 0.0, 1.0, LIMIT) == "augment"
 
 
 def test_multipliers_wait_until_the_forces_nearly_balance():
     way = walk(0.2)
-    assert way.judge(61 * LIMIT.residual, 1.0, 1.0, LIMIT) == "go on"
-    assert way.judge(59 * LIMIT.residual, 1.0, 1.0, LIMIT) == "augment"
+    assert way.judge(61 * LIMIT.residual, 1.0, 0.0, 1.0, LIMIT) == "go on"
+    assert way.judge(59 * LIMIT.residual, 1.0, 0.0, 1.0, LIMIT) == "augment"
 
 
 def test_iterations_without_progress_end_the_attempt():
     way = walk(0.2)
-    verdicts = [way.judge(1.0, 0.0, 0.5, LIMIT) for _ in range(LIMIT.patience + 2)]
+    verdicts = [way.judge(1.0, 0.0, 0.0, 0.5, LIMIT) for _ in range(LIMIT.patience + 2)]
     assert verdicts[:-1] == ["go on"] * (LIMIT.patience + 1)
     assert verdicts[-1] == "failed"
     assert "residual is 1.0e+00" in way.reason and "det F 0.50" in way.reason
@@ -87,7 +94,7 @@ def test_iterations_without_progress_end_the_attempt():
 
 def test_slow_progress_is_let_go_on_up_to_the_limit():
     way, error, count = walk(0.2), 1.0, 0
-    while way.judge(error, 0.0, 1.0, SolverSettings(residual=1e-30)) == "go on":
+    while way.judge(error, 0.0, 0.0, 1.0, SolverSettings(residual=1e-30)) == "go on":
         error, count = 0.8 * error, count + 1
     assert count == LIMIT.newton_limit
     assert f"{LIMIT.newton_limit} Newton iterations" in way.reason
@@ -96,26 +103,26 @@ def test_slow_progress_is_let_go_on_up_to_the_limit():
 def test_augmenting_forgives_the_growth_that_it_causes():
     """The residual jumps with the multipliers: what counts as progress starts anew."""
     way, small = walk(0.2), 2 * LIMIT.residual
-    way.judge(small, 0.0, 1.0, LIMIT)
+    way.judge(small, 0.0, 0.0, 1.0, LIMIT)
     for _ in range(LIMIT.patience):
-        assert way.judge(small, 1.0, 1.0, LIMIT) == "augment"
+        assert way.judge(small, 1.0, 0.0, 1.0, LIMIT) == "augment"
     for _ in range(LIMIT.patience):
-        assert way.judge(100 * small, 1.0, 1.0, LIMIT) == "go on"
+        assert way.judge(100 * small, 1.0, 0.0, 1.0, LIMIT) == "go on"
 
 
 @pytest.mark.parametrize("error", [math.nan, math.inf])
 def test_a_state_that_is_no_number_fails_at_once(error):
     way = walk(0.2)
-    assert way.judge(error, 0.0, 1.0, LIMIT) == "failed"
-    assert way.judge(0.0, math.nan, 1.0, LIMIT) != "found"
+    assert way.judge(error, 0.0, 0.0, 1.0, LIMIT) == "failed"
+    assert way.judge(0.0, math.nan, 0.0, 1.0, LIMIT) != "found"
 
 
 def test_iterations_are_counted_over_failed_attempts():
     way = walk(0.2)
     for _ in range(3):
-        way.judge(1.0, 0.0, 1.0, LIMIT)
+        way.judge(1.0, 0.0, 0.0, 1.0, LIMIT)
     way.halve()
-    way.judge(1.0, 0.0, 1.0, LIMIT)
+    way.judge(1.0, 0.0, 0.0, 1.0, LIMIT)
     assert (way.newton, way.spent) == (1, 4)
 
 
@@ -140,7 +147,7 @@ def test_a_press_is_given_up_in_words_when_steps_become_tiny():
     way = walk(0.25, 0.5)
     way.found()
     way.go_on()
-    way.judge(math.nan, 0.0, 0.3, LIMIT)
+    way.judge(math.nan, 0.0, 0.0, 0.3, LIMIT)
     for _ in range(3):
         way.halve()
     words = r"sphere at \(1, 2\) mm: no equilibrium beyond depth 0\.250 mm; after"

@@ -116,6 +116,23 @@ def test_the_inverse_by_blocks_is_the_inverse(rows):
     assert (single.double() - found).abs().max() < 1e-4 * found.abs().max()
 
 
+@pytest.mark.parametrize("make", [FactoredTransfer, DenseTransfer])
+def test_a_member_put_anew_leaves_its_neighbours_as_they_are(make):
+    compliance, stiffness = spd(70, 3, 50.0, seed=1), spd(70, 3, 30.0, seed=2)
+    transfer, alone = make(3), make(3)
+    moved = torch.as_tensor(np.random.default_rng(3).normal(size=(3, 80)))
+    transfer.put(torch.tensor([0, 1]), stiffness[:2], compliance[:2])
+    before = transfer.times(moved)
+    assert before[2].abs().max() == 0 and before[:, 70:].abs().max() == 0
+    transfer.put(torch.tensor([1]), stiffness[2:, :40, :40], compliance[2:, :40, :40])
+    alone.put(torch.tensor([1]), stiffness[2:, :40, :40], compliance[2:, :40, :40])
+    after = transfer.times(moved)
+    assert torch.equal(after[0], before[0])
+    assert torch.allclose(after[1], alone.times(moved)[1], rtol=1e-12) and after[1, 40:].abs().max() == 0
+    transfer.put(torch.tensor([0]), stiffness[:1, :0, :0], compliance[:1, :0, :0])
+    assert transfer.times(moved)[0].abs().max() == 0
+
+
 @pytest.mark.parametrize("rows", [40, 130])
 def test_both_formulas_for_the_contact_transfer_agree(rows):
     """(I + S G)^-1 S, as the CPU has it, is P - P (P + S)^-1 P with P = G^-1, as a card has it."""
@@ -125,9 +142,14 @@ def test_both_formulas_for_the_contact_transfer_agree(rows):
     moved = torch.as_tensor(np.random.default_rng(3).normal(size=(2, rows)))
     expected = torch.linalg.inv(torch.eye(rows, dtype=torch.float64) + stiffness @ compliance) @ stiffness
     expected = (expected @ moved[:, :, None])[:, :, 0]
-    for transfer in (FactoredTransfer, DenseTransfer):
-        found = transfer(stiffness, compliance).times(moved)
+    both = torch.arange(2)
+    for make in (FactoredTransfer, DenseTransfer):
+        transfer = make(2)
+        transfer.put(both, stiffness, compliance)
+        found = transfer.times(moved)
         assert (found - expected).abs().max() < 1e-10 * expected.abs().max()
-        single = transfer(stiffness.float(), compliance.float()).times(moved.float())
+        transfer = make(2)
+        transfer.put(both, stiffness.float(), compliance.float())
+        single = transfer.times(moved.float())
         assert single.dtype == torch.float32
         assert (single - expected).abs().max() < 1e-4 * expected.abs().max()
