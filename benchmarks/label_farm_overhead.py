@@ -99,8 +99,9 @@ def results(folder: Path, wanted: list[Job], sensor: Sensor) -> None:
         store.intact(job)
     report("check a result", 1e3 * (time.perf_counter() - begin) / len(some), "ms")
     frames = np.linspace(0.01, 1.5, 300)
-    begin = time.perf_counter()
     branch = Branch.of(solution, "surface", True)
+    branch.at(frames[:1])  # scipy is imported when it is needed first
+    begin = time.perf_counter()
     branch.at(frames), branch.bound(frames)
     report("interpolate a frame", 1e6 * (time.perf_counter() - begin) / len(frames), "us", frames=len(frames))
 

@@ -8,8 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from label_farm import environment
 from label_farm.job import Job
 from tacdata import provenance
+from tacdata.errors import SolveError
 from tacdata.indenters import from_document
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
@@ -22,9 +24,6 @@ _ROUNDS = 3
 
 _ON_A_CARD = 256
 """How many presses a card is given at a time (benchmarks/skin_throughput.py); a CPU solves one after the other."""
-
-DEVICE = "TACDATA_DEVICE"
-"""Variable that says where a worker solves: "cpu" or a card such as "cuda:0"."""
 
 _SOURCES = ("fem.py", "interpolate.py", "tolerance.py")
 """Files of the farm that decide which states a path gets."""
@@ -45,7 +44,7 @@ class FemModel:
         from tacdata.skin.path_uncertainty import check_spreads
 
         check_spreads(sensor, Sphere(1.0))
-        device = os.environ.get(DEVICE, "cpu")
+        device = os.environ.get(environment.DEVICE, "cpu")
         self._model = SkinModel(sensor, device=device)
         self.batch = 1 if device == "cpu" else _ON_A_CARD
 

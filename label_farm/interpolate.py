@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from tacdata.labels import PathSolution
 
@@ -34,6 +33,8 @@ class Branch:
         Piecewise cubic, monotone where the states are: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980)
         238-246. Held constant beyond the deepest state.
         """
+        from scipy.interpolate import PchipInterpolator  # here: it would be half of a worker's start
+
         return PchipInterpolator(self.depth, self.values, axis=0)(np.clip(depth, 0.0, self.depth[-1]))
 
     def left_out(self) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -59,6 +60,14 @@ class Job:
     def batch(self) -> str:
         """What jobs share that may be solved together: of one model, those with equal indenters (hex)."""
         return provenance.content_hash(self.indenter)[:16]
+
+    @classmethod
+    def of_text(cls, text: str) -> Job:
+        """Rebuild a job from JSON that this code wrote itself, so that it is not checked again."""
+        values = json.loads(text)
+        del values["version"]
+        tolerance = Tolerance(**values["tolerance"]) if "tolerance" in values else None
+        return cls(**{**values, "depths": tuple(values["depths"]), "tolerance": tolerance})
 
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str = "job") -> Job:

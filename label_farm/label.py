@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from label_farm.interpolate import Branch
-from label_farm.plan import LabelRequest
+from label_farm.plan import LabelRequest, Planned
 from tacdata import provenance
 from tacdata.errors import SolveError
 from tacdata.labels import Label, PathSolution, columns
@@ -43,9 +45,7 @@ def make_label(request: LabelRequest, solution: PathSolution | None) -> Label:
         SolveError: If there is a job and no solution.
     """
     if request.job is not None and solution is None:
-        raise SolveError(
-            f"episode {request.episode} has no solution", "a solved path", "run `tacdata label` again"
-        )
+        raise SolveError(f"episode {request.episode} has no solution", "a solved path", "run `tacdata label` again")
     values = _along_path(request, solution) if solution else _untouched(request)
     error_map = values["error_map"]
     readings, remarks = _readings(request.sensor, values)
@@ -108,13 +108,24 @@ def _readings(sensor: Sensor, values: dict[str, np.ndarray]) -> tuple[dict[str, 
     return {"taxel_capacitance": readings.capacitance, "taxel_counts": readings.counts}, readings.remarks
 
 
-def parents(request: LabelRequest) -> dict[str, str]:
+_SOURCES = ("interpolate.py", "label.py", "plan.py")
+"""Files of the farm that decide what a label makes of a solution; who computes it where does not."""
+
+
+@cache
+def source_hash() -> str:
+    """Return the hash of the code that turns recordings and solutions into labels (hex, 64 characters)."""
+    here = Path(__file__).parent
+    return provenance.content_hash([provenance.file_hash(here / name) for name in _SOURCES])
+
+
+def parents(request: LabelRequest | Planned) -> dict[str, str]:
     """Return what a label of this request is made from, by name and hash; equal parents, equal label."""
     made_from = {
         "recording": request.recording,
         "sensor": request.sensor.content_hash,
         "model": request.model,
-        "label_farm": provenance.source_hash("label_farm"),
+        "label_farm": source_hash(),
     }
     if request.sensor.transduction is not None:
         made_from["transduction"] = request.sensor.transduction.content_hash

@@ -2,73 +2,52 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
+import uuid
 from collections import defaultdict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from contextlib import suppress
+from dataclasses import asdict, replace
 from pathlib import Path
 
-from label_farm import environment, model
+from label_farm import label, model
 from label_farm.failure import Failure
+from label_farm.farm_settings import FarmSettings
 from label_farm.job import Job
-from label_farm.ladder import Ladder
-from label_farm.ledger import LEASE_SECONDS, Change, Ledger
+from label_farm.label_index import Known, stamp
+from label_farm.ledger import Change, Ledger, owner_name
 from label_farm.margin import Margin
-from label_farm.plan import LabelRequest, request
-from label_farm.pool import Pool
+from label_farm.plan import LabelRequest, Planned, request
+from label_farm.pool import StoreFull
+from label_farm.recall import FLUSH, Recall, skin_key
 from label_farm.session_labels import SessionLabels
 from label_farm.store import Store
+from label_farm.summary import Summary
 from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
 
 Progress = Callable[[str, int, int], None]
-"""Called with the stage ("read" or "solve"), how much of it is done, and how much there is."""
+"""Called with the stage ("read", "look" or "solve"), how much of it is done, and how much there is."""
+
+Delivered = Callable[[int, str], None]
+"""Called with an episode's number and "" once its label lies there, or the reason why it has none."""
 
 
-@dataclass(frozen=True)
-class FarmSettings:
-    """How a session is labelled."""
+KEPT_REQUESTS = 256
+"""Requests kept in memory with their frames; others are read again when their press is solved."""
 
-    factory: str = model.FACTORY
-    """Dotted path of what builds the skin model from a sensor."""
-    ladder: Ladder = field(default_factory=Ladder)
-    """How the states of a path are spaced."""
-    uncertainty: bool = True
-    """Whether labels say what the spreads that the sensor file states make of them; costs about as much again."""
-    workers: int = field(default_factory=environment.cores)
-    """Number of worker processes."""
-    redo: bool = False
-    """Replace labels of another model version, and try failed presses again."""
-    lease_seconds: float = LEASE_SECONDS
-    """How long a silent worker keeps its job [s]."""
-
-
-@dataclass
-class Summary:
-    """What became of a session."""
-
-    written: list[int] = field(default_factory=list)
-    """Episodes whose label was written."""
-    current: list[int] = field(default_factory=list)
-    """Episodes whose label lay there already."""
-    failed: dict[int, str] = field(default_factory=dict)
-    """Episode -> reason why it has no label."""
-    untouched: int = 0
-    """Labels without contact, which need no solve."""
-    seconds: list[float] = field(default_factory=list)
-    """Time of each path solved in this run [s]."""
-    found: int = 0
-    """Paths that the store held already."""
-    margins: list[Margin] = field(default_factory=list)
-    """How well each written label with contact is known."""
-    remarks: list[str] = field(default_factory=list)
-    """What a user should know of the models, in words."""
+MANY = 5000
+"""Episodes from which on the store is listed whole, rather than asked for each."""
 
 
 class Labelling:
-    """One run over one session. Stopped at any point, a second run goes on where it stood."""
+    """One run over one session. Stopped at any point, a second run goes on where it stood.
+
+    `run` does all of it. A service calls `plan` once and `settle` for every change, beside other runs.
+    """
 
     def __init__(
         self,
@@ -76,6 +55,9 @@ class Labelling:
         store: Store,
         settings: FarmSettings | None = None,
         progress: Progress = lambda *_: None,
+        delivered: Delivered = lambda *_: None,
+        name: str = "",
+        versions: dict[str, model.Version] | None = None,
     ) -> None:
         """Prepare a run.
 
@@ -84,95 +66,254 @@ class Labelling:
             store: Where solved paths lie.
             settings: How to label.
             progress: Told how far it is.
+            delivered: Called with each episode's number once its label lies there, or with the reason why it has none.
+            name: Under which the run asks for jobs; by default one of its own.
+            versions: Versions of models that were found already, by sensor; a service shares them among its runs.
         """
         self.labels, self.store = SessionLabels(folder), store
         self.settings, self.progress = settings or FarmSettings(), progress
         self.summary = Summary()
-        self._versions: dict[str, str] = {}
-        self._sensors: dict[str, Sensor] = {}
-        self._waiting: dict[str, list[LabelRequest]] = defaultdict(list)
+        self.name = name or f"{owner_name()} {uuid.uuid4().hex[:8]}"
+        self._delivered = delivered
+        self._versions: dict[str, model.Version] = {} if versions is None else versions
+        self._made_by: dict[str, str] = {}
+        self._skin_keys: dict[str, str] = {}
+        self._skins: list[Sensor] = []
+        self._keys: dict[int, tuple[Sensor, str]] = {}
+        self.sensors: dict[str, Sensor] = {}
+        self._waiting: dict[str, list[Planned]] = defaultdict(list)
+        self._read_already: dict[int, LabelRequest] = {}
+        self._jobs: dict[str, Job] = {}
+        self._total = 0
+        self._recall = Recall(folder)
 
-    def run(self, recordings: Mapping[int, Callable[[], Episode]], sensor: Sensor | None = None) -> Summary:
+    @property
+    def pending(self) -> int:
+        """Number of presses that are not settled."""
+        return len(self._jobs)
+
+    def run(
+        self,
+        recordings: Mapping[int, Callable[[], Episode]],
+        sensor: Sensor | None = None,
+        paths: Mapping[int, Path] | None = None,
+    ) -> Summary:
         """Label recordings.
 
         Args:
             recordings: Episode number -> function that reads it; a whole session may not fit in memory.
             sensor: The skin to label with, if not each recording's own.
+            paths: Episode number -> its recording's file, by which a second run knows it without reading it.
 
         Raises:
             UsageError: If labels of another model version lie there (without ``redo``), or a folder cannot be
                 written.
             SolveError: If the model cannot be built or the workers keep dying.
         """
-        requests, unfit = self._read(recordings, sensor)
-        if not self.settings.redo:
-            self.labels.refuse_other_models(requests)
         try:
-            for number, failure in unfit.items():
-                self._fail(number, failure, None)
-            with Ledger(self.store.ledger_path, self.settings.lease_seconds) as ledger:
-                since = ledger.last_change()
-                missing = self._missing(requests)
-                ledger.enqueue(missing)
-            self._solve(missing, since)
+            since = self.plan(recordings, sensor, paths)
+            if self._jobs:
+                self._solve(since)
+        except StoreFull:
+            raise
         except (OSError, sqlite3.OperationalError) as error:
             raise UsageError(
                 f"{self.labels.folder} or {self.store.folder} cannot be written: {error}",
                 "folders with space and permission to write",
                 "make room and run again: what is finished is kept",
             ) from error
+        finally:
+            self.close()
         return self.summary
 
+    def plan(
+        self,
+        recordings: Mapping[int, Callable[[], Episode]],
+        sensor: Sensor | None = None,
+        paths: Mapping[int, Path] | None = None,
+    ) -> int:
+        """Write what can be written at once and ask for the presses that are missing; arguments as of `run`.
+
+        Returns:
+            The ledger's last change before the store was asked for results.
+        """
+        self.labels.sweep()
+        requests, unfit = self._read(recordings, sensor, paths or {})
+        if not self.settings.redo:
+            self.labels.refuse_other_models(requests)
+        for number, failure in unfit.items():
+            self._fail(number, failure, None)
+        with Ledger(self.store.ledger_path, self.settings.lease_seconds) as ledger:
+            since = ledger.last_change()
+            self._jobs = self._missing(requests)
+            self._total = len(self._jobs)
+            ledger.register({job.model: self.sensors[job.model].document for job in self._jobs.values()})
+            ledger.enqueue(self._jobs.values(), self.settings.priority, self.name)
+        if self._jobs:
+            self.progress("solve", 0, self._total)
+        return since
+
+    def settle(self, change: Change) -> None:
+        """Take note of a press that was finished or failed; those of other runs are passed over."""
+        job = self._jobs.get(change.key)
+        if job is None:
+            return
+        wishes = self._waiting[change.key]
+        if change.done and not all(self._write(wish) for wish in wishes):
+            with Ledger(self.store.ledger_path, self.settings.lease_seconds) as ledger:
+                ledger.enqueue([job], self.settings.priority, self.name)
+            return
+        if change.done and change.seconds > 0:
+            self.summary.seconds.append(change.seconds)
+        if not change.done:
+            failure = self.store.failure(job.key) or Failure("solve", change.error)
+            for wish in wishes:
+                self._fail(wish.episode, failure, job)
+        del self._jobs[change.key], self._waiting[change.key]
+        self.progress("solve", self._total - len(self._jobs), self._total)
+
+    def close(self) -> None:
+        """Take back what is still asked for, and note which labels are current."""
+        with suppress(sqlite3.OperationalError, FormatError):
+            with Ledger(self.store.ledger_path, self.settings.lease_seconds) as ledger:
+                ledger.withdraw(self.name)
+        self._recall.close()
+
     def _read(
-        self, recordings: Mapping[int, Callable[[], Episode]], sensor: Sensor | None
-    ) -> tuple[list[LabelRequest], dict[int, Failure]]:
-        requests, unfit = [], {}
-        for done, (number, read) in enumerate(recordings.items()):
-            self.progress("read", done, len(recordings))
-            try:
-                episode = read()
-            except (FormatError, UsageError) as error:
-                unfit[number] = Failure("recording", str(error))
+        self, recordings: Mapping[int, Callable[[], Episode]], sensor: Sensor | None, paths: Mapping[int, Path]
+    ) -> tuple[list[Planned], dict[int, Failure]]:
+        wishes, unfit = [], {}
+        self._given, self._recordings, self._paths = self._skin(sensor) if sensor else None, recordings, paths
+        if not self.settings.redo:
+            self._recall.open(self._given, lambda skin: self._made(skin, self._version(skin)))
+        numbers = list(recordings)
+        for done, number in enumerate(numbers):
+            self.progress("read", done, len(numbers))
+            if done % FLUSH == 0:
+                self._recall.prefetch([paths[n] for n in numbers[done : done + FLUSH] if n in paths])
+            known = self._known(number)
+            if isinstance(known, Planned):
+                wishes.append(known)
+            if known:
                 continue
-            skin = sensor or episode.sensor
-            skin = skin if self.settings.uncertainty else replace(skin, uncertainty={})
-            version = self._version(skin)
             try:
-                requests.append(request(episode, skin, version, self.settings.ladder))
+                wishes.append(Planned.of(self._request(number)))
             except FormatError as error:
                 unfit[number] = Failure("recording", str(error))
+        self._recall.flush()
         self.progress("read", len(recordings), len(recordings))
-        return requests, unfit
+        return wishes, unfit
+
+    def _known(self, number: int) -> Planned | bool:
+        """Return what is known of an episode from the run before; True if its label is current, False if nothing."""
+        path = self._paths.get(number)
+        found = self._recall.find(path) if path else None
+        if path is None or found is None:
+            return False
+        row, skin = found
+        if row.label and row.label == stamp(self.labels.path(number)):
+            self.summary.current.append(number)
+            self._delivered(number, "")
+            return True
+        job = Job.of_text(row.job) if row.job else None
+        return Planned(number, row.hash, skin, self._version(skin), job)
+
+    def _request(self, number: int) -> LabelRequest:
+        """Read a recording and work out what it needs.
+
+        Raises:
+            FormatError: If it cannot be read, or is no press.
+        """
+        path = self._paths.get(number)
+        source = stamp(path) if path else ""  # before it is read: a change meanwhile must not go unnoticed
+        try:
+            episode = self._recordings[number]()
+        except UsageError as error:
+            raise FormatError(error.given, error.allowed, error.remedy) from None
+        except OSError as error:
+            raise FormatError(
+                f"the recording of episode {number} cannot be read: {error}", "a readable file", "check its disk"
+            ) from None
+        skin = self._given or self._skin(episode.sensor)
+        version = self._version(skin)
+        wish = request(episode, skin, version, self.settings.ladder)
+        if path is not None:
+            job = json.dumps(wish.job.document) if wish.job else ""
+            made = self._made(skin, version)
+            if version not in self._skin_keys:
+                self._skin_keys[version] = skin_key(skin)
+            own = self._given is None
+            row = Known(path.name, source, own, self._skin_keys[version], made, wish.recording, job)
+            self._recall.note(row, skin)
+        if len(self._read_already) < KEPT_REQUESTS:
+            self._read_already[number] = wish
+        return wish
+
+    def _skin(self, sensor: Sensor) -> Sensor:
+        """Return the skin to label with: one object for all recordings of equal ones, so that it is hashed once."""
+        skin = sensor if self.settings.uncertainty else replace(sensor, uncertainty={})
+        for known in self._skins:
+            if known == skin:
+                return known
+        self._skins.append(skin)
+        return skin
+
+    def _made(self, skin: Sensor, version: str) -> str:
+        """Hash of all that decides a label beside its recording."""
+        key = version + (skin.transduction.content_hash if skin.transduction else "")
+        if key not in self._made_by:
+            parts = [skin.document, version, asdict(self.settings.ladder), label.source_hash()]
+            self._made_by[key] = provenance.content_hash(parts)
+        return self._made_by[key]
 
     def _version(self, sensor: Sensor) -> str:
-        key = provenance.content_hash([sensor.content_hash, sensor.uncertainty])
+        # By identity first: a session of a million recordings asks a million times for the same skin's.
+        known = self._keys.get(id(sensor))
+        if known is None:
+            key = provenance.content_hash([sensor.content_hash, sensor.uncertainty])
+            known = self._keys[id(sensor)] = (sensor, key)  # kept, so that no other gets its identity
+        key = known[1]
         if key not in self._versions:
-            found = model.version(self.settings.factory, sensor)
-            self._versions[key] = found.content_hash
-            self._sensors[found.content_hash] = sensor
+            self._versions[key] = model.version(self.settings.factory, sensor)
+        found = self._versions[key]
+        if found.content_hash not in self.sensors:
+            self.sensors[found.content_hash] = sensor
             self.summary.remarks += found.remarks
-        return self._versions[key]
+        return found.content_hash
 
-    def _missing(self, requests: list[LabelRequest]) -> list[Job]:
-        """Write what can be written at once; return the jobs whose results are wanted and not present."""
+    def _missing(self, wishes: list[Planned]) -> dict[str, Job]:
+        """Write what can be written at once; return the jobs whose results are wanted and not present, by key."""
         missing: dict[str, Job] = {}
-        for wish in requests:
+        stored = self.store.keys() if len(wishes) > MANY else None
+        for done, wish in enumerate(wishes):
+            self.progress("look", done, len(wishes))
+            job = wish.job
             if self.labels.current(wish):
-                self.summary.current.append(wish.episode)
-            elif wish.job is None:
+                self._found_current(wish)
+            elif job is None:
                 self.summary.untouched += 1
                 self._write(wish)
-            elif wish.job.key in missing:
-                self._waiting[wish.job.key].append(wish)
-            elif (failure := self._known_failure(wish.job)) is not None:
-                self._fail(wish.episode, failure, wish.job)
-            elif self.store.intact(wish.job):
+            elif job.key in missing:
+                self._waiting[job.key].append(wish)
+            elif (failure := self._known_failure(job)) is not None:
+                self._fail(wish.episode, failure, job)
+            elif (stored is None or job.key in stored) and self._write(wish):
                 self.summary.found += 1
-                self._write(wish)
             else:
-                missing[wish.job.key] = wish.job
-                self._waiting[wish.job.key].append(wish)
-        return list(missing.values())
+                missing[job.key] = job
+                self._waiting[job.key].append(wish)
+        return missing
+
+    def _found_current(self, wish: Planned) -> None:
+        self.summary.current.append(wish.episode)
+        self._read_already.pop(wish.episode, None)
+        self.labels.forget(wish.episode)
+        self._note_current(wish.episode)
+
+    def _note_current(self, episode: int) -> None:
+        if episode in self._paths:
+            self._recall.note_current(self._paths[episode], self.labels.path(episode))
+        self._delivered(episode, "")
 
     def _known_failure(self, job: Job) -> Failure | None:
         failure = self.store.failure(job.key)
@@ -182,50 +323,44 @@ class Labelling:
             return None
         return failure
 
-    def _solve(self, jobs: list[Job], since: int) -> None:
-        if not jobs:
-            return
-        total = len(jobs)
-        by_key = {job.key: job for job in jobs}
-        self.progress("solve", 0, total)
-        wanted = {version: self._sensors[version] for version in {job.model for job in jobs}}
-        pool = Pool(
-            self.store, self.settings.factory, wanted, self.settings.workers, self.settings.lease_seconds
-        )
-
-        def settle(change: Change) -> None:
-            job = by_key.pop(change.key)
-            if change.done and change.seconds > 0:
-                self.summary.seconds.append(change.seconds)
-            for wish in self._waiting[change.key]:
-                if change.done:
-                    self._write(wish)
-                else:
-                    self._fail(
-                        wish.episode, self.store.failure(job.key) or Failure("solve", change.error), job
-                    )
-            self.progress("solve", total - len(by_key), total)
-
+    def _solve(self, since: int) -> None:
+        wanted = {version: self.sensors[version] for version in {job.model for job in self._jobs.values()}}
+        pool = self.settings.engine(
+            self.store, self.settings.factory, wanted, self.settings.workers, self.settings.lease_seconds,
+            self.settings.devices,
+        )  # fmt: skip
         try:
-            pool.run(set(by_key), since, settle)
+            while self._jobs:
+                since = pool.run(set(self._jobs), since, self.settle)
         finally:
             pool.close()
 
-    def _write(self, wish: LabelRequest) -> None:
+    def _write(self, wish: Planned) -> bool:
+        """Write a label; False if its solution is missing, or was found damaged and put aside."""
         solution = self.store.get(wish.job) if wish.job else None
         if wish.job is not None and solution is None:
-            reason = "its result was damaged between being written and being read; run again"
-            self._fail(wish.episode, Failure("crash", reason), wish.job)
-            return
+            return False
         try:
-            label = self.labels.write(wish, solution)
+            full = self._read_already.pop(wish.episode, None) or self._request(wish.episode)
+            if full.job != wish.job:
+                raise FormatError(
+                    f"the recording of episode {wish.episode} changed while it was labelled",
+                    "recordings that stay as they are",
+                    "run `tacdata label` again",
+                )
+            written = self.labels.write(full, solution)
         except FormatError as error:
             self._fail(wish.episode, Failure("recording", str(error)), wish.job)
-            return
+            return True
+        finally:
+            self._read_already.pop(wish.episode, None)
         self.summary.written.append(wish.episode)
-        if (margin := Margin.of(label)) is not None:
+        if (margin := Margin.of(written)) is not None:
             self.summary.margins.append(margin)
+        self._note_current(wish.episode)
+        return True
 
     def _fail(self, episode: int, failure: Failure, job: Job | None) -> None:
         self.labels.write_failure(episode, failure, job)
         self.summary.failed[episode] = failure.reason
+        self._delivered(episode, failure.reason)

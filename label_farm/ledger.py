@@ -212,10 +212,10 @@ class Ledger:
             first = self._db.execute(FIRST_WAITING, (model,)).fetchone()
             if first is None:
                 keys = [row[0] for row in self._db.execute(FIRST_EXPIRED, (model, now))]
-            elif first[3] or count == 1:
+            elif first[2] or count == 1:
                 keys = [first[0]]
             else:
-                keys = [row[0] for row in self._db.execute(WAITING_LIKE_IT, (model, first[1], first[2], count))]
+                keys = [row[0] for row in self._db.execute(WAITING_LIKE_IT, (model, first[1], count))]
             grant = (owner, self._boot, now + self.lease_seconds)
             rows = [self._db.execute(TAKE, (*grant, key)).fetchone() for key in keys]
         return [_lease(document, tries) for document, tries in rows]
@@ -300,14 +300,28 @@ class Ledger:
             " WHERE changed > ? AND state IN (2, 3) ORDER BY changed",
             (since,),
         )
-        return [
-            Change(number, key, state == DONE, error, seconds) for number, key, state, error, seconds in rows
-        ]
+        return [Change(number, key, state == DONE, error, seconds) for number, key, state, error, seconds in rows]
 
     def counts(self) -> dict[int, int]:
         """Return how many jobs are in each state (`WAITING`, `LEASED`, `DONE`, `FAILED`)."""
         found = dict(self._db.execute("SELECT state, count(*) FROM job GROUP BY state").fetchall())
         return {state: found.get(state, 0) for state in (WAITING, LEASED, DONE, FAILED)}
+
+    def knows(self, key: str) -> bool:
+        """Return whether a job was ever asked for."""
+        return bool(self._db.execute("SELECT 1 FROM job WHERE key = ?", (key,)).fetchone())
+
+    def held(self, key: str, owner: str) -> Job | None:
+        """Return a job that a worker holds; None if it does not hold it any more."""
+        row = self._db.execute(
+            "SELECT document, tries FROM job WHERE key = ? AND state = 1 AND owner = ?", (key, owner)
+        ).fetchone()
+        return _lease(*row).job if row else None
+
+    def unsettled(self, most: int) -> int:
+        """Return how many jobs wait or are worked on, counting no further than ``most``."""
+        count = "SELECT count(*) FROM (SELECT 1 FROM job WHERE state = {} LIMIT ?)"
+        return sum(self._db.execute(count.format(state), (most,)).fetchone()[0] for state in (WAITING, LEASED))
 
     def withdraw(self, run: str) -> int:
         """Take back what a run asked for; what nobody else asked for and nobody works on leaves the queue.
@@ -338,12 +352,12 @@ class Ledger:
 
 
 def _lease(document: str, tries: int) -> Lease:
-    return Lease(Job.from_document(json.loads(document), "ledger"), tries)
+    return Lease(Job.of_text(document), tries)
 
 
 def is_dead(owner: str) -> bool:
     """Return whether a worker is a process of this machine that has ended; of other machines nothing is known."""
-    host, _, process = owner.rpartition("/")
+    host, _, process = owner.partition("#")[0].rpartition("/")
     return host == socket.gethostname() and process.isdigit() and not _alive(int(process))
 
 

@@ -22,6 +22,14 @@ FACTORY = "label_farm.fem:FemModel"
 """Dotted path of what builds the model from a sensor."""
 
 
+_TRIES = 3
+"""How often a process that is killed is started again."""
+
+
+class ProcessDied(SolveError):
+    """The process that was to build a model was killed: by whom or for what memory ever, not by the sensor's fault."""
+
+
 class Model(Protocol):
     """What a factory builds. The farm knows of a solver only this: a stand-in is one class with these names.
 
@@ -92,24 +100,32 @@ def version(factory: str, sensor: Sensor) -> Version:
         SolveError: If the sensor cannot be modelled.
     """
     asked = json.dumps({"factory": factory, "sensor": sensor.document})
-    finished = subprocess.run(
-        environment.python("label_farm.model"),
-        env=environment.variables(),
-        input=asked,
-        capture_output=True,
-        text=True,
-    )
+    for _ in range(_TRIES):
+        finished = subprocess.run(
+            environment.python("label_farm.model"),
+            env=environment.variables(),
+            input=asked,
+            capture_output=True,
+            text=True,
+        )
+        if finished.returncode >= 0:
+            break
     try:
         answer = json.loads(finished.stdout)
     except ValueError:
-        raise SolveError(
-            f"the skin model of {sensor.name} cannot be built:\n{finished.stderr[-2000:]}",
+        kind = ProcessDied if finished.returncode < 0 else SolveError
+        raise kind(
+            f"the skin model of {sensor.name} cannot be built{_how(finished.returncode)}:\n{finished.stderr[-2000:]}",
             "a model that can be built on this machine",
             "see the last lines above",
         ) from None
     if "error" in answer:
         raise getattr(tacdata.errors, answer["kind"], SolveError)(*answer["error"])
     return Version(answer["version"], tuple(answer["remarks"]))
+
+
+def _how(code: int) -> str:
+    return f", its process was ended by signal {-code} {_TRIES} times" if code < 0 else ""
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -45,6 +46,27 @@ class LabelRequest:
     """Time at which the nominal path first reaches its deepest point [ns]."""
     job: Job | None
     """The path to solve; None if the indenter never touches."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What is to be known of a request until its press is solved: a session may have more frames than memory."""
+
+    episode: int
+    """Number of the episode in its session."""
+    recording: str
+    """SHA-256 of the recording's file."""
+    sensor: Sensor
+    """The skin that the label is of."""
+    model: str
+    """Content hash of the skin model."""
+    job: Job | None
+    """The path to solve; None if the indenter never touches."""
+
+    @classmethod
+    def of(cls, request: LabelRequest) -> Self:
+        """Keep of a request what is small."""
+        return cls(request.episode, request.recording, request.sensor, request.model, request.job)
 
 
 def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> LabelRequest:

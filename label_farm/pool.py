@@ -6,16 +6,17 @@ import os
 import socket
 import subprocess
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO
+from typing import IO, Protocol
 
 from label_farm import environment
 from label_farm.failure import Failure
 from label_farm.ledger import LEASE_SECONDS, MAX_TRIES, Change, Ledger
+from label_farm.roster import Roster
 from label_farm.store import Store
-from label_farm.worker import OTHER_CODE, Assignment
+from label_farm.worker import NO_ROOM, OTHER_CODE, Assignment
 from tacdata.errors import SolveError, UsageError
 from tacdata.sensor import Sensor
 
@@ -34,31 +35,57 @@ class _Slot:
         return f"{socket.gethostname()}/{self.process.pid}"
 
 
+class StoreFull(UsageError):
+    """The store's disk is full or refuses; what is finished is kept, and the jobs are back in the queue."""
+
+
+class Engine(Protocol):
+    """What runs jobs: something made of the same arguments as `Pool`, with these two calls."""
+
+    def __call__(
+        self,
+        store: Store,
+        factory: str,
+        sensors: dict[str, Sensor] | None,
+        workers: int,
+        lease_seconds: float,
+        devices: Sequence[str],
+    ) -> Pool:
+        """Prepare; see `Pool`."""
+        ...
+
+
 class Pool:
-    """Local workers on one store. Another engine needs the same two calls: `run` and `stop`."""
+    """Local workers on one store. Another engine needs the same calls: `run`, `tend` and `stop`."""
 
     def __init__(
         self,
         store: Store,
         factory: str,
-        sensors: dict[str, Sensor],
+        sensors: dict[str, Sensor] | None,
         workers: int,
         lease_seconds: float = LEASE_SECONDS,
+        devices: Sequence[str] = ("cpu",),
     ) -> None:
         """Prepare; nothing is started yet.
 
         Args:
             store: Where results and the ledger lie.
             factory: Dotted path of what builds a model from a sensor.
-            sensors: Content hash of a model -> the sensor that it models.
+            sensors: Content hash of a model -> the sensor that it models; None to work for every model that the
+                ledger offers.
             workers: Number of processes.
             lease_seconds: How long a silent worker keeps its job [s].
+            devices: What the workers solve on, one after the other: "cpu" or cards such as "cuda:0".
         """
         self.store, self.workers = store, workers
-        documents = {version: sensor.document for version, sensor in sensors.items()}
-        self._assignment = Assignment(str(store.folder.resolve()), factory, documents, lease_seconds)
-        self._slots: list[_Slot] = []
         self._ledger = Ledger(store.ledger_path, lease_seconds)
+        if sensors is not None:
+            self._ledger.register({version: sensor.document for version, sensor in sensors.items()})
+        versions = None if sensors is None else list(sensors)
+        self._assignment = Assignment(str(store.folder.resolve()), factory, versions, lease_seconds)
+        self._devices, self._roster = devices, Roster(self._ledger)
+        self._slots: list[_Slot] = []
         self._deaths = 0
 
     @property
@@ -66,13 +93,16 @@ class Pool:
         """Process numbers of the workers that were started and not replaced."""
         return [slot.process.pid for slot in self._slots]
 
-    def run(self, keys: set[str], since: int, on_change: Callable[[Change], None]) -> None:
+    def run(self, keys: set[str], since: int, on_change: Callable[[Change], None]) -> int:
         """Work until every key is settled, by these workers or by those of another run on the same store.
 
         Args:
             keys: Keys of the jobs, already in the ledger.
             since: The ledger's last change before the store was asked for results.
             on_change: Called for each of the keys as it is finished or failed.
+
+        Returns:
+            Number of the last change that was told.
 
         Raises:
             UsageError: If the workers' code is of another version.
@@ -82,17 +112,34 @@ class Pool:
         self._ledger.release_dead()
         try:
             while pending:
-                while len(self._slots) < min(self.workers, len(pending)):
-                    self._slots.append(self._start(len(self._slots)))
+                self.tend(len(pending))
                 time.sleep(POLL_SECONDS)
                 for change in self._ledger.changes(since):
                     since, self._deaths = change.number, 0
                     if change.key in pending:
                         pending.remove(change.key)
                         on_change(change)
-                self._replace_dead()
         finally:
             self.stop()
+        return since
+
+    def tend(self, wanted: int, settled: bool = False) -> None:
+        """Start workers as far as they are wanted, and replace those that died.
+
+        Args:
+            wanted: How many jobs wait.
+            settled: Whether a job was settled since the last call.
+
+        Raises:
+            UsageError: If the workers' code is of another version (only where the models were named).
+            StoreFull: If the store's disk refuses.
+            SolveError: If workers cannot start or keep dying.
+        """
+        if settled:
+            self._deaths = 0
+        self._replace_dead()
+        while len(self._slots) < min(self.workers, wanted):
+            self._slots.append(self._start(len(self._slots)))
 
     def stop(self) -> None:
         """Stop the workers and give their jobs back to the queue; may be called twice."""
@@ -107,6 +154,7 @@ class Pool:
                 slot.process.wait()
             self._close(slot)
             self._ledger.release(slot.owner, blame=False)
+            self._roster.leave(slot.owner)
             slot.log.unlink(missing_ok=True)
         self._slots.clear()
 
@@ -119,11 +167,12 @@ class Pool:
         logs = self.store.folder / "logs"
         logs.mkdir(exist_ok=True)
         log = logs / f"{socket.gethostname()}-{os.getpid()}-{number}.log"
+        device = self._devices[number % len(self._devices)]
         with log.open("w") as stream:
             # A process group of its own: Ctrl-C reaches the pool alone, which stops the workers.
             process = subprocess.Popen(
                 environment.python("label_farm.worker"),
-                env=environment.variables(),
+                env=environment.variables(device),
                 process_group=0,
                 text=True,
                 stdin=subprocess.PIPE,
@@ -132,7 +181,7 @@ class Pool:
             )
         slot = _Slot(process, log)
         try:
-            _stdin(slot).write(self._assignment.line())
+            _stdin(slot).write(replace(self._assignment, device=device).line())
             _stdin(slot).flush()
         except BrokenPipeError:
             pass  # it died at once: noticed by the next watch, with its log
@@ -150,6 +199,7 @@ class Pool:
             if code is None:
                 continue
             self._close(slot)
+            self._roster.leave(slot.owner)
             self._bury(slot, code)
             self._slots[number] = self._start(number)
 
@@ -161,6 +211,13 @@ class Pool:
                 f"a worker runs other code: {log.strip()}",
                 "workers of the same code version as the run",
                 "let everything be of one version, then run again",
+            )
+        if code == NO_ROOM:
+            self._ledger.release(slot.owner, blame=False)
+            raise StoreFull(
+                f"a worker cannot write to {self.store.folder}: {_last_line(log)}",
+                "a disk with room that may be written",
+                "make room and run again: what is finished is kept",
             )
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         for lease in self._ledger.release(slot.owner, blame=True):
@@ -175,6 +232,10 @@ class Pool:
                 "workers that can start and write to the store",
                 "see the log above (memory? disk space?); run again to go on: what is finished is kept",
             )
+
+
+def _last_line(log: str) -> str:
+    return (log.strip().splitlines() or ["it refuses"])[-1]
 
 
 def _stdin(slot: _Slot) -> IO[str]:

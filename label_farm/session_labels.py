@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from label_farm.failure import Failure
 from label_farm.job import Job
 from label_farm.label import make_label, parents
-from label_farm.plan import LabelRequest
+from label_farm.plan import LabelRequest, Planned
+from label_farm.store import STALE_SECONDS
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import Label, PathSolution, read_label, table, write_label
@@ -21,6 +25,13 @@ class SessionLabels:
         self.folder = folder
         self._parents: dict[int, dict[str, str] | None] = {}
 
+    def sweep(self) -> None:
+        """Remove what killed writers left; a young file may belong to a living one."""
+        for path in self.folder.glob(".episode-*"):
+            with suppress(FileNotFoundError):
+                if time.time() - path.stat().st_mtime > STALE_SECONDS:
+                    path.unlink()
+
     def path(self, episode: int) -> Path:
         """Return where an episode's label lies, or would lie."""
         return self.folder / f"episode-{episode:06d}.parquet"
@@ -29,11 +40,27 @@ class SessionLabels:
         """Return where the reason lies if an episode has no label."""
         return self.folder / f"episode-{episode:06d}.failure.json"
 
+    def failures(self, most: int) -> dict[str, str]:
+        """Return the reasons of up to ``most`` episodes that have no label, by episode number."""
+        found = {}
+        for path in sorted(self.folder.glob("episode-*.failure.json"))[:most]:
+            with suppress(FormatError):
+                found[str(int(path.name[8:14]))] = Failure.read(path).reason
+        return found
+
     def parents(self, episode: int) -> dict[str, str] | None:
         """Return what the present label was made from; None if there is no readable label."""
         if episode not in self._parents:
-            self._parents[episode] = self._read_parents(self.path(episode))
+            found = self._read_parents(self.path(episode))
+            # None is not kept: most episodes of a large session have no label yet.
+            if found is None:
+                return None
+            self._parents[episode] = found
         return self._parents[episode]
+
+    def forget(self, episode: int) -> None:
+        """Keep no longer in memory what a label was made from."""
+        self._parents.pop(episode, None)
 
     def _read_parents(self, path: Path) -> dict[str, str] | None:
         try:
@@ -44,7 +71,7 @@ class SessionLabels:
         except FormatError:
             return None
 
-    def refuse_other_models(self, requests: list[LabelRequest]) -> None:
+    def refuse_other_models(self, requests: Sequence[Planned]) -> None:
         """Refuse to mix model versions within the folder.
 
         Raises:
@@ -64,7 +91,7 @@ class SessionLabels:
                 "give --redo to replace them, or use the tacdata release and sensor file that made them",
             )
 
-    def current(self, request: LabelRequest) -> bool:
+    def current(self, request: LabelRequest | Planned) -> bool:
         """Return whether the label lies there, made from exactly what this request would be made from."""
         return self.parents(request.episode) == parents(request)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from pathlib import Path
 
@@ -116,6 +117,14 @@ class Store:
         documents.check(document, "label_failure", f"failure of {job.key[:12]}")
         self._write(self.failure_path(job.key), (json.dumps(document, indent=1) + "\n").encode())
 
+    def keys(self) -> set[str]:
+        """Return the keys of all results that lie here, whole or not; a million take seconds."""
+        found: set[str] = set()
+        for entry in os.scandir(self.folder):
+            if len(entry.name) == 2 and entry.is_dir():
+                found.update(e.name[:-4] for e in os.scandir(entry.path) if e.name.endswith(".npz"))
+        return found
+
     def failure(self, key: str) -> Failure | None:
         """Return why a job failed, or None; an unreadable reason counts as none: the job is tried again."""
         path = self.failure_path(key)
@@ -131,8 +140,15 @@ class Store:
         self.failure_path(key).unlink(missing_ok=True)
 
     def _write(self, path: Path, data: bytes) -> None:
-        with replacement(path, self.folder / WRITING) as stream:
-            stream.write(data)
+        beside = self.folder / WRITING
+        try:
+            with replacement(path, beside) as stream:
+                stream.write(data)
+        except FileNotFoundError:
+            # Another's sweep took it for old: a clock that jumps ages a file by hours.
+            beside.mkdir(exist_ok=True)
+            with replacement(path, beside) as stream:
+                stream.write(data)
 
     def _sweep(self) -> None:
         """Remove what killed writers left; a young file may belong to a living one."""

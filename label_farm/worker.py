@@ -26,7 +26,7 @@ from label_farm.failure import Failure
 from label_farm.ledger import MAX_TRIES, Lease, owner_name
 from label_farm.model import Model, batch_size, build, solve_each
 from tacdata import provenance
-from tacdata.errors import SolveError, TacdataError
+from tacdata.errors import DeviceError, SolveError, TacdataError
 from tacdata.labels import PathSolution
 
 IDLE_SECONDS = 0.1
@@ -97,22 +97,22 @@ class Worker:
         return False
 
     def _settle(self, leases: list[Lease], model: Model) -> None:
-        todo = {lease.job: lease.tries for lease in leases if self._is_open(lease)}
+        todo = {lease.job.key: lease for lease in leases if self._is_open(lease)}
         began = time.monotonic()
         try:
-            for job, outcome in solve_each(model, list(todo)):
+            for job, outcome in solve_each(model, [lease.job for lease in todo.values()]):
                 seconds, began = time.monotonic() - began, time.monotonic()
-                self._leave(Lease(job, todo.pop(job)), outcome, seconds)
+                self._leave(todo.pop(job.key), outcome, seconds)
             if todo:
                 raise RuntimeError(f"the model left {len(todo)} jobs unanswered")
-        except (OSError, MemoryError, sqlite3.OperationalError):
+        except (OSError, MemoryError, DeviceError, sqlite3.OperationalError):
             raise  # not the press's fault: the pool gives the jobs back
         except Exception as error:
             # Of several, nobody knows which one did it: each gets a try alone.
             if len(todo) == 1:
-                [(job, tries)] = todo.items()
+                [lease] = todo.values()
                 reason = f"unexpected {type(error).__name__}: {error}"
-                self.desk.fail(job, Failure("crash", reason, traceback.format_exc(), tries))
+                self.desk.fail(lease.job, Failure("crash", reason, traceback.format_exc(), lease.tries))
             raise
 
     def _is_open(self, lease: Lease) -> bool:
@@ -133,7 +133,7 @@ class Worker:
             self.desk.put(lease.job, replace(outcome, provenance={**made, **outcome.provenance}))
         except SolveError as error:
             log = "".join(traceback.format_exception(error))
-            self.desk.fail(lease.job, Failure("solve", str(error), log, lease.tries))
+            self.desk.fail(lease.job, Failure("solve", str(error), log, lease.tries), seconds)
         else:
             self.desk.finish(lease.job, seconds)
 
@@ -144,7 +144,7 @@ class Worker:
             try:
                 self._models[version] = self._built(version)
             except (OtherCodeError, TacdataError) as error:
-                if self._strict:
+                if self._strict or isinstance(error, DeviceError):
                     raise
                 self._refused[version] = str(error)
                 self.desk.note(f"refuses model {version[:12]}…: {error}")
@@ -183,6 +183,8 @@ def work(worker: Worker, stopped: Callable[[], bool] = lambda: False) -> int:
     except (OSError, sqlite3.OperationalError) as error:
         traceback.print_exc()
         return NO_ROOM if is_disk(error) else BROKEN
+    except DeviceError:
+        raise  # the line to a service is cut: whoever started it tries again
     except Exception:
         traceback.print_exc()
         return BROKEN

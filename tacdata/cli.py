@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import typer
@@ -28,9 +29,22 @@ def application() -> typer.Typer:
     modules = [registry.load_module(ROOM, BASE, name) for name in registry.names(ROOM, BASE)]
     for module in sorted(modules, key=lambda m: (m.ORDER, m.__name__)):
         name = module.__name__.rsplit(".", 1)[-1].replace("_", "-")
-        verb = interruptible(module.run)
-        app.command(name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)(verb)
+        if hasattr(module, "__path__"):
+            app.add_typer(_group(module), name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)
+        else:
+            verb = interruptible(module.run)
+            app.command(name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)(verb)
     return app
+
+
+def _group(room: ModuleType) -> typer.Typer:
+    """Return a verb that is a folder: each file in it is a verb below it."""
+    group = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown")
+    modules = [registry.load_module(room.__name__, BASE, name) for name in registry.names(room.__name__, BASE)]
+    for module in sorted(modules, key=lambda m: (m.ORDER, m.__name__)):
+        name = module.__name__.rsplit(".", 1)[-1].replace("_", "-")
+        group.command(name=name, help=module.run.__doc__)(interruptible(module.run))
+    return group
 
 
 def interruptible(verb: Callable[..., Any]) -> Callable[..., Any]:

@@ -26,7 +26,7 @@ def run(
         Path | None,
         typer.Option(help="Folder of solved presses, may serve many sessions; else SESSION/labels/store."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one per core.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one per core or card.")] = None,
     redo: Annotated[
         bool, typer.Option("--redo", help="Replace labels of another model version; retry failed presses.")
     ] = False,
@@ -40,15 +40,28 @@ def run(
         float,
         typer.Option(min=0.0, help="Add states where maps between them would be off by more [mm], or by 1 %; 0: none."),
     ] = 0.005,
+    into: Annotated[
+        Path | None, typer.Option(help="Dataset that each label flows into as soon as it is finished; made if missing.")
+    ] = None,
+    device: Annotated[
+        list[str] | None, typer.Option(help="What workers solve on: cpu, cuda for all cards, cuda:0, ...; repeatable.")
+    ] = None,
+    dask: Annotated[
+        str, typer.Option(help="Solve on a Dask cluster: tcp://HOST:PORT of its scheduler, or `here` to start one.")
+    ] = "",
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> None:
     """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
     from functools import partial
 
-    from label_farm.environment import cores
-    from label_farm.labelling import FarmSettings, Labelling
+    from label_farm.dask_pool import dask_engine
+    from label_farm.dataset_flow import DatasetFlow
+    from label_farm.environment import cores, devices
+    from label_farm.farm_settings import FarmSettings
+    from label_farm.labelling import Labelling
     from label_farm.ladder import Ladder
     from label_farm.model import FACTORY
+    from label_farm.pool import Pool
     from label_farm.store import Store
     from label_farm.tolerance import Tolerance
     from tacdata.recording.reader import read_episode
@@ -64,15 +77,24 @@ def run(
             load_step=load_step, unload_step=unload_step, tolerance=Tolerance(least=tolerance) if tolerance else None
         ),
         uncertainty=uncertainty,
-        workers=workers or cores(),
+        workers=workers or (cores() if devices(device or ()) == ("cpu",) else len(devices(device or ()))),
+        devices=devices(device or ()),
         redo=redo,
+        engine=dask_engine(dask) if dask else Pool,
     )
     skin = read_sensor(sensor) if sensor else None
     labels = session / "labels"
-    recordings = {int(path.stem[-6:]): partial(read_episode, path) for path in recorded.episodes}
+    paths = {int(path.stem[-6:]): path for path in recorded.episodes}
+    recordings = {number: partial(read_episode, path) for number, path in paths.items()}
+    flow = DatasetFlow(into, session, recorded.episodes, skin) if into else None
+    deliver = flow.deliver if flow else lambda *_: None
     with _Bars() as bars:
-        labelling = Labelling(labels, Store(store or labels / "store"), settings, bars.show)
-        summary = labelling.run(recordings, skin)
+        labelling = Labelling(labels, Store(store or labels / "store"), settings, bars.show, deliver)
+        try:
+            summary = labelling.run(recordings, skin, paths)
+        finally:
+            if flow:
+                flow.say()
     _report(summary, labels, session)
 
 
@@ -110,7 +132,7 @@ class _Bars:
 
     def show(self, stage: str, done: int, total: int) -> None:
         """Move the bar of a stage."""
-        names = {"read": "reading recordings", "solve": "solving presses"}
+        names = {"read": "reading recordings", "look": "looking for labels", "solve": "solving presses"}
         if stage not in self._tasks:
             self._tasks[stage] = self._progress.add_task(names[stage], total=total)
         self._progress.update(self._tasks[stage], completed=done)

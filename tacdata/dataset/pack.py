@@ -77,7 +77,7 @@ def pack(
             if writer is None or writer.sensor != skin:
                 again = out.exists() and (append or writer is not None)
                 writer = (DatasetWriter.open if again else DatasetWriter.create)(out, skin, extra)
-            reason = _append(writer, episode, label, recording)
+            reason = append_episode(writer, episode, label, recording)
         if reason:
             left_out.append((episode.path.name, reason))
         else:
@@ -93,7 +93,7 @@ def pack(
     return Packed(out, count, total, tuple(left_out))
 
 
-def _append(writer: DatasetWriter, episode: Episode, label: Label, recording: str) -> str:
+def append_episode(writer: DatasetWriter, episode: Episode, label: Label, recording: str) -> str:
     """Append an episode; return the reason if that is refused, else ""."""
     if recording in writer.recordings:
         return "the dataset holds it already"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -135,7 +136,7 @@ class Sensor:
             document[name] = getattr(self, name).document
         return document
 
-    @property
+    @cached_property
     def content_hash(self) -> str:
         """Hash of every value that can change a label; names, remarks, spreads and the transduction do not
         count."""

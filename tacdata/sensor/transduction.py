@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Self
 
 from tacdata import provenance
@@ -35,7 +36,7 @@ class Transduction:
             document["full_scale"] = self.full_scale
         return document
 
-    @property
+    @cached_property
     def content_hash(self) -> str:
         """Hash of every value that can change a reading beside those that change a label."""
         return provenance.content_hash(self.document)

@@ -48,8 +48,6 @@ def press_episode(folder, number=0, x=0.0, depth=1.0, reached=None, frames=40, *
 
 def label_episodes(folder, episodes, progress=lambda *_: None, sensor=None, **settings):
     """Label episodes into a folder with the fast model; return the summary."""
-    chosen = FarmSettings(
-        **{"factory": "fast_model:FastModel", "workers": 2, "lease_seconds": 4.0, **settings}
-    )
+    chosen = FarmSettings(**{"factory": "fast_model:FastModel", "workers": 2, "lease_seconds": 4.0, **settings})
     recordings = {episode.number: lambda episode=episode: episode for episode in episodes}
     return Labelling(folder, Store(folder / "store"), chosen, progress).run(recordings, sensor)

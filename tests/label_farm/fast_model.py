@@ -17,6 +17,7 @@ class FastModel:
 
     def __init__(self, sensor):
         self.sensor = sensor
+        self.batch = int(os.environ.get("FAST_MODEL_BATCH", "1"))
         self.remarks = tuple(filter(None, [os.environ.get("FAST_MODEL_REMARK")]))
         self.content_hash = provenance.content_hash(
             [sensor.content_hash, sensor.uncertainty, os.environ.get("FAST_MODEL_VERSION", "1")]

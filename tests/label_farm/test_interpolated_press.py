@@ -30,8 +30,10 @@ def test_no_frame_is_further_off_than_a_state_left_out(indenter):
         branch, whole = Branch(dense[::2], values[::2]), Branch(dense, values)
         lost = np.abs(branch.at(dense) - values).max(axis=1)
         bound = branch.left_out_beside(dense)
-        print(f"\n{indenter.shape} {name}: lost at most {1e3 * lost.max():.1f} um, bound {1e3 * bound.max():.1f} um; "
-              f"left out with twice the states {1e3 * whole.left_out().max():.1f} um")
+        print(
+            f"\n{indenter.shape} {name}: lost at most {1e3 * lost.max():.1f} um, bound {1e3 * bound.max():.1f} um; "
+            f"left out with twice the states {1e3 * whole.left_out().max():.1f} um"
+        )
         assert (lost[1::2] <= bound[1::2]).all()
         # Bounds stay near what states left out cost: a fiftieth of the depth under the sphere's moving edge.
         assert bound.max() < 0.025

@@ -28,9 +28,7 @@ def test_a_damaged_result_is_made_again(tmp_path, label_all, solves, damage):
     assert np.array_equal(read_label(label).signed, surface)
 
 
-def test_labels_of_another_model_version_are_not_touched_unless_asked(
-    tmp_path, label_all, solves, monkeypatch
-):
+def test_labels_of_another_model_version_are_not_touched_unless_asked(tmp_path, label_all, solves, monkeypatch):
     episode = press_episode(tmp_path)
     label_all([episode])
     label = tmp_path / "labels" / "episode-000000.parquet"

@@ -85,9 +85,7 @@ def test_a_recording_that_is_no_vertical_press_is_a_failure_with_words(tmp_path,
 
 def test_a_recording_that_cannot_be_read_or_labelled_stops_no_other(tmp_path, solves):
     def unreadable():
-        raise FormatError(
-            "episode-000000.mcap broke off before its attachments", "a recording", "record again"
-        )
+        raise FormatError("episode-000000.mcap broke off before its attachments", "a recording", "record again")
 
     backwards = press_episode(tmp_path, 1)
     times = backwards.taxels.sample_ns.copy()

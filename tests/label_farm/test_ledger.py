@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from farm_examples import HERE
@@ -112,14 +113,57 @@ def test_leases_of_the_dead_and_of_before_a_restart_are_given_back(tmp_path):
 
 
 def test_claims_use_the_indices(ledger):
-    from label_farm.ledger import TAKE_EXPIRED, TAKE_WAITING
+    from label_farm import ledger_tables as tables
 
     ledger.enqueue(jobs(20))
-    for statement, values in ((TAKE_WAITING, (MODEL, 1)), (TAKE_EXPIRED, (MODEL, 0.0, 1))):
-        plan = [
-            row[3] for row in ledger._db.execute("EXPLAIN QUERY PLAN " + statement, ("w", "", 0.0, *values))
-        ]
-        assert not [step for step in plan if step.startswith("SCAN")], plan
+    batch = jobs(1)[0].batch
+    statements = {
+        tables.FIRST_WAITING: (MODEL,),
+        tables.WAITING_LIKE_IT: (MODEL, batch, 5),
+        tables.FIRST_EXPIRED: (MODEL, 0.0),
+    }
+    for statement, values in statements.items():
+        plan = [row[3] for row in ledger.rows("EXPLAIN QUERY PLAN " + statement, values)]
+        assert not [step for step in plan if step.startswith("SCAN") or "TEMP B-TREE" in step], plan
+
+
+def test_only_jobs_of_one_indenter_are_taken_together(ledger):
+    ledger.enqueue(jobs(4))
+    other = [replace(job, indenter={"shape": "sphere", "radius": 3.0}) for job in jobs(6)[4:]]
+    ledger.enqueue(other, priority=1)
+    assert [lease.job.x for lease in ledger.claim("a", MODEL, 5)] == [4, 5]
+    assert [lease.job.x for lease in ledger.claim("a", MODEL, 3)] == [0, 1, 2]
+
+
+def test_a_batch_whose_worker_died_is_tried_one_by_one(ledger):
+    ledger.enqueue(jobs(3))
+    assert len(ledger.claim("w", MODEL, 3)) == 3
+    assert ledger.release("w", blame=True) == []
+    for x in range(3):
+        (lease,) = ledger.claim("w", MODEL, 3)
+        assert (lease.job.x, lease.tries) == (x, 1), "who shared the blame starts anew, alone"
+
+
+def test_withdrawn_jobs_leave_unless_another_run_wants_them(ledger):
+    ledger.enqueue(jobs(3), run="mine")
+    ledger.enqueue(jobs(4)[2:], priority=7, run="yours")
+    (worked_on,) = ledger.claim("w", MODEL)
+    assert worked_on.job.x == 2, "the highest priority that anyone asked for"
+    ledger.release("w", blame=False)
+    ledger.prioritize("yours", -1)
+    assert ledger.claim("w", MODEL)[0].job.x == 0
+    assert ledger.withdraw("mine") == 1, "job 0 is worked on, job 2 is wanted by another"
+    assert ledger.counts() == {WAITING: 2, LEASED: 1, DONE: 0, FAILED: 0}
+    assert {lease.job.x for lease in ledger.claim("w", MODEL, 9)} == {2, 3}
+
+
+def test_models_are_offered_by_the_priority_of_their_first_job(ledger):
+    ledger.register({MODEL: {}, "b" * 64: {}, "c" * 64: {}})
+    ledger.enqueue(jobs(2))
+    ledger.enqueue(jobs(1, "b" * 64), priority=3)
+    assert ledger.offered() == ["b" * 64, MODEL]
+    ledger.withhold("b" * 64)
+    assert ledger.offered() == [MODEL]
 
 
 @pytest.mark.parametrize("content", [b"this is no database" * 100, None])

@@ -29,9 +29,7 @@ def test_a_worker_killed_in_mid_job_costs_nothing_but_time(tmp_path, label_all, 
     assert sorted(x for _, x in solves()) == ["0", "1", "2", "2", "3", "4"]
 
 
-def test_a_press_that_always_kills_its_worker_is_a_failure_and_stops_no_other(
-    tmp_path, label_all, solves, monkeypatch
-):
+def test_a_press_that_always_kills_its_worker_is_a_failure_and_stops_no_other(tmp_path, label_all, solves, monkeypatch):
     monkeypatch.setenv("FAST_MODEL_KILLS", "1")
     summary = label_all(episodes(tmp_path, 3))
     assert sorted(summary.written) == [0, 2] and "signal 9 in each of 3 tries" in summary.failed[1]
@@ -78,8 +76,6 @@ def test_a_store_that_cannot_be_written_is_said_in_words(tmp_path, solves):
 
 
 def test_a_dead_model_process_is_said_in_words(monkeypatch, solves):
-    monkeypatch.setattr(
-        model.environment, "python", lambda module: [sys.executable, "-c", "import os; os.abort()"]
-    )
+    monkeypatch.setattr(model.environment, "python", lambda module: [sys.executable, "-c", "import os; os.abort()"])
     with pytest.raises(SolveError, match="cannot be built"):
         model.version("fast_model:FastModel", SENSOR)

@@ -57,8 +57,11 @@ def test_a_solution_comes_back_bit_for_bit(tmp_path):
 def test_standard_deviations_come_back_where_they_are_known(tmp_path):
     store = Store(tmp_path / "store")
     known = replace(
-        SOLUTION, uncertainty=0.1 * SOLUTION.surface, force_uncertainty=np.abs(SOLUTION.force),
-        taxel_force_uncertainty=SOLUTION.taxel_force, taxel_closure_uncertainty=SOLUTION.taxel_closure,
+        SOLUTION,
+        uncertainty=0.1 * SOLUTION.surface,
+        force_uncertainty=np.abs(SOLUTION.force),
+        taxel_force_uncertainty=SOLUTION.taxel_force,
+        taxel_closure_uncertainty=SOLUTION.taxel_closure,
     )
     store.put(JOB, known, SENSOR)
     found = Store(tmp_path / "store").get(JOB)

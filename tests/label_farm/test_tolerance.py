@@ -98,7 +98,13 @@ def test_the_model_solves_again_until_the_states_are_near_enough_or_three_times(
     model = FemModel.__new__(FemModel)
     ladder = Ladder()
     job = Job(
-        SENSOR.content_hash, "a" * 64, {"shape": "sphere", "radius": 2.0}, 0.5, 0.0, 0.0, ladder.depths(1.5),
+        SENSOR.content_hash,
+        "a" * 64,
+        {"shape": "sphere", "radius": 2.0},
+        0.5,
+        0.0,
+        0.0,
+        ladder.depths(1.5),
         ladder.tolerance,
     )
     model._model = Kinked()

@@ -1,0 +1,152 @@
+"""The HTTP interface of the service (OpenAPI under /openapi.json), and its page."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from importlib.resources import files
+from typing import Any
+
+from fastapi import FastAPI, Request, Response
+from fastapi.responses import HTMLResponse, JSONResponse
+from pydantic import BaseModel, ConfigDict, Field
+
+from label_farm.ledger import Ledger
+from label_farm.service.foreman import Foreman
+from label_farm.service.guard import Guard
+from label_farm.service.run import LABELS
+from label_farm.service.submission import Submission
+from label_farm.service.work import add_work
+from label_farm.session_labels import SessionLabels
+from tacdata import documents, provenance
+from tacdata.errors import FormatError, SolveError, TacdataError, UsageError
+
+STATUS = {UsageError: 400, FormatError: 422, SolveError: 422}
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; img-src blob:"
+
+
+class Wish(BaseModel):
+    """What a person may ask for; as `schemas/submission.schema.json`."""
+
+    model_config = ConfigDict(extra="forbid")
+    session: str = Field(min_length=1, max_length=1000)
+    by: str = Field(min_length=1, max_length=100)
+    priority: int = Field(0, ge=-1000, le=1000)
+    sensor: str | None = Field(None, max_length=1000)
+    dataset: str | None = Field(None, max_length=1000)
+    redo: bool = False
+    uncertainty: bool = True
+    tolerance: float = Field(0.005, ge=0, le=10)
+    load_step: float = Field(0.25, gt=0, le=10)
+    unload_step: float = Field(0.25, gt=0, le=10)
+
+
+class Priority(BaseModel):
+    """A new priority."""
+
+    model_config = ConfigDict(extra="forbid")
+    priority: int = Field(ge=-1000, le=1000)
+
+
+def application(foreman: Foreman, token: str = "") -> Guard:
+    """Return the ASGI application.
+
+    Args:
+        foreman: Who works the submissions off.
+        token: What every request must carry; empty for the loopback alone.
+    """
+    api = FastAPI(title="tacdata label farm", version=provenance.code_version(), docs_url=None, redoc_url=None)
+
+    @api.exception_handler(TacdataError)
+    async def _in_words(_: Request, error: TacdataError) -> JSONResponse:
+        content = {"given": error.given, "allowed": error.allowed, "next": error.remedy}
+        return JSONResponse(content, next((code for kind, code in STATUS.items() if isinstance(error, kind)), 500))
+
+    @api.get("/", response_class=HTMLResponse, include_in_schema=False)
+    def page() -> HTMLResponse:
+        text = (files("label_farm.service") / "page.html").read_text()
+        return HTMLResponse(text, headers={"Content-Security-Policy": POLICY, "X-Frame-Options": "DENY"})
+
+    _add_submissions(api, foreman)
+    add_work(api, foreman)
+    return Guard(api, token)
+
+
+def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
+    @api.get("/api/state")
+    def state() -> dict[str, Any]:
+        """Everything that the page shows."""
+        return {"submissions": _listing(foreman), **_farm(foreman)}
+
+    @api.post("/api/submissions", status_code=201)
+    def submit(wish: Wish) -> dict[str, Any]:
+        """Ask for a session's labels."""
+        return foreman.submit(Submission(**wish.model_dump())).document
+
+    @api.get("/api/submissions/{number}")
+    def one(number: str) -> dict[str, Any]:
+        """One submission as it stands."""
+        foreman.submissions.get(number)
+        entry = next(entry for entry in _listing(foreman) if entry["id"] == number)
+        if "failures" not in entry and entry["failed"]:
+            entry["failures"] = SessionLabels(foreman.session(number) / LABELS).failures(100)
+        return entry
+
+    @api.post("/api/submissions/{number}/cancel")
+    def cancel(number: str) -> dict[str, Any]:
+        """Take a submission back; what is finished stays."""
+        return foreman.cancel(number).document
+
+    @api.post("/api/submissions/{number}/priority")
+    def prioritize(number: str, asked: Priority) -> dict[str, Any]:
+        """Change a submission's priority."""
+        return foreman.prioritize(number, asked.priority).document
+
+    @api.get("/api/submissions/{number}/failures/{episode}")
+    def failure(number: str, episode: int) -> dict[str, Any]:
+        """Why an episode has no label, with the worker's log (`schemas/label_failure.schema.json`)."""
+        path = SessionLabels(foreman.session(number) / LABELS).failure_path(episode)
+        return documents.read(path, "label_failure")
+
+    @api.get("/api/submissions/{number}/labels/{episode}.png")
+    def preview(number: str, episode: int) -> Response:
+        """The deepest frame of a finished label as a picture; its depth [mm] stands in the header X-Depth."""
+        from label_farm.service.preview import picture
+
+        session = foreman.session(number)
+        content, depth = picture(session / LABELS / f"episode-{episode:06d}.parquet")
+        return Response(content, media_type="image/png", headers={"X-Depth": f"{depth:.4f}"})
+
+
+def _listing(foreman: Foreman) -> list[dict[str, Any]]:
+    listed = []
+    for submission, run in foreman.states():
+        entry: dict[str, Any] = submission.document
+        if run is not None:
+            stage, done, total = run.stage
+            entry |= {
+                "stage": {"name": stage, "done": done, "total": total},
+                "recent": list(run.recent)[::-1],
+                "failures": {str(k): reason for k, reason in sorted(run.failures.items())[:100]},
+                "presses_left": run.labelling.pending if run.labelling else 0,
+            }
+        listed.append(entry)
+    return listed
+
+
+def _farm(foreman: Foreman) -> dict[str, Any]:
+    with Ledger(foreman.store.ledger_path) as ledger:
+        waiting, leased, done, failed = ledger.counts().values()
+    workers = [asdict(row) for row in foreman.workers()]
+    for row in workers:
+        row["rate"] = (row["done"] + row["failed"]) / row["busy"] if row["busy"] > 0 else 0.0
+    rate = sum(row["rate"] for row in workers if not row["note"])
+    left = waiting + leased
+    return {
+        "presses": {"waiting": waiting, "in_work": leased, "solved": done, "failed": failed},
+        "workers": workers,
+        "rate": rate,
+        "seconds_left": left / rate if rate and left else (0.0 if not left else None),
+        "paused": foreman.paused,
+        "damaged": foreman.submissions.damaged,
+        "code_version": provenance.code_version(),
+    }

@@ -1,0 +1,28 @@
+"""Paths that came over the network stay under one folder."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePosixPath
+
+from tacdata.errors import UsageError
+
+
+def confined(root: Path, asked: str, what: str) -> Path:
+    """Return the path under ``root`` that was asked for, links followed.
+
+    Raises:
+        UsageError: If it is absolute, has dots, or leads out of the root.
+    """
+    parts = PurePosixPath(asked)
+    refused = UsageError(
+        f"{what} {asked[:200]!r}", "a path inside the folder that the service serves", f"name it from {root.name}/ on"
+    )
+    if not asked or "\0" in asked or "\\" in asked or parts.is_absolute() or ".." in parts.parts:
+        raise refused
+    try:
+        path = (root / parts).resolve()
+    except (OSError, ValueError, RuntimeError):
+        raise refused from None
+    if not path.is_relative_to(root.resolve()):
+        raise refused
+    return path

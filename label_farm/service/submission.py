@@ -1,0 +1,125 @@
+"""What the service was asked for: one file a submission, in the store, so that no kill and no restart loses one."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import asdict, dataclass, fields, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Self
+
+import schemas
+from tacdata import documents
+from tacdata.errors import FormatError, UsageError
+
+OPEN = ("waiting", "planning", "running")
+"""States of a submission that is not finished."""
+
+
+@dataclass(frozen=True)
+class Submission:
+    """One session to label; fields as `schemas/submission.schema.json` says."""
+
+    session: str
+    """Folder of the recordings, from the service's root on."""
+    by: str
+    """Who asks."""
+    priority: int = 0
+    """Larger comes first."""
+    sensor: str | None = None
+    """Sensor file from the root on; None for each recording's own."""
+    dataset: str | None = None
+    """Dataset that finished labels flow into, from the root on."""
+    redo: bool = False
+    """Replace labels of another model version, try failed presses again."""
+    uncertainty: bool = True
+    """Whether labels say what the sensor file's spreads make of them."""
+    tolerance: float = 0.005
+    """States are added where maps between them would be off by more [mm]; 0: none."""
+    load_step: float = 0.25
+    """Largest depth step while loading [mm]."""
+    unload_step: float = 0.25
+    """Largest depth step while unloading [mm]."""
+    id: str = "000000"
+    """Number in its store."""
+    submitted_at: str = ""
+    """UTC, ISO 8601."""
+    finished_at: str | None = None
+    """UTC, ISO 8601."""
+    state: str = "waiting"
+    """``waiting``, ``planning``, ``running``, ``done``, ``cancelled`` or ``refused``."""
+    reason: str = ""
+    """Why it was refused."""
+    episodes: int = 0
+    """Recordings of the session."""
+    labelled: int = 0
+    """Episodes whose label lies there."""
+    failed: int = 0
+    """Episodes that have none."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The submission as plain data."""
+        return {"version": schemas.version("submission"), **asdict(self)}
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], origin: str) -> Self:
+        """Rebuild a submission.
+
+        Raises:
+            FormatError: If it breaks the schema.
+        """
+        documents.check(document, "submission", origin)
+        known = {entry.name for entry in fields(cls)}
+        return cls(**{key: value for key, value in document.items() if key in known})
+
+
+class Submissions:
+    """The submissions of one store. One service at a time writes here."""
+
+    def __init__(self, store: Path) -> None:
+        """Open the folder in the store, or make it."""
+        self.folder = store / "submissions"
+        self.folder.mkdir(exist_ok=True)
+        self._all: dict[str, Submission] = {}
+        self.damaged: list[str] = []
+        for path in sorted(self.folder.glob("*.json")):
+            try:
+                found = Submission.from_document(json.loads(path.read_text()), str(path))
+                self._all[found.id] = found
+            except (ValueError, FormatError) as error:
+                self.damaged.append(f"{path}: {str(error).splitlines()[0]}")
+
+    def add(self, wish: Submission) -> Submission:
+        """File a submission under the next number; it is on the disk when this returns."""
+        taken = [int(p.stem) for p in self.folder.glob("*.json") if re.fullmatch("[0-9]{6}", p.stem)]
+        filed = replace(wish, id=f"{max(taken, default=0) + 1:06d}", submitted_at=now())
+        self.keep(filed)
+        return filed
+
+    def keep(self, submission: Submission) -> None:
+        """Write a submission as it is now."""
+        documents.write(self.folder / f"{submission.id}.json", submission.document, "submission")
+        self._all[submission.id] = submission
+
+    def get(self, number: str) -> Submission:
+        """Return a submission.
+
+        Raises:
+            UsageError: If there is none of that number.
+        """
+        if number not in self._all:
+            raise UsageError(
+                f"no submission {number[:20]!r}", f"one of the {len(self._all)} of this store", "see farm status"
+            )
+        return self._all[number]
+
+    def listing(self) -> list[Submission]:
+        """Return all, the oldest first."""
+        return [self._all[number] for number in sorted(self._all)]
+
+
+def now() -> str:
+    """Return the time, UTC, ISO 8601."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

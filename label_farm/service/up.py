@@ -1,0 +1,138 @@
+"""The service as a process: checked settings, one socket, the foreman beside it."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from label_farm import environment
+from label_farm.farm_settings import FarmSettings
+from label_farm.model import FACTORY
+from label_farm.pool import Engine, Pool
+from label_farm.store import Store
+from tacdata.errors import UsageError
+
+SHORTEST_TOKEN = 16
+
+
+@dataclass(frozen=True)
+class UpSettings:
+    """How the service is started."""
+
+    root: Path
+    """Folder that sessions are named from."""
+    store: Path | None = None
+    """Folder of solved presses and submissions; None for ``root/farm``."""
+    host: str = "127.0.0.1"
+    """Address to listen on."""
+    port: int = 8765
+    """Port; 0 for any that is free."""
+    token: str = ""
+    """What every request must carry."""
+    workers: int | None = None
+    """Worker processes; None for one a card or core."""
+    devices: tuple[str, ...] = ()
+    """What they solve on, see `environment.devices`; empty for the processor."""
+    dask: str = ""
+    """Address of a Dask scheduler, "here" to start one, or "" for local processes."""
+    factory: str = ""
+    """Dotted path of what builds the model."""
+
+
+def up(asked: UpSettings) -> None:
+    """Serve until interrupted.
+
+    Raises:
+        UsageError: If the address is taken or not allowed, the token too short, or the store in use.
+    """
+    try:
+        import uvicorn
+
+        from label_farm.service.app import application
+        from label_farm.service.foreman import Foreman
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"the service needs {error.name}, not installed",
+            "tacdata with its extra",
+            "pip install 'tacdata[farm]'",
+        ) from None
+    _check_token(asked)
+    if not asked.root.is_dir():
+        raise UsageError(f"no folder {asked.root}", "the folder that the sessions lie in", "name it with --root")
+    root, settings = asked.root.resolve(), _settings(asked)
+    with closing(_listen(asked.host, asked.port)) as listener:
+        foreman = Foreman(root, Store(asked.store or root / "farm"), settings)
+        host = f"[{asked.host}]" if ":" in asked.host else asked.host
+        address = f"http://{host}:{listener.getsockname()[1]}"
+        foreman.announce(address)
+        foreman.start()
+        print(f"label farm of {root} at {address}", flush=True)
+        print("open it in a browser, or: tacdata farm submit SESSION --url " + address, flush=True)
+        config = uvicorn.Config(
+            application(foreman, asked.token),
+            log_level="warning",
+            timeout_graceful_shutdown=3,
+            server_header=False,
+            h11_max_incomplete_event_size=64 * 1024,
+            lifespan="off",
+        )
+        try:
+            uvicorn.Server(config).run(sockets=[listener])
+        finally:
+            foreman.stop()
+            print("stopped: what was submitted goes on with the next `tacdata farm up`", flush=True)
+
+
+def _settings(asked: UpSettings) -> FarmSettings:
+    devices = environment.devices(asked.devices)
+    ready = environment.cores() if devices == ("cpu",) else len(devices)
+    workers = ready if asked.workers is None else asked.workers
+    return FarmSettings(factory=asked.factory or FACTORY, workers=workers, devices=devices, engine=_engine(asked.dask))
+
+
+def _engine(dask: str) -> Engine:
+    if not dask:
+        return Pool
+    from label_farm.dask_pool import dask_engine
+
+    return dask_engine(dask)
+
+
+def _check_token(asked: UpSettings) -> None:
+    if asked.token and (len(asked.token) < SHORTEST_TOKEN or not asked.token.isascii() or " " in asked.token):
+        raise UsageError(
+            f"a token of {len(asked.token)} characters", f"at least {SHORTEST_TOKEN}, plain letters and digits",
+            "python -c 'import secrets; print(secrets.token_urlsafe())' makes one",
+        )  # fmt: skip
+    if not asked.token and not _is_loopback(asked.host):
+        raise UsageError(
+            f"to listen on {asked.host} without a token",
+            "127.0.0.1, or a token that every request must carry",
+            "set TACDATA_FARM_TOKEN (or --token), here and for whoever submits; put TLS before it on an open network",
+        )
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+        listener.listen(128)  # before the address is said: whoever comes early waits
+    except OSError as error:
+        listener.close()
+        raise UsageError(
+            f"cannot listen on {host}:{port}: {error.strerror or error}", "an address of this computer, a free port",
+            "name another with --host and --port; 0 takes any free port",
+        ) from None  # fmt: skip
+    return listener

@@ -1,0 +1,29 @@
+"""What became of a session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from label_farm.margin import Margin
+
+
+@dataclass
+class Summary:
+    """What became of a session."""
+
+    written: list[int] = field(default_factory=list)
+    """Episodes whose label was written."""
+    current: list[int] = field(default_factory=list)
+    """Episodes whose label lay there already."""
+    failed: dict[int, str] = field(default_factory=dict)
+    """Episode -> reason why it has no label."""
+    untouched: int = 0
+    """Labels without contact, which need no solve."""
+    seconds: list[float] = field(default_factory=list)
+    """Time of each path solved in this run [s]."""
+    found: int = 0
+    """Paths that the store held already."""
+    margins: list[Margin] = field(default_factory=list)
+    """How well each written label with contact is known."""
+    remarks: list[str] = field(default_factory=list)
+    """What a user should know of the models, in words."""

@@ -1,0 +1,23 @@
+"""Take a submission back."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.farm import command as service
+
+ORDER = 40
+
+
+def run(
+    number: Annotated[str, typer.Argument(help="Number of the submission.")],
+    url: service.Url = service.DEFAULT,
+    token: service.Token = "",
+) -> None:
+    """Take a submission back; labels that are finished stay."""
+    from label_farm.service.client import Client
+
+    entry = Client(url, token).post(f"/api/submissions/{number}/cancel")
+    print(f"submission {number} is cancelled: {entry['labelled']} of {entry['episodes']} labels lie there")

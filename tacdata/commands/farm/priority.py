@@ -1,0 +1,24 @@
+"""Change a submission's priority."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.farm import command as service
+
+ORDER = 50
+
+
+def run(
+    number: Annotated[str, typer.Argument(help="Number of the submission.")],
+    priority: Annotated[int, typer.Argument(min=-1000, max=1000, help="Larger comes first.")],
+    url: service.Url = service.DEFAULT,
+    token: service.Token = "",
+) -> None:
+    """Change a submission's priority; its waiting presses move at once."""
+    from label_farm.service.client import Client
+
+    Client(url, token).post(f"/api/submissions/{number}/priority", {"priority": priority})
+    print(f"submission {number} has priority {priority}")

@@ -1,0 +1,71 @@
+"""Say how far a label service is."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from tacdata.commands.farm import command as service
+
+ORDER = 30
+
+
+def run(
+    number: Annotated[str, typer.Argument(help="Submission; without it, all.")] = "",
+    url: service.Url = service.DEFAULT,
+    token: service.Token = "",
+    wait: Annotated[bool, typer.Option("--wait", help="Until the submission is finished; needs its number.")] = False,
+) -> None:
+    """Say what was submitted, how far it is, who works, and why presses failed."""
+    from time import sleep
+
+    from label_farm.service.client import Client
+    from tacdata.errors import SolveError, UsageError
+
+    client = Client(url, token)
+    if wait and not number:
+        raise UsageError("--wait without a submission", "the number of one", "see `tacdata farm status`")
+    if not number:
+        _all(client.get("/api/state"))
+        return
+    entry = client.get(f"/api/submissions/{number}")
+    while wait and entry["state"] in ("waiting", "planning", "running"):
+        sleep(1.0)
+        entry = client.get(f"/api/submissions/{number}")
+    _line(entry)
+    for episode, reason in entry.get("failures", {}).items():
+        print(f"  episode {episode}: no label: {reason.splitlines()[0]}")
+    if entry["reason"]:
+        print(f"  {entry['reason']}")
+    if entry["state"] == "refused" or (wait and entry["failed"]):
+        refused = entry["state"] == "refused"
+        raise SolveError(
+            f"submission {number} " + ("is refused" if refused else f"left {entry['failed']} episodes without a label"),
+            "a label for every episode", "mend what is said above and submit again",
+        )  # fmt: skip
+
+
+def _line(entry: dict[str, Any]) -> None:
+    left = f", {entry['presses_left']} presses to go" if entry.get("presses_left") else ""
+    print(
+        f"{entry['id']}  {entry['state']:9}  {entry['labelled']} of {entry['episodes']} labelled, "
+        f"{entry['failed']} failed{left}  {entry['session']}  (by {entry['by']}, priority {entry['priority']})"
+    )
+
+
+def _all(state: dict[str, Any]) -> None:
+    for entry in state["submissions"]:
+        _line(entry)
+    if not state["submissions"]:
+        print("nothing was submitted yet: tacdata farm submit SESSION")
+    presses = state["presses"]
+    print(f"presses: {presses['waiting']} waiting, {presses['in_work']} in work, {presses['solved']} solved, "
+          f"{presses['failed']} failed")  # fmt: skip
+    for row in state["workers"]:
+        print(f"worker {row['owner']} on {row['device']}: {row['done']} solved, {60 * row['rate']:.1f} a minute"
+              + (f"; {row['note']}" if row["note"] else ""))  # fmt: skip
+    if state["seconds_left"]:
+        print(f"about {state['seconds_left'] / 60:.1f} min left")
+    if state["paused"]:
+        print(f"paused: {state['paused']}")

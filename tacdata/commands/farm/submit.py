@@ -1,0 +1,42 @@
+"""Ask a label service for the labels of a session."""
+
+from __future__ import annotations
+
+import getpass
+import socket
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.farm import command as service
+
+ORDER = 20
+
+
+def run(
+    session: Annotated[str, typer.Argument(help="Folder of recordings, named from the service's root on.")],
+    url: service.Url = service.DEFAULT,
+    token: service.Token = "",
+    sensor: Annotated[str, typer.Option(help="Sensor file from the root on, if not each recording's own.")] = "",
+    into: Annotated[str, typer.Option(help="Dataset from the root on that finished labels flow into.")] = "",
+    priority: Annotated[int, typer.Option(min=-1000, max=1000, help="Larger comes first.")] = 0,
+    by: Annotated[str, typer.Option(help="Who asks; else your name and computer.")] = "",
+    redo: Annotated[
+        bool, typer.Option("--redo", help="Replace labels of another model version; retry failed presses.")
+    ] = False,
+    uncertainty: Annotated[bool, typer.Option(help="Say what the sensor file's spreads make of each pixel.")] = True,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="As of `tacdata label` [mm].")] = 0.005,
+    load_step: Annotated[float, typer.Option(help="Largest depth step while loading [mm].")] = 0.25,
+    unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
+) -> None:
+    """Ask for the labels of a session and walk away; `tacdata farm status` says how far they are."""
+    from label_farm.service.client import Client
+
+    wish = {
+        "session": session, "by": by or f"{getpass.getuser()}@{socket.gethostname()}", "priority": priority,
+        "sensor": sensor or None, "dataset": into or None, "redo": redo, "uncertainty": uncertainty,
+        "tolerance": tolerance, "load_step": load_step, "unload_step": unload_step,
+    }  # fmt: skip
+    filed = Client(url, token).post("/api/submissions", wish)
+    print(f"submission {filed['id']} of {session} is filed")
+    print(f"next: tacdata farm status {filed['id']}, or open {url} in a browser")

@@ -1,0 +1,34 @@
+"""Work for a label service from this computer."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.farm import command as service
+
+ORDER = 60
+
+
+def run(
+    url: Annotated[
+        str,
+        typer.Argument(envvar="TACDATA_FARM_URL", help="The service, http://HOST:PORT; or a Dask scheduler, tcp://…"),
+    ],
+    token: service.Token = "",
+    processes: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one a card or core.")] = None,
+    device: Annotated[
+        list[str] | None, typer.Option(help="What they solve on: cpu, cuda for all cards, cuda:0, ...")
+    ] = None,
+    factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
+) -> None:
+    """Solve presses for a service, or a Dask scheduler, elsewhere; Ctrl-C gives back what is in work."""
+    if url.startswith(("tcp://", "tls://")):
+        from label_farm.dask_pool import join
+
+        join(url, processes, tuple(device or ()))
+        return
+    from label_farm.service.crew import Crew
+
+    Crew(url, token, processes, tuple(device or ()), factory).work()

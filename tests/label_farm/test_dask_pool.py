@@ -1,0 +1,77 @@
+"""The same jobs on a Dask cluster of this machine."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+from chaos import ROOT
+from farm_examples import HERE
+from session_examples import session
+
+pytest.importorskip("distributed")
+
+
+def label(folder, *options, **variables):
+    path = os.pathsep.join([str(HERE), str(ROOT)])
+    command = [
+        sys.executable, "-m", "tacdata.cli", "label", "s", "--factory", "fast_model:FastModel", *options,
+    ]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": path, "FAST_MODEL_LOG": str(folder / "solves.log"), **variables}
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
+
+
+@pytest.mark.slow
+def test_a_cluster_labels_and_a_press_that_kills_its_worker_is_a_failure(tmp_path):
+    session(tmp_path / "s", 6)
+    # The second press kills its worker once, the third always, the fourth finds no equilibrium.
+    shown = label(
+        tmp_path, "--dask", "here", "--workers", "2",
+        FAST_MODEL_KILLS_ONCE="-5.95", FAST_MODEL_KILLS="-5.9", FAST_MODEL_FAILS="-5.85",
+    )  # fmt: skip
+    assert shown.returncode == 5, shown.stderr
+    assert "labels written: 4" in shown.stdout and "failed: 2" in shown.stdout, shown.stdout
+    assert "episode 2: no label: its Dask worker died" in shown.stdout
+    assert "episode 3: no label: no equilibrium" in shown.stdout
+    counted = [line.split()[1] for line in (tmp_path / "solves.log").read_text().splitlines()]
+    assert (counted.count("-5.95"), counted.count("-5.9")) == (2, 3)
+    # A result that its worker had not yet handed over goes with it.
+    assert all(counted.count(x) <= 2 for x in ("-6", "-5.85", "-5.8", "-5.75"))
+
+
+@pytest.mark.slow
+def test_workers_of_other_code_are_refused(tmp_path):
+    """The cluster is a host with another version: here by a variable that only its worker has."""
+    session(tmp_path / "s", 2)
+    path = os.pathsep.join([str(HERE), str(ROOT)])
+    other = {**os.environ, "PYTHONPATH": path, "FAST_MODEL_VERSION": "2"}
+    address = f"tcp://127.0.0.1:{free_port()}"
+    commands = (
+        [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", address, "--no-dashboard"],
+        [sys.executable, "-m", "tacdata.cli", "farm", "worker", address, "--processes", "1"],
+    )
+    started = [subprocess.Popen(c, env=other, cwd=tmp_path, stderr=subprocess.DEVNULL) for c in commands]
+    try:
+        shown = label(tmp_path, "--dask", address)
+    finally:
+        for process in reversed(started):
+            process.send_signal(signal.SIGINT)
+            process.wait(30)
+    assert shown.returncode == 2 and "run other code" in shown.stderr, shown.stderr
+    assert not (tmp_path / "solves.log").exists() and not list((tmp_path / "s" / "labels").glob("*.json"))
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def test_what_cannot_be_reached_is_said(tmp_path):
+    session(tmp_path / "s", 1)
+    shown = label(tmp_path, "--dask", "tcp://127.0.0.1:9")
+    assert shown.returncode == 4 and "no Dask scheduler answers" in shown.stderr and "Traceback" not in shown.stderr
+    shown = label(tmp_path, "--dask", "there")
+    assert shown.returncode == 2 and "tcp://HOST:PORT" in shown.stderr

@@ -1,0 +1,97 @@
+"""The page in a real browser: Debian's Chromium, without a head."""
+
+import os
+import shutil
+
+import pytest
+from chaos import Service, record
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+sync_api = pytest.importorskip("playwright.sync_api")
+pytestmark = pytest.mark.skipif(not CHROMIUM, reason="no Chromium: apt-get install chromium")
+TOKEN = "0123456789abcdef0123"
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    record(folder, 2, 6)
+    (folder / "empty").mkdir()
+    options = ("--token", TOKEN)
+    with Service(folder, workers=1, seconds=0.3, options=options, FAST_MODEL_FAILS="-5.95") as service:
+        yield service
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def page(browser, service):
+    opened = browser.new_page(viewport={"width": 1100, "height": 900})
+    faults = []
+    opened.on("pageerror", lambda error: faults.append(str(error)))
+    opened.set_default_timeout(30_000)
+    opened.goto(service.url)
+    yield opened
+    opened.close()
+    assert not faults
+
+
+def log_in(page):
+    page.fill("#token", TOKEN)
+    page.click("#login button")
+    page.wait_for_selector("#main:visible")
+
+
+def test_the_page_asks_for_the_token_first(page):
+    page.wait_for_selector("#login:visible")
+    assert not page.is_visible("#main")
+    page.fill("#token", "wrong")
+    page.click("#login button")
+    page.wait_for_selector("#problem:has-text('a wrong token')")
+    assert not page.is_visible("#main")
+
+
+def test_a_person_submits_watches_and_cancels(page, service):
+    log_in(page)
+    for name in ("session-0", "session-1"):
+        page.fill("[name=session]", name)
+        page.fill("[name=by]", "ann <b>")
+        page.click("#submit button")
+        page.wait_for_selector(f"#submissions tr:has-text('{name}')")
+    assert page.inner_text("tr[data-id='000001'] td:nth-child(3)") == "ann <b>", "words of others are shown as words"
+    page.click("tr[data-id='000001'] button.up")
+    page.wait_for_selector("tr[data-id='000001'] td.n:text-is('1')")
+    page.on("dialog", lambda dialog: dialog.accept())
+    page.click("tr[data-id='000002'] button.cancel")
+    page.wait_for_selector("tr[data-id='000002'] .cancelled")
+    page.wait_for_selector("tr[data-id='000001'] .done")
+    assert "5 of 6, 1 failed" in page.inner_text("tr[data-id='000001']")
+    assert "1 failed" in page.inner_text("#summary")
+    page.wait_for_selector("#maps figure:nth-of-type(5)")
+    shown = page.eval_on_selector_all("#maps img", "all => all.map(image => image.naturalWidth)")
+    assert all(width == 35 * 6 for width in shown)
+    assert "no equilibrium" in page.inner_text("#failures summary")
+    page.click("#failures summary")
+    assert "next:" in page.inner_text("#failures details")
+    page.wait_for_selector("#failures pre:has-text('Traceback')")
+    row = page.inner_text("#workers tbody tr").split("\t")
+    assert row[1] == "cpu" and int(row[2]) >= 5 and float(row[4]) > 10
+    if folder := os.environ.get("TACDATA_SCREENSHOTS"):
+        page.screenshot(path=f"{folder}/farm.png", full_page=True)
+
+
+def test_what_is_refused_is_said_on_the_page(page, service):
+    log_in(page)
+    page.fill("[name=session]", "../elsewhere")
+    page.fill("[name=by]", "eve")
+    page.click("#submit button")
+    page.wait_for_selector("#problem:has-text('a path inside the folder')")
+    service.client(TOKEN).post("/api/submissions", {"session": "empty", "by": "eve"})
+    page.wait_for_selector("#submissions .refused")
+    assert "session.json" in page.inner_text("#submissions tr:has-text('empty')")

@@ -1,0 +1,30 @@
+"""The skin model as the farm calls it: several presses at once are the presses one by one."""
+
+import numpy as np
+import pytest
+
+from label_farm.fem import FemModel
+from label_farm.job import Job
+from label_farm.model import solve_each
+from label_farm.tolerance import Tolerance
+from tacdata.errors import SolveError
+from tacdata.sensor import default_sensor
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_batch_gives_each_press_its_own_answer():
+    sensor = default_sensor()
+    model = FemModel(sensor)
+    loose = Tolerance(share=0.2, least=0.1)
+    jobs = [
+        Job(sensor.content_hash, "a" * 64, {"shape": "sphere", "radius": 3.0}, x, 0.0, 0.0, (0.0, depth, 0.0), loose)
+        for x, depth in ((0.0, 0.1), (60.0, 0.1), (1.5, 0.12))
+    ]
+    assert model.batch == 1, "a processor solves one after the other"
+    found = {job.x: outcome for job, outcome in solve_each(model, jobs)}
+    assert isinstance(found[60.0], SolveError), "beside the skin: one bad press stops no other"
+    for job in (jobs[0], jobs[2]):
+        alone, together = model.solve(job), found[job.x]
+        assert np.abs(alone.surface - together.surface).max() < 1e-3 * job.deepest
+        assert "ladder" in together.provenance
