@@ -161,8 +161,19 @@ class _Drawing:
         elif kind == "cnc":
             for axis, number in zip("xyz", value, strict=True):
                 self._recording.log(f"guide/{axis}_mm", rr.Scalars([float(number)]))
+        elif kind == "depth":
+            self._depth(name, *value)
         elif kind == "camera":
             self._recording.log(f"camera/{name}", rr.Image(value, "L" if value.ndim == 2 else "BGR"))
+
+    def _depth(self, name: str, depth: np.ndarray, largest: float, centre: tuple[float, float] | None) -> None:
+        import rerun as rr
+
+        # Row 0 of a map lies at the lowest x; shown with x to the right and y upwards, as the array is.
+        self._recording.log(f"depth/{name}", rr.Tensor(np.round(depth.T[::-1], 4), dim_names=("y", "x")))
+        self._recording.log(f"depth_mm/{name}", rr.Scalars([largest]))
+        for axis, number in zip("xy", centre or (np.nan, np.nan), strict=True):
+            self._recording.log(f"centre_mm/{name}/{axis}", rr.Scalars([float(number)]))
 
     def _taxels(self, counts: np.ndarray) -> None:
         import rerun as rr

@@ -1,95 +1,120 @@
-"""Judge blocks of hidden worlds, one file a world: python run.py OUT BLOCK... [--shard K/N] [--seed FIRST]."""
+"""Make worlds and have them judged: python run.py OUT BLOCK... [--help]. Goes on where it was stopped."""
 
+import argparse
+import hashlib
 import json
+import os
+import shutil
+import subprocess
 import sys
 import tempfile
-import time
-import traceback
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
+from worlds import written
+from worlds.cases import BLOCKS, DEVELOPMENT, cases
+from worlds.physics import KNOWN
 
-import cases
-import numpy as np
-import skin
-import world
-
-from tacdata.chain import Course, Tool
-from tacdata.chain.rows import rows_of
-from tacdata.chain.table_response import TableResponse
-from tacdata.discrepancy import decide
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.judge import judge
-from tacdata.discrepancy.problem import Setting
-from tacdata.effects import library
+HERE = Path(__file__).parent
+REPOSITORY = HERE.parents[1]
+ROOMS = ("chain", "effects", "discrepancy")
+"""What makes up the engine."""
+LONGEST = 300
+"""A judge that takes longer is stopped, and scored as crashed [s]."""
 
 
-def course_of(data):
-    """Return the recordings of a world as the workflow takes them."""
-    parts = []
-    for e in range(int(data["episode"].max()) + 1):
-        rows, way = data["episode"] == e, data["path_episode"] == e
-        parts.append(rows_of(data["time"][rows], data["readings"][rows].astype(float), data["path_time"][way],
-                             data["path"][way]))
-    count = [len(p.time) for p in parts]
-    episode = np.repeat(np.arange(len(parts)), count)
-    tool = np.array([data["tool"][data["episode"] == e][0] for e in range(len(parts))], dtype=int)
-    return Course(
-        time=np.concatenate([p.time for p in parts]), episode=episode, tip=np.concatenate([p.tip for p in parts]),
-        tool=tool[episode], readings=np.concatenate([p.values for p in parts]),
-        averaged=np.concatenate([p.averaged for p in parts]), session=np.zeros(len(parts), int),
-        site=np.asarray(data["site"], int),
-        tools=tuple(Tool(f"sphere_{r:g}", "sphere", float(r)) for r in data["radii"]),
-        names=tuple(f"episode {k}" for k in range(len(parts))), centers=data["centers"],
-    )
+def engine_of(root):
+    """Return what names an engine: the hash of its files, and the commit they stand in."""
+    digest = hashlib.sha256()
+    for path in sorted(p for room in ROOMS for p in (root / "tacdata" / room).rglob("*")):
+        if path.suffix in (".py", ".yaml", ".json"):
+            digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=root, capture_output=True, text=True, check=False)
+    return {"hash": digest.hexdigest()[:16], "commit": head.stdout.strip()[:12] or None}
 
 
-def answer(data, response, table):
-    """Return the verdict on a world as plain data, with what it rests on."""
-    course = course_of(data)
-    start = time.process_time()
-    quiet = course.reduced.tip[:, 2] <= 0
-    given = table.idling_at(np.median(course.reduced.readings[quiet], axis=0))
-    found = judge(Setting(course, given if response == "table" else FittedResponse(course), library()))
-    return {
-        "status": decide.status(found), "seconds": time.process_time() - start,
-        "p": float(found.tested.p.min()), "p_generic": found.tested.p_generic, "share_left": found.share_left,
-        "left": found.left.gain, "left_t": found.left.t, "explained": found.explained,
-        "members": [
-            {"mechanism": m.placed.effect.called, "effect": m.placed.effect.name, "rivals": list(m.rivals),
-             "margins": {k: float(v) for k, v in m.margins.items()}, "necessity": float(m.necessity),
-             "at_bound": list(m.at_bound),
-             "values": {k: np.asarray(v).tolist() for k, v in m.placed.values.items()}, "error": m.error}
-            for m in decide.members(found)
-        ],
-    }
-
-
-def main(out, blocks, shard, first):
-    """Judge what is not judged yet."""
-    out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        skin.write_table(Path(folder) / "table.npz", world.RADII)
-        table = TableResponse.read(Path(folder) / "table.npz")
-    k, n = shard
-    wanted = [case for block in blocks for case in cases.cases(block, first)]
-    for number, (name, seed, effects, settings, response) in enumerate(wanted):
-        path = out / f"{name}-{seed}.json"
-        if number % n != k or path.exists():
-            continue
+def judged(world, root, options):
+    """Have one world judged by a process that sees nothing else; return its answer and what its model says."""
+    with tempfile.TemporaryDirectory(prefix="judge-") as name:
+        folder = Path(name)
+        for path in world.iterdir():
+            shutil.copy(path, folder / path.name)
+        if not (folder / "table.npz").exists():
+            shutil.copy(world.parent / written.TABLE, folder / "table.npz")
+        kept = {k: v for k, v in os.environ.items() if k in ("PATH", "HOME", "TMPDIR", "LANG")}
+        command = [sys.executable, str(HERE / "judge.py"), str(folder), json.dumps(options)]
         try:
-            given = answer(world.make(seed, effects, **settings), response, table)
-        except Exception:
-            given = {"status": "crashed", "error": traceback.format_exc(), "members": []}
-        path.write_text(json.dumps({"name": name, "truth": effects, "response": response, **settings, **given}))
-        told = [(m["effect"], m["rivals"]) for m in given["members"]]
-        print(name, given["status"], told, f"{given.get('share_left', 0):.3f}", f"{given.get('left_t', 0):.1f}",
-              f"{given.get('seconds', 0):.0f}s", flush=True)
+            done = subprocess.run(
+                command, cwd=folder, env={**kept, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"},
+                capture_output=True, text=True, timeout=LONGEST, check=False,
+            )  # fmt: skip
+            error = done.stderr[-2000:] if done.returncode else ""
+        except subprocess.TimeoutExpired:
+            error = f"stopped after {LONGEST} s"
+        if error:
+            return {"verdict": None, "seconds": None, "error": error}, None
+        said = folder / "said.npz"
+        return json.loads((folder / "verdict.json").read_text()), said.read_bytes() if said.exists() else None
+
+
+def wanted(arguments):
+    """Return the cases of this shard."""
+    first, of = (int(n) for n in arguments.shard.split("/"))
+    every = [c for b in arguments.blocks for r in range(arguments.repeats) for c in cases(b, arguments.seed, r)]
+    every = [c for c in every if not arguments.name or any(n in c.name for n in arguments.name)]
+    # The order by identity is as good as random, so that the first worlds of a run are a sample of all blocks.
+    every = sorted(every, key=lambda c: c.identity)
+    return [c for k, c in enumerate(every) if k % of == first][: arguments.most]
+
+
+def main(arguments):
+    """Judge what is not judged yet."""
+    out, kept = arguments.out, arguments.out / "verdicts" / arguments.label
+    kept.mkdir(parents=True, exist_ok=True)
+    options = json.loads(arguments.options)
+    if arguments.method != "workflow":
+        options["method"] = arguments.method
+    for case in wanted(arguments):
+        path = kept / f"{case.identity}.json"
+        if path.exists():
+            continue
+        written.write(out, case)
+        more = {"without": [n for e in case.effects for n in KNOWN[e].called]} if arguments.without_truth else {}
+        engine = engine_of(arguments.engine)
+        answer, said = judged(out / "worlds" / case.identity, arguments.engine, {**options, **more})
+        if said is not None:
+            path.with_suffix(".npz").write_bytes(said)
+        answer = {"version": "1.0", "id": case.identity, "engine": engine, "options": {**options, **more}, **answer}
+        path.write_text(json.dumps(answer))
+        if arguments.show:
+            print(case.block, case.name, case.response, line(answer), flush=True)
+        else:
+            print(case.identity, line(answer), flush=True)
+
+
+def line(answer):
+    """Return an answer in a line."""
+    verdict = answer["verdict"]
+    if verdict is None:
+        return f"crashed: {answer['error'].strip().splitlines()[-1:]}"
+    told = ["/".join([e["mechanism"], *e["alternatives"]]) for e in verdict["effects"]]
+    return f"{verdict['status']} {' + '.join(told)} {answer['seconds']:.0f} s"
 
 
 if __name__ == "__main__":
-    words = sys.argv[1:]
-    option = {words[i]: words[i + 1] for i in range(len(words)) if words[i].startswith("--")}
-    plain = [w for i, w in enumerate(words) if not w.startswith("--") and not (i and words[i - 1].startswith("--"))]
-    part, whole = option.get("--shard", "0/1").split("/")
-    main(Path(plain[0]), plain[1:], (int(part), int(whole)), int(option.get("--seed", 1000)))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("blocks", nargs="+", choices=[*BLOCKS, "all"])
+    parser.add_argument("--shard", default="0/1", help="K/N: the K-th of N parts, from 0")
+    parser.add_argument("--seed", type=int, default=DEVELOPMENT, help="first seed: 1000 development, 5000 test")
+    parser.add_argument("--repeats", type=int, default=1, help="worlds a case, each with a seed of its own")
+    parser.add_argument("--most", type=int, default=None, help="stop after so many worlds of this shard")
+    parser.add_argument("--name", nargs="*", default=[], help="only cases whose names hold one of these")
+    parser.add_argument("--label", default="workflow", help="folder of the verdicts below OUT/verdicts")
+    parser.add_argument("--method", default="workflow", help="workflow, or a baseline")
+    parser.add_argument("--options", default="{}", help="JSON: switches of the engine's setting")
+    parser.add_argument("--without-truth", action="store_true", help="take what is true out of the library")
+    parser.add_argument("--engine", type=Path, default=REPOSITORY, help="folder that holds the package to judge with")
+    parser.add_argument("--show", action="store_true", help="print what was hidden beside what was found")
+    chosen = parser.parse_args()
+    chosen.blocks = list(BLOCKS) if "all" in chosen.blocks else chosen.blocks
+    main(chosen)

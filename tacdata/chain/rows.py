@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tacdata.chain.spikes import copies, without_spikes
+
 BETWEEN = 0.03
 """Longest way between rows [mm]: readings of a fast press lie farther apart than effects of timing can bear."""
 FEW_BETWEEN = 4
@@ -40,6 +42,10 @@ def rows_of(time: np.ndarray, values: np.ndarray, path_time: np.ndarray, path: n
         path: x, y, depth [mm], shape (p, 3), linear in between.
     """
 
+    values = without_spikes(values)
+    new = ~copies(values)
+    time, values = time[new], values[new]
+
     def tip_at(when: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(when, path_time, path[:, axis]) for axis in range(3)], axis=-1)
 
@@ -49,13 +55,23 @@ def rows_of(time: np.ndarray, values: np.ndarray, path_time: np.ndarray, path: n
     group = _groups(time, last)
     count = np.bincount(group).astype(float)
     mean_time = np.bincount(group, time) / count
-    mean = np.stack([np.bincount(group, column) / count for column in values.T], axis=-1)
+    mean = np.stack([_mean(group, column) for column in values.T], axis=-1)
     between = _between(mean_time, tip_at(mean_time)) if len(mean_time) > 1 else np.zeros(0)
     every = np.concatenate([mean_time, between])
     order = np.argsort(every, kind="stable")
     filled = np.concatenate([mean, np.full((len(between), values.shape[1]), np.nan)])[order]
     weight = np.concatenate([count, np.zeros(len(between))])[order]
     return Rows(every[order], tip_at(every[order]), filled, weight)
+
+
+def _mean(group: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """Return the mean of what is known of each group; NaN where nothing is."""
+    known = np.isfinite(column)
+    if known.all():
+        return np.bincount(group, column) / np.bincount(group)
+    count = np.bincount(group, known)
+    total = np.bincount(group, np.where(known, column, 0.0))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _groups(time: np.ndarray, last: np.ndarray) -> np.ndarray:

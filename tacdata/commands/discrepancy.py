@@ -22,6 +22,13 @@ def run(
         Path | None,
         typer.Option(help="Model spec (schemas/model_spec.schema.json); else a response fitted to the recordings."),
     ] = None,
+    stop_after: Annotated[
+        str,
+        typer.Option(help="Last step: gate (is there a gap), locate (where), fit (what fits best), decide (all)."),
+    ] = "decide",
+    fem: Annotated[
+        bool, typer.Option("--fem", help="Start from finite elements: tacdata surrogate first, into OUT-base.")
+    ] = False,
 ) -> None:
     """Find where recordings and a model disagree, and name the missing effect, or say why not."""
     from rich.console import Console
@@ -30,8 +37,26 @@ def run(
     from tacdata.discrepancy.spec import read_spec
 
     console = Console(stderr=True)
+    if fem:
+        spec = _solved(recordings, spec, out)
     model = read_spec(spec)
+    print("base: " + ("a response fitted to these recordings" if spec is None else str(spec)))
     with console.status("reading") as status:
-        written = judge(recordings, model, out, status.update)
+        written = judge(recordings, model, out, status.update, stop_after)
     print(written.text, end="")
     console.print(f"written: {written.folder}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _solved(recordings: list[Path], spec: Path | None, out: Path) -> Path:
+    """Solve what the recordings pressed; return the spec that starts from it."""
+    from tacdata.commands import surrogate
+    from tacdata.errors import UsageError
+
+    if spec is not None or out.exists():
+        raise UsageError(
+            f"--fem with --spec {spec}" if spec is not None else f"{out} exists",
+            "one base, and a new folder", "leave one of them out" if spec is not None else "choose another --out",
+        )  # fmt: skip
+    base = out.with_name(f"{out.name}-base")
+    surrogate.run(recordings, base, None, False, None, "cpu", 1, False)
+    return base / "spec.json"

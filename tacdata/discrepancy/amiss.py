@@ -39,11 +39,69 @@ def amiss(course: Course) -> list[str]:
         told.append("an indenter without a known radius: what depends on it is not judged")
     if len(course.tools) < 2:
         told.append("one indenter: compliance, stiffening and poroelasticity need a second radius")
+    told += units(course)
+    told += stuck(course)
     if course.force is None:
         told.append("no force: stiffness and gain, relaxing skin and relaxing taxel cannot be told apart")
     if course.tag is None:
         told.append("no second observation of the pose: the guide and the skin are told apart by their response alone")
     return told
+
+
+STROKE, RATE, RADIUS, EVERY = (0.02, 60.0), 500.0, 200.0, (2e-5, 5.0)
+"""Strokes [mm], rates [mm/s], radii [mm] and intervals of readings [s] beyond these are hardly of their unit."""
+
+
+def units(course: Course) -> list[str]:
+    """Return in words what is of another size than its unit lets expect."""
+    told = []
+    if not STROKE[0] < course.stroke < STROKE[1]:
+        told.append(f"strokes of {course.stroke:.3g} mm: is the depth in mm? Say its unit in the import mapping")
+    if float(np.abs(course.speed).max()) > RATE:
+        told.append(f"presses of {np.abs(course.speed).max():.3g} mm/s: are times in s and lengths in mm?")
+    if any(np.isfinite(t.radius) and t.radius > RADIUS for t in course.tools):
+        told.append(f"an indenter of {max(t.radius for t in course.tools):.3g} mm radius: is it in mm?")
+    reduced = course.reduced
+    every = float(np.median(reduced.step[~reduced.first])) if not reduced.first.all() else 0.0
+    if not EVERY[0] < every < EVERY[1]:
+        told.append(f"a reading every {every:.3g} s: are times in s?")
+    return told
+
+
+def stuck(course: Course) -> list[str]:
+    """Return in words which channels, or the second observation, say nothing in some episodes."""
+    told, reduced = [], course.reduced
+    episodes = np.unique(reduced.episode)
+    still = np.array([np.ptp(reduced.readings[reduced.episode == e], axis=0) == 0 for e in episodes])
+    for channel in np.flatnonzero(still.any(axis=0) & ~still.all(axis=0)):
+        count = int(still[:, channel].sum())
+        if count > 0.1 * len(episodes) and still[:, channel].mean() > 2 * np.median(still.mean(axis=0)):
+            told.append(f"channel {channel}: the same reading throughout {count} of {len(episodes)} episodes: stuck at "
+                        "times; mend its contact, or leave it out")  # fmt: skip
+    for name, values in (("force", course.force), ("tag", None if course.tag is None else course.tag[:, 2])):
+        if values is not None and np.isfinite(values[course.read]).mean() < 0.5:
+            share = 100 * (1 - np.isfinite(values[course.read]).mean())
+            told.append(f"{name}: missing at {share:.0f} % of the readings")
+    return told
+
+
+def clocks(called: set[str], late: float) -> list[str]:
+    """Return in words what a named delay says of the clocks.
+
+    Args:
+        called: Mechanisms in the answer.
+        late: The delay found [s]; 0 for none.
+    """
+    told = []
+    if abs(late) > LATE:
+        told.append(f"readings are {late:.2f} s late: more than a sensor is; were the clocks of path and readings one?")
+    if "clock_skew" in called:
+        told.append("the clocks of path and readings run apart: record both on one clock, or a tap early and late")
+    return told
+
+
+LATE = 0.25
+"""Delays beyond this are of clocks, not of sensors [s]."""
 
 
 def longest_hold(course: Course) -> float:
@@ -70,6 +128,6 @@ def _recovers(course: Course) -> bool:
 def _tared(course: Course) -> bool:
     reduced = course.reduced
     starts = np.array([reduced.readings[np.flatnonzero(reduced.episode == e)[:3]].mean(axis=0)
-                       for e in range(course.episodes)])  # fmt: skip
+                       for e in np.unique(reduced.episode)])  # fmt: skip
     level = np.abs(starts).max()
     return bool(course.episodes > 3 and level < 1e-3 * np.ptp(reduced.readings))

@@ -82,7 +82,7 @@ def build(
     candidates: list[Candidate] = []
     unjudgeable: dict[str, str] = {}
     for effect in effects:
-        reason = effect.unjudgeable(course, response) or _absorbed(effect, nuisance)
+        reason = _unjudgeable(effect, course, response) or _absorbed(effect, nuisance)
         if reason:
             unjudgeable[effect.name] = reason
             continue
@@ -92,6 +92,33 @@ def build(
             columns += made
             candidates.append(Candidate(effect, shapes, index, np.array(low), np.array(high)))
     return Board(np.stack(columns, axis=-1), candidates, unjudgeable)
+
+
+class StandIn(Response):
+    """A response without channels, to ask effects what they think of fitted ones and others."""
+
+    def __init__(self, fitted: bool) -> None:
+        """Say whether it was fitted."""
+        self.fitted = fitted
+
+    def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return nothing."""
+        return np.zeros((len(pose), 1))
+
+    def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return nothing."""
+        return np.zeros(len(pose))
+
+    def signal(self, load: np.ndarray) -> np.ndarray:
+        """Return the loads."""
+        return load
+
+
+def _unjudgeable(effect: Effect, course: Course, response: Response) -> str:
+    """Return why an effect cannot be judged; a tag sees what a fitted response would take up."""
+    if response.fitted and course.tag is not None and effect.seen_by_tag:
+        return effect.unjudgeable(course, StandIn(False))
+    return effect.unjudgeable(course, response)
 
 
 def _absorbed(effect: Effect, nuisance: Sequence[str]) -> str:

@@ -20,6 +20,8 @@ SURE = 3.0
 """Without any effect that helps, leftovers must show by so many standard errors to be called a gap [1]."""
 BEYOND = 3.0
 """A channel's gain is more than calibration's business beyond so many of its standard deviations [1]."""
+DECOYS = 0.05
+"""No effect is named that more decoys do as well as [1]."""
 COMMON = ("modulus", "thickness")
 """What a common gain cannot be told from without a force reading."""
 
@@ -58,7 +60,8 @@ def calibrated(found: Judgement) -> list[Member]:
     if abs(common) > BEYOND * prior / np.sqrt(len(found.gains)) * 2:
         placed = Placed(load("gain"), {"e": np.array(common)})
         error = float(1.25 * np.std(found.gains) / np.sqrt(len(found.gains)))
-        made.append(Member(placed, {"e": error}, (), COMMON, {}, abs(common) / max(error, 1e-9)))
+        rivals = COMMON if found.problem.setting.course.force is None else ()
+        made.append(Member(placed, {"e": error}, (), rivals, {}, abs(common) / max(error, 1e-9)))
     own = found.gains - common
     far = np.abs(own) > BEYOND * prior
     if far.any():
@@ -70,6 +73,8 @@ def calibrated(found: Judgement) -> list[Member]:
 def status(found: Judgement) -> str:
     """Return the verdict: none, named, ambiguous or unknown."""
     answer = members(found)
+    if found.until != "decide":
+        return "unknown" if found.gap else "none"
     if not found.gap and not answer:
         return "none"
     if not answer and found.tested.p_generic > ALPHA and found.left.t < SURE:
@@ -81,4 +86,4 @@ def status(found: Judgement) -> str:
 
 def settled(member: Member) -> str:
     """Return whether one effect may be named: named or ambiguous."""
-    return "ambiguous" if member.rivals or member.at_bound else "named"
+    return "ambiguous" if member.rivals or member.at_bound or member.decoys > DECOYS else "named"

@@ -43,7 +43,9 @@ class FittedResponse(Response):
         streams = reduced.readings - self.idle
         self._has_force = course.force is not None
         if reduced.force is not None:
-            streams = np.column_stack([streams, reduced.force])
+            rows, there = np.arange(len(reduced.force)), np.isfinite(reduced.force)
+            filled = np.interp(rows, rows[there], reduced.force[there]) if there.any() else np.zeros(len(rows))
+            streams = np.column_stack([streams, filled])
         count = knots or self._chosen(streams)
         self._bases = [self._basis(reduced.tip[self._within(k), 2], count) for k in range(self.context.max() + 1)]
         self._weights: list[np.ndarray] = []
@@ -64,8 +66,7 @@ class FittedResponse(Response):
 
     def features(self, course: Course) -> np.ndarray:
         """Return the splines at the course's rows, shape (n, most splines of a place)."""
-        width = max(len(b.t) - b.k - 1 for b in self._bases)
-        result = np.zeros((course.rows, width))
+        result = np.zeros((course.rows, self.width))
         context = contexts(course)
         for k, basis in enumerate(self._bases):
             rows = context == k
@@ -73,11 +74,32 @@ class FittedResponse(Response):
             result[np.ix_(rows, np.arange(design.shape[1]))] = design
         return result
 
-    def correct(self, residual: np.ndarray) -> None:
-        """Add to the response what of a residual (rows read, channels [+ force]) its splines can follow."""
+    def basis(self, pose: np.ndarray) -> np.ndarray:
+        """Return the splines at poses of all rows of the course, shape (n, most splines of a place)."""
+        result = np.zeros((len(pose), self.width))
         for k, basis in enumerate(self._bases):
-            rows = self._within(k)
-            self._weights[k] = self._weights[k] + self._solve(basis, rows, residual[rows])
+            rows = self.context == k
+            design = self._design(basis, pose[rows, 2])
+            result[np.ix_(rows, np.arange(design.shape[1]))] = design
+        return result
+
+    @property
+    def width(self) -> int:
+        """Splines of the place that has most."""
+        return max(len(b.t) - b.k - 1 for b in self._bases)
+
+    def correct(self, residual: np.ndarray, features: np.ndarray) -> None:
+        """Add to the response what of a residual its splines can follow.
+
+        Args:
+            residual: Of the rows read, shape (m, channels), or one more with the force.
+            features: What each spline adds to a reading in a model, shape (m, most splines of a place).
+        """
+        for k, basis in enumerate(self._bases):
+            rows, count = self._within(k), len(basis.t) - basis.k - 1
+            self._weights[k] = self._weights[k] + self._solve(
+                rows, np.nan_to_num(residual[rows]), features[rows, :count]
+            )
 
     def _chosen(self, streams: np.ndarray) -> int:
         """Return the number of intervals that says most of episodes left out, the same for all places."""
@@ -100,7 +122,8 @@ class FittedResponse(Response):
             basis = self._basis(reduced.tip[within, 2], count)
             for part in (numbers[::2], numbers[1::2]):
                 out = within & np.isin(reduced.episode, part)
-                weights = self._solve(basis, within & ~out, streams[within & ~out])
+                rest = within & ~out
+                weights = self._solve(rest, streams[rest], self._design(basis, reduced.tip[rest, 2]))
                 wrong = streams[out] - self._design(basis, reduced.tip[out, 2]) @ weights
                 for number in part:
                     own = wrong[reduced.episode[out] == number]
@@ -109,18 +132,18 @@ class FittedResponse(Response):
         return total
 
     def _fit(self, streams: np.ndarray) -> None:
-        self._weights = [
-            self._solve(basis, self._within(k), streams[self._within(k)]) for k, basis in enumerate(self._bases)
-        ]
+        depth = self._course.reduced.tip[:, 2]
+        for k, basis in enumerate(self._bases):
+            rows = self._within(k)
+            self._weights.append(self._solve(rows, streams[rows], self._design(basis, depth[rows])))
 
     def _within(self, k: int) -> np.ndarray:
         """Return which of the rows read belong to a context, shape (m,), bool."""
         return self.context[self._read] == k
 
-    def _solve(self, basis: BSpline, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    def _solve(self, rows: np.ndarray, values: np.ndarray, design: np.ndarray) -> np.ndarray:
         """Return spline weights, with an offset for every episode fitted beside and left out."""
         reduced = self._course.reduced
-        design = self._design(basis, reduced.tip[rows, 2])
         episode = reduced.episode[rows]
         own = (episode[:, None] == np.unique(episode)[None]).astype(float)
         matrix = np.column_stack([design, own])

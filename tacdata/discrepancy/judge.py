@@ -9,7 +9,7 @@ import numpy as np
 
 from tacdata.discrepancy.candidates import Candidate
 from tacdata.discrepancy.fit import clipped_t, gains
-from tacdata.discrepancy.problem import Problem, Setting, frame, prepare
+from tacdata.discrepancy.problem import Frame, Problem, Setting, frame, prepare
 from tacdata.discrepancy.refine import Refined, refine
 from tacdata.discrepancy.search import Left, Tested, best_shapes, fitted, held_out, leftovers, test
 from tacdata.effects import Placed, load
@@ -32,8 +32,18 @@ AHEAD = 1.0
 """By how many standard errors over episodes it must be ahead [1]."""
 SIMPLER = 1.5
 """A rival with more numbers must pay for them, but for so much [nats]."""
+BEAM = 5
+"""Sets that a search for pairs keeps [1]."""
+SURE_PAIR = 3.0
+"""A pair of which neither is significant must help by so many standard errors over episodes [1]."""
+FAR, BEHIND = 5.0, 0.8
+"""Rivals are not refined that are behind to first order by so many standard errors and this share of the gain [1]."""
+BOOTSTRAPS = 200
 CLOSE = 0.5
 """Candidates with at least this share of the best gain may be rivals [1]."""
+
+STEPS = ("gate", "locate", "fit", "decide")
+"""Steps of the workflow, each of which may be the last: rivals and leftovers are only known after `decide`."""
 
 Note = Callable[[str], None]
 
@@ -55,6 +65,10 @@ class Member:
     """By how many standard errors over episodes the model is worse without it."""
     losses: dict[str, float] = field(default_factory=dict)
     """Rival effect -> by how much half the whitened energy is larger with it [nats]."""
+    selected: float = 1.0
+    """Share of resamplings of the episodes in which its mechanism explains most [1]."""
+    decoys: float = 0.0
+    """Share of decoys, sign-flipped copies of all effects, that do as well [1]."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +93,8 @@ class Judgement:
     """The model with the members in place."""
     gains: np.ndarray
     """Gain of each channel beyond the response's, as a calibration finds it [1], shape (channels,); 0 if fitted."""
+    until: str = "decide"
+    """The last step that was made, one of `STEPS`."""
 
     @property
     def share_left(self) -> float:
@@ -87,12 +103,13 @@ class Judgement:
         return self.left.gain / whole if whole > 0 else 0.0
 
 
-def judge(setting: Setting, note: Note = lambda text: None) -> Judgement:
+def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide") -> Judgement:
     """Find what a model lacks.
 
     Args:
         setting: Recordings, response, library.
         note: Is told what is being done.
+        until: The last step to make, one of `STEPS`.
     """
     note("gate: is there a gap")
     same = frame(setting)
@@ -101,12 +118,12 @@ def judge(setting: Setting, note: Note = lambda text: None) -> Judgement:
     gap = bool(min(tested.p.min(initial=1.0), tested.p_generic) <= ALPHA)
     nothing = refine(setting, [], problem.frame)
     now, current, members = problem, nothing, []
-    verdicts = tested
-    while gap and len(members) < MOST:
+    verdicts, beaten = tested, _beaten(problem, tested, {})
+    while gap and len(members) < MOST and until not in STEPS[:2]:
         chosen = _next(now, verdicts)
         if not chosen:
             break
-        note(f"fit: {', '.join(c.effect.name for c in chosen)}")
+        note(f"fit: {', '.join(' with '.join(c.effect.name for c in one) for one in chosen)}")
         best, _ = _race(now, current, chosen)
         if best is None:
             break
@@ -120,10 +137,18 @@ def judge(setting: Setting, note: Note = lambda text: None) -> Judgement:
         current = refine(replace(setting, response=best.response), best.placed, same, AGAIN)
         now = prepare(replace(setting, response=current.response), same, current.placed)
         verdicts = test(now, seed=len(members))
+        beaten = _beaten(now, verdicts, beaten)
+    if until != "decide":
+        bare = [Member(p, *_errors(current, k), (), {}, 0.0) for k, p in enumerate(current.placed)]
+        return Judgement(
+            gap, tested, tuple(bare), Left(0.0, 0.0), float((nothing.energy - current.energy).sum()),
+            (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), until,
+        )  # fmt: skip
     note("rivals and leftovers")
     if members:
         problem = prepare(setting, same)
     found, current = _members(setting, current, problem)
+    found = [replace(m, decoys=_decoys(setting, current, k, same, beaten)) for k, m in enumerate(found)]
     if found and [p.effect.name for p in current.placed] != [p.effect.name for p in now.placed]:
         now = prepare(replace(setting, response=current.response), same, current.placed)
     left = leftovers(now)
@@ -131,6 +156,24 @@ def judge(setting: Setting, note: Note = lambda text: None) -> Judgement:
         gap, tested, tuple(found), left, float((nothing.energy - current.energy).sum()),
         (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now),
     )  # fmt: skip
+
+
+def _beaten(problem: Problem, tested: Tested, before: dict[str, float]) -> dict[str, float]:
+    """Return the least share of decoys that do as well as each mechanism, so far."""
+    result = dict(before)
+    for candidate, p in zip(problem.candidates, tested.p, strict=True):
+        result[candidate.called] = min(result.get(candidate.called, 1.0), float(p))
+    return result
+
+
+def _decoys(setting: Setting, current: Refined, at: int, same: Frame, beaten: dict[str, float]) -> float:
+    """Return the share of decoys that do as well as one effect: at the step that asked for it, or beside the others."""
+    called = current.placed[at].effect.called
+    if beaten.get(called, 1.0) <= ALPHA:
+        return beaten[called]
+    others = [p for k, p in enumerate(current.placed) if k != at]
+    bare = prepare(replace(setting, response=current.response), same, others)
+    return min(beaten.get(called, 1.0), _beaten(bare, test(bare), {}).get(called, 1.0))
 
 
 def _gains(problem: Problem) -> np.ndarray:
@@ -142,37 +185,80 @@ def _gains(problem: Problem) -> np.ndarray:
     return np.broadcast_to(values[len(problem.tangent.columns) :] * unit, (channels,)).copy()
 
 
-def _next(problem: Problem, tested: Tested) -> list[Candidate]:
-    """Return effects worth adding: one, or two that only together do well; none if nothing is significant."""
+def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:
+    """Return sets of effects worth adding: up to three single ones, and the pair that does better than any of them."""
     taken = {p.effect.called for p in (*problem.setting.given, *problem.placed)}
     best = best_shapes(problem)
     free = [c for c in best.values() if c.called not in taken]
-    everything = np.arange(len(problem.folds))
 
-    def gain(chosen: list[Candidate]) -> float:
-        columns, values = fitted(problem, chosen, everything)
-        return float(gains(problem.evidence.gram, columns, values).sum())
-
-    singles = sorted(((gain([c]), c) for c in free), key=lambda item: -item[0])[:TOP]
+    singles = sorted(((_gain(problem, [c]), c) for c in free), key=lambda item: -item[0])[:TOP]
     significant = {c.effect.name for c, p in zip(problem.candidates, tested.p, strict=True) if p <= ALPHA}
-    order = [c for _, c in singles if c.effect.name in significant and clipped_t(held_out(problem, [c])) > 2.0]
+    held = {c.effect.name: held_out(problem, [c]) for _, c in singles}
+    order = [c for _, c in singles if c.effect.name in significant and clipped_t(held[c.effect.name]) > 2.0]
+    pair = _pair(problem, [c for _, c in singles], free)
     if order:
-        return order[:3]
-    pairs = [[a, b] for i, (_, a) in enumerate(singles) for _, b in singles[i + 1 :] if a.called != b.called]
-    scored = sorted(((float(held_out(problem, p).sum()), p) for p in pairs), key=lambda item: -item[0])
-    if tested.p_generic <= ALPHA and scored and clipped_t(held_out(problem, scored[0][1])) > 3.0:
-        return scored[0][1][:1]
+        alone = max((held[c.effect.name] for c in order), key=lambda h: h.sum())
+        better = pair and clipped_t(held_out(problem, pair) - alone) > RIVAL
+        return [[c] for c in order[:3]] + ([pair] if better else [])
+    if tested.p_generic <= ALPHA and pair and clipped_t(held_out(problem, pair)) > SURE_PAIR:
+        return [pair[:1], pair]
     return []
 
 
-def _race(problem: Problem, current: Refined, chosen: list[Candidate]) -> tuple[Refined | None, list[Refined]]:
+def _gain(problem: Problem, chosen: list[Candidate]) -> float:
+    columns, values = fitted(problem, chosen, np.arange(len(problem.folds)))
+    fee = 0.5 * sum(len(c.columns) for c in chosen) * float(np.log(max(len(problem.folds), 2)))
+    return float(gains(problem.evidence.gram, columns, values).sum()) - fee
+
+
+def _beside(problem: Problem, first: Candidate, others: list[Candidate]) -> list[float]:
+    """Return the gain of a first effect with each of others, without bounds, less half a log of episodes a number."""
+    fixed = np.concatenate([problem.nuisances, problem.tangent.columns, first.columns]).astype(int) + 1
+    total = problem.evidence.of(np.arange(len(problem.folds)))
+    ridge = np.concatenate([problem.ridge, np.ones(len(problem.tangent.columns)), np.zeros(len(first.columns))])
+    matrix = total[np.ix_(fixed, fixed)] + np.diag(ridge + 1e-9 * max(float(np.trace(total)), 1e-12) / len(total))
+    rest = total - total[:, fixed] @ np.linalg.solve(matrix, total[fixed])
+    alone, fee = _gain(problem, [first]), 0.5 * float(np.log(max(len(problem.folds), 2)))
+    result = []
+    for c in others:
+        index = c.columns + 1
+        inner = rest[np.ix_(index, index)]
+        weight = 1e-6 * max(float(np.trace(total[np.ix_(index, index)])) / len(index), 1e-12)
+        more = 0.5 * rest[index, 0] @ np.linalg.solve(inner + weight * np.eye(len(index)), rest[index, 0])
+        result.append(alone + float(more) - fee * len(index))
+    return result
+
+
+def _pair(problem: Problem, first: list[Candidate], free: list[Candidate]) -> list[Candidate]:
+    """Return the pair that predicts left-out episodes best, of the best few of a beam; empty if there is none.
+
+    One effect may hide another: each of the first few is joined with every other effect, whatever that does alone.
+    """
+    made = []
+    for a in first[:BEAM]:
+        made += [
+            (gain, [a, c]) for gain, c in zip(_beside(problem, a, free), free, strict=True) if c.called != a.called
+        ]
+    made.sort(key=lambda item: -item[0])
+    told = [(float(held_out(problem, pair).sum()), pair) for _, pair in made[:BEAM]]
+    if not told:
+        return []
+    pair = max(told, key=lambda item: item[0])[1]
+    return sorted(pair, key=lambda c: -_gain(problem, [c]))
+
+
+def _race(problem: Problem, current: Refined, sets: list[list[Candidate]]) -> tuple[Refined | None, list[Refined]]:
     """Refine each choice on the chain; return the best, if it is better than what there is, and the others."""
     everything = np.arange(len(problem.folds))
     tried = []
-    for candidate in chosen:
-        _, values = fitted(problem, [candidate], everything)
-        first = candidate.placed(values[: len(candidate.columns)], problem.setting.course.channels)
-        tried.append(refine(problem.setting, [*problem.placed, first], problem.frame))
+    for chosen in sets:
+        _, values = fitted(problem, chosen, everything)
+        first, at = [], 0
+        for candidate in chosen:
+            own = values[at : at + len(candidate.columns)]
+            first.append(candidate.placed(own, problem.setting.course.channels))
+            at += len(candidate.columns)
+        tried.append(refine(problem.setting, [*problem.placed, *first], problem.frame))
     tried.sort(key=_cost)
     if not tried or clipped_t(current.energy - tried[0].energy) < RIVAL:
         return None, tried
@@ -212,13 +298,16 @@ def _member(
     mine = current.placed[at]
     everything = np.arange(len(bare.folds))
     best = best_shapes(bare)
-    score = {}
+    each = {}
     for name, candidate in best.items():
         columns, values = fitted(bare, [candidate], everything)
-        score[name] = float(gains(bare.evidence.gram, columns, values).sum())
+        each[name] = gains(bare.evidence.gram, columns, values)
+    score = {name: float(gain.sum()) for name, gain in each.items()}
     top = max(score.values(), default=0.0)
+    first = each[max(score, key=lambda n: score[n])] if score else np.zeros(1)
     taken = {p.effect.called for p in current.placed}
     close = [n for n, s in score.items() if s >= CLOSE * top and best[n].called not in taken]
+    close = [n for n in close if score[n] > BEHIND * top or clipped_t(first - each[n]) < FAR]
     close = sorted(close, key=lambda n: -score[n])[:TOP]
     margins, losses, rivals = {}, {}, []
     better: Refined | None = None
@@ -239,7 +328,22 @@ def _member(
             rivals.append(best[name].called)
     error, bound = _errors(current, at)
     need = clipped_t(without.energy - current.energy)
-    return Member(mine, error, bound, tuple(dict.fromkeys(rivals)), margins, need, losses), better
+    chosen = _selected(bare, best, each, mine.effect.called)
+    return Member(mine, error, bound, tuple(dict.fromkeys(rivals)), margins, need, losses, chosen), better
+
+
+def _selected(
+    problem: Problem, best: dict[str, Candidate], each: dict[str, np.ndarray], mechanism: str
+) -> float:  # fmt: skip
+    """Return the share of resamplings of the episodes in which a mechanism explains most."""
+    if not each:
+        return 0.0
+    names, count = list(each), len(problem.folds)
+    fee = np.array([0.5 * len(best[n].columns) * np.log(max(count, 2)) for n in names])
+    pick = np.random.default_rng(11).integers(count, size=(BOOTSTRAPS, count))
+    table = np.stack([each[n] for n in names])
+    top = np.argmax(table[:, pick].sum(axis=2) - fee[:, None], axis=0)
+    return float(np.mean([best[names[k]].called == mechanism for k in top]))
 
 
 def _cost(model: Refined) -> float:

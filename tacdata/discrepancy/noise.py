@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tacdata.chain import Course
@@ -13,9 +15,15 @@ def first_guess(residual: np.ndarray, course: Course) -> Noise:
     inner = ~course.first & ~np.roll(course.first, -1) & ~np.roll(course.first, 1)
     second = residual[1:-1] - 0.5 * (residual[:-2] + residual[2:])
     second = second[inner[1:-1]]
-    scale = 1.4826 * np.median(np.abs(second), axis=0) / np.sqrt(1.5) if len(second) else np.std(residual, axis=0)
-    floor = 1e-3 * np.std(residual, axis=0) + 1e-12
-    return Noise(np.maximum(scale, floor), 0.0, np.inf)
+    whole = np.nanstd(residual, axis=0)
+    known = np.isfinite(second).sum(axis=0) > 10
+    scale = whole.copy()
+    if known.any():
+        scale[known] = 1.4826 * np.nanmedian(np.abs(second[:, known]), axis=0) / np.sqrt(1.5)
+    missing = ~np.isfinite(residual)
+    tag = np.inf if course.tag is not None else None
+    found = np.maximum(scale, 1e-3 * whole + 1e-12)
+    return Noise(found, 0.0, np.inf, missing=missing if missing.any() else None, tag=tag)
 
 
 def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
@@ -30,13 +38,13 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
     median = float(np.median(course.step[inside])) if inside.any() else 1.0
     pairs = inside & (course.step < 1.5 * median)
     later, earlier = leftover[pairs], leftover[np.flatnonzero(pairs) - 1]
-    weight = 1 / np.maximum(np.mean(np.square(leftover), axis=0), 1e-24)
-    products = float(np.sum(later * earlier * weight))
-    squares = float(np.sum(0.5 * (later**2 + earlier**2) * weight))
+    weight = 1 / np.maximum(np.nanmean(np.square(leftover), axis=0), 1e-24)
+    products = float(np.nansum(later * earlier * weight))
+    squares = float(np.nansum(np.where(np.isfinite(later * earlier), 0.5 * (later**2 + earlier**2) * weight, 0.0)))
     memory = float(np.clip(products / max(squares, 1e-12), 0.0, 0.98))
-    spread = 1.4826 * np.median(np.abs(leftover - np.median(leftover, axis=0)), axis=0)
-    mixed = np.maximum(0.5 * (spread + leftover.std(axis=0)), before.scale * 0.3)
-    return Noise(mixed * np.sqrt(max(1 - memory**2, 0.02)), memory, before.offset)
+    spread = 1.4826 * np.nanmedian(np.abs(leftover - np.nanmedian(leftover, axis=0)), axis=0)
+    mixed = np.maximum(0.5 * (spread + np.nanstd(leftover, axis=0)), before.scale * 0.3)
+    return replace(before, scale=mixed * np.sqrt(max(1 - memory**2, 0.02)), memory=memory)
 
 
 def wander(residual: np.ndarray, course: Course, known: Noise) -> float:
@@ -54,7 +62,7 @@ def wander(residual: np.ndarray, course: Course, known: Noise) -> float:
     for number in range(course.episodes):
         rows = quiet & (course.episode == number)
         if rows.sum() >= 3:
-            means.append(residual[rows].mean(axis=0) / known.scale)
+            means.append(np.mean(residual[rows][:, : course.channels], axis=0) / known.scale[: course.channels])
             times.append(course.time[rows].mean())
     if len(means) < 6:
         return np.inf
@@ -68,7 +76,7 @@ def wander(residual: np.ndarray, course: Course, known: Noise) -> float:
 
 
 def gain_spread(residual: np.ndarray, rises: np.ndarray, context: np.ndarray) -> float:
-    """Return how far an episode's gain of a stream is off the others', as a standard deviation [1].
+    """Return how far an episode's gain of a stream is off the next one's at its place, as a standard deviation [1].
 
     Presses that miss their place by a little read a little more here and less there: random to every model without
     a gradient.
@@ -78,16 +86,66 @@ def gain_spread(residual: np.ndarray, rises: np.ndarray, context: np.ndarray) ->
         rises: What the response says above idle in the rows of one episode of each place, alike, shape (n, streams, k).
         context: Place of each row, shape (n,).
     """
-    top = weight = 0.0
+    gaps, known = [], []
     for key in np.unique(context):
         rows = context == key
         power = np.square(rises[rows]).sum(axis=0)
-        product = np.einsum("nsk,ns->sk", rises[rows], residual[rows])
-        known = power > 1.0
-        # product = gain * power + noise of variance power: unbiased for the variance of gain, weighted by power.
-        top += float(np.sum(product[known] ** 2 / power[known] - 1))
-        weight += float(np.sum(power[known]))
-    return float(np.sqrt(max(top, 0.0) / max(weight, 1e-12)))
+        gain = np.einsum("nsk,ns->sk", rises[rows], residual[rows]) / np.maximum(power, 1e-9)
+        both = (power[:, 1:] > 1.0) & (power[:, :-1] > 1.0)
+        gaps.append(np.diff(gain, axis=1)[both])
+        known.append((1 / np.maximum(power[:, 1:], 1e-9) + 1 / np.maximum(power[:, :-1], 1e-9))[both])
+    return spread_of(np.concatenate(gaps), np.concatenate(known))
+
+
+HALF = 0.4549
+"""Median of the square of a standard normal number [1]."""
+FEW_GAPS = 6
+"""Fewer differences tell no spread."""
+
+
+def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
+    """Return the standard deviation that numbers have beyond their known errors, 0 or more.
+
+    Told from differences of successive ones by their median: neither a slow change nor a step makes it larger.
+
+    Args:
+        gaps: Differences of successive numbers, shape (n,).
+        known: Variance of each that is known, shape (n,).
+    """
+    if len(gaps) < FEW_GAPS:
+        return 0.0
+    square = np.square(gaps)
+    low, high = 0.0, float(np.max(square)) + 1e-30
+    if np.median(square / np.maximum(known, 1e-30)) <= HALF:
+        return 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if np.median(square / (2 * middle + known)) > HALF:
+            low = middle
+        else:
+            high = middle
+    return float(np.sqrt(high))
+
+
+def tag_wander(residual: np.ndarray, course: Course, known: Noise) -> float | None:
+    """Return how far an episode's offset of the tag is off the next one's, in noise scales [1]; None without a tag.
+
+    Args:
+        residual: Shape (n, streams).
+        course: Whose rows.
+        known: Noise so far.
+    """
+    if course.tag is None:
+        return None
+    gaps, error = [], []
+    for column in (residual[:, -3:] / known.scale[-3:]).T:
+        there = np.isfinite(column)
+        count = np.bincount(course.episode[there], minlength=course.episodes)
+        mean = np.bincount(course.episode[there], column[there], minlength=course.episodes) / np.maximum(count, 1)
+        both = (count[1:] > 2) & (count[:-1] > 2) & (course.site[1:] == course.site[:-1])
+        gaps.append(np.diff(mean)[both])
+        error.append((1 / np.maximum(count[1:], 1) + 1 / np.maximum(count[:-1], 1))[both])
+    return max(spread_of(np.concatenate(gaps), np.concatenate(error)), 0.2)
 
 
 def number_within(context: np.ndarray, episode: np.ndarray) -> np.ndarray:
@@ -101,4 +159,4 @@ def number_within(context: np.ndarray, episode: np.ndarray) -> np.ndarray:
 
 def still(known: Noise, streams: int) -> Noise:
     """Return noise that whitens nothing, so that what is left keeps its memory and size."""
-    return Noise(np.ones(streams), 0.0, known.offset)
+    return replace(known, scale=np.ones(streams), memory=0.0)

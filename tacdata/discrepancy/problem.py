@@ -14,6 +14,7 @@ from tacdata.discrepancy.evidence import Evidence, Noise
 from tacdata.discrepancy.fit import fold_of, solve
 from tacdata.discrepancy.fitted_response import contexts
 from tacdata.discrepancy.generic import depth_slope, generic
+from tacdata.discrepancy.spline_response import taken_up
 from tacdata.discrepancy.streams import Streams
 from tacdata.discrepancy.tangent import Tangent, tangents
 from tacdata.effects import Effect, Placed, load
@@ -24,6 +25,8 @@ AMPLITUDES = ("gain", "modulus")
 """What all channels' gains have in common: read off their calibration too, and not to be told apart."""
 JITTER = (0.02, 0.02, 0.01)
 """Standard deviation of an episode's own errors of x, y and depth [mm] where the response is not fitted."""
+MODEL = 0.003
+"""What any response is off at least, in each stream of an episode, as a standard deviation of its rise [1]."""
 FITTED_JITTER = 0.01
 """The same of depth for a fitted response, over the stroke [1]."""
 
@@ -40,6 +43,8 @@ class Setting:
     """Effect -> prior standard deviation, for a response that is not fitted."""
     given: tuple[Placed, ...] = ()
     """Effects that the model has already, with their numbers fixed."""
+    decoys: bool = True
+    """Whether effects race with sign-flipped copies of all; without, each is tested alone (to see what that costs)."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,8 @@ class Problem:
     """Columns of nuisances, from 0, shape (k,), int64."""
     generic: np.ndarray
     """Columns that belong to no effect, from 0, shape (k,), int64."""
+    rise: float
+    """What presses add to all readings, root of the sum of squares in noise scales [1]."""
 
     @property
     def candidates(self) -> list[Candidate]:
@@ -98,24 +105,25 @@ def frame(setting: Setting) -> Frame:
     """Return what stays the same, for a model without further effects."""
     course, response = setting.course, setting.response
     reduced, streams = course.reduced, Streams.of(course)
-    context, features = contexts(reduced), response.features(reduced)
+    said = predict(course, response, list(setting.given))
+    context, features = contexts(reduced), taken_up(course, response, setting.given)
     errors = jitter(setting, setting.given)
     extra, ridge = nuisance_columns(setting, setting.given)
     rich = generic(course, response, list(setting.given))
-    residual = streams.measured(course) - streams.predicted(predict(course, response, setting.given))
+    residual = streams.measured(course) - streams.predicted(said)
     every = np.concatenate([extra, rich], axis=2)
     known = told(residual.astype(np.float32), every, reduced, context, features, errors)
-    if response.fitted:
-        rise = streams.predicted(predict(course, response, setting.given)).astype(np.float32)
-        rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
-        rise[:, course.channels + (course.force is not None) :] = 0.0
-        local = noise.number_within(context, reduced.episode)
-        apart = rise[:, :, None] * (local[:, None, None] == np.arange(local.max() + 1))
-        bare = _rich_left(residual, every, reduced, known, context, features, errors)
-        both = np.concatenate([bare[:, :, None], apart], axis=2)
-        white = evidence.cleaned(both, reduced, known, context, features, errors)
-        spread = noise.gain_spread(white[:, :, 0], white[:, :, 1:], context)
-        known = replace(known, swing=(rise * spread).astype(np.float32))
+    errors = errors * _jitter_told(residual, every, reduced, known, context, features, errors)
+    rise = streams.predicted(said).astype(np.float32)
+    rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
+    rise[:, course.channels + (course.force is not None) :] = 0.0
+    local = noise.number_within(context, reduced.episode)
+    apart = rise[:, :, None] * (local[:, None, None] == np.arange(local.max() + 1))
+    bare = _rich_left(residual, every, reduced, known, context, features, errors)
+    both = np.concatenate([bare[:, :, None], apart], axis=2)
+    white = evidence.cleaned(both, reduced, known, context, features, errors)
+    spread = noise.gain_spread(white[:, :, 0], white[:, :, 1:], context)
+    known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
     beside = evidence.cleaned(every, reduced, known, context, features, errors)
     return Frame(context, features, errors, ridge, beside, known, fold_of(course.episodes))
 
@@ -129,19 +137,50 @@ def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Pr
         placed: Effects that the model has.
     """
     course, response = setting.course, setting.response
-    taken = () if response.fitted else (*setting.nuisance, *AMPLITUDES)
+    # A force reading tells a stiffer skin from a larger gain: then only the gain is left to calibration.
+    common = AMPLITUDES[:1] if course.force is not None else AMPLITUDES
+    taken = () if response.fitted else (*setting.nuisance, *common)
     board = build(course, response, [*setting.given, *placed], setting.effects, taken)
     moving = tangents(course, response, placed, setting.given)
     count = board.values.shape[2] - 1
     first = count + moving.values.shape[2]
     values = np.concatenate([board.values, moving.values], axis=2)
-    found = evidence.collect(
-        values, course.reduced, frame.noise, frame.context, frame.features, frame.errors, frame.beside
-    )
+    features = taken_up(course, response, [*setting.given, *placed])
+    found = evidence.collect(values, course.reduced, frame.noise, frame.context, features, frame.errors, frame.beside)
     second = first + len(frame.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
     board = replace(board, values=board.values[:, :, :1])
-    return Problem(setting, frame, tuple(placed), board, found, moving.at(count), nuisances, rich)
+    return Problem(
+        setting, frame, tuple(placed), board, found, moving.at(count), nuisances, rich, _rise(setting, frame)
+    )
+
+
+def _rise(setting: Setting, frame: Frame) -> float:
+    course = setting.course
+    said = predict(course, setting.response, list(setting.given)).signal[course.read]
+    rise = said - setting.response.signal(np.zeros((1, course.channels)))
+    return float(np.sqrt(np.sum(np.square(rise / frame.noise.scale[: course.channels]))))
+
+
+LEAST, MOST = 0.1, 10.0
+"""Errors of pose are told to be between these, in standard deviations of the prior [1]."""
+
+
+def _jitter_told(
+    residual: np.ndarray, rich: np.ndarray, course: Course, known: Noise, context: np.ndarray,
+    features: np.ndarray | None, errors: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Return how large episodes' own errors of pose are [prior sizes], by successive episodes, shape (kinds,)."""
+    left = _rich_left(residual, rich, course, known, context, features, errors)
+    columns = np.concatenate([left[:, :, None].astype(np.float32), errors], axis=2)
+    gram = evidence.collect(columns, course, known, context, features, np.zeros_like(errors[:, :, :1])).gram
+    gram = gram[gram[:, 0, 0] > 0]  # sealed episodes say nothing
+    kinds = errors.shape[2]
+    inner = gram[:, 1:, 1:] + 1e-3 * np.eye(kinds)
+    found = np.linalg.solve(inner, gram[:, 1:, :1])[:, :, 0]
+    variance = np.diagonal(np.linalg.inv(inner), axis1=1, axis2=2)
+    spread = [noise.spread_of(np.diff(found[:, k]), variance[1:, k] + variance[:-1, k]) for k in range(kinds)]
+    return np.clip(spread, LEAST, MOST) if len(found) > noise.FEW_GAPS else np.ones(kinds)
 
 
 def _rich_left(
@@ -171,8 +210,10 @@ def told(
         left = (residual - rich @ best.astype(np.float32)) / known.scale
         still = noise.still(known, left.shape[1])
         bare = evidence.leftover(left, course, still, context, features, errors / known.scale[None, :, None])
+        bare[~np.isfinite(residual)] = np.nan
         known = noise.refined(bare * known.scale, course, known)
-    return replace(known, offset=noise.wander(residual - rich @ best.astype(np.float32), course, known))
+    rest = residual - rich @ best.astype(np.float32)
+    return replace(known, offset=noise.wander(rest, course, known), tag=noise.tag_wander(rest, course, known))
 
 
 def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from tacdata.chain import Course, Tool
 from tacdata.chain.rows import Rows, rows_of
+from tacdata.discrepancy.second_view import Views, second_views
 from tacdata.discrepancy.strokes import strokes
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording import Episode, read_episode, read_session
@@ -66,16 +67,20 @@ def course_of(paths: list[Path]) -> Course:
     notes += left_out
     names = sorted({m.name for _, e in found for m in e.measured})
     force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
+    views: dict[int, Views] = {}
+    for number in sorted({n for n, _ in found}):
+        own = [k for k, (n, _) in enumerate(found) if n == number]
+        views |= {own[k]: v for k, v in second_views([found[k][1] for k in own]).items()}
     parts: list[_Stroke] = []
-    for number, episode in found:
-        parts += _strokes_of(episode, number, kept, force, temperature)
+    for k, (number, episode) in enumerate(found):
+        parts += _strokes_of(episode, number, kept, force, temperature, views.get(k), bool(views))
     if not parts:
         raise FormatError("no stretch with enough readings", f"{FEW_ROWS} or more readings a press", "record again")
     if len(parts) > len(found):
         notes.append(f"{len(found)} recordings hold {len(parts)} strokes; each counts as an episode")
-    if any(e.tags for _, e in found):
-        notes.append("tag poses are not used yet")
-    return _joined(parts, kept, found[0][1], bool(force), bool(temperature), notes)
+    if any(e.tags for _, e in found) and not views:
+        notes.append("the tag was seen too seldom to tell of the guide: let it be in view during the presses")
+    return _joined(parts, kept, found[0][1], (bool(force), bool(temperature), bool(views)), notes)
 
 
 def _files(path: Path) -> list[Path]:
@@ -133,14 +138,18 @@ def _measured(episode: Episode, name: str, time_ns: np.ndarray) -> np.ndarray:
     return result
 
 
-def _strokes_of(episode: Episode, session: int, kept: np.ndarray, force: str, temperature: str) -> list[_Stroke]:
+def _strokes_of(
+    episode: Episode, session: int, kept: np.ndarray, force: str, temperature: str, views: Views | None, tag: bool
+) -> list[_Stroke]:
     time_ns = episode.taxels.sample_ns
     order = np.argsort(time_ns, kind="stable")
     time_ns = time_ns[order]
     columns = [episode.taxels.counts[order][:, kept]]
     columns += [_measured(episode, name, time_ns)[:, None] for name in (force, temperature) if name]
+    if tag:
+        columns.append(np.full((len(time_ns), 3), np.nan) if views is None else views.at(time_ns))
     values = np.column_stack(columns)
-    good = np.isfinite(values).all(axis=1) & np.concatenate([[True], np.diff(time_ns) > 0])
+    good = np.isfinite(columns[0]).all(axis=1) & np.concatenate([[True], np.diff(time_ns) > 0])
     time_ns, values = time_ns[good], values[good]
     if len(time_ns) < FEW_ROWS or len(episode.tip_ns) < 2:
         return []
@@ -162,8 +171,9 @@ def _strokes_of(episode: Episode, session: int, kept: np.ndarray, force: str, te
 
 
 def _joined(
-    parts: list[_Stroke], kept: np.ndarray, example: Episode, force: bool, temperature: bool, notes: list[str]
+    parts: list[_Stroke], kept: np.ndarray, example: Episode, extra: tuple[bool, bool, bool], notes: list[str]
 ) -> Course:
+    force, temperature, tag = extra
     tools = tuple(dict.fromkeys(p.tool for p in parts))
     clock, last = [], None
     for part in parts:
@@ -189,6 +199,7 @@ def _joined(
         centers=centers[kept] if len(centers) > int(kept.max()) else None,
         force=values[:, channels] if force else None,
         temperature=_filled(values[:, channels + force]) if temperature else None, notes=tuple(notes),
+        tag=values[:, channels + force + temperature :] if tag else None,
     )  # fmt: skip
 
 

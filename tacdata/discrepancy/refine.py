@@ -14,6 +14,7 @@ from tacdata.discrepancy.evidence import Evidence
 from tacdata.discrepancy.fit import solve
 from tacdata.discrepancy.fitted_response import FittedResponse
 from tacdata.discrepancy.problem import Frame, Setting
+from tacdata.discrepancy.spline_response import taken_up
 from tacdata.discrepancy.streams import Streams
 from tacdata.discrepancy.tangent import Tangent, tangents
 from tacdata.effects import Placed
@@ -47,6 +48,8 @@ def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int 
     """
     response = copy.deepcopy(setting.response) if setting.response.fitted else setting.response
     now = list(placed)
+    if isinstance(response, FittedResponse) and now:
+        _correct(response, setting, now)
     state = _evaluate(setting, response, now, frame)
     for _ in range(steps):
         best = None
@@ -81,13 +84,14 @@ class _State:
 def _evaluate(setting: Setting, response: Response, placed: list[Placed], frame: Frame) -> _State:
     course, streams = setting.course, Streams.of(setting.course)
     moving = tangents(course, response, placed, setting.given)
-    residual = streams.measured(course) - streams.predicted(predict(course, response, [*setting.given, *placed]))
+    said = predict(course, response, [*setting.given, *placed])
+    residual = streams.measured(course) - streams.predicted(said)
     values = np.concatenate([residual[:, :, None].astype(np.float32), moving.values], axis=2)
     ridge = frame.ridge
+    features = taken_up(course, response, [*setting.given, *placed])
     found = evidence.collect(
-        values, course.reduced, frame.noise, frame.context, frame.features, frame.errors,
-        frame.beside[:, :, : len(ridge)],
-    )  # fmt: skip
+        values, course.reduced, frame.noise, frame.context, features, frame.errors, frame.beside[:, :, : len(ridge)]
+    )
     k = len(moving.knobs)
     rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
     weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
@@ -128,5 +132,8 @@ def _correct(response: FittedResponse, setting: Setting, placed: Sequence[Placed
     course, streams = setting.course, Streams.of(setting.course)
     keep = streams.channels + streams.force
     for _ in range(2):
-        residual = streams.measured(course) - streams.predicted(predict(course, response, [*setting.given, *placed]))
-        response.correct(residual[:, :keep])
+        said = predict(course, response, [*setting.given, *placed])
+        residual = streams.measured(course) - streams.predicted(said)
+        features = taken_up(course, response, [*setting.given, *placed])
+        if features is not None:
+            response.correct(residual[:, :keep], features)

@@ -9,13 +9,11 @@ from typing import Any
 
 from tacdata import documents, provenance
 from tacdata.discrepancy import decide, verdict
-from tacdata.discrepancy.judge import judge
-from tacdata.discrepancy.located import residual, slices
+from tacdata.discrepancy.judge import STEPS
+from tacdata.discrepancy.judged import judged
 from tacdata.discrepancy.picture import draw
-from tacdata.discrepancy.problem import Setting
 from tacdata.discrepancy.recordings import course_of
 from tacdata.discrepancy.spec import Spec
-from tacdata.effects import library
 from tacdata.errors import UsageError
 
 VERDICT, TEXT, PICTURE, SPEC = "verdict.json", "verdict.txt", "verdict.png", "spec.json"
@@ -31,7 +29,9 @@ class Written:
     folder: Path
 
 
-def run(paths: list[Path], spec: Spec, out: Path, note: Callable[[str], None] = lambda text: None) -> Written:
+def run(
+    paths: list[Path], spec: Spec, out: Path, note: Callable[[str], None] = lambda text: None, until: str = "decide"
+) -> Written:
     """Judge recordings and write the verdict, a picture and, if effects were named, the next spec.
 
     Args:
@@ -39,6 +39,7 @@ def run(paths: list[Path], spec: Spec, out: Path, note: Callable[[str], None] = 
         spec: The model.
         out: Folder to create.
         note: Is told what is being done.
+        until: The last step to make (`tacdata.discrepancy.judge.STEPS`).
 
     Raises:
         UsageError: If ``out`` exists, or there is nothing to read.
@@ -46,21 +47,18 @@ def run(paths: list[Path], spec: Spec, out: Path, note: Callable[[str], None] = 
     """
     if out.exists():
         raise UsageError(f"{out} exists", "a new folder", "choose another --out")
+    if until not in STEPS:
+        raise UsageError(f"step {until!r}", ", ".join(STEPS), "choose one of them for --stop-after")
     note("reading")
     course = course_of(paths)
-    response = spec.response(course)
-    placed = spec.effects()
-    known = {p.effect.called for p in placed}
-    setting = Setting(course, response, [e for e in library() if e.called not in known], spec.nuisance, placed)
-    found = judge(setting, note)
-    before, after = slices(found.problem, residual(found.problem)), slices(found.final, residual(found.final))
     parents = {"spec": spec.content_hash, **{f"recording {p.name}": _hash(p) for p in paths}}
-    answer = verdict.document(found, before, parents)
+    done = judged(course, spec, note, parents, until=until)
+    answer, found = done.verdict, done.found
     out.mkdir(parents=True)
     documents.write(out / VERDICT, answer, "verdict")
     text = verdict.in_text(answer)
     documents.write_text(out / TEXT, text)
-    draw(found, before, after, answer, out / PICTURE)
+    draw(found, done.before, done.after, answer, out / PICTURE)
     if answer["status"] == "named":
         members = decide.members(found)
         following = spec.with_effects([m.placed for m in members], [m.error for m in members], VERDICT)

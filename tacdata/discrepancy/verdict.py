@@ -12,34 +12,44 @@ import schemas
 from tacdata import provenance
 from tacdata.chain import Course
 from tacdata.discrepancy import decide
-from tacdata.discrepancy.amiss import FEWEST, amiss
+from tacdata.discrepancy.amiss import FEWEST, amiss, clocks
+from tacdata.discrepancy.confidence import confidence, features
 from tacdata.discrepancy.judge import Judgement, Member
 from tacdata.discrepancy.limits import limits
 from tacdata.discrepancy.located import Slice, in_words
+from tacdata.discrepancy.sealed import Gap
+from tacdata.discrepancy.wiring import miswired
 from tacdata.effects import load
 
 Z90 = 1.645
 """Standard errors either way of a 90 % interval."""
 
 
-def document(found: Judgement, sliced: list[Slice], parents: dict[str, str]) -> dict[str, Any]:
+def document(
+    found: Judgement, sliced: list[Slice], parents: dict[str, str], shown: Gap | None = None
+) -> dict[str, Any]:
     """Return the verdict (`schemas/verdict.schema.json`).
 
     Args:
         found: What was found.
         sliced: Where the residual lives, before anything is added.
         parents: Name to content hash of what was judged.
+        shown: The gap on episodes that were sealed before.
     """
     course = found.problem.setting.course
     answer, status = decide.members(found), decide.status(found)
-    remarks = amiss(course)
-    if course.episodes < FEWEST and status != "unknown":
+    late = [float(m.placed.values["L"]) for m in answer if m.placed.effect.name == "latency"]
+    remarks = [*amiss(course), *clocks({m.placed.effect.called for m in answer}, max(late, key=abs, default=0.0))]
+    wires = miswired(course, found.problem.setting.response) if not found.problem.setting.given else []
+    remarks = [*wires, *remarks]
+    if course.episodes < FEWEST or wires:
         status = "unknown"
-    effects = [_effect(m) for m in answer]
+    effects = [_effect(m, features(found, m, len(answer))) for m in answer]
     tested = found.tested
     values = max(float(found.values.sum()), 1.0)
     return {
-        "version": schemas.version("verdict"), "status": status, "why": why(status, found, answer, course),
+        "version": schemas.version("verdict"), "status": status,
+        "why": "; ".join(wires) or why(status, found, answer, course),
         "effects": effects,
         "gate": {"gap": found.gap, "p": float(tested.p.min(initial=1.0)), "p_generic": tested.p_generic,
                  "noise": [float(v) for v in found.problem.frame.noise.scale],
@@ -49,12 +59,14 @@ def document(found: Judgement, sliced: list[Slice], parents: dict[str, str]) -> 
                  "after": float(2 * found.energy[1].sum() / values), "floor": 1.0},
         "located": in_words(sliced), "unjudgeable": found.problem.board.unjudgeable,
         "limits": {k: (round(v, 4) if np.isfinite(v) and v < 1e3 else None) for k, v in limits(found.final).items()},
-        "untested": untested(answer), "data": data(course), "remarks": remarks, "next": following(answer, status),
+        "untested": untested(answer), "data": {**data(course), "sealed": list(shown.names) if shown else []},
+        "sealed": shown.document() if shown else {"episodes": 0, "share": 0.0, "rule": "none was sealed"},
+        "remarks": remarks, "next": following(answer, status),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": 999}),
     }  # fmt: skip
 
 
-def _effect(member: Member) -> dict[str, Any]:
+def _effect(member: Member, told: dict[str, float]) -> dict[str, Any]:
     effect = member.placed.effect
     parameters = {}
     for p in effect.parameters:
@@ -69,7 +81,7 @@ def _effect(member: Member) -> dict[str, Any]:
         "moves": list(effect.moves), "status": decide.settled(member), "alternatives": list(member.rivals),
         "parameters": parameters, "margins": {k: float(np.clip(v, -99, 99)) for k, v in member.margins.items()},
         "necessity": float(np.clip(member.necessity, -99, 99)), "at_bound": list(member.at_bound),
-        "experiment": effect.experiment,
+        "experiment": effect.experiment, "features": told, "confidence": confidence(told),
     }  # fmt: skip
 
 
@@ -81,6 +93,9 @@ def why(status: str, found: Judgement, answer: list[Member], course: Course) -> 
     )
     if course.episodes < FEWEST:
         return f"{course.episodes} episodes cannot carry a verdict" + (f"; they point to {sets}" if answer else "")
+    if found.until != "decide":
+        fitted = f"; {names} fits best, rivals were not tried" if answer else ""
+        return f"stopped after {found.until}: {'a gap' if found.gap else 'no gap'}{fitted}"
     if status == "none":
         return "nothing is missing that these recordings would show; see the detection limits"
     if status == "named":
@@ -130,7 +145,8 @@ def in_text(verdict: dict[str, Any]) -> str:
     """Return a verdict for reading."""
     lines = [f"{verdict['status'].upper()}: {verdict['why']}", ""]
     for e in verdict["effects"]:
-        lines.append(f"  {e['mechanism']} ({e['effect']}, {e['stage']}): {e['status']}")
+        sure = "" if e["confidence"] is None or e["status"] != "named" else f", {100 * e['confidence']:.0f} % sure"
+        lines.append(f"  {e['mechanism']} ({e['effect']}, {e['stage']}): {e['status']}{sure}")
         for name, p in e["parameters"].items():
             if isinstance(p["value"], list):
                 lines.append(
@@ -146,6 +162,13 @@ def in_text(verdict: dict[str, Any]) -> str:
     lines += ["", f"gate: p = {gate['p']:.3f} over all effects, {gate['p_generic']:.3f} for patterns of no effect"]
     lines.append(f"residual: {left['before']:.3f} before, {left['after']:.3f} after; 1 is the noise floor")
     lines.append(f"left of what could be explained: {100 * left['share']:.1f} % ({left['t']:.1f} standard errors)")
+    sealed = verdict["sealed"]
+    if sealed["episodes"]:
+        lines.append(
+            f"{sealed['episodes']} sealed episodes: {sealed['before']:.3f} before, {sealed['after']:.3f} after, "
+            f"{sealed['ceiling']:.3f} at best; {100 * sealed['closed']:.0f} % of the gap closed "
+            f"(90 %: {100 * sealed['interval'][0]:.0f} to {100 * sealed['interval'][1]:.0f} %)"
+        )
     lines += ["where it lives:", *(f"  {words}" for words in verdict["located"])]
     if verdict["next"]:
         lines += ["next:", *(f"  {words}" for words in verdict["next"])]

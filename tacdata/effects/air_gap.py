@@ -22,6 +22,7 @@ class AirGap(Effect):
     source = "standard form"
     experiment = "slow approach over every taxel: onset against slope"
     parameters = (Parameter("g", "1", "lost share of the channel's largest rise", 0.03, 0.0, 0.6, per_channel=True),)
+    by_channel = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

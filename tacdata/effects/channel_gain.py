@@ -22,6 +22,7 @@ class ChannelGain(Effect):
     source = "standard form"
     experiment = "uniform pressure, or presses between taxels: a gain follows the channel, inhomogeneity the place"
     parameters = (Parameter("e", "1", "relative excess of the channel", 0.1, -0.95, 3.0, per_channel=True),)
+    by_channel = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

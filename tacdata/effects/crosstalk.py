@@ -22,6 +22,7 @@ class Crosstalk(Effect):
     source = "standard form"
     experiment = "charge one channel electrically: traces, not distance"
     parameters = (Parameter("k", "1", "share of each neighbour", 0.03, -0.4, 0.4),)
+    by_channel = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -67,6 +67,8 @@ class Effect(ABC):
     """Its numbers."""
     seen_by_tag: ClassVar[bool] = False
     """Whether a tag on the carriage sees it (kinematics only)."""
+    by_channel: ClassVar[bool] = False
+    """Whether it mixes channels, or treats each in a way of its own."""
     mechanism: ClassVar[str] = ""
     """The name it shares with other functional forms of the same thing; empty: its own."""
 

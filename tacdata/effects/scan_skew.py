@@ -23,6 +23,7 @@ class ScanSkew(Effect):
     source = "standard form"
     experiment = "fast presses over several channels: the delay is linear in the channel's number"
     parameters = (Parameter("D", "s", "from the first channel to the last", 0.03, -0.5, 0.5),)
+    by_channel = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -24,6 +24,7 @@ class TemperatureOffset(Effect):
     parameters = (
         Parameter("k", "largest rise/10K", "change of the channel over 10 K", 0.02, -5.0, 5.0, per_channel=True),
     )
+    by_channel = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -1,11 +1,14 @@
 """What is missing is named when it can be, and only then."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pressing import course
 
 from tacdata import documents
 from tacdata.discrepancy import decide, verdict
+from tacdata.discrepancy.amiss import amiss
 from tacdata.discrepancy.fitted_response import FittedResponse
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.located import residual, slices
@@ -78,3 +81,13 @@ def test_a_fitted_response_cannot_learn_history():
     response = FittedResponse(made)
     left = made.reduced.readings - response.signal(response.load(made.tip, made.tool))[made.read]
     assert np.abs(left).max() > 0.1 * 0.2 * 800
+
+
+def test_what_is_of_another_unit_or_stuck_is_said():
+    made = course(episodes=12)
+    metres = replace(made, tip=made.tip / 1000)
+    assert any("is the depth in mm" in words for words in amiss(metres))
+    readings = made.readings.copy()
+    readings[made.episode % 3 == 0, 1] = 5000
+    assert any("channel 1" in words and "stuck" in words for words in amiss(made.with_readings(readings)))
+    assert not any("stuck" in words or "in mm" in words for words in amiss(made))

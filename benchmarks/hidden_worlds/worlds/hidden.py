@@ -1,0 +1,43 @@
+"""What may be hidden: one function each, entered here with what it is called and where it acts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+STAGES = ("simulator", "guide", "mounting", "layer", "skin", "taxel", "readout", "timing")
+"""Order in which they act."""
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One thing that may be true of a world and is not in the lab's model."""
+
+    name: str
+    stage: str
+    act: Callable
+    """Changes the world, given a size [1]; size 1 would not surprise a lab."""
+    called: tuple[str, ...]
+    """Names that a verdict may rightly give it; empty if no library is expected to hold it."""
+    group: str
+    """What it looks like."""
+    most: float
+    """Largest physical size [1]."""
+    needs: dict = field(default_factory=dict)
+    """Settings of a world without which it does not show."""
+    fitted: bool = False
+    """Whether it shows beside a response without memory that was fitted to the recordings."""
+
+
+KNOWN: dict[str, Hidden] = {}
+"""Name -> what may be hidden."""
+
+
+def hidden(stage, group, called=None, most=10.0, fitted=False, needs=None):
+    """Enter a function; it is called by its own name unless told otherwise."""
+
+    def enter(act):
+        name = act.__name__
+        names = (name,) if called is None else tuple(called)
+        KNOWN[name] = Hidden(name, stage, act, names, group, most, needs or {}, fitted)
+        return act
+
+    return enter

@@ -1,0 +1,76 @@
+"""Do what follows a verdict: add, relabel, show, next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+ORDER = 162
+PANEL = TOOLS
+
+
+def run(
+    verdict: Annotated[Path, typer.Argument(help="Folder that tacdata discrepancy wrote.")],
+    recordings: Annotated[list[Path], typer.Argument(help="The recordings or sessions that it was given.")],
+    out: Annotated[Path, typer.Option(help="New folder for spec.json, card.html, gap.png, gap.rrd, next.yaml.")],
+    spec: Annotated[Path | None, typer.Option(help="The model spec that it was given, if one was.")] = None,
+    relabel: Annotated[bool, typer.Option("--relabel", help="Make the labels again that the effect moves.")] = False,
+    store: Annotated[Path | None, typer.Option(help="Folder of solved presses; else SESSION/labels/store.")] = None,
+    uncertainty: Annotated[bool, typer.Option(help="Labels with their spreads, as tacdata label has them.")] = True,
+    confirm: Annotated[
+        int, typer.Option(min=0, help="Presses to solve by finite elements where the effect matters most.")
+    ] = 0,
+    presses: Annotated[int, typer.Option(min=1, help="Different presses of the next plan.")] = 4,
+    factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
+) -> None:
+    """Add what a verdict named to the model, show the gap before and after, and plan the next presses."""
+    from rich.console import Console
+
+    from label_farm.labelling import FarmSettings
+    from label_farm.model import FACTORY
+    from tacdata.discrepancy.spec import read_spec
+    from tacdata.revision.revise import CARD, SPEC, Wishes, revise
+    from viewers.gap_recording import write
+
+    console = Console(stderr=True)
+    farm = FarmSettings(factory=factory or FACTORY, uncertainty=uncertainty) if relabel else None
+    with console.status("reading") as status:
+        done = revise(verdict, recordings, read_spec(spec), out, Wishes(farm, store, confirm, presses), status.update)
+        if done.shown:
+            status.update("Rerun file")
+            write(done.shown, out / "gap.rrd", done.document["status"])
+    document = done.document
+    gap = document["gap"]
+    if gap:
+        sealed = gap["sealed"]
+        print(
+            f"sealed episodes: {sealed['episodes']}; residual {sealed['before']:.3g} before, {sealed['after']:.3g} "
+            "after; 1 is the noise floor"
+        )
+        for change in gap["elsewhere"]:
+            print(f"  left out, {change['name']}: {change['before']:.3g} before, {change['after']:.3g} after")
+    for moved in document["labels"]:
+        print(
+            f"{moved['session']}: {moved['paths']} of {moved['episodes']} paths move, {moved['path_rms']:.4f} mm rms, "
+            f"{moved['path_most']:.4f} mm at most"
+        )
+        if moved["labels"]:
+            print(
+                f"  {moved['labels']} labels made again: {moved['rms']:.4f} mm rms, {moved['most']:.4f} mm at most; "
+                f"{moved['solved']} paths solved, {moved['found']} found in the store"
+            )
+    for c in document["confirmed"]:
+        told = f"{100 * c['difference']:.1f} % off" if c["solved"] else "no equilibrium"
+        print(f"finite elements, {c['tool']} {c['depth']:.3f} mm deep: {told}")
+    if document["added"]:
+        print(f"added: {', '.join(document['added'])} in {out / SPEC}")
+    for words in (document["next"]["remark"], *document["next"]["presses"]):
+        if words:
+            print(f"next: {words}")
+    if document["next"]["plan"]:
+        print(f"next: tacdata record --rig RIG --plan {out / document['next']['plan']} --out SESSION")
+    print(f"card: {out / CARD}")

@@ -1,0 +1,76 @@
+"""Solve a session's presses by finite elements into a table that answers at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+from tacdata.errors import UsageError
+
+ORDER = 158
+PANEL = TOOLS
+
+
+def run(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings (.mcap) or session folders.")],
+    out: Annotated[Path, typer.Option(help="New folder for spec.json and response.npz.")],
+    spacing: Annotated[
+        float | None, typer.Option(min=0.2, help="Distance of places [mm]; 0.8 where presses ship, else 1.6.")
+    ] = None,
+    fine: Annotated[bool, typer.Option("--fine", help="The default mesh, though its presses must be solved.")] = False,
+    left_out: Annotated[
+        int | None, typer.Option(min=0, help="Presses left out to measure the table's error; 3 where it is solved.")
+    ] = None,
+    device: Annotated[str, typer.Option(help="cpu, or a card: cuda:0.")] = "cpu",
+    capacity: Annotated[int, typer.Option(min=1, help="Presses in work at a time; about 100 on a card.")] = 1,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what it takes and stop.")] = False,
+) -> None:
+    """Solve what a session pressed by finite elements: the base that tacdata discrepancy --spec starts from."""
+    from rich.console import Console
+
+    from tacdata.skin.mesher import MeshSettings
+    from tacdata.stages import clock_face
+    from tacdata.surrogate import TableSettings, work, written_spec
+    from tacdata.surrogate.pressed import pressed
+
+    if out.exists():
+        raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
+    console = Console(stderr=True)
+    with console.status("reading") as status:
+        what = pressed(recordings)
+        status.update("building the skin model")
+        settings = TableSettings(spacing, MeshSettings() if fine else None, device, capacity, left_out)
+        ready = work(what.sensor, what.reaches, settings)
+    mesh = ready.model.settings.mesh
+    left = len(ready.missing)
+    print(
+        f"{ready.presses} presses of {', '.join(ready.names)} on {len(ready.model.mesh.nodes)} nodes "
+        f"(edges of {mesh.outer:g} mm outside), {left} of them to solve"
+        + (f", about {clock_face(ready.expected_seconds)} on one core" if left else "")
+    )
+    if dry_run:
+        return
+    with console.status("solving") as status:
+
+        def told(done: int, of: int, seconds: float) -> None:
+            status.update(f"press {done} of {of}, about {clock_face(seconds)} left")
+            if not console.is_terminal and done:
+                print(f"  press {done} of {of}, about {clock_face(seconds)} left", flush=True)
+
+        table, off = ready.done(told)
+    if off:
+        print(
+            f"{off.presses} presses left out: loads off by {100 * off.load:.1f} % rms, {100 * off.worst:.1f} % at most "
+            f"of a press's largest; forces by {100 * off.normal:.1f} %"
+        )
+    outside = table.uncovered(what.places)
+    if outside:
+        print(
+            f"{len(outside)} presses lie where the model cannot be pressed (over a bonded rim), continued from beside"
+        )
+    spec = written_spec(out, ready, table, off)
+    print(f"written: {spec}")
+    print(f"next: tacdata discrepancy {' '.join(map(str, recordings))} --spec {spec} --out VERDICT")

@@ -1,0 +1,111 @@
+"""Where a camera, or a second gauge, saw the tip: laid onto the commanded path, episode by episode.
+
+How camera and guide lie to each other is not known, so that a rotation and an offset for a whole session are fitted;
+what is left over is what the guide did otherwise than it was told. A constant error of place is lost by that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.recording import Episode
+
+FEWEST = 30
+"""Views of a session below which its camera tells nothing."""
+NEAR = 150_000_000
+"""A reading farther from any view has none [ns]."""
+LINE = 0.3
+"""Motion whose second direction is shorter than this fixes no rotation: only the depth is seen [mm]."""
+TRIMMED = 4.0
+"""Views farther off than so many robust standard deviations do not take part in the fit [1]."""
+GAUGES = ("tag", "displacement", "height", "laser", "gauge", "encoder")
+"""Words in the names of measured lengths that are a second observation of the depth."""
+
+
+@dataclass(frozen=True)
+class Views:
+    """What one episode's second observation says."""
+
+    time_ns: np.ndarray
+    """Times of the views [ns], shape (p,), int64, increasing."""
+    tip: np.ndarray
+    """x, y, depth [mm], shape (p, 3); NaN where not known."""
+
+    def at(self, time_ns: np.ndarray) -> np.ndarray:
+        """Return what was seen at times [ns], shape (n, 3): linear between views, NaN far from any."""
+        result = np.stack([np.interp(time_ns, self.time_ns, column) for column in self.tip.T], axis=-1)
+        behind = np.clip(np.searchsorted(self.time_ns, time_ns), 1, len(self.time_ns) - 1)
+        off = np.minimum(np.abs(time_ns - self.time_ns[behind - 1]), np.abs(time_ns - self.time_ns[behind]))
+        result[off > NEAR] = np.nan
+        return result
+
+
+def second_views(episodes: list[Episode]) -> dict[int, Views]:
+    """Return what a session's episodes saw of the tip, by their place in the list; none if it cannot be told."""
+    raw = {k: seen for k, e in enumerate(episodes) if (seen := _seen(e)) is not None}
+    if sum(len(time) for time, _ in raw.values()) < FEWEST:
+        return {}
+    told = np.concatenate([_right_handed(episodes[k].tip_at(time)) for k, (time, _) in raw.items()])
+    seen = np.concatenate([place for _, place in raw.values()])
+    turn, offset = _laid_on(seen, told)
+    result = {}
+    for k, (time, place) in raw.items():
+        laid = _right_handed(place @ turn.T + offset)
+        if np.linalg.matrix_rank(turn) < 3:
+            laid[:, :2] = np.nan
+        result[k] = Views(time, laid)
+    return result
+
+
+def _seen(episode: Episode) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return times [ns] and places [mm] of the stream that saw most; a gauge's lengths stand in the third column."""
+    made = []
+    for tags in episode.tags:
+        good = (tags.faces > 0) & np.isfinite(tags.position).all(axis=1)
+        good &= True if tags.ambiguous is None else ~tags.ambiguous
+        made.append((tags.sample_ns[good], tags.position[good] * 1e3))
+    for stream in episode.measured:
+        if stream.unit == "mm" and any(word in stream.name for word in GAUGES):
+            good = np.isfinite(stream.values[:, 0])
+            length = np.zeros((int(good.sum()), 3))
+            length[:, 2] = stream.values[good, 0]
+            made.append((stream.sample_ns[good], length))
+    best = max(made, key=lambda item: len(item[0]), default=None)
+    if best is None or len(best[0]) < 2:
+        return None
+    order = np.argsort(best[0], kind="stable")
+    time, place = best[0][order], best[1][order]
+    new = np.concatenate([[True], np.diff(time) > 0])
+    return time[new], place[new]
+
+
+def _right_handed(tip: np.ndarray) -> np.ndarray:
+    return tip * np.array([1.0, 1.0, -1.0])
+
+
+def _laid_on(seen: np.ndarray, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return rotation (3, 3) and offset (3,) that lay one set of points onto another, trimmed (Kabsch 1976).
+
+    Motion along one line fixes no rotation: the third row is then the line's direction, and the others are 0.
+    """
+    kept = np.ones(len(seen), dtype=bool)
+    turn, offset = np.eye(3), np.zeros(3)
+    for _ in range(4):
+        a, b = seen[kept].mean(axis=0), told[kept].mean(axis=0)
+        cross = (seen[kept] - a).T @ (told[kept] - b)
+        width = np.sqrt(np.linalg.eigvalsh(np.cov((told[kept] - b).T))[-2])
+        flat = np.count_nonzero(np.ptp(seen[kept], axis=0) > 1e-9) < 2
+        if width < LINE or flat:
+            line = cross[:, 2] / max(float(np.linalg.norm(cross[:, 2])), 1e-12)
+            turn = np.stack([np.zeros(3), np.zeros(3), line])
+        else:
+            left, _, right = np.linalg.svd(cross)
+            sign = np.sign(np.linalg.det(right.T @ left.T))
+            turn = right.T @ np.diag([1.0, 1.0, sign]) @ left.T
+        offset = b - turn @ a
+        off = np.abs((seen @ turn.T + offset - told)[:, 2])
+        usual = 1.4826 * float(np.median(off[kept]))
+        kept = off <= max(TRIMMED * usual, 1e-6)
+    return turn, offset

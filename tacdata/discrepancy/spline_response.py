@@ -1,0 +1,54 @@
+"""What a fitted response may still take up, as it comes out of the chain: its splines, gone through the effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import Course, Response, predict
+from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.effects import Placed
+
+
+class SplineResponse(Response):
+    """A response whose channels are the splines of a fitted one, each with weight 1."""
+
+    fitted = True
+
+    def __init__(self, response: FittedResponse, weight: float = 1.0) -> None:
+        """Keep the response; ``weight`` 0 for what effects add by themselves."""
+        self._response, self._weight = response, weight
+
+    def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return the splines, shape (n, splines)."""
+        return self._weight * self._response.basis(np.broadcast_to(pose, (len(self._response.context), 3)))
+
+    def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return the force of the response as it is, shape (n,)."""
+        return self._response.force(pose, tool)
+
+    def signal(self, load: np.ndarray) -> np.ndarray:
+        """Return the loads, shape (n, splines)."""
+        return load
+
+
+def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np.ndarray | None:
+    """Return what a unit of each spline adds to a reading, at the rows read, shape (m, splines).
+
+    A model must not be blamed for splines that do not go through its own effects: a delayed response is made of delayed
+    splines. What differs between channels is left out: features are shared by all.
+
+    Args:
+        course: The recordings.
+        response: Columns of pose alone are returned for one that was not fitted; None for none.
+        placed: Effects of the model.
+    """
+    acting = [p for p in placed if not p.effect.by_channel]
+    if not isinstance(response, FittedResponse) or not acting:
+        return response.features(course.reduced)
+    plain = replace(course, readings=np.zeros((course.rows, response.width)), centers=None, force=None)
+    moved = predict(plain, SplineResponse(response), acting).signal
+    alone = predict(plain, SplineResponse(response, 0.0), acting).signal
+    return (moved - alone)[course.read]

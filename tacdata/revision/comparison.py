@@ -1,0 +1,88 @@
+"""A model with and without further effects, held against the same recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tacdata.chain import Course, Response, predict
+from tacdata.discrepancy.problem import Frame, Setting, frame
+from tacdata.discrepancy.refine import Refined, refine
+from tacdata.discrepancy.sealed import without_readings
+from tacdata.discrepancy.spec import Spec
+from tacdata.discrepancy.streams import Streams
+from tacdata.effects import Placed
+from tacdata.revision.episodes import part
+
+STEPS = 2
+"""Steps of a fit to a part of the episodes, from the numbers that all of them gave."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Recordings and the model that they are held against."""
+
+    course: Course
+    spec: Spec
+    answer: tuple[Placed, ...] = ()
+    """Effects beside which the noise is told: a large one that is missing would be taken for noise."""
+
+    @cached_property
+    def setting(self) -> Setting:
+        """The model without further effects."""
+        return Setting(self.course, self.spec.response(self.course), [], self.spec.nuisance, self.spec.effects())
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Noise and nuisances, the same before and after."""
+        first = frame(self.setting)
+        if not self.answer:
+            return first
+        there = refine(self.setting, self.answer, first, steps=0)
+        given = (*self.setting.given, *self.answer)
+        return frame(replace(self.setting, response=there.response, given=given))
+
+    @cached_property
+    def before(self) -> Refined:
+        """The model as it was."""
+        return refine(self.setting, [], self.frame)
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """Whitened values behind each episode [1], shape (episodes,)."""
+        rows = np.bincount(self.course.reduced.episode, minlength=self.course.episodes)
+        return np.maximum(rows * Streams.of(self.course).count, 1).astype(float)
+
+    def after(self, placed: Sequence[Placed]) -> Refined:
+        """Return the model with effects whose numbers stay as they are; a fitted response takes up the rest."""
+        return refine(self.setting, placed, self.frame, steps=0)
+
+    def fitted_without(self, placed: Sequence[Placed], left_out: np.ndarray) -> tuple[Placed, ...]:
+        """Return effects with their numbers fitted to all episodes but some.
+
+        What those did to the skin stays known, unless a place or tool was pressed in no other.
+        """
+        kept = np.setdiff1d(np.arange(self.course.episodes), left_out)
+        if set(self._contexts[left_out]) <= set(self._contexts[kept]):
+            course = without_readings(self.course, left_out)
+        else:
+            course = part(self.course, kept)
+        own = Comparison(course, self.spec)  # weights need no better noise, and telling it twice costs as much again
+        return refine(own.setting, placed, own.frame, STEPS).placed
+
+    @cached_property
+    def _contexts(self) -> np.ndarray:
+        course = self.course
+        first = np.searchsorted(course.episode, np.arange(course.episodes))
+        return course.site * len(course.tools) + course.tool[first]
+
+    def mean_square(self, model: Refined, episodes: np.ndarray) -> float:
+        """Return the whitened residual's mean square in some episodes [1]; 1 is the noise floor."""
+        return float(2 * model.energy[episodes].sum() / self.values[episodes].sum())
+
+    def said(self, response: Response, placed: Sequence[Placed]) -> np.ndarray:
+        """Return what a model says of the readings, shape (rows, channels)."""
+        return predict(self.course, response, [*self.setting.given, *placed]).signal

@@ -1,0 +1,65 @@
+"""Readings of a few telling episodes, measured and as the model says them before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.effects import Placed
+from tacdata.revision.comparison import Comparison
+
+
+@dataclass(frozen=True)
+class EpisodeCurves:
+    """One episode, rows that were read only."""
+
+    name: str
+    time: np.ndarray
+    """Since its first row [s], shape (n,)."""
+    depth: np.ndarray
+    """Commanded depth [mm], shape (n,)."""
+    measured: np.ndarray
+    """[the source's unit], shape (n, channels)."""
+    before: np.ndarray
+    """Predicted, moved by a constant to the episode's measured mean [the source's unit], shape (n, channels)."""
+    after: np.ndarray
+    """The same with the effects [the source's unit], shape (n, channels)."""
+    noise: np.ndarray
+    """Standard deviation of a reading's noise [the source's unit], shape (channels,)."""
+
+    @property
+    def channel(self) -> int:
+        """The channel in which the effects change most."""
+        return int(np.argmax(np.square(self.after - self.before).mean(axis=0) / self.noise**2))
+
+    def off(self, said: np.ndarray) -> float:
+        """Return the root mean square difference from what was measured [the source's unit]."""
+        return float(np.sqrt(np.mean(np.square(said - self.measured))))
+
+
+def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, most: int = 3) -> list[EpisodeCurves]:
+    """Return the episodes among some in which the effects change most, that most first."""
+    after = held.after(placed)
+    before_said = held.said(held.before.response, [])
+    after_said = held.said(after.response, after.placed)
+    course, scale = held.course, held.frame.noise.scale[: held.course.channels]
+    change = np.square((after_said - before_said) / scale).mean(axis=1)
+    order = sorted(episodes.tolist(), key=lambda e: -float(change[course.episode == e].mean()))[:most]
+    found = []
+    for e in order:
+        rows = np.flatnonzero((course.episode == e) & (course.averaged > 0))
+        measured = course.readings[rows]
+
+        def level(said: np.ndarray, rows: np.ndarray = rows, measured: np.ndarray = measured) -> np.ndarray:
+            own = said[rows]
+            return own + (measured - own).mean(axis=0)
+
+        time = course.time[rows] - course.time[rows[0]]
+        found.append(
+            EpisodeCurves(
+                course.names[e], time, course.tip[rows, 2], measured, level(before_said), level(after_said), scale
+            )
+        )
+    return found

@@ -1,0 +1,71 @@
+"""Parts of a course: episodes sealed before the verdict, groups that are left out to see how far a model reaches."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.discrepancy.sealed import chosen
+
+SHARE = 0.25
+"""Share of the episodes that is sealed where the verdict sealed none [1]."""
+FEWEST = 3
+"""Episodes that a group must have on either side."""
+
+
+@dataclass(frozen=True)
+class Sealed:
+    """Episodes that the gap is shown on."""
+
+    numbers: np.ndarray
+    """Which episodes, shape (k,), int64."""
+    unseen: bool
+    """Whether the verdict was reached without them; else only the effects' numbers are fitted without them."""
+
+
+def sealed(course: Course, verdict: dict[str, Any]) -> Sealed:
+    """Return the episodes that the verdict sealed; where it sealed none, a share by the hash of their names.
+
+    Args:
+        course: What the verdict was reached from.
+        verdict: The verdict's document.
+    """
+    own = chosen(course)
+    if len(own) and len(own) == verdict.get("sealed", {}).get("episodes"):
+        return Sealed(own, True)
+    order = sorted(range(course.episodes), key=lambda k: hashlib.sha256(f"{k} {course.names[k]}".encode()).digest())
+    return Sealed(np.sort(np.array(order[: max(int(np.ceil(SHARE * course.episodes)), 1)])), False)
+
+
+def part(course: Course, numbers: np.ndarray) -> Course:
+    """Return the course of some episodes alone, on the same clock."""
+    keep = np.sort(np.asarray(numbers))
+    rows = np.flatnonzero(np.isin(course.episode, keep))
+    fields = ("time", "tip", "tool", "readings", "averaged", "force", "tag", "temperature")
+    values = {name: value[rows] for name in fields if (value := getattr(course, name)) is not None}
+    return replace(
+        course, **values, episode=np.searchsorted(keep, course.episode[rows]), session=course.session[keep],
+        site=course.site[keep], names=tuple(course.names[k] for k in keep),
+    )  # fmt: skip
+
+
+def groups(course: Course) -> list[tuple[str, np.ndarray]]:
+    """Return groups of episodes that differ from all others by rate, depth or indenter: each is left out in turn."""
+    number = np.arange(course.episodes)
+    inside = course.tip[:, 2] > 0  # the approach is as fast in every episode
+    speed = np.array([np.abs(course.speed[inside & (course.episode == e)]).max(initial=0.0) for e in number])
+    deepest = np.array([course.tip[course.episode == e, 2].max() for e in number])
+    tool = np.array([course.tool[course.episode == e][0] for e in number])
+    found: list[tuple[str, np.ndarray]] = []
+    for what, unit, values in (("rate", "mm/s", np.round(speed, 2)), ("depth", "mm", np.round(deepest, 2))):
+        low, high = np.quantile(values, [0.25, 0.75])
+        if high > 1.2 * low > 0:
+            found.append((f"slowest {what}s" if what == "rate" else "shallowest", number[values <= low]))
+            found.append((f"{what} from {high:.2g} {unit}", number[values >= high]))
+    if len(course.tools) > 1:
+        found += [(f"indenter {t.name}", number[tool == k]) for k, t in enumerate(course.tools)]
+    return [(name, own) for name, own in found if FEWEST <= len(own) <= course.episodes - FEWEST]

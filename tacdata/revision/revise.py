@@ -1,0 +1,264 @@
+"""From a verdict to a folder: the new model, the gap, the labels, the evidence card, the next plan."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import schemas
+from label_farm.labelling import FarmSettings
+from tacdata import documents, provenance
+from tacdata.discrepancy.recordings import course_of
+from tacdata.discrepancy.run import VERDICT
+from tacdata.discrepancy.spec import Spec
+from tacdata.effects import Placed
+from tacdata.errors import UsageError
+from tacdata.plans import Plan
+from tacdata.recording import read_session
+from tacdata.recording.session import FILE
+from tacdata.revision import table
+from tacdata.revision.card import card
+from tacdata.revision.comparison import Comparison
+from tacdata.revision.confirm import Confirmed, confirm, touches_fem
+from tacdata.revision.curves import EpisodeCurves, curves
+from tacdata.revision.episodes import sealed
+from tacdata.revision.gap import Gap, gap
+from tacdata.revision.next_presses import choose, plan_of
+from tacdata.revision.picture import draw
+from tacdata.revision.relabel import Moved, moves_labels, paths_moved, relabelled
+from tacdata.revision.rivals import named, rivals
+from tacdata.skin.mesher import MeshSettings
+from tacdata.surrogate.pressed import pressed
+
+REVISION, SPEC, CARD, PICTURE, TABLE, CSV, PLAN, LABELS = (
+    "revision.json", "spec.json", "card.html", "gap.png", "gap.md", "gap.csv", "next.yaml", "labels",
+)  # fmt: skip
+"""Files of the folder."""
+
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What is to be done beside the card."""
+
+    relabel: FarmSettings | None = None
+    """How to make labels again; None to say only how far the tip moves."""
+    store: Path | None = None
+    """Where solved paths lie; each session's own if not given."""
+    confirm: int = 0
+    """Presses to solve by finite elements where the revision moves the loads most."""
+    presses: int = 4
+    """Different presses of the next plan."""
+
+
+@dataclass(frozen=True)
+class Revised:
+    """What was made."""
+
+    document: dict[str, Any]
+    """`schemas/revision.schema.json`."""
+    folder: Path
+    shown: tuple[EpisodeCurves, ...] = ()
+    """The sealed episodes in which the effects change most."""
+
+
+def revise(
+    judged: Path, recordings: list[Path], spec: Spec, out: Path, wishes: Wishes | None = None,
+    note: Note = lambda text: None,
+) -> Revised:  # fmt: skip
+    """Do all that follows a verdict.
+
+    Args:
+        judged: Folder that `tacdata discrepancy` wrote.
+        recordings: What it was given.
+        spec: The model that it was given.
+        out: Folder to create.
+        wishes: What else is to be done.
+        note: Is told what is being done.
+
+    Raises:
+        UsageError: If ``out`` exists, or the verdict was reached from other recordings or another model.
+        FormatError: If the verdict is none.
+    """
+    asked = wishes or Wishes()
+    if out.exists():
+        raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
+    verdict = documents.read(judged / VERDICT, "verdict")
+    _same(verdict, spec, judged)
+    note("reading")
+    answer, status = named(verdict), verdict["status"]
+    held = Comparison(course_of(recordings), spec, tuple(answer))
+    out.mkdir(parents=True)
+    note("gap, with the numbers fitted without the sealed episodes")
+    found = gap(held, answer, sealed(held.course, verdict)) if answer else None
+    moved = _labels(recordings, answer, out, asked, note) if status == "named" else []
+    confirmed = _confirmed(recordings, held, answer, asked, note) if status == "named" else []
+    after = _added(verdict, judged, spec, answer, out) if status == "named" else None
+    following = _next(recordings, held, verdict, asked, out, note)
+    parents = {"verdict": provenance.content_hash(verdict), "spec": spec.content_hash}
+    document = {
+        "version": schemas.version("revision"), "verdict": parents["verdict"], "status": status,
+        "added": [e.effect.name for e in answer] if after else [],
+        "spec": {"before": spec.content_hash, "after": after}, "gap": _gap(found),
+        "labels": [{"session": s, **_finite(asdict(m)), "failed": {str(k): v for k, v in m.failed.items()}}
+                   for s, m in moved],
+        "confirmed": [{**_finite(asdict(c)), "place": list(c.place)} for c in confirmed], "next": following,
+        "provenance": provenance.stamp("tacdata revise", parents, {"confirm": asked.confirm}),
+    }  # fmt: skip
+    shown = _show(document, verdict, held, answer, found, out, note)
+    documents.write(out / REVISION, document, "revision")
+    return Revised(document, out, shown)
+
+
+def _same(verdict: dict[str, Any], spec: Spec, judged: Path) -> None:
+    known = verdict["provenance"].get("parents", {}).get("spec")
+    if known is not None and known != spec.content_hash:
+        raise UsageError(
+            f"{judged} was reached from another model ({known[:12]}… instead of {spec.content_hash[:12]}…)",
+            "the model spec that `tacdata discrepancy` was given", "name it with --spec, or leave --spec out as then",
+        )  # fmt: skip
+
+
+def _sessions(recordings: list[Path]) -> list[Path]:
+    return [p for p in recordings if (p / FILE).is_file()]
+
+
+def _labels(
+    recordings: list[Path], answer: list[Placed], out: Path, asked: Wishes, note: Note
+) -> list[tuple[str, Moved]]:
+    if not moves_labels(answer):
+        return []
+    found = []
+    for session in _sessions(recordings):
+        note(f"labels of {session.name}")
+        if asked.relabel is None:
+            found.append((session.name, paths_moved(session, answer)))
+        else:
+            folder = out / LABELS / session.name
+            told = relabelled(session, answer, folder, asked.relabel, asked.store, _told(note, session.name))
+            found.append((session.name, told))
+    return found
+
+
+def _told(note: Note, name: str) -> Callable[[str, int, int], None]:
+    return lambda stage, done, of: note(f"labels of {name}: {stage} {done} of {of}")
+
+
+def _confirmed(
+    recordings: list[Path], held: Comparison, answer: list[Placed], asked: Wishes, note: Note
+) -> list[Confirmed]:
+    given = held.spec.document["response"]
+    if asked.confirm < 1 or given["kind"] != "table" or not touches_fem(answer):
+        return []
+    note("finite elements, where the revision moves the loads most")
+    mesh = _mesh(held.spec.folder / given["file"])
+    what = pressed(recordings)
+
+    def progress(done: int, of: int, left: float) -> None:
+        note(f"finite elements: {done} of {of}, about {left:.0f} s left")
+
+    return confirm(held, answer, what.sensor, what.reaches, asked.confirm, mesh, progress)
+
+
+def _mesh(path: Path) -> MeshSettings:
+    """Return the mesh that a table was made on; the default one where it does not say."""
+    import numpy as np
+
+    with np.load(path, allow_pickle=False) as data:
+        told = json.loads(str(data["provenance"])) if "provenance" in data else {}
+    values = told.get("parameters", {}).get("mesh")
+    return MeshSettings(**{**values, "focus": tuple(values["focus"]) if values["focus"] else None}) if values else (
+        MeshSettings()
+    )  # fmt: skip
+
+
+def _added(verdict: dict[str, Any], judged: Path, spec: Spec, answer: list[Placed], out: Path) -> str:
+    """Write the new version of the model, with its evidence; return its hash."""
+    errors = [
+        {name: float(p["error"]) for name, p in e["parameters"].items() if p["error"] is not None}
+        for e in verdict["effects"]
+    ]
+    names = [n for n in verdict["provenance"].get("parents", {}) if n != "spec"]
+    evidence = f"{judged.name}/{VERDICT} sha256 {provenance.content_hash(verdict)}, from {', '.join(names)}"
+    document = spec.with_effects(answer, errors, evidence)
+    given = document["response"]
+    if "file" in given:
+        import os
+
+        document = {**document, "response": {**given, "file": os.path.relpath(spec.folder / given["file"], out)}}
+    documents.write(out / SPEC, document, "model_spec")
+    return provenance.content_hash(document)
+
+
+def _next(
+    recordings: list[Path], held: Comparison, verdict: dict[str, Any], asked: Wishes, out: Path, note: Note
+) -> dict[str, Any]:
+    status = verdict["status"]
+    if status not in ("ambiguous", "unknown"):
+        return {"plan": None, "presses": [], "remark": ""}
+    sessions = _sessions(recordings)
+    found = rivals(held, verdict)
+    if len(found) < 2 or not sessions:
+        why = "no session with a plan" if not sessions else "the rivals do not come out differently in these recordings"
+        return {"plan": None, "presses": list(verdict["next"]), "remark": f"no plan: {why}"}
+    note("next presses")
+    plan = read_session(sessions[-1]).plan
+    chosen = choose(held, found, plan, asked.presses)
+    if not chosen:
+        names = ", ".join(r.mechanism for r in found)
+        remark = f"no press at these places tells {names} apart beyond the noise: another kind of measurement is needed"
+        return {"plan": None, "presses": list(verdict["next"]), "remark": remark}
+    document = plan_of(chosen, held, plan, f"{plan.name}, next")
+    documents.write(out / PLAN, document, "plan")
+    Plan.from_document(document, PLAN).check_against(read_session(sessions[-1]).sensor)
+    told = []
+    for c in chosen:
+        pair = max(c.nats, key=lambda p: c.nats[p])
+        told.append(
+            f"{c.trial.in_words(held.course.tools[c.trial.tool].name)}: {c.nats[pair]:.3g} nats between "
+            f"{pair[0]} and {pair[1]} in one press"
+        )
+    return {"plan": PLAN, "presses": told, "remark": "judge the new session together with those there are"}
+
+
+def _gap(found: Gap | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    changes = {
+        "sealed": found.whole, "worst": found.worst,
+    }  # fmt: skip
+    return {
+        "unseen": found.unseen, **{n: asdict(c) for n, c in changes.items()},
+        "closed": _or_none(found.whole.closed), "interval": [_or_none(v) for v in found.interval], "floor": 1.0,
+        "elsewhere": [asdict(c) for c in found.elsewhere],
+    }  # fmt: skip
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _finite(values: dict[str, Any]) -> dict[str, Any]:
+    return {k: _or_none(v) if isinstance(v, float) else v for k, v in values.items()}
+
+
+def _show(
+    document: dict[str, Any], verdict: dict[str, Any], held: Comparison, answer: list[Placed], found: Gap | None,
+    out: Path, note: Note,
+) -> tuple[EpisodeCurves, ...]:  # fmt: skip
+    note("picture, table, card")
+    drawn, shown = None, []
+    if found is not None:
+        shown = curves(held, answer, sealed(held.course, verdict).numbers)
+        names = " and ".join(p.effect.title.lower() for p in answer)
+        drawn = out / PICTURE
+        draw(f"{verdict['status']}: {names}", shown, found, drawn)
+        documents.write_text(out / TABLE, table.markdown(document))
+        documents.write_text(out / CSV, table.as_csv(document))
+    documents.write_text(out / CARD, card(document, verdict, drawn))
+    return tuple(shown)

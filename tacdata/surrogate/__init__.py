@@ -1,0 +1,8 @@
+"""The skin's finite-element model as a table that answers in microseconds."""
+
+from tacdata.surrogate.build import LeftOut, TableSettings, Work, work
+from tacdata.surrogate.grid import Reach
+from tacdata.surrogate.spec import written_spec
+from tacdata.surrogate.table import Table
+
+__all__ = ["LeftOut", "Reach", "Table", "TableSettings", "Work", "work", "written_spec"]

@@ -1,0 +1,196 @@
+"""From what was pressed to a table of finite-element presses, and how far it is off between its nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tacdata.errors import SolveError
+from tacdata.sensor import Sensor
+from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.skin.press import PressRequest
+from tacdata.surrogate.grid import Grid, Reach, covering, request
+from tacdata.surrogate.press_store import PressStore
+from tacdata.surrogate.reading import reading_of
+from tacdata.surrogate.solved import Solved
+from tacdata.surrogate.table import Table, assembled
+from tacdata.transduction import Loads, Transducer
+
+COARSE = MeshSettings(outer=1.2, interior=2.5, protrusion=1.6)
+"""A mesh that costs a third of the default one; `tacdata/surrogate/README.md` says what it leaves off."""
+
+FINE, WIDE = 0.8, 1.6
+"""Distances of places [mm]; the README says what they leave off."""
+LEFT_OUT = 3
+"""Presses left out of a table, to measure its error."""
+
+Progress = Callable[[int, int, float], None]
+"""Told how many presses are done, of how many, and about how many seconds are left."""
+
+
+@dataclass(frozen=True)
+class TableSettings:
+    """How a table is made."""
+
+    spacing: float | None = None
+    """Distance of places [mm]; None: `FINE` where those presses are known already, else `WIDE`."""
+    mesh: MeshSettings | None = None
+    """The skin's mesh; None: the default one where its presses are known already, else `COARSE`."""
+    device: str = "cpu"
+    """"cpu", or a card such as "cuda:0"."""
+    capacity: int = 1
+    """Presses in work at a time: 1 on a CPU, hundreds on a card."""
+    left_out: int | None = None
+    """Presses solved beside the table, to measure how far it is off between its nodes; None: 3, or none where the
+    table itself costs nothing because its presses ship."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """How far a table is off at presses that it was not made from, all of it errors of interpolation."""
+
+    load: float
+    """Root mean square over channels and depths of the loads' error, over the largest load of each press [1]."""
+    worst: float
+    """The largest error of a load, over the largest load of its press [1]."""
+    normal: float
+    """Root mean square error of the normal force, over its largest [1]."""
+    presses: int
+    """How many presses were left out."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """A table that can be made: what it takes is known before it is begun."""
+
+    sensor: Sensor
+    settings: TableSettings
+    model: SkinModel
+    store: PressStore
+    grid: Grid
+    names: tuple[str, ...]
+    """Name of each tool."""
+    reaches: tuple[Reach, ...]
+    """What each tool did."""
+
+    @cached_property
+    def requests(self) -> list[tuple[int, tuple[int, int], PressRequest]]:
+        """Tool, node and press of everything that is solved."""
+        depths, found = self.grid.depth[: self.grid.states], []
+        for t, reach in enumerate(self.reaches):
+            for i, j in self.grid.presses(reach):
+                press = request(reach, self.grid.x[i], self.grid.y[j], depths, self.sensor)
+                if press is not None:
+                    found.append((t, (i, j), press))
+        return found
+
+    @property
+    def presses(self) -> int:
+        """Presses of the table and beside it."""
+        return len(self.requests) + len(self.probes)
+
+    @cached_property
+    def probes(self) -> list[tuple[int, PressRequest]]:
+        """Tool and press of those left out, at places between nodes drawn with a fixed seed, unfolded."""
+        rng, found, wanted = np.random.default_rng(0), [], self.settings.left_out
+        if wanted is None:
+            wanted = 0 if self._ships else LEFT_OUT
+        for k in range(50 * wanted):
+            if len(found) >= wanted:
+                break
+            t = k % len(self.reaches)
+            reach = self.reaches[t]
+            x, y = (float(rng.uniform(a, b)) for a, b in zip(reach.low, reach.high, strict=True))
+            depths = np.linspace(0.0, reach.deepest, 4)
+            press = request(reach, x, y, depths, self.sensor)
+            if press is not None and len(press.depths) == len(depths):
+                found.append((t, press))
+        return found
+
+    @cached_property
+    def _ships(self) -> bool:
+        return all(self.store.shipped.get(press) is not None for _, _, press in self.requests)
+
+    @property
+    def missing(self) -> list[PressRequest]:
+        """Presses that are still to be solved."""
+        asked = [press for _, _, press in self.requests] + [press for _, press in self.probes]
+        return [asked[k] for k in self.store.missing(asked)]
+
+    @property
+    def expected_seconds(self) -> float:
+        """About how long it will take [s]."""
+        asked = [press for _, _, press in self.requests] + [press for _, press in self.probes]
+        return self.store.expected_seconds(asked)
+
+    def done(self, progress: Progress = lambda *_: None) -> tuple[Table, LeftOut | None]:
+        """Solve what is missing and return the table with its error; broken off, a second call goes on.
+
+        Raises:
+            SolveError: If a press that is possible was not solved.
+        """
+        asked, probes = self.requests, self.probes
+        answers = self.store.solve([p for _, _, p in asked] + [p for _, p in probes], self.settings.capacity, progress)
+        presses: list[dict[tuple[int, int], Solved]] = [{} for _ in self.reaches]
+        for (t, node, _), answer in zip(asked, answers[: len(asked)], strict=True):
+            if isinstance(answer, SolveError):
+                raise answer
+            presses[t][node] = answer
+        every = [s.loads for found in presses for s in found.values()]
+        all_loads = Loads(*(np.concatenate([getattr(v, n) for v in every]) for n in ("force", "closure", "area")))
+        reading = reading_of(self.sensor, all_loads)
+        table = assembled(self.grid, presses, self.names, reading, self.sensor)
+        return table, self._off(table, probes, answers[len(asked) :])
+
+    def _off(
+        self, table: Table, probes: list[tuple[int, PressRequest]], answers: Sequence[Solved | SolveError]
+    ) -> LeftOut | None:
+        response, transducer = table.response, Transducer.of(self.sensor)
+        loads, normals = [], []
+        for (t, press), answer in zip(probes, answers, strict=True):
+            if isinstance(answer, SolveError):
+                continue
+            depths = np.array(press.depths)
+            pose = np.column_stack([np.full(len(depths), press.x), np.full(len(depths), press.y), depths])
+            tool = np.full(len(depths), t)
+            true = table.reading.load(answer.loads, transducer)
+            loads.append((response.load(pose, tool) - true)[1:] / np.abs(true).max())
+            normals.append((response.force(pose, tool) - answer.normal)[1:] / answer.normal.max())
+        if not loads:
+            return None
+        wrong, force = np.concatenate(loads), np.concatenate(normals)
+        return LeftOut(
+            float(np.sqrt(np.mean(wrong**2))), float(np.abs(wrong).max()), float(np.sqrt(np.mean(force**2))),
+            len(loads),
+        )  # fmt: skip
+
+
+def work(sensor: Sensor, reaches: dict[str, Reach], settings: TableSettings | None = None) -> Work:
+    """Return what a table of these tools takes; builds the skin model, which costs seconds.
+
+    Args:
+        sensor: The sensor.
+        reaches: Name of each tool, and what it did.
+        settings: How the table is made.
+
+    Raises:
+        SolveError: If the sensor cannot be modelled.
+    """
+    chosen = settings or TableSettings()
+    known = _work(sensor, reaches, chosen, chosen.mesh or MeshSettings(), chosen.spacing or FINE)
+    asked = [press for _, _, press in known.requests]
+    if (chosen.mesh and chosen.spacing) or not known.store.missing(asked):
+        return known
+    return _work(sensor, reaches, chosen, chosen.mesh or COARSE, chosen.spacing or WIDE)
+
+
+def _work(
+    sensor: Sensor, reaches: dict[str, Reach], settings: TableSettings, mesh: MeshSettings, spacing: float
+) -> Work:
+    model = SkinModel(sensor, ModelSettings(mesh=mesh, error_estimate=False), settings.device)
+    grid = covering(list(reaches.values()), sensor, spacing)
+    return Work(sensor, settings, model, PressStore.of(model), grid, tuple(reaches), tuple(reaches.values()))

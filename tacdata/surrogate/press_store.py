@@ -1,0 +1,128 @@
+"""Solved presses, kept by the hash of all that decides them: a table that is broken off goes on where it stood."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from tacdata import provenance
+from tacdata.errors import SolveError
+from tacdata.labels import PathSolution
+from tacdata.replacement import replacement as written
+from tacdata.skin.model import SkinModel
+from tacdata.skin.press import PressRequest
+from tacdata.surfaces.store import cache_folder
+from tacdata.surrogate.shipped import Shipped
+from tacdata.surrogate.solved import Solved
+from tacdata.transduction import Loads
+
+FIELDS = ("force", "closure", "area", "normal", "seconds", "ended")
+TRIES, LEAST = 4, 3
+"""A press without an equilibrium is tried so many times, a depth less each time, as long as so many are left."""
+SECONDS_EACH = 1e-3
+"""Time of a node of the mesh and a state on one core of a CPU [s], where none was measured yet."""
+
+
+@dataclass
+class PressStore:
+    """Presses of one skin model: those that ship, and those in the user's cache folder."""
+
+    model: SkinModel
+    folder: Path
+    """Where they are kept; made when the first press is written."""
+    shipped: Shipped
+    """Presses of this sensor and mesh that come with tacdata."""
+
+    @classmethod
+    def of(cls, model: SkinModel) -> PressStore:
+        """Return the store of a model."""
+        folder = cache_folder() / "presses" / model.content_hash[:32]
+        return cls(model, folder, Shipped.of(model.sensor, model.settings.mesh))
+
+    def path(self, request: PressRequest) -> Path:
+        """Return where a press is kept: its name is a hash of all that decides it but its end (32 hex digits)."""
+        parts = {
+            "indenter": request.indenter.document, "x": request.x, "y": request.y, "yaw": request.yaw,
+            "depths": list(request.depths[:3]), "model": self.model.content_hash,
+        }  # fmt: skip
+        return self.folder / f"{provenance.content_hash(parts)[:32]}.npz"
+
+    def get(self, request: PressRequest) -> Solved | None:
+        """Return a press that was solved before, at least as deep; a damaged file counts as none."""
+        if (found := self.shipped.get(request)) is not None:
+            return found
+        try:
+            with np.load(self.path(request), allow_pickle=False) as data:
+                depths = data["depths"]
+                force, closure, area, normal, seconds, ended = (data[name] for name in FIELDS)
+        except (OSError, ValueError, KeyError, BadZipFile):
+            return None
+        kept = Solved(depths, Loads(force, closure, area), normal, float(seconds), bool(ended))
+        return kept.down_to(request.depths)
+
+    def put(self, request: PressRequest, solved: Solved) -> None:
+        """Keep a press."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        buffer, loads = io.BytesIO(), solved.loads
+        np.savez_compressed(
+            buffer, depths=solved.depths, force=loads.force, closure=loads.closure, area=loads.area,
+            normal=solved.normal, seconds=np.array(solved.seconds), ended=np.array(solved.ended),
+        )  # fmt: skip
+        with written(self.path(request)) as stream:
+            stream.write(buffer.getvalue())
+
+    def missing(self, requests: Sequence[PressRequest]) -> list[int]:
+        """Return which presses are still to be solved."""
+        return [k for k, request in enumerate(requests) if self.get(request) is None]
+
+    def expected_seconds(self, requests: Sequence[PressRequest]) -> float:
+        """Return about how long missing presses will take [s]: as those kept did, or by the mesh's size."""
+        found = [self.get(r) for r in requests]
+        known = [s.seconds / len(s.normal) for s in found if s is not None and s.seconds > 0]
+        each = float(np.median(known)) if known else SECONDS_EACH * len(self.model.mesh.nodes)
+        return each * sum(len(r.depths) for r, s in zip(requests, found, strict=True) if s is None)
+
+    def solve(
+        self, requests: Sequence[PressRequest], capacity: int = 1,
+        progress: Callable[[int, int, float], None] = lambda *_: None,
+    ) -> list[Solved | SolveError]:  # fmt: skip
+        """Return presses, those that are missing solved now and kept at once.
+
+        Args:
+            requests: What to press.
+            capacity: How many are in work at a time (1 on a CPU, hundreds on a card).
+            progress: Told how many are done, of how many, and about how many seconds are left.
+        """
+        found: list[Solved | SolveError | None] = [self.get(r) for r in requests]
+        begin, before = time.perf_counter(), sum(f is not None for f in found)
+        progress(before, len(requests), self.expected_seconds(requests))
+        asked = {k: requests[k] for k, solved in enumerate(found) if solved is None}
+        done, count = 0, len(asked)
+        for attempt in range(TRIES):
+            numbers, again = list(asked), {}
+            for index, answer in self.model.solve_many([asked[k] for k in numbers], capacity):
+                k = numbers[index]
+                if isinstance(answer, SolveError) and attempt + 1 < TRIES and len(asked[k].depths) > LEAST:
+                    again[k] = replace(asked[k], depths=asked[k].depths[:-1])
+                    continue
+                done += 1
+                passed = time.perf_counter() - begin
+                found[k] = answer if isinstance(answer, SolveError) else self._kept(
+                    requests[k], answer, passed / done, attempt > 0
+                )  # fmt: skip
+                progress(before + done, len(requests), passed / done * (count - done))
+            if not (asked := again):
+                break
+        return [f for f in found if f is not None]
+
+    def _kept(self, request: PressRequest, answer: PathSolution, seconds: float, ended: bool) -> Solved:
+        loads = Loads(answer.taxel_force, answer.taxel_closure, answer.taxel_area)
+        solved = Solved(answer.depth, loads, answer.force[:, 2], seconds, ended)
+        self.put(request, solved)
+        return solved

@@ -1,0 +1,94 @@
+"""What recordings pressed: sensor, tools, places and depths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.errors import FormatError, UsageError
+from tacdata.recording import Episode, read_episode, read_session
+from tacdata.sensor import Sensor
+from tacdata.surrogate.grid import Reach
+from tacdata.surrogate.symmetry import round_about_axis
+
+_DESCRIBED = ("sensor", "indenter", "contact")
+"""What an import must not have made up, if its presses are to be solved."""
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """What was pressed into one sensor."""
+
+    sensor: Sensor
+    reaches: dict[str, Reach]
+    """Name of each tool, and what it did."""
+    places: tuple[tuple[str, np.ndarray, float], ...]
+    """Tool, x and y [mm], shape (2,), and depth [mm] of every press with contact."""
+
+
+def unmodelled(episode: Episode) -> str:
+    """Return in words why a recording's sensor has no finite-element model; empty if it has one."""
+    stand_ins = [text.split(":")[0] for text in episode.rig.get("imported", {}).get("stand_ins", [])]
+    made_up = [name for name in stand_ins if name.split("/")[0] in _DESCRIBED]
+    if made_up:
+        return f"imported without {', '.join(made_up)}"
+    return "" if episode.sensor.transduction else "its sensor file says nothing of its transduction"
+
+
+def pressed(paths: list[Path]) -> Pressed:
+    """Read what was pressed.
+
+    Args:
+        paths: Recordings, or folders of sessions.
+
+    Raises:
+        UsageError: If nothing touches the sensor, or a path is neither.
+        FormatError: If sensors differ, have no model, or one tool was mounted in several ways that matter.
+    """
+    sensor: Sensor | None = None
+    seen: dict[str, list[tuple[Episode, np.ndarray]]] = {}
+    for file in (file for path in paths for file in _files(path)):
+        episode = read_episode(file)
+        if why := unmodelled(episode):
+            raise FormatError(
+                f"{file}: no finite-element model of this sensor: {why}", "a sensor and indenters that are described",
+                "start from a fitted response (no --fem), or import with sensor file, indenter and height of contact",
+            )  # fmt: skip
+        if sensor is not None and episode.sensor.content_hash != sensor.content_hash:
+            raise FormatError(f"{file}: another sensor than the recordings before", "one sensor", "judge it alone")
+        sensor = episode.sensor
+        touching = episode.tip[episode.tip[:, 2] > 0]
+        if len(touching):
+            seen.setdefault(episode.press.indenter_name, []).append((episode, touching))
+    if sensor is None or not seen:
+        raise UsageError("no recording touches the sensor", "presses with a depth above 0", "record presses")
+    places = tuple((name, t[np.argmax(t[:, 2]), :2], float(t[:, 2].max())) for name, e in seen.items() for _, t in e)
+    return Pressed(sensor, {name: _reach(name, found) for name, found in seen.items()}, places)
+
+
+def _reach(name: str, found: list[tuple[Episode, np.ndarray]]) -> Reach:
+    first = found[0][0].press
+    yaws = {round(e.press.yaw, 3) for e, _ in found}
+    if round_about_axis(first.indenter):
+        yaws = {0.0}
+    if len(yaws) > 1:
+        raise FormatError(
+            f"{name} mounted at {', '.join(f'{y:g}' for y in sorted(yaws))} deg", "one way for each name",
+            "judge the ways one at a time, or give them names of their own in the plan",
+        )  # fmt: skip
+    tips = np.concatenate([t for _, t in found])
+    low, high = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
+    return Reach(
+        first.indenter, yaws.pop(), (float(low[0]), float(low[1])), (float(high[0]), float(high[1])),
+        float(tips[:, 2].max()),
+    )  # fmt: skip
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        return list(read_session(path).episodes)
+    if not path.is_file():
+        raise UsageError(f"no file or folder {path}", "a recording (.mcap) or a session's folder", "check the path")
+    return [path]

@@ -1,0 +1,67 @@
+"""From the loads of protrusions to one number a channel, and the curve from it to readings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.sensor import Sensor
+from tacdata.transduction import Loads, Transducer
+
+POINTS = 400
+"""Points of the curve."""
+_NOTHING = 1e-9
+"""A derivative that is smaller than this share of the largest counts as none."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a table's loads become readings."""
+
+    by: str
+    """What the load is: "force" [N], "closure" [mm] or "capacitance" [pF], whichever a reading follows alone."""
+    curve_load: np.ndarray
+    """Loads [as above], shape (m,), increasing."""
+    curve_signal: np.ndarray
+    """Change of capacitance at those loads [pF], shape (m,)."""
+    gain: np.ndarray
+    """[counts/pF], shape (taxels,)."""
+    offset: np.ndarray
+    """Reading without load [counts], shape (taxels,)."""
+
+    def load(self, loads: Loads, transducer: Transducer) -> np.ndarray:
+        """Return the one number that a reading follows, shape (n, taxels)."""
+        if self.by == "capacitance":
+            return transducer.principle.capacitance(loads) - transducer.rest
+        return np.asarray(getattr(loads, self.by))
+
+
+def reading_of(sensor: Sensor, loads: Loads) -> Reading:
+    """Return how loads such as these become readings, by the sensor file's transduction.
+
+    A reading that follows the force alone, or the closure alone, by one curve for all taxels, keeps it as the load:
+    effects of the skin act on it. Otherwise the load is the change of capacitance itself.
+
+    Args:
+        sensor: Whose transduction.
+        loads: Of states as they occur, shapes (n, taxels).
+    """
+    transducer = Transducer.of(sensor)
+    slopes = transducer.derivatives(loads)
+    weight = {
+        name: float(np.abs(getattr(slopes, name) * getattr(loads, name)).max()) for name in ("force", "closure", "area")
+    }
+    most = max(weight.values())
+    alone = [name for name, value in weight.items() if value > _NOTHING * most]
+    numbers = [np.ptp(np.atleast_1d(v)) for v in vars(transducer.principle).values()]
+    by = alone[0] if len(alone) == 1 and alone[0] in ("force", "closure") and not any(numbers) else "capacitance"
+    if by == "capacitance":
+        top = float(np.abs(transducer.principle.capacitance(loads) - transducer.rest).max())
+        at = np.array([0.0, max(top, 1e-9)])
+        return Reading(by, at, at, transducer.gain, transducer.offset)
+    at = np.linspace(0.0, 1.5 * float(getattr(loads, by).max()), POINTS)
+    none = np.zeros((POINTS, transducer.taxels))
+    own = {"force": none, "closure": none, "area": none, by: np.repeat(at[:, None], transducer.taxels, axis=1)}
+    change = transducer.principle.capacitance(Loads(**own)) - transducer.rest
+    return Reading(by, at, change[:, 0], transducer.gain, transducer.offset)

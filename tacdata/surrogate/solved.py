@@ -1,0 +1,39 @@
+"""One solved press, loading only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.transduction import Loads
+
+
+@dataclass(frozen=True)
+class Solved:
+    """One press, loading only."""
+
+    depths: np.ndarray
+    """Depth of each state [mm], shape (k,), rising from 0."""
+    loads: Loads
+    """Of each state, shapes (k, taxels)."""
+    normal: np.ndarray
+    """Normal force on the indenter [N], shape (k,)."""
+    seconds: float
+    """What it took [s]; 0 where that is not known."""
+    ended: bool = False
+    """Whether it was asked to go deeper and found no equilibrium."""
+
+    def down_to(self, depths: Sequence[float]) -> Solved | None:
+        """Return the states at these depths [mm], from the first; None if it does not go as deep, or by other steps.
+
+        A press that ended before gives what it has.
+        """
+        count = min(len(depths), len(self.depths)) if self.ended else len(depths)
+        if len(self.depths) < count or not np.allclose(self.depths[:count], depths[:count], atol=1e-6):
+            return None
+        own = self.loads
+        cut = Loads(own.force[:count], own.closure[:count], own.area[:count])
+        share = count / len(self.depths)
+        return Solved(self.depths[:count], cut, self.normal[:count], self.seconds * share, self.ended)

@@ -1,0 +1,45 @@
+"""A table of presses as the response of a model spec."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import schemas
+from tacdata import documents, provenance
+from tacdata.errors import UsageError
+from tacdata.surrogate.build import LeftOut, Work
+from tacdata.surrogate.table import Table
+
+SPEC, TABLE = "spec.json", "response.npz"
+
+
+def written_spec(folder: Path, work: Work, table: Table, off: LeftOut | None) -> Path:
+    """Write the table and a model spec without effects that starts from it; return the spec's path.
+
+    Args:
+        folder: To make, or empty.
+        work: What the table was made by.
+        table: The table.
+        off: How far it is off between its nodes.
+
+    Raises:
+        UsageError: If the folder holds a spec or a table already.
+    """
+    for name in (SPEC, TABLE):
+        if (folder / name).exists():
+            raise UsageError(f"{folder / name} exists", "a new folder; nothing is overwritten", "choose another --out")
+    folder.mkdir(parents=True, exist_ok=True)
+    parameters = {
+        "mesh": asdict(work.model.settings.mesh), "spacing": float(work.grid.x[1] - work.grid.x[0]),
+        "left_out": asdict(off) if off else None, "load": table.reading.by,
+        "tools": {name: r.indenter.document for name, r in zip(work.names, work.reaches, strict=True)},
+    }  # fmt: skip
+    table.write(folder / TABLE, provenance.stamp("tacdata.surrogate", dict(work.model.identity), parameters))
+    document: dict[str, Any] = {
+        "version": schemas.version("model_spec"), "name": f"{work.sensor.name}, finite elements", "parent": None,
+        "response": {"kind": "table", "file": TABLE}, "effects": [],
+    }  # fmt: skip
+    documents.write(folder / SPEC, document, "model_spec")
+    return folder / SPEC

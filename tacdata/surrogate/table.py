@@ -1,0 +1,160 @@
+"""Solved presses to the table that a `TableResponse` reads: mirrored, continued beyond its ends, written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.chain.table_response import TableResponse
+from tacdata.errors import SolveError
+from tacdata.replacement import replacement
+from tacdata.sensor import Sensor
+from tacdata.surrogate.grid import EDGE, Grid
+from tacdata.surrogate.reading import Reading
+from tacdata.surrogate.solved import Solved
+from tacdata.surrogate.symmetry import mirrored
+from tacdata.transduction import Transducer
+
+_STEEPEST = 3.0
+"""Largest exponent of force over depth by which a press is continued to depths that were not solved [1]."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Loads by place and depth, and how they become readings."""
+
+    grid: Grid
+    tools: tuple[str, ...]
+    """Name of each tool."""
+    load: np.ndarray
+    """Of every taxel [N, mm or pF, as `Reading.by` says], shape (tools, a, b, d, channels)."""
+    normal: np.ndarray
+    """Normal force on the indenter [N], shape (tools, a, b, d)."""
+    solved: np.ndarray
+    """Whether a node is a solved press (or the mirror image of one), shape (tools, a, b, d), bool."""
+    reading: Reading
+
+    @property
+    def response(self) -> TableResponse:
+        """The response that it makes."""
+        g, r = self.grid, self.reading
+        return TableResponse(
+            g.x, g.y, g.depth, self.load, self.normal, r.curve_load, r.curve_signal, r.gain, r.offset, self.tools
+        )
+
+    def write(self, path: Path, provenance: dict[str, Any]) -> None:
+        """Write the table (.npz), with what made it as JSON text in ``provenance``."""
+        g, r = self.grid, self.reading
+        with replacement(path) as stream:
+            np.savez_compressed(
+                stream, x=g.x, y=g.y, depth=g.depth, load=self.load.astype(np.float32),
+                force=self.normal.astype(np.float32), curve_load=r.curve_load, curve_signal=r.curve_signal,
+                gain=r.gain, offset=r.offset, tools=np.array(self.tools), solved=self.solved,
+                provenance=np.array(json.dumps(provenance)),
+            )  # fmt: skip
+
+    def uncovered(self, places: Sequence[tuple[str, np.ndarray, float]]) -> list[tuple[str, np.ndarray, float]]:
+        """Return the presses (tool, x and y [mm], depth [mm]) that do not lie among solved nodes."""
+        return [p for p in places if not self.covers(self.tools.index(p[0]), p[1], p[2])]
+
+    def covers(self, tool: int, place: np.ndarray, deepest: float) -> bool:
+        """Return whether a press lies among solved nodes.
+
+        Args:
+            tool: Number of the tool.
+            place: x and y [mm], shape (2,).
+            deepest: Depth [mm].
+        """
+        at = [np.searchsorted(axis, v - 1e-9) for axis, v in zip((self.grid.x, self.grid.y), place, strict=True)]
+        if not all(0 < k < len(axis) for k, axis in zip(at, (self.grid.x, self.grid.y), strict=True)):
+            return False
+        level = int(np.searchsorted(self.grid.depth, deepest - 1e-9))
+        if level >= len(self.grid.depth):
+            return False
+        near = self.solved[tool, at[0] - 1 : at[0] + 1, at[1] - 1 : at[1] + 1, level]
+        return bool(near.all())
+
+
+def assembled(
+    grid: Grid, presses: Sequence[dict[tuple[int, int], Solved]], tools: tuple[str, ...], reading: Reading,
+    sensor: Sensor,
+) -> Table:  # fmt: skip
+    """Return the table of presses solved for each tool, by node.
+
+    Args:
+        grid: The nodes.
+        presses: For each tool, node to press; nodes that cannot be pressed are absent.
+        tools: Name of each tool.
+        reading: How loads become readings.
+        sensor: The sensor.
+
+    Raises:
+        SolveError: If a tool could be pressed nowhere.
+    """
+    shape = (len(tools), len(grid.x), len(grid.y), len(grid.depth))
+    load = np.zeros((*shape, sensor.taxels.count))
+    normal, solved = np.zeros(shape), np.zeros(shape, dtype=bool)
+    transducer = Transducer.of(sensor)
+    for t, found in enumerate(presses):
+        if not found:
+            raise SolveError(
+                f"{tools[t]} can be pressed at none of the places", "places where it stays inside a bonded rim",
+                "press elsewhere, or describe another bonding in the sensor file",
+            )  # fmt: skip
+        _place(grid, found, reading, transducer, sensor, load[t], normal[t], solved[t])
+        _continue(grid, load[t], normal[t], solved[t])
+    return Table(grid, tools, load, normal, solved, reading)
+
+
+def _place(
+    grid: Grid, found: dict[tuple[int, int], Solved], reading: Reading, transducer: Transducer, sensor: Sensor,
+    load: np.ndarray, normal: np.ndarray, solved: np.ndarray,
+) -> None:  # fmt: skip
+    times = np.zeros(normal.shape)
+    for (i, j), press in found.items():
+        values, count = reading.load(press.loads, transducer), len(press.normal)
+        sides = [(a, b) for a in (False, True) for b in (False, True)] if grid.folded else [(False, False)]
+        for over_x, over_y in sides:
+            at = (len(grid.x) - 1 - i if over_x else i, len(grid.y) - 1 - j if over_y else j)
+            load[*at, :count] += mirrored(values, sensor, over_x, over_y)
+            normal[*at, :count] += press.normal
+            times[*at, :count] += 1
+    solved[:] = times > 0
+    load /= np.maximum(times, 1)[..., None]
+    normal /= np.maximum(times, 1)
+
+
+def _continue(grid: Grid, load: np.ndarray, normal: np.ndarray, solved: np.ndarray) -> None:
+    """Fill what was not solved: deeper by a power law, elsewhere from the nearest place; ends by parabolas."""
+    pressed = np.asarray(np.any(solved, axis=2))
+    nodes = np.argwhere(pressed)
+    levels = np.sum(solved, axis=2)
+    for k in range(len(nodes)):
+        i, j = nodes[k].tolist()
+        _deepen(grid.depth, load[i, j], normal[i, j], int(levels[i, j]))
+    for i in range(EDGE, len(grid.x) - EDGE):
+        for j in range(EDGE, len(grid.y) - EDGE):
+            if not pressed[i, j]:
+                a, b = nodes[int(np.argmin(np.sum(np.square(nodes - (i, j)), axis=1)))].tolist()
+                load[i, j], normal[i, j] = load[a, b], normal[a, b]
+    for values in (load, normal):
+        for axis in (0, 1):
+            moved = np.moveaxis(values, axis, 0)
+            for k in range(EDGE - 1, -1, -1):
+                moved[k] = 3 * moved[k + 1] - 3 * moved[k + 2] + moved[k + 3]
+                moved[-1 - k] = 3 * moved[-2 - k] - 3 * moved[-3 - k] + moved[-4 - k]
+
+
+def _deepen(depth: np.ndarray, load: np.ndarray, normal: np.ndarray, count: int) -> None:
+    last, before = count - 1, max(count - 2, 1)
+    power = 1.5
+    if last > before and normal[last] > normal[before] > 0:
+        power = float(np.log(normal[last] / normal[before]) / np.log(depth[last] / depth[before]))
+    for k in range(count, len(depth)):
+        factor = (depth[k] / depth[last]) ** min(power, _STEEPEST)
+        load[k], normal[k] = load[last] * factor, normal[last] * factor

@@ -1,0 +1,140 @@
+"""A few hidden worlds, made by code that shares nothing with the library; the benchmark proper is benchmarks/."""
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+FOLDER = Path(__file__).parents[2] / "benchmarks" / "hidden_worlds"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _bench():
+    sys.path.insert(0, str(FOLDER))
+    yield
+    sys.path.remove(str(FOLDER))
+
+
+def _run(out, *words):
+    command = [sys.executable, str(FOLDER / "run.py"), str(out), *words, "--show"]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_the_generator_takes_nothing_from_what_it_tests():
+    for path in (FOLDER / "worlds").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not [n for n in names if n.split(".")[0] in ("tacdata", "label_farm", "training")], path.name
+
+
+def test_a_judge_cannot_open_what_is_true(tmp_path):
+    (tmp_path / "truth").mkdir()
+    (tmp_path / "truth" / "a.json").write_text("{}")
+    code = "import sys; sys.path.insert(0, sys.argv[1]); import judge; sys.addaudithook(judge.guard); open(sys.argv[2])"
+    for path in (tmp_path / "truth" / "a.json", FOLDER / "worlds" / "material.py"):
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(FOLDER), str(path)], capture_output=True, text=True, check=False
+        )
+        assert done.returncode != 0
+        assert "a judge may not open" in done.stderr
+
+
+def test_recordings_and_their_names_do_not_tell_what_is_hidden(tmp_path):
+    from worlds import written
+    from worlds.cases import cases
+
+    case = next(c for c in cases("singles10") if c.name == "crosstalk")
+    name = written.write(tmp_path, case)
+    folder = tmp_path / "worlds" / name
+    assert sorted(p.name for p in folder.iterdir()) == ["recordings.npz", "task.json"]
+    assert json.loads((folder / "task.json").read_text()) == {"version": "1.0", "response": "table"}
+    assert not {"pose", "seed", "effects"} & set(np.load(folder / "recordings.npz").files)
+    assert "crosstalk" not in name
+    assert json.loads((tmp_path / "truth" / f"{name}.json").read_text())["effects"]["crosstalk"] > 0
+
+
+def test_every_hidden_thing_changes_what_is_read_and_size_tells_how_much():
+    from worlds import world
+    from worlds.physics import KNOWN
+
+    settings = {"episodes": 10, "sessions": 2}
+    still, none = world.make(3, {}, **settings)[1]["oracle"], np.zeros((10, 3))
+    for name, h in KNOWN.items():
+        if h.stage == "simulator":
+            continue
+        moved = []
+        for size in (0.25, 1.0):
+            given = {**world.SETTINGS, **settings, **{k: v for k, v in h.needs.items() if k == "streams"}}
+            w = world.run(world.begin(3, given), 3, {name: size}, none)
+            tag = np.abs(w.tag_error).max()
+            moved.append(np.abs(world.read(w, w.rise, world.frames(w, 3)) - still).max() + tag)
+        assert moved[1] > 1.3 * moved[0] > 0, name
+
+
+@pytest.mark.slow
+def test_limits_are_those_of_the_generator_as_it_is():
+    from worlds.cases import limits
+    from worlds.oracle import Oracle
+
+    known = limits()
+    oracle = Oracle(known["seeds"][0], {})
+    for name in ("latency", "z_offset"):
+        found = oracle.delta({name: known["limits"]["table"][name]})
+        assert found == pytest.approx(known["level"], rel=0.3)
+
+
+def test_a_rival_that_is_a_multiple_of_the_truth_cannot_be_told_from_it():
+    from worlds.oracle import nearest
+
+    line, bend, other = np.eye(3)
+    rival = [x * line + x**2 * bend for x in (1.0, 3.0)]
+    truth = 2.5 * line + 2.5**2 * bend
+    rows = np.array([truth, *rival, truth + 4 * other])
+    gram = rows @ rows.T
+    assert nearest(gram, 0, 1, 2) < 0.01
+    assert nearest(gram, 3, 1, 2) == pytest.approx(4.0, abs=0.01)
+
+
+def test_blocks_hold_what_the_protocol_asks_for():
+    from worlds.cases import BLOCKS, cases
+    from worlds.physics import FORMS, KNOWN, OUTSIDE
+
+    every = {b: cases(b) for b in BLOCKS}
+    assert len(every["nulls"]) >= 200
+    assert all(not c.effects for c in every["nulls"])
+    assert len({n for c in every["singles3"] for n in c.effects}) >= 25
+    assert len(OUTSIDE) >= 12 and not any(KNOWN[n].called for n in OUTSIDE)
+    assert len(FORMS) >= 8
+    assert all(c.facts["separation"] < 2.576 for c in every["aliases"])
+    identities = [c.identity for cases_ in every.values() for c in cases_]
+    assert len(set(identities)) == len(identities)
+    assert all(1000 <= c.seed < 2000 for cases_ in every.values() for c in cases_)
+    assert all(5000 <= c.seed < 6000 for c in cases("pairs", 5000))
+
+
+def test_a_single_is_one_that_an_oracle_tells_from_any_rival_and_the_rest_are_aliases():
+    from worlds.cases import cases, inseparable
+
+    for c in cases("singles3") + cases("singles10"):
+        assert not inseparable(c.name, c.response, c.times[c.name])
+    alike = {(c.response, name) for c in cases("aliases") for name in c.effects}
+    assert {("table", "gain"), ("table", "modulus")} <= alike
+
+
+@pytest.mark.slow
+def test_a_null_gets_no_name_and_a_spring_is_found_the_whole_way(tmp_path):
+    told = _run(tmp_path, "nulls", "--name", "plain-4-0")
+    assert told.count("\n") == 2 and "named" not in told and "crashed" not in told
+    told = _run(tmp_path, "tagged", "--name", "frame_compliance")
+    assert "frame_compliance" in told.partition(" table ")[2]
+    assert _run(tmp_path, "tagged", "--name", "frame_compliance") == ""  # goes on where it was stopped
+    report = subprocess.run(
+        [sys.executable, str(FOLDER / "score.py"), str(tmp_path)], capture_output=True, text=True, check=True
+    ).stdout
+    assert "| tagged | table | 1 |" in report
+    assert (tmp_path / "scores" / "workflow" / "power.png").stat().st_size > 10_000

@@ -1,0 +1,70 @@
+"""The presses that come next tell the rivals apart, stay within what was recorded, and can be run."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "discrepancy"))
+from pressing import course
+
+from tacdata.discrepancy.refine import refine
+from tacdata.discrepancy.spec import read_spec
+from tacdata.effects import Placed, load
+from tacdata.plans import Plan
+from tacdata.revision.comparison import Comparison
+from tacdata.revision.next_presses import choose, plan_of
+from tacdata.revision.rivals import Rival
+from tacdata.revision.trial import laid_out, trials
+
+PLAN = Plan.from_document(
+    {"version": "1.1", "name": "one speed", "indenters": {"ball": {"shape": "sphere", "radius": 4.0}},
+     "motion": {"clearance": 3.0, "travel_speed": 3.0, "approach_speed": 3.0, "press_speed": 1.0, "hold": 1.0,
+                "rest": 1.0},
+     "presses": [{"indenter": "ball", "x": 0.0, "y": 0.0, "depth": 1.0}]},
+    "test",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def held():
+    """Presses of one rate from a drive with play, held against a response without memory."""
+    return Comparison(course(rates=(1.0,), play=0.05, episodes=12), read_spec(None))
+
+
+def rival(held, name, **values):
+    placed = [Placed(load(name), {k: np.array(v) for k, v in values.items()})]
+    return Rival(load(name).called, tuple(placed), refine(held.setting, placed, held.frame, steps=0))
+
+
+def test_lag_and_play_are_told_apart_by_another_rate(held):
+    found = [rival(held, "backlash", b=0.05), rival(held, "latency", L=0.05)]
+    chosen = choose(held, found, PLAN, presses=3)
+    assert chosen and all(c.trial.speed != 1.0 for c in chosen)
+    pair = ("backlash", "latency")
+    again = [t for t in trials(held.course, PLAN) if t.overshoot == 0]
+    best = max(c.nats[pair] for c in chosen)
+    assert best > 10
+    document = plan_of(chosen, held, PLAN, "next", repeats=3)
+    plan = Plan.from_document(document, "next")
+    assert len(plan.presses) == 3 * len(chosen)
+    assert max(p.deepest for p in plan.presses) <= held.course.tip[:, 2].max() + 1e-9, "nowhere deeper than recorded"
+    assert max(p.speed for p in plan.presses) <= PLAN.motion.travel_speed
+    assert "backlash" in document["purpose"] and again
+
+
+def test_rivals_that_say_the_same_get_no_press(held):
+    same = [rival(held, "backlash", b=0.05), rival(held, "backlash", b=0.05)]
+    same[1] = Rival("twin", same[1].placed, same[1].model)
+    assert choose(held, same, PLAN, presses=3) == []
+
+
+def test_a_trial_is_laid_out_as_the_guide_would_run_it(held):
+    [trial] = [t for t in trials(held.course, PLAN) if t.overshoot and t.speed == 2.0 and t.hold == 2.0 and t.site == 0]
+    own = laid_out(held.course, trial)
+    assert own.tip[:, 2].max() == pytest.approx(trial.depth + trial.overshoot)
+    held_at = np.isclose(own.tip[:, 2], trial.depth) & (own.time > own.time[np.argmax(own.tip[:, 2])])
+    assert np.ptp(own.time[held_at]) == pytest.approx(2.0), "it holds after coming back up"
+    moving = np.abs(own.speed[1:])
+    assert moving.max() == pytest.approx(2.0, rel=1e-6)

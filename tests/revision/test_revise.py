@@ -1,0 +1,108 @@
+"""What follows a verdict: the gap is told where the numbers were not fitted; nothing is made to look better."""
+
+import csv
+import re
+
+import numpy as np
+import pytest
+from revised_bench import verdict
+
+from tacdata import documents
+from tacdata.discrepancy.spec import read_spec
+from tacdata.errors import UsageError
+from tacdata.plans.plan import read_plan
+from tacdata.revision.revise import revise
+
+
+@pytest.fixture(scope="module")
+def right(late, tmp_path_factory):
+    """The right effect with numbers that are a little off."""
+    folder = tmp_path_factory.mktemp("right")
+    judged = verdict(folder / "verdict", "latency", {"L": 0.07})
+    return revise(judged, [late], read_spec(None), folder / "revision")
+
+
+def test_the_right_effect_closes_the_gap_where_its_numbers_were_not_fitted(right):
+    gap = right.document["gap"]
+    assert gap["sealed"]["before"] > 20 and gap["sealed"]["after"] < 1.6
+    assert gap["closed"] > 0.98 and gap["interval"][0] <= gap["closed"] <= gap["interval"][1]
+    assert not gap["unseen"], "the verdict did not seal them, and it is said so"
+    rates = [c for c in gap["elsewhere"] if "rate" in c["name"]]
+    assert len(rates) == 2 and all(c["after"] < 0.1 * c["before"] for c in rates), "another rate is foretold too"
+    assert right.document["labels"] == [], "a late reading moves no label"
+
+
+def test_the_new_model_carries_its_evidence(right):
+    document = documents.read(right.folder / "spec.json", "model_spec")
+    assert document["parent"] == read_spec(None).content_hash
+    [entry] = document["effects"]
+    assert entry["effect"] == "latency" and entry["error"] == {"L": 0.01}
+    assert right.document["verdict"] in entry["evidence"] and "recording session" in entry["evidence"]
+    assert read_spec(right.folder / "spec.json").content_hash == right.document["spec"]["after"]
+
+
+def test_the_card_stands_alone_and_says_what_it_rests_on(right):
+    page = (right.folder / "card.html").read_text()
+    assert "data:image/png;base64," in page and not re.search(r"(src|href)=['\"]https?:", page)
+    for told in ("Readings come late", "named", right.document["verdict"], "What would refute it", "90 % interval"):
+        assert told in page
+    assert (right.folder / "gap.png").stat().st_size > 20_000
+    rows = list(csv.DictReader((right.folder / "gap.csv").read_text().splitlines()))
+    assert float(rows[0]["after"]) == pytest.approx(right.document["gap"]["sealed"]["after"], rel=1e-4)
+    assert len((right.folder / "gap.md").read_text().splitlines()) == len(rows) + 2
+
+
+def test_the_curves_go_into_a_rerun_file(right, tmp_path):
+    from viewers.gap_recording import write
+
+    assert right.shown and all(own.off(own.after) < 0.2 * own.off(own.before) for own in right.shown)
+    write(right.shown, tmp_path / "gap.rrd", "named")
+    assert (tmp_path / "gap.rrd").read_bytes()[:4] == b"RRF2" and (tmp_path / "gap.rrd").stat().st_size > 5_000
+
+
+def test_a_wrong_effect_does_not_close_the_gap(late, tmp_path):
+    judged = verdict(tmp_path / "verdict", "backlash", {"b": 0.02})
+    wrong = revise(judged, [late], read_spec(None), tmp_path / "revision").document["gap"]
+    assert wrong["closed"] < 0.9
+    assert max(c["after"] for c in wrong["elsewhere"]) > 5, "another rate gives it away"
+
+
+def test_an_undecided_verdict_adds_nothing_and_plans_presses_that_decide(loose, tmp_path):
+    judged = verdict(tmp_path / "verdict", "backlash", {"b": 0.06}, "ambiguous", ["latency"])
+    made = revise(judged, [loose], read_spec(None), tmp_path / "revision")
+    assert made.document["added"] == [] and made.document["spec"]["after"] is None
+    assert not (made.folder / "spec.json").exists()
+    plan = read_plan(made.folder / made.document["next"]["plan"])
+    assert any(abs(p.speed - 1.3) > 0.5 or p.overshoot for p in plan.presses), "another rate, or from below"
+    assert all("tells" in p.purpose for p in plan.presses) and len(made.document["next"]["presses"]) >= 1
+
+
+def test_play_moves_the_paths_of_labels_on_the_way_back_alone(loose):
+    from tacdata.effects import Placed, load
+    from tacdata.recording import read_episode, read_session
+    from tacdata.revision.pose_path import moved_episodes
+    from tacdata.revision.relabel import paths_moved
+
+    placed = [Placed(load("backlash"), {"b": np.array(0.06)})]
+    moved = paths_moved(loose, placed)
+    assert moved.paths == moved.episodes == 16
+    assert moved.path_most == pytest.approx(0.06, abs=1e-6)
+    old = [read_episode(p) for p in read_session(loose).episodes]
+    for before, after in zip(old, moved_episodes(old, placed), strict=True):
+        nominal = before.tip_at(after.tip_ns)
+        peak = int(np.argmax(nominal[:, 2]))
+        down = np.flatnonzero(nominal[:peak, 2] > 0)
+        np.testing.assert_allclose(after.tip[down, 2], nominal[down, 2], atol=1e-6)
+        up = peak + np.flatnonzero((nominal[peak:, 2] > 0) & (nominal[peak:, 2] < 0.9))
+        np.testing.assert_allclose(after.tip[up, 2], nominal[up, 2] + 0.06, atol=1e-6)
+
+
+def test_nothing_is_overwritten_and_a_verdict_of_another_model_is_refused(late, right, tmp_path):
+    judged = verdict(tmp_path / "verdict", "latency", {"L": 0.08})
+    with pytest.raises(UsageError, match="exists"):
+        revise(judged, [late], read_spec(None), tmp_path)
+    with pytest.raises(UsageError, match="another model"):
+        revise(judged, [late], read_spec(right.folder / "spec.json"), tmp_path / "new")
+    with pytest.raises(UsageError, match="no file"):
+        revise(tmp_path / "nothing", [late], read_spec(None), tmp_path / "new")
+    assert not (tmp_path / "new").exists()
