@@ -24,8 +24,8 @@ PANEL = PIPELINE
 
 def run(
     rig: Annotated[Path, typer.Option(help="Rig file: devices, registration, envelope.")],
-    plan: Annotated[Path, typer.Option(help="Plan file: what to press.")],
     out: Annotated[Path, typer.Option(help="Session folder to create, or to continue with --resume.")],
+    plan: Annotated[Path | None, typer.Option(help="Plan file: what to press.")] = None,
     sensor: Annotated[Path | None, typer.Option(help="Sensor file; default: the paper's.")] = None,
     registration: Annotated[
         Path | None, typer.Option(help="Registration file; default: registration.yaml beside the rig file.")
@@ -38,8 +38,24 @@ def run(
     live: Annotated[
         str | None, typer.Option(metavar="WHERE", help="Watch in Rerun: window, web, or a file name (.rrd).")
     ] = None,
+    demo: Annotated[
+        bool, typer.Option("--demo", help="Record by hand, without a guide: boards on fingers, cameras on tag cubes.")
+    ] = False,
+    task: Annotated[str, typer.Option(help="With --demo: what is demonstrated, for example grasp.")] = "grasp",
+    seconds: Annotated[
+        float | None, typer.Option(help="With --demo: length of each; without it Enter or Ctrl-C ends one [s].")
+    ] = None,
+    demonstrations: Annotated[int, typer.Option(min=1, help="With --demo: how many.")] = 1,
 ) -> None:
-    """Press the sensor as the plan says and record every press to its own MCAP file."""
+    """Press the sensor as the plan says and record every press to its own MCAP file; or --demo, by hand."""
+    if demo:
+        unwanted = {"--plan": plan, "--sensor": sensor, "--registration": registration, "--live": live}
+        _by_hand(rig, out, task, seconds, demonstrations, resume, [k for k, v in unwanted.items() if v is not None])
+        return
+    if plan is None:
+        from tacdata.errors import UsageError
+
+        raise UsageError("no --plan", "a plan file, or --demo", "make one with tacdata plan")
     from contextlib import nullcontext
 
     from tacdata.plans import read_plan
@@ -98,6 +114,22 @@ def run(
             chosen.keep(out)
     print(f"{len(session.done)} of {len(session.plan.presses)} presses recorded in {out}")
     print(f"next: tacdata check {out}")
+
+
+def _by_hand(
+    rig: Path, out: Path, task: str, seconds: float | None, count: int, resume: bool, unwanted: list[str]
+) -> None:
+    from tacdata.demonstrations.by_hand import record_by_hand
+    from tacdata.errors import UsageError
+
+    if unwanted:
+        raise UsageError(f"--demo with {', '.join(unwanted)}", "--rig, --out, --task", "the demo rig names the sensors")
+    try:
+        session = record_by_hand(rig, out, task, seconds, count, resume)
+    except KeyboardInterrupt:
+        print(f"interrupted: what was recorded is in {out}", file=sys.stderr)
+        raise typer.Exit(130) from None
+    print(f"{len(session.episodes)} demonstrations in {out}\nnext: tacdata track {out}")
 
 
 def _answer(question: str) -> str:

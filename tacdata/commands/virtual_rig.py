@@ -16,11 +16,20 @@ ORDER, PANEL = 110, TOOLS
 
 def run(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="where rig.yaml and truth.yaml are written")],
-    speed: Annotated[float, typer.Option(help="seconds of the rig per real second")] = 8.0,
+    speed: Annotated[
+        float | None, typer.Option(help="seconds of the rig per real second; default 8, with --demo 0.5")
+    ] = None,
     seed: Annotated[int, typer.Option(help="which world: registration error, gains, noise")] = 0,
     camera: Annotated[bool, typer.Option(help="with a camera that watches the AprilTag cube")] = True,
     sensor: Annotated[Path | None, typer.Option(help="sensor file; default: the paper's")] = None,
     rough: Annotated[bool, typer.Option("--rough", help="sensor put down by eye, to be registered first")] = False,
+    demo: Annotated[
+        bool, typer.Option("--demo", help="a hand that grasps a ball, for record --demo: writes demo_rig.yaml")
+    ] = False,
+    cameras: Annotated[int, typer.Option(help="with --demo: cameras on the hand, 1 or 2")] = 2,
+    fault: Annotated[
+        str | None, typer.Option(help="with --demo: no-tag, turned-tag, swapped-fingers or silent-finger")
+    ] = None,
 ) -> None:
     """Emulate a rig (GRBL, taxel board, camera) that other verbs reach by its rig.yaml, until Ctrl-C."""
     from tacdata.sensor import read_sensor
@@ -29,7 +38,13 @@ def run(
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
-    rig = VirtualRig(directory, speed, seed, camera, read_sensor(sensor) if sensor else None, rough)
+    skin = read_sensor(sensor) if sensor else None
+    if demo:
+        from tacdata.virtual_rig.demo import VirtualDemo
+
+        rig = VirtualDemo(directory, 0.5 if speed is None else speed, seed, cameras, fault, skin)
+    else:
+        rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skin, rough)
     try:
         rig.start()
         print("\n".join([*rig.emulates, f"rig file           {rig.path}", "Ctrl-C stops it."]), flush=True)

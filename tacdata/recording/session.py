@@ -54,8 +54,11 @@ def read_session(folder: Path) -> Session:
     """
     folder = Path(folder)
     if not (folder / FILE).is_file():
+        by_hand = (folder / "demonstrations.json").is_file()
         raise UsageError(
-            f"{folder} is no session: no {FILE} in it", "a folder written by tacdata record", "check the path"
+            f"{folder} is no session: no {FILE} in it",
+            "a folder written by tacdata record",
+            "demonstrations by hand lie in it: work them up with tacdata track" if by_hand else "check the path",
         )
     document = documents.read(folder / FILE, "session")
     origin = str(folder / FILE)

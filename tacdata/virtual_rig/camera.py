@@ -25,10 +25,15 @@ class Camera:
         draw: Callable[[int], np.ndarray],
         delay: float = 0.035,
         seed: int = 0,
+        ahead: bool = False,
     ) -> None:
-        """Serve ``draw(exposure [ns]) -> uint8 (height, width)`` at ``rate`` [Hz] after ``delay`` [s]."""
+        """Serve ``draw(exposure [ns]) -> uint8 (height, width)`` at ``rate`` [Hz] after ``delay`` [s].
+
+        With ``ahead`` images are drawn before they are due, so that drawing does not add to the delay; then what is
+        drawn must be known beforehand.
+        """
         self.clock, self.rate, self.delay = clock, rate, delay
-        self._draw = draw
+        self._draw, self._ahead = draw, ahead
         self._rng = np.random.default_rng([seed, 5])
         self.start_ns = clock.now_ns()
         self._image: tuple[int, bytes] = (-1, b"")
@@ -68,17 +73,23 @@ class Camera:
         """Return the true time of an exposure [ns]."""
         return self.start_ns + round(number / self.rate * NS)
 
-    def _expose(self) -> None:
+    def _encoded(self, number: int) -> bytes:
         import cv2
 
-        number = 0
+        image = self._draw(self.exposure_ns(number))
+        return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+
+    def _expose(self) -> None:
+        number, data = 0, b""
         while not self._stopped.is_set():
+            drawn = self._ahead and self._watchers and not self._stalled
+            if drawn:
+                data = self._encoded(number)
             due = self.exposure_ns(number) + int((self.delay + self._rng.uniform(0, 0.01)) * NS)
             if self._stopped.wait(max((due - self.clock.now_ns()) / NS / self.clock.rate, 0.0)):
                 return
             if self._watchers and not self._stalled:
-                image = self._draw(self.exposure_ns(number))
-                data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+                data = data if drawn else self._encoded(number)
                 with self._changed:
                     self._image = (number, data)
                     self._changed.notify_all()

@@ -214,6 +214,8 @@ def _draw(canvas: np.ndarray, face: str, pose: np.ndarray, cube: dict[str, Any],
     if outward @ centre >= 0:
         return
     texture = _texture(cube["ids"].get(face, -1), cube["tag"] / cube["side"])
+    if face in cube.get("turned", ()):  # glued on upside down
+        texture = np.ascontiguousarray(texture[::-1, ::-1])
     size = len(texture)
     # Columns: the texture's axes (right, down) and its centre; its inverse takes a ray to the face's plane.
     plane = np.stack([rotation @ right * side, rotation @ np.cross(right, normal) * side, centre], axis=-1)

@@ -1,0 +1,75 @@
+"""Find where a camera stands in the world."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+if TYPE_CHECKING:
+    from tacdata.demonstrations.camera_world import CameraWorld
+
+ORDER = 105
+PANEL = TOOLS
+
+
+def run(
+    out: Annotated[Path, typer.Option(help="File to write (YAML); a demo rig names it as the camera's world.")],
+    pairs: Annotated[
+        Path | None, typer.Option(help="Poses of a robot's gripper with a tag cube, and the cube as seen (YAML).")
+    ] = None,
+    board: Annotated[Path | None, typer.Option(help="Board file (YAML) of a ChArUco board that is the world.")] = None,
+    images: Annotated[
+        Path | None, typer.Option(help="With --board: folder of images of it, board and camera at rest.")
+    ] = None,
+    calibration: Annotated[
+        Path | None, typer.Option(help="With --board: what tacdata calibrate-camera wrote for this camera.")
+    ] = None,
+    camera: Annotated[str, typer.Option(help="With --board: name of the camera.")] = "camera",
+    frame: Annotated[str, typer.Option(help="With --board: name of the world.")] = "board",
+) -> None:
+    """Find where a camera stands: by a robot that carries a tag cube (hand-eye), or by a board on the table."""
+    import numpy as np
+
+    from tacdata import documents
+    from tacdata.errors import UsageError
+
+    if out.exists():
+        raise UsageError(f"{out} exists", "a new file; calibrations are not overwritten", "choose another --out")
+    if pairs is not None:
+        from tacdata.demonstrations.hand_eye_pairs import solve_pairs
+
+        found = solve_pairs(pairs)
+    elif board is not None and images is not None and calibration is not None:
+        found = _by_board(board, images, calibration, camera, frame)
+    else:
+        raise UsageError(
+            "neither --pairs nor --board with --images and --calibration", "one of them",
+            "see tacdata calibrate-world --help",
+        )  # fmt: skip
+    documents.write(out, found.document(datetime.now(UTC).isoformat(timespec="seconds")), "camera_world")
+    x, y, z = found.matrix[:3, 3]
+    place, turn = found.residual
+    print(f"camera {found.camera} stands at {x:.4f}, {y:.4f}, {z:.4f} m in {found.frame!r} ({found.method})")
+    print(f"{found.poses} poses leave {1000 * place:.2f} mm and {np.degrees(turn):.3f} deg (root mean square)")
+    if found.spread:
+        print(f"it is known to {1000 * found.spread[0]:.2f} mm and {np.degrees(found.spread[1]):.3f} deg")
+    for remark in found.remarks:
+        print(f"note: {remark}")
+    print(f"written to {out}\nnext: put  world: {out.name}  into the camera's entry of the demo rig file")
+
+
+def _by_board(board: Path, images: Path, calibration: Path, camera: str, frame: str) -> CameraWorld:
+    from tacdata import documents
+    from tacdata.demonstrations.board_pose import board_poses
+    from tacdata.demonstrations.hand_eye import board_world
+    from tacdata.tags.board import read_board
+    from tacdata.tags.view_picker import images_of
+
+    intrinsics = documents.read(calibration, "camera_calibration")["intrinsics"]
+    poses, rms, spread = board_poses(images_of(images), read_board(board), intrinsics)
+    return board_world(camera, frame, poses, rms, spread)

@@ -1,0 +1,59 @@
+"""Hand demonstrations to robots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+ORDER = 121
+PANEL = TOOLS
+
+
+def run(
+    path: Annotated[Path, typer.Argument(help="A folder that tacdata track worked up, or one of its recordings.")],
+    out: Annotated[Path, typer.Option(help="Folder to make.")],
+    form: Annotated[
+        str, typer.Option("--format", help="A file's name in tacdata/exporters: lerobot, csv, parquet, joints, ...")
+    ] = "lerobot",
+    direct: Annotated[
+        bool, typer.Option("--direct", help="Targets as the fingertips were seen, not moved by what was felt.")
+    ] = False,
+    task: Annotated[str | None, typer.Option(help="Task whose gains are taken; default: the demonstrations'.")] = None,
+    gains: Annotated[Path | None, typer.Option(help="Gains file (YAML); default: the paper's grasp and wipe.")] = None,
+    finger: Annotated[list[str] | None, typer.Option(help="Which fingers, in this order; default: all.")] = None,
+    robot: Annotated[Path | None, typer.Option(help="Robot file (YAML), for --format joints.")] = None,
+) -> None:
+    """Write fingertip targets, direct or compensated by touch, in a format that a robot reads."""
+    from tacdata.demonstrations.compensation import read_gains
+    from tacdata.demonstrations.demo_session import read_demo_session
+    from tacdata.demonstrations.tracks_file import path_of, read_tracks
+    from tacdata.exporters.exporter import exporter
+    from tacdata.replay.targets import targets_of
+
+    writer = exporter(form, robot)
+    files = [path_of(p) for p in read_demo_session(path).episodes] if path.is_dir() else [_tracks(path)]
+    episodes = []
+    for file in files:
+        made = read_tracks(file)
+        chosen = None if direct else read_gains(gains).of(task or made.task)
+        episodes.append(targets_of(made, chosen, finger or ()))
+    limits = writer.write(episodes, out)
+    for targets in episodes:
+        moved = 1000 * abs(targets.position - targets.seen).max()
+        kind = f"compensated by up to {moved:.1f} mm" if targets.kind == "compensated" else "direct"
+        print(f"{targets.recording}: {len(targets.time_ns)} targets for {', '.join(targets.fingers)}, {kind}")
+    for words in limits:
+        print(f"note: {words}")
+    print(f"written to {out} ({form}), poses in frame {episodes[0].frame!r}")
+    if limits and writer.needs_robot:
+        raise typer.Exit(1)
+
+
+def _tracks(path: Path) -> Path:
+    from tacdata.demonstrations.tracks_file import ENDING, path_of
+
+    return path if path.name.endswith(ENDING) else path_of(path)

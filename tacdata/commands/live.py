@@ -1,0 +1,97 @@
+"""Depth maps while a sensor is touched."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+if TYPE_CHECKING:
+    from tacdata.live.live_loop import LiveLoop
+
+ORDER = 122
+PANEL = TOOLS
+
+
+def run(
+    network: Annotated[Path, typer.Argument(help="A training run or checkpoint.")],
+    rig: Annotated[Path, typer.Option(help="Rig or demo rig file: which board.")],
+    finger: Annotated[str | None, typer.Option(help="With a demo rig: whose board; default: the first.")] = None,
+    causal: Annotated[
+        bool, typer.Option("--causal", help="Estimate the newest frame, without waiting for the network's look-ahead.")
+    ] = False,
+    socket: Annotated[int | None, typer.Option(help="Port on this machine to send messages to; 0: a free one.")] = None,
+    maps: Annotated[bool, typer.Option(help="With --socket: whole maps in the messages.")] = True,
+    view: Annotated[str | None, typer.Option(metavar="WHERE", help="Rerun: window, web, or a file (.rrd).")] = None,
+    tare: Annotated[float, typer.Option(help="How long nothing touches the skin at the beginning [s].")] = 1.0,
+    seconds: Annotated[float | None, typer.Option(help="End after so long [s]; default: Ctrl-C.")] = None,
+) -> None:
+    """Show depth map and contact centre at the sensor's rate, with their latency; send them to a socket or Rerun."""
+    from contextlib import ExitStack
+
+    from tacdata.live.depth_stream import DepthStream
+    from tacdata.live.live_loop import LiveLoop
+    from tacdata.live.message_server import MessageServer
+    from tacdata.live.source import stream_clock, touched_board
+    from training.checkpoint import load
+    from training.sequence import window_map
+
+    trained = load(network)
+    source = touched_board(rig, finger, trained.sensor)
+    trained.check_sensor(source.sensor, str(rig))
+    offsets = trained.network.offsets
+    stream = DepthStream(
+        window_map(trained), offsets, source.sensor.map, stream_clock(source.board), round(tare * source.rate), causal
+    )
+    print(_mode(trained.network.name, max(offsets), causal, source.rate), flush=True)
+    with ExitStack() as stack:
+        watch = server = None
+        if view:
+            from viewers.live_view import live_view
+
+            watch = stack.enter_context(live_view(view, source.sensor.taxels.columns, source.sensor.taxels.rows))
+        if socket is not None:
+            server = MessageServer(socket)
+            stack.callback(server.close)
+            where = f"127.0.0.1:{server.port}"
+            print(f"messages: {where}, one line of JSON each (schemas/live_message.schema.json)", flush=True)
+        stack.enter_context(source.board)
+        print(f"{source.name}: taring, do not touch the skin", flush=True)
+        loop = LiveLoop(source, stream, trained.content_hash, server, watch, maps)
+        with _stopping(loop):
+            loop.run(seconds, lambda words: print(words, flush=True))
+    figures = loop.meter.figures
+    print(figures.text if figures else "no estimate was made")
+    lost = source.board.counts.lost
+    print(f"board: {source.rate:g} Hz, {lost} frames lost, {loop.skipped} estimates left out as late")
+
+
+def _mode(name: str, ahead: int, causal: bool, rate: float) -> str:
+    """Say what the network's look-ahead costs."""
+    wait = f"{ahead} frames, {1000 * ahead / rate:.0f} ms at {rate:g} Hz"
+    if ahead <= 0:
+        return f"network {name} needs no later frames: each estimate is of the newest one"
+    if causal:
+        return (
+            f"causal: network {name} was trained to look {wait} ahead; the newest frame stands for them. That is right "
+            "while a contact holds still and late while it changes; `tacdata train --network causal` needs none."
+        )
+    return f"network {name} looks {wait} ahead: every estimate is at least so old (with --causal it is not)"
+
+
+@contextmanager
+def _stopping(loop: LiveLoop) -> Iterator[None]:
+    """Ctrl-C ends the loop and lets it say what it measured."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: loop.stop()) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

@@ -1,0 +1,83 @@
+"""Work up recorded demonstrations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+if TYPE_CHECKING:
+    from tacdata.demonstrations.demonstration import Demonstration
+    from tacdata.demonstrations.tracking import Estimator
+
+ORDER = 120
+PANEL = TOOLS
+
+
+def run(
+    path: Annotated[Path, typer.Argument(help="A folder that record --demo wrote, or one of its recordings.")],
+    network: Annotated[
+        Path | None, typer.Option(help="A training run or checkpoint: its predicted depth is added, marked as such.")
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Rate of the grid [Hz].")] = 30.0,
+) -> None:
+    """Smooth the fingertip paths of demonstrations, mark gaps, name faults, and add a network's predicted depth."""
+    from tacdata.demonstrations.compensation import contact_depth
+    from tacdata.demonstrations.demo_reader import read_demo
+    from tacdata.demonstrations.demo_session import read_demo_session
+    from tacdata.demonstrations.tracking import track
+    from tacdata.demonstrations.tracks_file import path_of, write_tracks
+    from tacdata.errors import UsageError
+
+    recordings = read_demo_session(path).episodes if path.is_dir() else (path,)
+    if not recordings:
+        raise UsageError(f"no finished demonstration in {path}", "one or more", "record with tacdata record --demo")
+    estimator = _estimator(network) if network else None
+    for recording in recordings:
+        made = track(read_demo(recording), rate, estimator)
+        write_tracks(path_of(recording), made)
+        _draw(made, recording)
+        length = f"{made.seconds[-1]:.1f} s in frame {made.frame!r}"
+        print(f"{recording.name}: {length}, written to {path_of(recording).name}")
+        for name, found in made.tracks.items():
+            felt = ""
+            if found.depth is not None:
+                depth = contact_depth(found.depth)
+                felt = f", predicted depth up to {max(depth[depth == depth], default=0.0):.2f} mm"
+            print(
+                f"  {name:<8} {found.sightings} sightings, {found.outliers} left out, "
+                f"{found.gap.mean():.1%} of the time in gaps{felt}"
+            )
+        for remark in made.remarks:
+            print(f"  note: {remark}")
+    hint = "" if network else "  (with --network the targets can be compensated)"
+    print(f"next: tacdata export {path} --out EXPORT{hint}")
+
+
+def _draw(made: Demonstration, recording: Path) -> None:
+    import numpy as np
+
+    from tacdata.demonstrations.compensation import contact_depth
+    from viewers.tracks_picture import Strip, draw_tracks
+
+    strips = [
+        Strip(
+            name, found.position, np.sqrt(np.trace(found.covariance[:, 3:, 3:], axis1=1, axis2=2) / 3), found.gap,
+            None if found.depth is None else contact_depth(found.depth),
+        )
+        for name, found in made.tracks.items()
+    ]  # fmt: skip
+    title = f"{recording.name}: {made.task}, frame {made.frame!r}"
+    draw_tracks(recording.with_suffix(".tracks.png"), made.seconds, strips, title)
+
+
+def _estimator(network: Path) -> Estimator:
+    from tacdata.demonstrations.tracking import Estimator
+    from training.checkpoint import load
+    from training.sequence import identity, sequence_maps
+
+    trained = load(network)
+    return Estimator(identity(trained), trained.sensor, lambda taxels: sequence_maps(trained, taxels))

@@ -1,0 +1,1 @@
+"""Demonstrations by hand: fingertip paths and touch, recorded, smoothed and compensated."""

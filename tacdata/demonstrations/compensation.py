@@ -1,0 +1,134 @@
+"""Fingertip targets moved along their normals by what the finger felt (paper, Tactile-Guided Compensation)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tacdata import documents
+from tacdata.errors import FormatError, UsageError
+
+LARGEST = 10
+"""How many of a map's largest depths the scalar depth is the mean of (paper)."""
+DEFAULT = Path(__file__).with_name("gains.yaml")
+STEPS = 12
+"""Gains tried between nothing and the largest before the interval is halved [count]."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """How far a target moves for each millimetre of depth, task by task."""
+
+    tasks: dict[str, dict[str, float]]
+    """Task -> finger -> gain [m/mm]."""
+    origin: str
+    """Where they come from, for messages."""
+
+    def of(self, task: str) -> dict[str, float]:
+        """Return a task's gain of each finger [m/mm].
+
+        Raises:
+            UsageError: If there is no such task.
+        """
+        if task not in self.tasks:
+            raise UsageError(
+                f"no gains for task {task!r} in {self.origin}", ", ".join(self.tasks),
+                "name one of them with --task, or add the task to a gains file",
+            )  # fmt: skip
+        return self.tasks[task]
+
+
+def read_gains(path: Path | None = None) -> Gains:
+    """Read a gains file (`schemas/gains.schema.json`); without a path the paper's gains.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: If it is damaged, or a task has another number of gains than there are fingers.
+    """
+    document = documents.read(path or DEFAULT, "gains")
+    order = document["fingers"]
+    for task, values in document["tasks"].items():
+        if len(values) != len(order):
+            given = f"{path or DEFAULT}: tasks/{task}: {len(values)} gains"
+            raise FormatError(given, f"{len(order)}: {', '.join(order)}", "give every finger a gain, 0 for none")
+    tasks = {task: dict(zip(order, map(float, values), strict=True)) for task, values in document["tasks"].items()}
+    return Gains(tasks, str(path) if path else "the paper's gains")
+
+
+def contact_depth(maps: np.ndarray) -> np.ndarray:
+    """Return d(t): the mean of the ten largest depths of each map [mm], shape (n,).
+
+    Args:
+        maps: Depth [mm], shape (n, pixels_x, pixels_y); a map with NaN gives NaN.
+
+    Raises:
+        FormatError: If a map has fewer than ten pixels.
+    """
+    flat = np.asarray(maps, float).reshape(len(maps), -1)
+    if flat.shape[1] < LARGEST:
+        raise FormatError(f"maps of {flat.shape[1]} pixels", f"at least {LARGEST}", "take the network's whole map")
+    return np.partition(flat, -LARGEST, axis=1)[:, -LARGEST:].mean(axis=1)
+
+
+def compensate(position: np.ndarray, normal: np.ndarray, depth: np.ndarray, gain: float) -> np.ndarray:
+    """Return p + gain d n [m], shape (n, 3).
+
+    Args:
+        position: Fingertips as seen [m], shape (n, 3).
+        normal: Unit normals towards the object [1], shape (n, 3).
+        depth: Contact depth d [mm], shape (n,); where it is NaN nothing was felt and nothing is moved.
+        gain: alpha [m/mm].
+
+    Raises:
+        UsageError: If the gain is negative or no number, or shapes or normals do not fit.
+    """
+    if not np.isfinite(gain) or gain < 0:
+        raise UsageError(f"a gain of {gain} m/mm", "0 or more", "correct the gains file")
+    length = np.linalg.norm(normal, axis=1)
+    if position.shape != normal.shape or len(depth) != len(position) or np.nanmax(np.abs(length - 1), initial=0) > 1e-3:
+        raise UsageError(
+            f"{len(position)} positions, {len(depth)} depths, normals of length {np.nanmin(length, initial=1):.3f}",
+            "as many of each, normals of length 1", "give fingertip poses with their depths",
+        )  # fmt: skip
+    return position + gain * np.nan_to_num(np.asarray(depth, float))[:, None] * normal
+
+
+def smallest_gain(
+    reached: Callable[[float], float], wanted: float, largest: float = 0.03, tolerance: float = 1e-4
+) -> float:
+    """Return the smallest gain [m/mm] with which a contact depth is reached.
+
+    Gains are tried upwards in equal steps, because a grasp need not answer evenly (an object can slip away), and the
+    first interval that reaches the depth is halved until it is narrower than ``tolerance``.
+
+    Args:
+        reached: Contact depth [mm] that a replay with this gain [m/mm] reaches: a trial on the robot or in simulation.
+        wanted: Contact depth wanted [mm].
+        largest: Largest gain tried [m/mm].
+        tolerance: How closely the gain is found [m/mm].
+
+    Raises:
+        UsageError: If no gain up to the largest reaches it, or an argument means nothing.
+    """
+    if not 0 < wanted < np.inf or not 0 < largest < np.inf or not 0 < tolerance < np.inf:
+        raise UsageError(f"depth {wanted} mm, gain up to {largest} m/mm", "positive numbers", "correct them")
+    low, best = 0.0, -np.inf
+    for gain in np.linspace(0.0, largest, STEPS + 1):
+        depth = float(reached(float(gain)))
+        best = max(best, depth)
+        if depth >= wanted:
+            high = float(gain)
+            break
+        low = float(gain)
+    else:
+        raise UsageError(
+            f"a contact depth of {wanted:g} mm; the deepest reached is {best:.3g} mm",
+            f"a depth that gains up to {largest:g} m/mm reach", "want less, or allow a larger gain",
+        )  # fmt: skip
+    while high - low > tolerance:
+        middle = (low + high) / 2
+        low, high = (low, middle) if float(reached(middle)) >= wanted else (middle, high)
+    return high

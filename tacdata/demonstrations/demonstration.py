@@ -1,0 +1,76 @@
+"""A demonstration, worked up: fingertip paths on one time grid, with what the fingers felt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tacdata.sensor import Sensor
+
+
+@dataclass(frozen=True, eq=False)
+class FingerTrack:
+    """One finger's path on the demonstration's grid."""
+
+    finger: str
+    hand: str
+    """"left", "right" or unknown."""
+    kind: str
+    """"thumb", "index", "middle", ... or unknown."""
+    position: np.ndarray
+    """Fingertip's origin [m], shape (n, 3); NaN before the first and after the last sighting."""
+    quaternion: np.ndarray
+    """From the fingertip's frame to the demonstration's, xyzw [1], shape (n, 4); NaN likewise."""
+    covariance: np.ndarray
+    """Of a small turn [rad] and the position [m], both in the demonstration's frame, shape (n, 6, 6)."""
+    gap: np.ndarray
+    """Whether no sighting lies near: the pose is a bridge between others, or unknown; shape (n,), bool."""
+    sightings: int
+    """Images in which the finger was seen."""
+    outliers: int
+    """Sightings left out because they contradict the others."""
+    signals: np.ndarray | None = None
+    """Tared readings [counts], shape (n, taxels), float32; NaN where the board said nothing. None without board."""
+    depth: np.ndarray | None = None
+    """PREDICTED depth [mm], shape (n, pixels_x, pixels_y), float32: a network's estimate, never a measurement; NaN
+    where it had no reading. None without a network."""
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normal out of the pad, towards the object [1], shape (n, 3): the fingertip frame's z."""
+        x, y, z, w = self.quaternion.T
+        return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstration:
+    """Fingers on one grid of times."""
+
+    recording: str
+    """File name of the recording."""
+    recording_hash: str
+    """Its SHA-256."""
+    task: str
+    frame: str
+    """Frame of all poses: the world's name, or "camera NAME"."""
+    rate: float
+    """Of the grid [Hz]."""
+    time_ns: np.ndarray
+    """Times of the grid on the recording's clock [ns], shape (n,), int64."""
+    tracks: dict[str, FingerTrack]
+    sensors: dict[str, Sensor]
+    """Finger -> its skin, of fingers with a board."""
+    smoothing: dict[str, Any] = field(default_factory=dict)
+    """Settings of the smoother and what it chose, by finger."""
+    network: dict[str, Any] | None = None
+    """Whose predicted depth the tracks hold: hash, network, epoch, lookahead [frames], sensor; None without."""
+    remarks: tuple[str, ...] = ()
+    """What a person should know of it, in words."""
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def seconds(self) -> np.ndarray:
+        """Times since the grid's beginning [s], shape (n,)."""
+        return (self.time_ns - self.time_ns[0]) * 1e-9

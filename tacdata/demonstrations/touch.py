@@ -1,0 +1,77 @@
+"""What a finger's board felt: tared readings on the demonstration's grid, and what is wrong with them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from tacdata.recording.episode import TaxelStream
+
+REST = 0.5
+"""Length of the quietest stretch, which is taken as untouched [s]."""
+SILENT = 0.5
+"""A board that says nothing for longer has been silent [s]."""
+TOUCH = 8.0
+"""A reading that rises by so many times the noise has been touched [1]."""
+
+
+def baseline(stream: TaxelStream) -> np.ndarray:
+    """Return the reading of each taxel without touch [counts], shape (taxels,).
+
+    A demonstration has no marked rest. Touch closes the taxels and raises their capacitance, so the stretch of `REST`
+    with the lowest sum of all readings is taken as untouched.
+    """
+    rows = max(min(round(REST / _period(stream)), len(stream.counts)), 1)
+    total = np.concatenate([[0.0], np.cumsum(stream.counts.sum(axis=1))])
+    start = int(np.argmin(total[rows:] - total[:-rows]))
+    return stream.counts[start : start + rows].mean(axis=0)
+
+
+def on_grid(stream: TaxelStream, values: np.ndarray, times_ns: np.ndarray) -> np.ndarray:
+    """Return the value of the nearest frame at each time; NaN where none lies within 1.5 periods.
+
+    Args:
+        stream: The board's frames, shape (m,).
+        values: One value a frame, shape (m, ...).
+        times_ns: Times [ns], shape (n,).
+    """
+    result = np.full((len(times_ns), *values.shape[1:]), np.nan, np.float32)
+    if not len(values):
+        return result
+    last = len(values) - 1
+    after = np.clip(np.searchsorted(stream.sample_ns, times_ns), min(1, last), last)
+    before = np.maximum(after - 1, 0)
+    is_nearer = times_ns - stream.sample_ns[before] < stream.sample_ns[after] - times_ns
+    nearest = np.where(is_nearer, before, after)
+    near = np.abs(stream.sample_ns[nearest] - times_ns) <= 1.5e9 * _period(stream)
+    result[near] = values[nearest[near]]
+    return result
+
+
+def faults(name: str, stream: TaxelStream, begin_ns: int, end_ns: int) -> list[str]:
+    """Say what is wrong with a board's signal: none, silent for a while, stuck channels, never touched."""
+    if len(stream.counts) < 2:
+        return [f"{name}: its board gave no signal"]
+    remarks = []
+    edges = np.concatenate([[begin_ns], stream.sample_ns, [end_ns]])
+    for a, b in pairwise(edges):
+        if b - a > SILENT * 1e9:
+            when = f"from {(a - begin_ns) * 1e-9:.1f} s to the end" if b == end_ns else (
+                f"from {(a - begin_ns) * 1e-9:.1f} to {(b - begin_ns) * 1e-9:.1f} s"
+            )  # fmt: skip
+            remarks.append(f"{name}: its board is silent {when}")
+    spread = np.ptp(stream.counts, axis=0)
+    stuck = np.flatnonzero(spread == 0)
+    if len(stuck) == stream.counts.shape[1]:
+        remarks.append(f"{name}: no reading of its board ever changes: it is not connected to a skin")
+    elif len(stuck):
+        remarks.append(f"{name}: channels {', '.join(map(str, stuck))} never change")
+    noise = np.median(np.abs(np.diff(stream.counts, axis=0)), axis=0) + 1.0
+    if len(stuck) < len(spread) and (spread < TOUCH * noise).all():
+        remarks.append(f"{name}: its board speaks, but nothing ever touched the finger")
+    return remarks
+
+
+def _period(stream: TaxelStream) -> float:
+    return max(float(np.median(np.diff(stream.sample_ns))) * 1e-9, 1e-4) if len(stream.sample_ns) > 1 else 1.0

@@ -1,0 +1,128 @@
+"""A worked-up demonstration as a file: Parquet, one row a grid time (`schemas/finger_tracks.schema.json`)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+import schemas
+from tacdata import documents
+from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
+from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.replacement import replacement
+from tacdata.sensor import Sensor
+
+HEADER = b"tacdata.finger_tracks"
+ENDING = ".tracks.parquet"
+UNITS = {
+    "position": "m", "quaternion": "1", "covariance": "rad^2, rad m, m^2", "gap": "1",
+    "signals": "counts", "predicted_depth": "mm",
+}  # fmt: skip
+"""Column of a finger -> unit; the columns are called FINGER.COLUMN, and time_ns [ns]."""
+REMEDY = "run `tacdata track` again: the recording holds everything"
+
+
+def path_of(recording: Path) -> Path:
+    """Return where the tracks of a recording lie: beside it."""
+    return recording.with_name(recording.name.removesuffix(".mcap") + ENDING)
+
+
+def write_tracks(path: Path, made: Demonstration) -> None:
+    """Write a worked-up demonstration; a crash leaves the old file or the new one.
+
+    Raises:
+        FormatError: If it contradicts the schema.
+        DeviceError: If the disk refuses it.
+    """
+    columns: dict[str, Any] = {"time_ns": pa.array(made.time_ns)}
+    for name, track in made.tracks.items():
+        for column, values in _columns(track).items():
+            flat = values.reshape(len(values), -1)
+            columns[f"{name}.{column}"] = (
+                pa.array(values) if values.ndim == 1
+                else pa.FixedSizeListArray.from_arrays(pa.array(flat.reshape(-1)), flat.shape[1])
+            )  # fmt: skip
+    header = {
+        "version": schemas.version("finger_tracks"),
+        **{k: getattr(made, k) for k in ("recording", "recording_hash", "task", "frame", "rate", "smoothing")},
+        "frames": len(made.time_ns),
+        "fingers": {name: _described(track, made.sensors.get(name)) for name, track in made.tracks.items()},
+        "units": {"time_ns": "ns", **UNITS}, "columns": list(columns), "network": made.network,
+        "remarks": list(made.remarks), "provenance": made.provenance,
+    }  # fmt: skip
+    documents.check(header, "finger_tracks", str(path))
+    table = pa.table(columns).replace_schema_metadata({HEADER: json.dumps(header)})
+    try:
+        with replacement(path) as stream:
+            pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
+    except OSError as error:
+        given = f"writing {path} failed: {error}"
+        raise DeviceError(given, "a disk with room", "make room, then track again") from error
+
+
+def read_tracks(path: Path) -> Demonstration:
+    """Read a worked-up demonstration.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: If it is damaged or of another kind.
+    """
+    if not path.is_file():
+        raise UsageError(f"no file {path}", f"a file that ends in {ENDING}", "run `tacdata track` first")
+    try:
+        table = pq.read_table(path, page_checksum_verification=True)
+        header = json.loads((table.schema.metadata or {})[HEADER])
+    except (pa.ArrowException, OSError, KeyError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise FormatError(f"{path} holds no tracks: {reason}", "a file that `tacdata track` wrote", REMEDY) from None
+    documents.check(header, "finger_tracks", str(path))
+    try:
+        sensors = {
+            name: Sensor.from_document(entry["sensor"], f"{path}: {name}")
+            for name, entry in header["fingers"].items() if entry.get("sensor")
+        }  # fmt: skip
+        tracks = {n: _track(n, e, table, sensors.get(n)) for n, e in header["fingers"].items()}
+        time_ns = table.column("time_ns").to_numpy()
+    except (KeyError, ValueError, AttributeError, pa.ArrowException) as error:
+        raise FormatError(f"{path}: {error}", "columns as its header says", REMEDY) from None
+    named = {f.name: header[f.name] for f in fields(Demonstration) if f.name in header and f.name != "remarks"}
+    return Demonstration(**named, time_ns=time_ns, tracks=tracks, sensors=sensors, remarks=tuple(header["remarks"]))
+
+
+def _columns(track: FingerTrack) -> dict[str, np.ndarray]:
+    named = {"position": track.position, "quaternion": track.quaternion, "covariance": track.covariance}
+    if track.signals is not None:
+        named["signals"] = track.signals
+    if track.depth is not None:
+        named["predicted_depth"] = track.depth
+    return {**named, "gap": track.gap}
+
+
+def _described(track: FingerTrack, sensor: Sensor | None) -> dict[str, Any]:
+    entry = {"hand": track.hand, "kind": track.kind, "sightings": track.sightings, "outliers": track.outliers}
+    return {**entry, "in_gaps": float(track.gap.mean()), "sensor": sensor.document if sensor else None}
+
+
+def _track(name: str, entry: dict[str, Any], table: pa.Table, sensor: Sensor | None) -> FingerTrack:
+    rows = table.num_rows
+
+    def column(which: str, *shape: int) -> np.ndarray | None:
+        if f"{name}.{which}" not in table.column_names:
+            return None
+        values = table.column(f"{name}.{which}").combine_chunks()
+        return values.flatten().to_numpy().reshape(rows, *shape)
+
+    maps = sensor.map.shape if sensor else ()
+    found = column("position", 3), column("quaternion", 4), column("covariance", 6, 6)
+    position, quaternion, covariance = (values for values in found if values is not None)
+    return FingerTrack(
+        name, entry["hand"], entry["kind"], position, quaternion, covariance,
+        table.column(f"{name}.gap").to_numpy(), entry["sightings"], entry["outliers"], column("signals", -1),
+        column("predicted_depth", *maps) if sensor else None,
+    )  # fmt: skip

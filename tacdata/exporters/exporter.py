@@ -1,0 +1,83 @@
+"""What an exporter's file holds.
+
+``tacdata/exporters/my_robot.py`` defines one class derived from `Exporter`; ``tacdata export --format my_robot`` finds
+it by its file's name. `write` makes a new folder from targets, `read` gives the same targets back: what a robot will
+do can be looked at, and the tests hold one against the other for every file here.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tacdata import registry
+from tacdata.errors import UsageError
+from tacdata.replay.targets import Targets
+
+ROOM, BASE = "tacdata.exporters", "exporter"
+
+
+class Exporter(ABC):
+    """A format that a robot reads."""
+
+    needs_robot = False
+    """Whether `write` needs a robot file (`schemas/robot.schema.json`)."""
+
+    def __init__(self, robot: Path | None = None) -> None:
+        """Keep the robot file, if there is one."""
+        self.robot = robot
+
+    @abstractmethod
+    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+        """Write a new folder.
+
+        Args:
+            episodes: Targets, one entry a demonstration.
+            out: The folder; it does not exist.
+
+        Returns:
+            What a person must know of what was written, in words: above all what a robot cannot do.
+
+        Raises:
+            UsageError: If something that the format needs is missing.
+            DeviceError: If the disk refuses it.
+        """
+
+    @abstractmethod
+    def read(self, out: Path) -> list[Targets]:
+        """Return the targets of a folder that `write` made.
+
+        Raises:
+            UsageError: If there is none.
+            FormatError: If it is damaged.
+        """
+
+
+def new_folder(out: Path) -> None:
+    """Make a folder that did not exist.
+
+    Raises:
+        UsageError: If it exists or cannot be made.
+    """
+    if out.exists():
+        raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
+    try:
+        out.mkdir(parents=True)
+    except OSError as error:
+        given = f"{out} cannot be made: {error.strerror}"
+        raise UsageError(given, "a place to write", "choose another --out") from None
+
+
+def exporter(name: str, robot: Path | None = None) -> Exporter:
+    """Return the exporter of a format.
+
+    Raises:
+        UsageError: If there is no such format, or it needs a robot file.
+    """
+    kind: Any = registry.load(ROOM, BASE, name, Exporter)
+    made: Exporter = kind(robot)
+    if made.needs_robot and robot is None:
+        raise UsageError(f"format {name} without a robot", "--robot ROBOT.yaml", "describe the robot in a file")
+    return made

@@ -1,0 +1,123 @@
+"""Joint values for a robot's URDF, by inverse kinematics; what it cannot reach is NaN and named, never clipped."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+import schemas
+from tacdata import documents, provenance
+from tacdata.errors import FormatError, UsageError
+from tacdata.exporters.exporter import Exporter, new_folder
+from tacdata.replacement import replacement
+from tacdata.replay.columns import from_columns, to_columns
+from tacdata.replay.inverse_kinematics import JointPath, follow
+from tacdata.replay.robot import Robot, read_robot
+from tacdata.replay.targets import Targets
+
+HEADER = b"tacdata.joint_trajectory"
+JOINT = "joint."
+"""What the name of a column of joint values begins with."""
+
+
+class Joints(Exporter):
+    """``NAME.joints.parquet``: joint values beside the targets (`schemas/joint_trajectory.schema.json`)."""
+
+    needs_robot = True
+
+    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+        """Solve and write a new folder; returns what cannot be reached, in words."""
+        if self.robot is None:
+            raise UsageError("no robot", "a robot file", "name it with --robot")
+        robot, said = read_robot(self.robot), []
+        solved = [follow(robot, targets)[0] for targets in episodes]
+        new_folder(out)
+        for targets, path in zip(episodes, solved, strict=True):
+            stem = Path(targets.recording).stem
+            said += [f"{stem}: {words}" for words in in_words(path, targets)]
+            columns = to_columns(targets)
+            header = _header(targets, path, robot, columns)
+            documents.check(header, "joint_trajectory", stem)
+            whole = columns | {f"{JOINT}{joint.name}": path.values[:, k] for k, joint in enumerate(path.joints)}
+            table = pa.table(whole).replace_schema_metadata({HEADER: json.dumps(header)})
+            with replacement(out / f"{stem}.joints.parquet") as stream:
+                pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
+        return said
+
+    def read(self, out: Path) -> list[Targets]:
+        """Return the targets of a folder; `read_joints` gives the joint values."""
+        return [targets for targets, _, _ in read_joints(out)]
+
+
+def read_joints(out: Path) -> list[tuple[Targets, dict[str, np.ndarray], dict[str, Any]]]:
+    """Return targets, joint values by name [rad or m], shape (n,), and the header of every file in a folder.
+
+    Raises:
+        UsageError: If there is none.
+        FormatError: If a file is damaged.
+    """
+    found = sorted(Path(out).glob("*.joints.parquet"))
+    if not found:
+        allowed = "a folder that tacdata export --format joints wrote"
+        raise UsageError(f"no joint trajectory in {out}", allowed, "check the path")
+    return [_read(path) for path in found]
+
+
+def in_words(path: JointPath, targets: Targets) -> list[str]:
+    """Return what the robot cannot do, in words with times."""
+    seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
+    said = []
+    for name, rows in path.unreached.items():
+        chosen = list(rows), targets.fingers.index(name)
+        worst = 1000 * path.position_error[chosen].max(), np.degrees(path.rotation_error[chosen].max())
+        share = f"{len(rows)} of {len(seconds)} targets ({_when(rows, seconds)})"
+        said.append(f"{name} does not reach {share}, off by up to {worst[0]:.1f} mm, {worst[1]:.0f} deg")
+    for name, rows in path.outside_workspace.items():
+        said.append(f"{name}: {len(rows)} targets lie outside the workspace ({_when(rows, seconds)})")
+    for name, rows in path.too_fast.items():
+        when = _when(rows, seconds)
+        said.append(f"joint {name} would have to be faster than its limit at {len(rows)} times ({when})")
+    return said
+
+
+def _when(rows: tuple[int, ...], seconds: np.ndarray) -> str:
+    parts = np.split(np.array(rows), 1 + np.flatnonzero(np.diff(rows) > 1))
+    shown = [f"{seconds[part[0]]:.2f} to {seconds[part[-1]]:.2f} s" for part in parts[:3]]
+    return ", ".join(shown) + (f" and {len(parts) - 3} more stretches" if len(parts) > 3 else "")
+
+
+def _header(targets: Targets, path: JointPath, robot: Robot, columns: dict[str, np.ndarray]) -> dict[str, Any]:
+    good = np.isfinite(path.values).all(axis=1)
+    largest = [float(e[good].max()) if good.any() else None for e in (path.position_error, path.rotation_error)]
+    parents = {"recording": targets.recording_hash, "urdf": robot.urdf_hash}
+    return {
+        "version": schemas.version("joint_trajectory"), "targets": targets.header(columns), "robot": robot.document,
+        "urdf_hash": robot.urdf_hash, "joints": [asdict(joint) for joint in path.joints],
+        "tolerance": {"position": robot.tolerance[0], "rotation": robot.tolerance[1]}, "frames": len(path.values),
+        "unreached": {name: list(rows) for name, rows in path.unreached.items()},
+        "too_fast": {name: list(rows) for name, rows in path.too_fast.items()},
+        "outside_workspace": {name: list(rows) for name, rows in path.outside_workspace.items()},
+        "errors": {"position": largest[0], "rotation": largest[1]},
+        "provenance": provenance.stamp("tacdata export", parents, {"robot": robot.name}),
+    }  # fmt: skip
+
+
+def _read(path: Path) -> tuple[Targets, dict[str, np.ndarray], dict[str, Any]]:
+    try:
+        table = pq.read_table(path, page_checksum_verification=True)
+        header = json.loads((table.schema.metadata or {})[HEADER])
+    except (pa.ArrowException, OSError, KeyError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        given = f"{path} holds no joint trajectory: {reason}"
+        raise FormatError(given, "a file of tacdata export", "export again") from None
+    documents.check(header, "joint_trajectory", str(path))
+    columns = {name: np.asarray(table.column(name).to_numpy()) for name in table.column_names}
+    values = {name.removeprefix(JOINT): column for name, column in columns.items() if name.startswith(JOINT)}
+    return from_columns(header["targets"], columns, str(path)), values, header

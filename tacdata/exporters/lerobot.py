@@ -1,0 +1,168 @@
+"""LeRobot v3.0: actions are the targets, observations are what was seen, felt and predicted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from tacdata import documents
+from tacdata.dataset import folder, statistics, tiff
+from tacdata.dataset.features import INDEX_COLUMNS
+from tacdata.errors import FormatError, UsageError
+from tacdata.exporters.exporter import Exporter, new_folder
+from tacdata.replay.columns import AXES, TURNS
+from tacdata.replay.targets import Targets
+
+META = Path("meta/tacdata_targets.json")
+"""What the targets are, an entry an episode (`schemas/fingertip_targets.schema.json`)."""
+ACTION, STATE = "action", "observation.state"
+DEPTH, FELT, GAP = "tacdata.predicted_contact_depth", "tacdata.felt", "tacdata.gap"
+TIME = "tacdata.time_ns"
+
+
+class Lerobot(Exporter):
+    """One dataset of all demonstrations; opens in stock lerobot.
+
+    ``action``: fingertip targets, ``observation.state``: fingertips as seen, both x y z [m] and qx qy qz qw a finger;
+    ``observation.tactile.FINGER`` [counts]; ``observation.predicted_depth.FINGER``: a network's estimate as a float32
+    depth image (metres in the file, millimetres in lerobot), with the checkpoint's hash in the feature's ``info``.
+    """
+
+    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+        """Write a new dataset."""
+        rate = _same([targets.rate for targets in episodes], "rates")
+        fingers = _same([targets.fingers for targets in episodes], "fingers")
+        _same([json.dumps(targets.network) for targets in episodes], "networks")
+        columns = [_columns(targets) for targets in episodes]
+        features = _features(episodes[0], columns[0])
+        if any(set(other) != set(columns[0]) for other in columns):
+            raise UsageError("demonstrations with boards on other fingers", "the same in all", "export them apart")
+        new_folder(out)
+        info = folder.empty_info(features, rate, "fingertips " + " ".join(fingers))
+        tasks, first, parts = list(dict.fromkeys(t.task for t in episodes)), 0, []
+        for number, (targets, whole) in enumerate(zip(episodes, columns, strict=True)):
+            count = len(targets.time_ns)
+            whole |= {
+                "timestamp": (np.arange(count) / info["fps"]).astype(np.float32), "frame_index": np.arange(count),
+                "episode_index": np.full(count, number), "index": np.arange(first, first + count),
+                "task_index": np.full(count, tasks.index(targets.task)),
+            }  # fmt: skip
+            stats = {key: statistics.column_statistics(whole[key]) for key in features}
+            parts.append(stats)
+            folder.write_parquet(out / folder.data_path(number), _table(whole, features))
+            row = folder.EpisodeRow(number, first, first + count, (targets.task,), number, number)
+            folder.write_row(out, row, stats, {})
+            first += count
+        folder.write_tasks(out, tasks)
+        folder.write_stats(out, {key: statistics.merge([part[key] for part in parts]) for key in features})
+        entries = [targets.header(features) for targets in episodes]
+        for entry in entries:
+            documents.check(entry, "fingertip_targets", str(out / META))
+        documents.write_text(out / META, json.dumps(entries, indent=1))
+        info |= {"total_episodes": len(episodes), "total_frames": first, "total_tasks": len(tasks)}
+        info["splits"] = {"train": f"0:{len(episodes)}"}
+        documents.write_text(out / folder.INFO, json.dumps(info, indent=4))
+        note = f"fps is {info['fps']} where the grid has {rate:g} Hz: LeRobot wants whole numbers"
+        return [] if info["fps"] == rate else [note]
+
+    def read(self, out: Path) -> list[Targets]:
+        """Return the targets of a dataset, to float32."""
+        info = folder.read_info(Path(out))
+        try:
+            entries = json.loads((Path(out) / META).read_text())
+        except (OSError, ValueError) as error:
+            given = f"{out}: {META} is missing or damaged: {error}"
+            raise FormatError(given, "a folder that tacdata export wrote", "export again") from None
+        rows = folder.read_rows(Path(out), info)
+        if len(entries) != len(rows):
+            given = f"{out}: {len(rows)} episodes, {META} describes {len(entries)}"
+            raise FormatError(given, "one entry an episode", "export again")
+        return [_read(Path(out), row, entry) for row, entry in zip(rows, entries, strict=True)]
+
+
+def _same(values: Sequence[Any], what: str) -> Any:
+    if not values:
+        raise UsageError("no demonstrations", "one or more", "track demonstrations first")
+    if any(value != values[0] for value in values):
+        raise UsageError(f"demonstrations of different {what}", "one dataset, one of each", "export them apart")
+    return values[0]
+
+
+def _columns(targets: Targets) -> dict[str, np.ndarray]:
+    count, made = len(targets.time_ns), targets.source
+    columns = {
+        ACTION: np.concatenate([targets.position, targets.quaternion], -1).reshape(count, -1).astype(np.float32),
+        STATE: np.concatenate([targets.seen, targets.quaternion], -1).reshape(count, -1).astype(np.float32),
+        # LeRobot's statistics bear no NaN: 0 where nothing was felt, which FELT says.
+        DEPTH: np.nan_to_num(targets.depth).astype(np.float32),
+        FELT: np.isfinite(targets.depth), GAP: targets.gap, TIME: targets.time_ns,
+    }  # fmt: skip
+    if len(targets.fingers) == 1:  # LeRobot stores a vector of one as a number
+        columns = {key: values[:, 0] if values.shape[1:] == (1,) else values for key, values in columns.items()}
+    for name, track in () if made is None else ((name, made.tracks[name]) for name in targets.fingers):
+        if track.signals is not None:
+            columns[f"observation.tactile.{name}"] = np.nan_to_num(track.signals[targets.rows])
+        if track.depth is not None:
+            maps = np.nan_to_num(track.depth[targets.rows]).astype(np.float32)
+            columns[f"observation.predicted_depth.{name}"] = maps / tiff.MM_PER_METRE
+    return columns
+
+
+def _features(targets: Targets, columns: dict[str, np.ndarray]) -> dict[str, dict[str, Any]]:
+    pose = [f"{name}.{part}" for name in targets.fingers for part in (*AXES, *TURNS)]
+    made: dict[str, dict[str, Any]] = {}
+    for key, values in columns.items():
+        shape, names, info = list(values.shape[1:]) or [1], None, {}
+        dtype = "bool" if values.dtype == bool else str(values.dtype)
+        if key in (ACTION, STATE):
+            names, info = pose, {"unit": "m, 1", "frame": targets.frame}
+        elif key in (DEPTH, FELT, GAP):
+            names, info = list(targets.fingers), {"unit": "mm" if key == DEPTH else "1"}
+        elif values.ndim == 3:
+            dtype, shape, names = "image", [*shape, 1], ["height", "width", "channels"]
+            info = {"is_depth_map": True, "depth_unit": "m", "unit": "m"}
+        elif key != TIME:
+            info = {"unit": "counts"}
+        if "predicted" in key:
+            info |= {"prediction": True, "checkpoint": (targets.network or {}).get("hash", "")}
+        made[key] = {"dtype": dtype, "shape": shape, "names": names, "info": info}
+    return made | {k: {"dtype": dtype, "shape": [1], "names": None} for k, dtype in INDEX_COLUMNS.items()}
+
+
+def _table(whole: dict[str, np.ndarray], features: dict[str, Any]) -> pa.Table:
+    arrays: dict[str, Any] = {}
+    for key, feature in features.items():
+        values = whole[key]
+        if feature["dtype"] == "image":
+            arrays[key] = tiff.encode(values)
+        elif values.ndim == 2:
+            arrays[key] = pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
+        else:
+            arrays[key] = pa.array(values)
+    return pa.table(arrays).replace_schema_metadata({b"huggingface": folder.huggingface_metadata(features)})
+
+
+def _read(out: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> Targets:
+    documents.check(header, "fingertip_targets", str(out / META))
+    wanted = [ACTION, STATE, DEPTH, FELT, GAP, TIME]
+    table = folder.read_parquet(out / folder.data_path(row.data_file), wanted)
+    fingers, count = tuple(header["fingers"]), table.num_rows
+
+    def column(key: str, *shape: int) -> np.ndarray:
+        values = table[key].combine_chunks()
+        flat = values.flatten() if pa.types.is_nested(values.type) else values
+        return flat.to_numpy(zero_copy_only=False).reshape(count, len(fingers), *shape)
+
+    action, state = column(ACTION, 7).astype(float), column(STATE, 7).astype(float)
+    depth = np.where(column(FELT), column(DEPTH).astype(float), np.nan)
+    named = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
+    return Targets(
+        **{name: header[name] for name in named}, fingers=fingers, time_ns=table[TIME].to_numpy(),
+        position=action[..., :3], quaternion=action[..., 3:], seen=state[..., :3], depth=depth, gap=column(GAP),
+        remarks=tuple(header["remarks"]),
+    )  # fmt: skip

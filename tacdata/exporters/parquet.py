@@ -1,0 +1,53 @@
+"""Parquet, a file a demonstration, with what it means in its header."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from tacdata.errors import FormatError, UsageError
+from tacdata.exporters.exporter import Exporter, new_folder
+from tacdata.replacement import replacement
+from tacdata.replay.columns import from_columns, to_columns
+from tacdata.replay.targets import Targets
+
+HEADER = b"tacdata.fingertip_targets"
+
+
+class Parquet(Exporter):
+    """``NAME.parquet``; the header is the document of `schemas/fingertip_targets.schema.json`."""
+
+    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+        """Write a new folder."""
+        new_folder(out)
+        for targets in episodes:
+            columns = to_columns(targets)
+            header = {HEADER: json.dumps(targets.header(columns))}
+            with replacement(out / f"{Path(targets.recording).stem}.parquet") as stream:
+                table = pa.table(columns).replace_schema_metadata(header)
+                pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
+        return []
+
+    def read(self, out: Path) -> list[Targets]:
+        """Return the targets of a folder."""
+        found = sorted(Path(out).glob("*.parquet"))
+        if not found:
+            allowed = "a folder that tacdata export --format parquet wrote"
+            raise UsageError(f"no Parquet file in {out}", allowed, "check the path")
+        return [_read(path) for path in found]
+
+
+def _read(path: Path) -> Targets:
+    try:
+        table = pq.read_table(path, page_checksum_verification=True)
+        header = json.loads((table.schema.metadata or {})[HEADER])
+    except (pa.ArrowException, OSError, KeyError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise FormatError(f"{path} holds no targets: {reason}", "a file of tacdata export", "export again") from None
+    columns = {name: np.asarray(table.column(name).to_numpy()) for name in table.column_names}
+    return from_columns(header, columns, str(path))

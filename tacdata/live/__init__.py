@@ -1,0 +1,1 @@
+"""Depth maps while the sensor is touched: windows over a stream, messages for controllers, latencies."""

@@ -1,0 +1,133 @@
+"""From a stream of frames to depth maps at the sensor's rate, by a network over a sliding window."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.demonstrations.compensation import contact_depth
+from tacdata.devices.device import TaxelFrame
+from tacdata.errors import DeviceError, UsageError
+from tacdata.recording.stream_clock import StreamClock
+from tacdata.sensor import DepthMap
+
+REGION = 0.4
+"""Depth above which a pixel belongs to the contact region [mm] (paper, Exp. 3)."""
+STILL = 6.0
+"""While taring, readings may spread by so many times their frame-to-frame noise [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What one frame's skin is estimated to be pressed; a network's prediction."""
+
+    sequence: int
+    """Number of the estimate."""
+    sample_ns: int
+    """When the frame that it is of was sampled, as estimated [ns]."""
+    arrival_ns: int
+    """When the newest frame used arrived [ns]."""
+    depth: np.ndarray
+    """Map [mm], shape (pixels_x, pixels_y), float32."""
+    largest: float
+    """Mean of the ten largest depths [mm]."""
+    centre: tuple[float, float] | None
+    """Centroid of the pixels deeper than `REGION` in the sensor's frame [mm]; None without contact."""
+
+
+class DepthStream:
+    """Takes frames one by one, gives an estimate for each once its window is full.
+
+    The first frames are for taring: nothing may touch the skin. A centred window gives the estimate of the frame
+    ``lookahead`` frames before the newest one. With ``causal`` the estimate is of the newest frame; the network's
+    frames to come are then all taken to be like it, which is what training did at the end of an episode: right while
+    the contact holds still, late while it changes.
+    """
+
+    def __init__(
+        self, estimate: Callable[[np.ndarray], np.ndarray], offsets: Sequence[int], grid: DepthMap,
+        clock: StreamClock, tare_frames: int, causal: bool = False,
+    ) -> None:  # fmt: skip
+        """Begin without frames.
+
+        Args:
+            estimate: Window of tared readings [counts], shape (len(offsets), taxels) -> map [mm].
+            offsets: Frames of the window relative to its target, ascending.
+            grid: The sensor's pixels.
+            clock: The board's clock, which says when frames were sampled.
+            tare_frames: Frames at the beginning over which the untouched reading is averaged.
+            causal: Whether to estimate the newest frame.
+
+        Raises:
+            UsageError: If there is no frame for taring.
+        """
+        if tare_frames < 1:
+            raise UsageError(f"taring over {tare_frames} frames", "one or more", "give --tare more time")
+        self._estimate, self._offsets, self._grid, self._clock = estimate, tuple(offsets), grid, clock
+        self.causal, self.lookahead = causal, 0 if causal else max(max(offsets), 0)
+        self._wanted, self._tare = tare_frames, []
+        self._frames: deque[tuple[np.ndarray, int]] = deque(maxlen=1 + max(offsets) - min(*offsets, 0))
+        self._sequence = 0
+        self.baseline: np.ndarray | None = None
+        """Reading without touch [counts], shape (taxels,), once it is known."""
+
+    def push(self, frame: TaxelFrame, wanted: bool = True) -> Estimate | None:
+        """Take a frame; return the estimate that it completes, or None while taring and at the beginning.
+
+        Args:
+            frame: The next frame.
+            wanted: Whether the estimate is wanted; without it the frame only enters the window.
+
+        Raises:
+            DeviceError: If something touched the skin while it was tared.
+        """
+        counter = frame.device_ns if self._clock.axis == "device_ns" else frame.counter
+        sample_ns = self._clock.take(frame.arrival_ns, counter)
+        if self.baseline is None:
+            self._tare.append(frame.counts)
+            if len(self._tare) == self._wanted:
+                self.baseline = _untouched(np.array(self._tare))
+            return None
+        self._frames.append((frame.counts - self.baseline, sample_ns))
+        newest = len(self._frames) - 1
+        target = newest - self.lookahead
+        if target < 0:
+            return None
+        self._sequence += 1
+        if not wanted:
+            return None
+        # Frames before the first and behind the newest are replaced by those, as in training.
+        rows = np.clip(target + np.array(self._offsets), 0, newest)
+        depth = self._estimate(np.array([self._frames[row][0] for row in rows]))
+        made = Estimate(
+            self._sequence - 1, self._frames[target][1], frame.arrival_ns, depth, float(contact_depth(depth[None])[0]),
+            contact_centre(depth, self._grid),
+        )  # fmt: skip
+        return made
+
+
+def contact_centre(depth: np.ndarray, grid: DepthMap, threshold: float = REGION) -> tuple[float, float] | None:
+    """Return the centroid of the pixels deeper than a threshold, x and y [mm, sensor frame]; None if there is none."""
+    inside = np.argwhere(depth > threshold)
+    if not len(inside):
+        return None
+    x, y = ((inside.mean(axis=0) - (np.array(depth.shape) - 1) / 2) * grid.pixel_pitch).tolist()
+    return x, y
+
+
+def _untouched(counts: np.ndarray) -> np.ndarray:
+    """Return the mean of readings, shape (n, taxels), if they stand still."""
+    if len(counts) < 2:
+        return counts[0]
+    noise = np.median(np.abs(np.diff(counts, axis=0)), axis=0) + 1.0
+    part = max(len(counts) // 4, 1)
+    moved = np.abs(counts[-part:].mean(axis=0) - counts[:part].mean(axis=0))
+    if (moved > STILL * noise).any():
+        raise DeviceError(
+            f"taxel {int(np.argmax(moved / noise))} changed by {moved.max():.0f} counts while it was tared",
+            "nothing on the skin during the first moments", "lift what touches it and start again",
+        )  # fmt: skip
+    return counts.mean(axis=0)

@@ -1,0 +1,85 @@
+"""Reads a board, estimates, and hands out: to a socket, to a viewer, to a person in words."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from tacdata.live.depth_stream import DepthStream, Estimate
+from tacdata.live.latency_meter import LatencyMeter
+from tacdata.live.message_server import MessageServer, message
+from tacdata.live.source import Source
+
+PATIENCE = 0.05
+"""How long a read may wait [s of the host's clock]."""
+LATE = 2.0
+"""A frame that has waited for longer [frame periods] gets an estimate only if no newer one is there."""
+SAID_EVERY = 1.0
+"""How often a person is told [s of real time]."""
+
+
+class LiveLoop:
+    """Runs until it is stopped."""
+
+    def __init__(
+        self, source: Source, stream: DepthStream, network: str, server: MessageServer | None = None,
+        watch: Callable[[str, int, Any], None] | None = None, maps: bool = True,
+    ) -> None:  # fmt: skip
+        """Prepare.
+
+        Args:
+            source: The opened board.
+            stream: Makes estimates of its frames.
+            network: Identity of the network, for messages.
+            server: Takes messages.
+            watch: Is shown every estimate (`viewers.live_view`); must return at once.
+            maps: Whether messages hold whole maps.
+        """
+        self._source, self._stream, self._server, self._watch, self._maps = source, stream, server, watch, maps
+        self._about = {
+            "finger": source.name, "network": network, "causal": stream.causal, "lookahead": stream.lookahead
+        }  # fmt: skip
+        self.meter = LatencyMeter()
+        self.skipped = 0
+        """Estimates left out because computing did not keep up."""
+        self._stopped = False
+
+    def stop(self) -> None:
+        """End `run` soon; safe from any thread and signal handler."""
+        self._stopped = True
+
+    def run(self, seconds: float | None, say: Callable[[str], None]) -> None:
+        """Read until stopped, or for so long [s of real time].
+
+        Raises:
+            DeviceError: If the board breaks, or is touched while it is tared.
+        """
+        begun = said = time.monotonic()
+        while not self._stopped and (seconds is None or time.monotonic() - begun < seconds):
+            frames = self._source.board.read(PATIENCE)
+            for frame in frames:
+                # Behind time, only the newest estimate helps a controller; the others would make it later still.
+                late = self._source.clock.now_ns() - frame.arrival_ns > LATE * 1e9 / self._source.rate
+                wanted = not late or frame is frames[-1]
+                self.skipped += not wanted and self._stream.baseline is not None
+                made = self._stream.push(frame, wanted)
+                if made is not None:
+                    self._hand_out(made)
+                    if time.monotonic() - said >= SAID_EVERY:
+                        said = time.monotonic()
+                        say(self._words(made))
+
+    def _hand_out(self, made: Estimate) -> None:
+        sent = self._source.clock.now_ns()
+        if self._server:
+            self._server.send(message(made, self._about, sent, self._maps))
+        self.meter.take(made.sample_ns, made.arrival_ns, sent)
+        if self._watch:
+            self._watch(f"depth {self._source.name}", made.sample_ns, (made.depth, made.largest, made.centre))
+
+    def _words(self, made: Estimate) -> str:
+        figures = self.meter.figures
+        where = "no contact" if made.centre is None else f"centre {made.centre[0]:+.2f}, {made.centre[1]:+.2f} mm"
+        pace = f"; {figures.rate:.1f} Hz, age {figures.age[0]:.0f} ms (95 %: {figures.age[1]:.0f})" if figures else ""
+        return f"{self._source.name}: depth {made.largest:.2f} mm, {where}{pace}"

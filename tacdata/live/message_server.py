@@ -1,0 +1,130 @@
+"""Messages to whoever listens on a socket (`schemas/live_message.schema.json`): a line of JSON each, never waiting."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from contextlib import suppress
+from typing import Any
+
+import schemas
+from tacdata.errors import UsageError
+from tacdata.live.depth_stream import Estimate
+
+LOOPBACK = "127.0.0.1"
+WAITING = 4
+"""Messages that wait for a slow reader; beyond, the oldest are left out [count]."""
+
+
+def message(made: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = True) -> dict[str, Any]:
+    """Return an estimate as a message.
+
+    Args:
+        made: The estimate.
+        source: Whose it is: ``finger``, ``network`` (hash), ``causal``, ``lookahead``.
+        sent_ns: Now [ns].
+        maps: Whether the whole map is in it.
+    """
+    values: dict[str, Any] = {
+        "version": schemas.version("live_message"), "sequence": made.sequence, **source,
+        "sample_ns": made.sample_ns, "arrival_ns": made.arrival_ns, "sent_ns": sent_ns,
+        "age_ms": round((sent_ns - made.sample_ns) * 1e-6, 3),
+        "depth": round(made.largest, 4), "contact": made.centre is not None,
+        "centre": None if made.centre is None else [round(value, 4) for value in made.centre],
+    }  # fmt: skip
+    if maps:
+        values["map"] = [[round(float(value), 4) for value in row] for row in made.depth]
+    return values
+
+
+class MessageServer:
+    """Listens on the loopback; every reader gets every message that it can take."""
+
+    def __init__(self, port: int) -> None:
+        """Open the socket; port 0 takes a free one.
+
+        Raises:
+            UsageError: If the port is taken or may not be opened.
+        """
+        self._socket = socket.socket()
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._socket.bind((LOOPBACK, port))
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise UsageError(f"port {port}: {error}", "a free port, or 0 for any", "choose another --socket") from None
+        self._socket.listen()
+        self.port: int = self._socket.getsockname()[1]
+        self._readers: list[_Reader] = []
+        self._closed = False
+        self._thread = threading.Thread(target=self._accept, name="live-messages", daemon=True)
+        self._thread.start()
+
+    @property
+    def readers(self) -> int:
+        """How many listen."""
+        return sum(reader.alive for reader in self._readers)
+
+    def send(self, values: dict[str, Any]) -> None:
+        """Hand a message to all readers; returns at once."""
+        self._readers = [reader for reader in self._readers if reader.alive]
+        if self._readers:
+            line = json.dumps(values, separators=(",", ":")).encode() + b"\n"
+            for reader in self._readers:
+                reader.offer(line)
+
+    def close(self) -> None:
+        """Close the socket and all connections; may be called twice."""
+        self._closed = True
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+        for reader in self._readers:
+            reader.close()
+        self._thread.join(timeout=2.0)
+
+    def _accept(self) -> None:
+        while not self._closed:
+            try:
+                connection, _ = self._socket.accept()
+            except OSError:
+                return
+            self._readers.append(_Reader(connection))
+
+
+class _Reader:
+    """One connection with a thread of its own: a controller that stalls must not hold up the others."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self.alive = True
+        self._connection, self._lines = connection, []
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # A large buffer would hand out old messages to a slow reader.
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 32768)
+        self._changed = threading.Condition()
+        threading.Thread(target=self._write, name="live-reader", daemon=True).start()
+
+    def offer(self, line: bytes) -> None:
+        with self._changed:
+            self._lines = [*self._lines, line][-WAITING:]
+            self._changed.notify()
+
+    def close(self) -> None:
+        with self._changed:
+            self.alive = False
+            self._changed.notify()
+        with suppress(OSError):
+            self._connection.shutdown(socket.SHUT_RDWR)
+        self._connection.close()
+
+    def _write(self) -> None:
+        while self.alive:
+            with self._changed:
+                self._changed.wait_for(lambda: self._lines or not self.alive)
+                lines, self._lines = self._lines, []
+            try:
+                for line in lines:
+                    self._connection.sendall(line)
+            except OSError:
+                self.alive = False

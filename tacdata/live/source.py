@@ -1,0 +1,72 @@
+"""Which board is touched: the only one of a rig, or one finger's of a demo rig."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from tacdata.clock import Clock
+from tacdata.demonstrations.demo_rig import read_demo_rig
+from tacdata.devices.device import TaxelBoard, create
+from tacdata.errors import UsageError
+from tacdata.recording.stream_clock import StreamClock, nominal_period_ns
+from tacdata.rig import read_rig
+from tacdata.sensor import Sensor
+
+
+@dataclass(frozen=True)
+class Source:
+    """A board with what is known of it."""
+
+    name: str
+    """The finger, or the sensor's name."""
+    board: TaxelBoard
+    """Not yet opened."""
+    clock: Clock
+    sensor: Sensor
+    rate: float
+    """Nominal frame rate [Hz]."""
+
+
+def touched_board(path: Path, finger: str | None, assumed: Sensor) -> Source:
+    """Return the board of a rig file or, of a demo rig file, of one finger (by default the first).
+
+    Args:
+        path: The file.
+        finger: Whose board.
+        assumed: The sensor where the file names none: a rig file does not.
+
+    Raises:
+        UsageError: If there is no file, no such finger, or a finger is asked of a rig.
+        FormatError: If the file is neither.
+    """
+    if not path.is_file():
+        raise UsageError(f"no file {path}", "a rig or demo rig file", "check the path")
+    try:
+        parsed = yaml.safe_load(path.read_text())
+    except (yaml.YAMLError, UnicodeDecodeError):
+        parsed = None  # the rig reader says what is wrong
+    if isinstance(parsed, dict) and "boards" in parsed:
+        demo = read_demo_rig(path)
+        name = finger or next(iter(demo.boards), "")
+        if name not in demo.boards:
+            known = ", ".join(demo.boards) or "a demo rig with boards"
+            raise UsageError(f"no board for finger {name!r} in {path}", known, "name it with --finger")
+        entry, clock, sensor = demo.boards[name], demo.clock, demo.sensors[name]
+    else:
+        rig = read_rig(path)
+        if finger is not None:
+            given = f"finger {finger} of rig {rig.name}"
+            raise UsageError(given, "a demo rig, which has fingers", "leave it out: a rig has one board")
+        name, entry, clock, sensor = assumed.name, rig.board, rig.clock, assumed
+    board = create(entry, TaxelBoard, clock)
+    return Source(name, board, clock, sensor, board.describe()["rate"]["nominal"] or sensor.taxels.rate)
+
+
+def stream_clock(board: TaxelBoard) -> StreamClock:
+    """Return a clock that says when a board's frames were sampled."""
+    described = board.describe()
+    axis = "device_ns" if described.get("clock") == "device_ns" else "counter"
+    return StreamClock(axis, board.clock.rate, nominal_period_ns(described))

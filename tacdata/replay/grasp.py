@@ -1,0 +1,51 @@
+"""One grasp out of a demonstration: from open fingers to their letting go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from tacdata.replay.targets import Targets
+
+FELT = 0.5
+"""A finger touches where it feels more than this share of its largest depth [1]."""
+LEAST_DEPTH = 0.05
+"""A largest depth below this is no touch [mm]."""
+BEFORE, AFTER = 1.0, 0.2
+"""What of the approach and of the letting go belongs to a grasp [s]."""
+SHORT = 0.5
+"""A touch that lasts less is no grasp [s]."""
+
+
+def touching(targets: Targets) -> np.ndarray:
+    """Return when all fingers feel something at once, shape (n,), bool."""
+    depth = np.nan_to_num(targets.depth)
+    return (depth > FELT * np.maximum(depth.max(axis=0), LEAST_DEPTH / FELT)).all(axis=1)
+
+
+def first_grasp(targets: Targets) -> tuple[int, int, int]:
+    """Return the rows of the first grasp that begins with open fingers: its beginning, first touch, and end.
+
+    Raises:
+        UsageError: If there is none.
+    """
+    touch = touching(targets)
+    edges = np.flatnonzero(np.diff(touch.astype(int), prepend=0, append=0))
+    lead, tail = round(BEFORE * targets.rate), round(AFTER * targets.rate)
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if begin >= lead and end - begin >= SHORT * targets.rate:
+            return begin - lead, begin, min(end + tail, len(touch))
+    raise UsageError(
+        "no grasp that begins with open fingers: they never all feel something for half a second",
+        f"a demonstration in which all of {', '.join(targets.fingers)} touch, tracked with a network",
+        "record from open hand to open hand, and track with --network",
+    )
+
+
+def cut(targets: Targets, begin: int, end: int) -> Targets:
+    """Return the targets of some rows."""
+    rows = slice(begin, end)
+    arrays = ("time_ns", "position", "quaternion", "seen", "depth", "gap")
+    return replace(targets, **{name: getattr(targets, name)[rows] for name in arrays}, source=None, rows=rows)

@@ -1,0 +1,120 @@
+"""A ball on a table and fingertips that follow targets like a robot's: springs pull them there, contact pushes back.
+
+A fingertip is a soft sphere whose place is held by springs (the compliance of joints and controllers; an infinitely
+stiff robot would need no compensation). A direct replay brings the pads to where they were seen, so that the springs
+hardly press; targets that are moved into the object stretch them. Whether the ball is lifted is Coulomb's friction and
+gravity, in MuJoCo; nothing here decides it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from tacdata.replay.scene_model import PAD, SceneModel
+from tacdata.replay.targets import Targets
+
+HIGH = 0.9
+"""The object is held high while the fingers are above this share of their lift [1]."""
+HELD = 0.5
+"""The object is held if it never sinks below this share of the fingers' lift meanwhile [1]."""
+LEAST_LIFT = 0.01
+"""Targets that rise by less lift nothing [m]."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What the robot and the object are; the spreads are those of `drawn`."""
+
+    radius: float = 0.035
+    """Radius of the ball [m]."""
+    mass: float = 0.18
+    """Its mass [kg]: a small apple."""
+    friction: float = 0.8
+    """Coulomb coefficient between skin and ball [1]."""
+    stiffness: float = 300.0
+    """Of the springs that hold a fingertip at its target [N/m]."""
+    skin: float = 3000.0
+    """Stiffness of the skin [N/m]."""
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """How far the ball lies from where it lay in the demonstration [m]."""
+    bias: tuple[tuple[float, float, float], ...] = ()
+    """How far each fingertip's targets are off in the robot's frame [m]: calibration, another hand's shape."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The scene as plain data."""
+        values = asdict(self)
+        return {**values, "place": list(self.place), "bias": [list(shift) for shift in self.bias]}
+
+
+def drawn(scene: Scene, fingers: int, seed: int) -> Scene:
+    """Return the scene of a seed: mass and stiffness +-20 %, friction +-15 %, ball +-1.5 mm, fingertips 0.7 mm."""
+    rng = np.random.default_rng([seed, 21])
+    x, y = rng.uniform(-0.0015, 0.0015, 2).tolist()
+    shifts = rng.normal(0, 0.0007, (fingers, 3)).tolist()
+    return replace(
+        scene, mass=scene.mass * float(rng.uniform(0.8, 1.2)), stiffness=scene.stiffness * float(rng.uniform(0.8, 1.2)),
+        friction=scene.friction * float(rng.uniform(0.85, 1.15)), place=(x, y, 0.0),
+        bias=tuple((a, b, c) for a, b, c in shifts),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of the ball."""
+
+    held: bool
+    lift: float
+    """Lowest height of the ball over where it lay, while the fingers are high [m]."""
+    force: dict[str, float]
+    """Finger -> mean normal force meanwhile [N]."""
+    depth: dict[str, float]
+    """Finger -> mean depth of the simulated skin meanwhile [mm]."""
+    time: np.ndarray
+    """Times of the replay [s], shape (n,)."""
+    ball: np.ndarray
+    """Centre of the ball [m], shape (n, 3)."""
+    tips: np.ndarray
+    """Centres of the fingertips' pads [m], shape (n, f, 3)."""
+
+
+def ball_centre(targets: Targets, touch: int, radius: float) -> np.ndarray:
+    """Return where a ball's centre was in a row in which all fingers touch it [m], shape (3,).
+
+    Each pad touches the ball, so the centre lies a radius along its normal, less the depth that it felt.
+    """
+    reach = (radius - np.nan_to_num(targets.depth[touch]) / 1000)[:, None]
+    return (targets.seen[touch] + reach * normals(targets)[touch]).mean(axis=0)
+
+
+def normals(targets: Targets) -> np.ndarray:
+    """Return the normals out of the pads [1], shape (n, f, 3)."""
+    x, y, z, w = np.moveaxis(targets.quaternion, -1, 0)
+    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
+
+
+def replay_targets(targets: Targets, scene: Scene, centre: np.ndarray) -> Outcome:
+    """Return what becomes of a ball that lies with its centre at ``centre`` [m] when fingertips follow targets.
+
+    Raises:
+        UsageError: If the targets do not lift.
+    """
+    pads = targets.position - PAD * normals(targets)
+    height = pads[..., 2].mean(axis=1)
+    lift = float(np.ptp(height))
+    if lift < LEAST_LIFT:
+        raise UsageError(f"targets that rise by {1000 * lift:.0f} mm", "10 mm or more", "replay a demonstrated grasp")
+    if scene.bias:
+        pads = pads + np.array(scene.bias)
+    ground = np.array(centre) + scene.place
+    seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
+    path = SceneModel(scene, pads[0], ground).run(pads, seconds)
+    high = height > height.min() + HIGH * lift
+    lowest = float((path.ball[high, 2] - ground[2]).min())
+    force = {name: float(path.force[high, k].mean()) for k, name in enumerate(targets.fingers)}
+    depth = {name: float(1000 * path.depth[high, k].mean()) for k, name in enumerate(targets.fingers)}
+    return Outcome(lowest > HELD * lift, lowest, force, depth, seconds, path.ball, path.tips)

@@ -1,0 +1,118 @@
+"""Where a robot's fingertips are to be, time by time: as seen, or moved by what was felt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata import provenance
+from tacdata.demonstrations.compensation import compensate, contact_depth
+from tacdata.demonstrations.demonstration import Demonstration
+from tacdata.errors import UsageError
+
+UNITS = {"time_ns": "ns", "position": "m", "quaternion": "1 (xyzw)", "seen": "m", "depth": "mm", "gap": "1"}
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Fingertip targets of one demonstration."""
+
+    recording: str
+    recording_hash: str
+    task: str
+    frame: str
+    """Frame of the poses."""
+    rate: float
+    """[Hz]"""
+    fingers: tuple[str, ...]
+    """Their order in the arrays, f of them."""
+    kind: str
+    """"direct" or "compensated"."""
+    gains: dict[str, float]
+    """Finger -> gain [m/mm]; empty for direct targets."""
+    time_ns: np.ndarray
+    """Times on the recording's clock [ns], shape (n,), int64."""
+    position: np.ndarray
+    """Targets [m], shape (n, f, 3)."""
+    quaternion: np.ndarray
+    """From each fingertip's frame (x along the finger, z out of the pad), xyzw [1], shape (n, f, 4)."""
+    seen: np.ndarray
+    """Where the fingertips were seen [m], shape (n, f, 3)."""
+    depth: np.ndarray
+    """Predicted contact depth [mm], shape (n, f); NaN where nothing is known."""
+    gap: np.ndarray
+    """Whether the pose is a bridge over a gap, shape (n, f), bool."""
+    network: dict[str, Any] | None = None
+    """Whose predicted depth this is."""
+    remarks: tuple[str, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+    source: Demonstration | None = None
+    """The demonstration; None of targets that were read back."""
+    rows: slice = slice(None)
+    """Which of the source's times these are."""
+
+    def header(self, columns: Iterable[str]) -> dict[str, Any]:
+        """Return what a file says of them (`schemas/fingertip_targets.schema.json`)."""
+        names = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
+        return {
+            "version": schemas.version("fingertip_targets"), **{name: getattr(self, name) for name in names},
+            "frames": len(self.time_ns), "fingers": list(self.fingers), "units": UNITS, "columns": list(columns),
+            "remarks": list(self.remarks),
+        }  # fmt: skip
+
+
+def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Iterable[str] = ()) -> Targets:
+    """Return a demonstration's targets, over the times at which every finger's pose is known.
+
+    Args:
+        made: The demonstration.
+        gains: Finger -> gain [m/mm] of compensated targets; None for direct ones.
+        fingers: Which fingers, in which order; all if none is named.
+
+    Raises:
+        UsageError: If a finger has no path or no gain, no time has all of them, or there is no predicted depth.
+    """
+    names = tuple(fingers) or tuple(made.tracks)
+    for what, known in (("path", made.tracks), *((("gain", gains),) if gains is not None else ())):
+        missing = [name for name in names if name not in known]
+        if missing:
+            given = f"no {what} for {', '.join(missing)}"
+            raise UsageError(given, ", ".join(known), "name other fingers with --finger")
+    tracks = [made.tracks[name] for name in names]
+    known = np.all([np.isfinite(track.position).all(axis=1) for track in tracks], axis=0)
+    if not known.any():
+        raise UsageError(f"no time at which {', '.join(names)} are all seen", "one or more", "choose fewer fingers")
+    first, last = np.flatnonzero(known)[[0, -1]]
+    rows, remarks = slice(int(first), int(last) + 1), list(made.remarks)
+    depths = [_depth(track.depth, len(made.time_ns)) for track in tracks]
+    seen = np.stack([track.position for track in tracks], axis=1)
+    position = seen.copy()
+    if gains is not None:
+        if made.network is None:
+            raise UsageError(
+                "compensated targets without predicted depth", "demonstrations tracked with a network",
+                "run tacdata track with --network, or export --direct",
+            )  # fmt: skip
+        for k, (name, track) in enumerate(zip(names, tracks, strict=True)):
+            position[:, k] = compensate(seen[:, k], track.normal, depths[k], gains[name])
+            blind = int(np.isnan(depths[k][rows]).sum())
+            if blind:
+                remarks.append(f"{name}: not moved at {blind} times without predicted depth")
+    used = {name: float(gains[name]) for name in names} if gains is not None else {}
+    kind, parents = "direct" if gains is None else "compensated", {"recording": made.recording_hash}
+    if made.network:
+        parents["checkpoint"] = made.network["hash"]
+    return Targets(
+        made.recording, made.recording_hash, made.task, made.frame, made.rate, names, kind, used,
+        made.time_ns[rows], position[rows], np.stack([t.quaternion for t in tracks], axis=1)[rows], seen[rows],
+        np.stack(depths, axis=1)[rows], np.stack([t.gap for t in tracks], axis=1)[rows], made.network,
+        tuple(remarks), provenance.stamp("tacdata export", parents, {"kind": kind, "gains": used}), made, rows,
+    )  # fmt: skip
+
+
+def _depth(maps: np.ndarray | None, count: int) -> np.ndarray:
+    return np.full(count, np.nan) if maps is None else contact_depth(maps)

@@ -1,0 +1,232 @@
+"""A virtual demonstration: boards on three fingers and cameras on their cubes, with a demo rig file like any other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata import documents, provenance
+from tacdata.clock import Clock
+from tacdata.errors import UsageError
+from tacdata.indenters.sphere import Sphere
+from tacdata.rig import Registration
+from tacdata.sensor import Sensor, default_sensor
+from tacdata.virtual_rig.board import Board, draw_timing
+from tacdata.virtual_rig.camera import Camera
+from tacdata.virtual_rig.hand import DIRECTIONS, PERIOD, RADIUS, draw_hand
+from tacdata.virtual_rig.rig import BAUDS, board_format
+from tacdata.virtual_rig.world import World, draw
+
+NAME = "virtual demonstration"
+INTRINSICS = {"width": 800, "height": 600, "fx": 880.0, "fy": 880.0, "cx": 399.5, "cy": 299.5}
+FACES = ("+x", "-x", "+y", "-y", "+z")
+TIP = {"position": [10.0, 0.0, -18.0], "quaternion": [1.0, 0.0, 0.0, 0.0], "method": "drawing", "residual": 0.1}
+EYES = {"left": (0.10, -0.36, 0.36), "right": (-0.08, 0.37, 0.35)}
+"""Where the cameras stand [m]; both look at the ball."""
+RATE = 20.0
+"""Images a second of the rig's clock [Hz]."""
+DELAY = 0.05
+"""From exposure to arrival of an image, at least [s]; the rig file says so, as if a sync tap had measured it."""
+FAULTS = ("no-tag", "turned-tag", "swapped-fingers", "silent-finger")
+"""What can go wrong on demand: the index finger's tags covered for a second; its upper tag turned half way round;
+the cubes of index and middle finger exchanged; the middle finger's board silent after three seconds."""
+FACE_UP = "-x"
+
+
+def cube(first: int) -> dict[str, Any]:
+    """Return a cube [mm] whose tags are numbered from ``first``."""
+    return {"side": 20.0, "tag": 16.0, "ids": {face: first + k for k, face in enumerate(FACES)}}
+
+
+FINGERS: dict[str, Any] = {
+    "version": "1.0",
+    "fingers": {n: {"hand": "right", "finger": n, "cube": cube(5 * k), "tip": TIP} for k, n in enumerate(DIRECTIONS)},
+}
+
+
+class VirtualDemo:
+    """Emulated boards and cameras; only the demo rig file and the wires reach the outside."""
+
+    def __init__(
+        self, directory: Path, speed: float = 1.0, seed: int = 0, cameras: int = 2, fault: str | None = None,
+        sensor: Sensor | None = None,
+    ) -> None:  # fmt: skip
+        """Set up a hand whose clock runs ``speed`` times as fast as real time.
+
+        Args:
+            directory: Where ``demo_rig.yaml`` and ``truth.yaml`` are written.
+            speed: Seconds of the rig per real second.
+            seed: Decides grasp, skins, boards and camera errors.
+            cameras: One or two.
+            fault: One of `FAULTS`, or none.
+            sensor: The skin on every finger.
+
+        Raises:
+            UsageError: If a number is out of range or there is no such fault.
+        """
+        if not 0 < speed <= 8 or not 1 <= cameras <= len(EYES):
+            raise UsageError(f"speed {speed:g}, {cameras} cameras", "above 0 to 8; 1 or 2 cameras", "choose others")
+        if fault is not None and fault not in FAULTS:
+            raise UsageError(f"fault {fault!r}", ", ".join(FAULTS), "name one of them")
+        self.directory, self.path, self.fault, self.seed = directory, directory / "demo_rig.yaml", fault, seed
+        self.clock, self.hand, self.sensor = Clock.start(speed), draw_hand(seed), sensor or default_sensor()
+        self.start_ns = self.clock.now_ns()
+        layout = board_format(self.sensor)
+        baud = next((b for b in BAUDS if b >= layout.size * 10 * layout.rate / 0.8), BAUDS[-1])
+        self.layout = layout
+        self.boards = {
+            name: Board(
+                self.clock, layout, draw_timing(10 * seed + k, self.start_ns, layout.rate), self._reader(name, k), baud,
+                10 * seed + k,
+            )
+            for k, name in enumerate(DIRECTIONS)
+        }  # fmt: skip
+        self.eyes = {name: _look_at(EYES[name]) for name in list(EYES)[:cameras]}
+        self._rng = np.random.default_rng([seed, 12])
+        self.cameras = {
+            name: Camera(self.clock, RATE, self._painter(pose), DELAY, seed, ahead=True)
+            for name, pose in self.eyes.items()
+        }
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The demo rig file's document (`schemas/demo_rig.schema.json`)."""
+        worlds = np.random.default_rng([self.seed, 13])
+        return {
+            "version": schemas.version("demo_rig"), "name": NAME, "clock": asdict(self.clock),
+            "boards": {
+                name: {
+                    "driver": "capacitive_board", "port": board.port.path, "baud": board.baud,
+                    "format": self.layout.document,
+                }
+                for name, board in self.boards.items()
+            },
+            "sensors": dict.fromkeys(self.boards, self.sensor.document),
+            "cameras": {
+                name: {
+                    "driver": "opencv_camera", "source": camera.url, "rate": RATE, "intrinsics": dict(INTRINSICS),
+                    "world": _world(name, self.eyes[name], worlds),
+                }
+                for name, camera in self.cameras.items()
+            },
+            "latencies": {
+                f"camera {name}": {"latency_ns": int(DELAY * 1e9), "uncertainty_ns": 2_000_000, "source": "virtual tap"}
+                for name in self.cameras
+            },
+            "fingers": FINGERS,
+        }  # fmt: skip
+
+    @property
+    def emulates(self) -> list[str]:
+        """What it emulates, a line each, for people."""
+        boards = [f"{name:<7} {board.port.path}  {self.layout.rate:g} Hz" for name, board in self.boards.items()]
+        return [
+            *boards, *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
+            f"a grasp every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} times real time",
+            *([f"fault: {self.fault}"] if self.fault else []),
+        ]  # fmt: skip
+
+    def seconds(self, time_ns: int) -> float:
+        """Return the hand's time [s] at a time of the clock [ns]."""
+        return (time_ns - self.start_ns) * 1e-9
+
+    def start(self) -> None:
+        """Switch everything on; the rig file comes last.
+
+        Raises:
+            UsageError: If a demo rig file lies there already.
+        """
+        if self.path.exists():
+            raise UsageError(f"{self.path} exists", "a directory without a demo rig", "choose another directory")
+        self.directory.mkdir(parents=True, exist_ok=True)
+        truth = {
+            "version": schemas.version("virtual_demo_truth"), "start_ns": self.start_ns, "fault": self.fault,
+            "hand": self.hand.document, "cameras": {name: pose.tolist() for name, pose in self.eyes.items()},
+        }  # fmt: skip
+        documents.write(self.directory / "truth.yaml", truth, "virtual_demo_truth")
+        for device in (*self.boards.values(), *self.cameras.values()):
+            device.start()
+        documents.write(self.path, self.document, "demo_rig")
+
+    def stop(self) -> None:
+        """Switch everything off and take the rig file away, whose ports are gone."""
+        self.path.unlink(missing_ok=True)
+        for device in (*self.cameras.values(), *self.boards.values()):
+            device.stop()
+
+    def _reader(self, finger: str, number: int) -> Callable[[int], np.ndarray]:
+        flat = Registration((0.0, 0.0, 0.0), 0.0)
+        world = World(draw(100 * self.seed + number, self.sensor, flat), self.sensor)
+        ball = Sphere(RADIUS)
+
+        def read(sampled_ns: int) -> np.ndarray:
+            seconds = self.seconds(sampled_ns)
+            if self.fault == "silent-finger" and finger == "middle" and seconds > 3.0:
+                self.boards[finger].port.close()
+            x, y, depth = self.hand.press(finger, seconds)
+            return world.readings(np.array([x, y, -depth]), ball, 0.0, sampled_ns)
+
+        return read
+
+    def _painter(self, eye: np.ndarray) -> Callable[[int], np.ndarray]:
+        from tacdata.virtual_rig.render import render_scene
+
+        world_to_eye, tip = np.linalg.inv(eye), _tip_on_cube()
+
+        def draw_image(exposed_ns: int) -> np.ndarray:
+            seconds = self.seconds(exposed_ns)
+            cubes = [
+                (world_to_eye @ self.hand.tip(name, seconds) @ np.linalg.inv(tip), self._cube(name, seconds))
+                for name in DIRECTIONS
+            ]
+            return render_scene(cubes, INTRINSICS, self._rng)
+
+        return draw_image
+
+    def _cube(self, finger: str, seconds: float) -> dict[str, Any]:
+        names = {"index": "middle", "middle": "index"} if self.fault == "swapped-fingers" else {}
+        carried = FINGERS["fingers"][names.get(finger, finger)]["cube"]
+        t = seconds % PERIOD
+        if finger == "index" and self.fault == "no-tag" and 4.0 < t < 5.0:
+            return {**carried, "ids": {}}
+        if finger == "index" and self.fault == "turned-tag":
+            return {**carried, "turned": [FACE_UP]}
+        return carried
+
+
+def _tip_on_cube() -> np.ndarray:
+    matrix = np.diag([1.0, -1.0, -1.0, 1.0])
+    matrix[:3, 3] = np.array(TIP["position"]) / 1000
+    return matrix
+
+
+def _look_at(place: tuple[float, float, float]) -> np.ndarray:
+    """Return a camera's frame in the world, shape (4, 4) [m], that looks at where the ball is lifted."""
+    forward = np.array([0.0, 0.0, 0.085]) - place
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    pose[:3, 3] = place
+    return pose
+
+
+def _world(camera: str, pose: np.ndarray, rng: np.random.Generator) -> dict[str, Any]:
+    """Return a camera's place as a careful lab would have found it: off by 0.2 mm and 0.03 degrees."""
+    from scipy.spatial.transform import Rotation
+
+    spread = 0.0002, float(np.radians(0.03))
+    turn = Rotation.from_rotvec(rng.normal(0, spread[1], 3)) * Rotation.from_matrix(pose[:3, :3])
+    return {
+        "version": schemas.version("camera_world"), "camera": camera, "frame": "table",
+        "position": (pose[:3, 3] + rng.normal(0, spread[0], 3)).tolist(), "quaternion": turn.as_quat().tolist(),
+        "method": "virtual board", "poses": 1, "residual": {"position": spread[0], "rotation": spread[1]},
+        "spread": {"position": spread[0], "rotation": spread[1]}, "date": "2026-01-01",
+        "code_version": provenance.code_version(),
+    }  # fmt: skip

@@ -1,0 +1,97 @@
+"""An emulated hand that grasps a ball over and over: where its fingertips are, and how deep their skins are pressed.
+
+World: z up, the ball lies on the table about the origin. Fingertip frame: origin on the pad, x along the finger,
+z out of the pad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+RADIUS = 35.0
+"""Radius of the ball [mm]."""
+HEIGHT = 36.0
+"""Height of its centre over the table [mm]."""
+DIRECTIONS = {"thumb": (-1.0, 0.0, 0.05), "index": (0.93, 0.36, 0.05), "middle": (0.93, -0.36, 0.05)}
+"""From the ball's centre to each finger of a right hand."""
+TIMES = (0.8, 2.0, 2.5, 3.7, 5.7, 6.9, 7.2, 8.2)
+"""Ends of: waiting, closing, pressing, lifting, holding, lowering, letting go, opening [s]; then it begins again."""
+PERIOD = 8.5
+"""From one grasp to the next [s]."""
+REACH = 45.0
+"""How far the fingertips are from the ball before and after [mm]."""
+LIFT = 90.0
+"""How high it is lifted [mm]."""
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A grasp, drawn from a seed."""
+
+    seed: int
+    depth: dict[str, float]
+    """How deep each finger's skin is pressed while it holds [mm]."""
+    skew: dict[str, tuple[float, float]]
+    """Where on the pad each finger touches: x and y [mm]."""
+    tremor: float
+    """Amplitude of the hand's trembling at 8 Hz [mm]."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The hand as plain data."""
+        values = asdict(self)
+        values["skew"] = {name: list(place) for name, place in self.skew.items()}
+        return values
+
+    def press(self, finger: str, seconds: float) -> tuple[float, float, float]:
+        """Return where on the pad the ball presses, x and y, and how deep [mm], at a time [s]."""
+        t = seconds % PERIOD
+        share = _blend(t, TIMES[1], TIMES[2]) - _blend(t, TIMES[5], TIMES[6])
+        return (*self.skew[finger], self.depth[finger] * share)
+
+    def tip(self, finger: str, seconds: float) -> np.ndarray:
+        """Return the fingertip's frame in the world, shape (4, 4) [m], at a time [s]."""
+        t = seconds % PERIOD
+        away = REACH * (1 - _blend(t, TIMES[0], TIMES[1]) + _blend(t, TIMES[6], TIMES[7]))
+        lift = LIFT * (_blend(t, TIMES[2], TIMES[3]) - _blend(t, TIMES[4], TIMES[5]))
+        out = np.array(DIRECTIONS[finger]) / np.linalg.norm(DIRECTIONS[finger])
+        normal = -out
+        along = np.array([0.0, 0.0, -1.0]) - (-normal[2]) * normal
+        along /= np.linalg.norm(along)
+        # The whole hand sways a little, so that no pose ever rests.
+        phase = 2 * np.pi * (seconds + 0.37 * self.seed)
+        sway = 4.0 * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
+        shake = self.tremor * np.array([np.sin(8 * phase), np.sin(8 * phase + 1), np.sin(8 * phase + 2)])
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.stack([along, np.cross(normal, along), normal], axis=-1)
+        x, y, depth = self.press(finger, seconds)
+        touch = np.array([0.0, 0.0, HEIGHT + lift]) + out * (RADIUS + away - depth)
+        # The pad's origin is the array's centre; what touches lies off it by the skew.
+        place = touch - matrix[:3, 0] * x - matrix[:3, 1] * y
+        turn = _turn(0.06 * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)]))
+        matrix[:3, :3] = turn @ matrix[:3, :3]
+        matrix[:3, 3] = (turn @ place + sway + shake) / 1000
+        return matrix
+
+
+def draw_hand(seed: int) -> Hand:
+    """Draw a grasp from a seed."""
+    rng = np.random.default_rng([seed, 11])
+    depth = {name: float(rng.uniform(0.7, 1.2)) for name in DIRECTIONS}
+    skew = {name: tuple(rng.uniform(-1.0, 1.0, 2).tolist()) for name in DIRECTIONS}
+    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)))  # type: ignore[arg-type]
+
+
+def _blend(t: float, begin: float, end: float) -> float:
+    """Return 0 before, 1 behind, and between them the step of least jerk."""
+    s = float(np.clip((t - begin) / (end - begin), 0.0, 1.0))
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def _turn(vector: np.ndarray) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(vector).as_matrix()

@@ -1,0 +1,179 @@
+"""A demonstration through the verbs, from a virtual hand to paths; and what is refused on the way."""
+
+import shutil
+import sys
+
+import numpy as np
+import pytest
+import yaml
+from demo_examples import rig
+
+from tacdata.cli import main
+from tacdata.demonstrations.demo_reader import read_demo
+from tacdata.demonstrations.demo_recorder import DemoRecorder
+from tacdata.demonstrations.demo_rig import read_demo_rig
+from tacdata.demonstrations.demo_session import open_demo_session, read_demo_session
+from tacdata.demonstrations.tracks_file import path_of, read_tracks
+from tacdata.errors import FormatError, UsageError
+from tacdata.recording.check import check
+from tacdata.tags import look
+from tacdata.virtual_rig.demo import FINGERS, VirtualDemo
+
+
+class Now:
+    """A detector that answers in the caller's thread."""
+
+    def __call__(self, *arguments):
+        from concurrent.futures import Future
+
+        answer = Future()
+        answer.set_result(look(*arguments))
+        return answer
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Six seconds of a hand with one camera, at half speed."""
+    folder = tmp_path_factory.mktemp("demo")
+    demo = VirtualDemo(folder / "rig", speed=0.6, seed=3, cameras=1)
+    demo.start()
+    try:
+        bench = read_demo_rig(demo.path)
+        session = open_demo_session(folder / "demos", bench, "grasp", resume=False)
+        with DemoRecorder(session, bench, Now()) as recorder:
+            path = recorder.record(lambda: False, seconds=5.0)
+    finally:
+        demo.stop()
+    return path, demo
+
+
+@pytest.mark.slow
+def test_three_boards_and_a_camera_come_into_one_file(recorded):
+    path, _ = recorded
+    found = read_demo(path)
+    assert found.complete and found.task == "grasp" and found.rig.frame == "table"
+    assert set(found.taxels) == {"thumb", "index", "middle"} == {view.finger for view in found.views}
+    for stream in found.taxels.values():
+        assert 4.5 < (stream.sample_ns[-1] - stream.sample_ns[0]) * 1e-9 < 5.5
+        assert (np.diff(stream.counter) == 1).all() and stream.counts.shape[1] == 24
+        assert np.median(np.diff(stream.sample_ns)) == pytest.approx(1e9 / 30, rel=1e-3)
+    for view in found.views:
+        seen = view.faces > 0
+        assert seen.mean() > 0.8
+    assert read_demo_session(path.parent).document["episodes"][0]["file"] == path.name
+
+
+@pytest.mark.slow
+def test_the_verbs_track_and_export_it(recorded, tmp_path, capsys):
+    path, demo = recorded
+    shutil.copytree(path.parent, tmp_path / "demos")
+    assert run(["track", str(tmp_path / "demos")]) == 0
+    made = read_tracks(path_of(tmp_path / "demos" / path.name))
+    assert set(made.tracks) == set(FINGERS["fingers"])
+    for name, track in made.tracks.items():
+        times = (made.time_ns - demo.start_ns) * 1e-9
+        truth = np.array([demo.hand.tip(name, t)[:3, 3] for t in times])
+        near = ~track.gap
+        assert near.mean() > 0.6
+        # The emulated camera shares this machine's cores: its images may come late and so be timed late.
+        assert 1000 * np.median(np.linalg.norm(track.position - truth, axis=1)[near]) < 3.0
+    assert run(["export", str(tmp_path / "demos"), "--out", str(tmp_path / "out"), "--format", "csv", "--direct"]) == 0
+    assert (tmp_path / "out" / "episode-000000.csv").is_file()
+    assert run(["export", str(tmp_path / "demos"), "--out", str(tmp_path / "more")]) == 2
+    assert "tacdata track with --network" in capsys.readouterr().err
+    assert not (tmp_path / "more").exists()
+
+
+@pytest.mark.slow
+def test_what_a_crash_left_is_read(recorded, tmp_path):
+    path, _ = recorded
+    cut = tmp_path / "episode-000000.mcap"
+    data = path.read_bytes()
+    cut.write_bytes(data[: int(0.8 * len(data))])
+    found = read_demo(cut)
+    assert not found.complete and any("breaks off" in note for note in found.notes)
+    assert min(len(stream.counts) for stream in found.taxels.values()) > 30
+
+
+@pytest.mark.slow
+def test_a_demonstration_is_no_press(recorded):
+    with pytest.raises(UsageError, match="no session"):
+        check(recorded[0].parent)
+
+
+def run(arguments):
+    """Run a verb as typed; return its exit code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["tacdata", *arguments])
+        try:
+            main()
+        except SystemExit as end:
+            return end.code or 0
+    return 0
+
+
+def documents_of(tmp_path, **changes):
+    document = {**rig().document, **changes}
+    for entry in document["cameras"].values():
+        entry.pop("source", None)
+        entry["source"] = str(tmp_path / "none.mp4")
+    path = tmp_path / "demo_rig.yaml"
+    path.write_text(yaml.safe_dump(document))
+    return path
+
+
+def test_a_demo_rig_is_checked(tmp_path):
+    boards = rig().document["boards"]
+    for changes, words in (
+        ({"boards": {"pinky": boards["thumb"]}}, "pinky, who carry no cube"),
+        ({"boards": {}, "sensors": {"thumb": rig().document["sensors"]["thumb"]}}, "a sensor but no board for thumb"),
+        ({"latencies": {"ear": {"latency_ns": 1, "uncertainty_ns": 1, "source": "x"}}}, "a latency of ear"),
+        ({"cameras": {}}, "cameras"),
+        ({"boards": {f"finger{k}": boards["thumb"] for k in range(4)}}, "boards"),
+    ):
+        with pytest.raises(FormatError, match=words):
+            read_demo_rig(documents_of(tmp_path, **changes))
+    with pytest.raises(UsageError, match="no file"):
+        read_demo_rig(documents_of(tmp_path, fingers="none.yaml"))
+
+
+def test_cameras_must_stand_in_one_world(tmp_path):
+    two = rig(cameras=("a", "b")).document["cameras"]
+    lost = {"a": two["a"], "b": {k: v for k, v in two["b"].items() if k != "world"}}
+    with pytest.raises(FormatError, match="where camera b stands"):
+        read_demo_rig(documents_of(tmp_path, cameras=lost))
+    other = {"a": two["a"], "b": {**two["b"], "world": {**two["b"]["world"], "frame": "robot"}}}
+    with pytest.raises(FormatError, match="several worlds"):
+        read_demo_rig(documents_of(tmp_path, cameras=other))
+    alone = {"a": {k: v for k, v in two["a"].items() if k != "world"}}
+    found = read_demo_rig(documents_of(tmp_path, cameras=alone))
+    assert found.frame == "camera a" and np.array_equal(found.camera_pose("a"), np.eye(4))
+
+
+def test_a_missing_board_is_named_by_its_finger_and_leaves_nothing_behind(tmp_path, capsys):
+    path = documents_of(tmp_path)
+    out = tmp_path / "demos"
+    assert run(["record", "--demo", "--rig", str(path), "--out", str(out), "--seconds", "1"]) == 4
+    assert "error: board of " in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_arguments_that_do_not_fit_are_refused(tmp_path, capsys):
+    path = documents_of(tmp_path)
+    common = ["--rig", str(path), "--out", str(tmp_path / "demos")]
+    assert run(["record", "--demo", *common, "--seconds", "-1"]) == 2
+    assert run(["record", "--demo", *common, "--plan", "plan.yaml"]) == 2
+    assert "--demo with --plan" in capsys.readouterr().err
+    assert run(["record", *common]) == 2
+    assert "no --plan" in capsys.readouterr().err
+    (tmp_path / "demos").mkdir()
+    assert run(["record", "--demo", *common, "--seconds", "1"]) == 2
+    assert run(["record", "--demo", *common, "--seconds", "1", "--resume"]) == 2
+    assert run(["track", str(tmp_path / "demos")]) == 2
+
+
+def test_a_virtual_demonstration_is_refused_what_it_cannot_do(tmp_path):
+    with pytest.raises(UsageError, match="fault 'fire'"):
+        VirtualDemo(tmp_path, fault="fire")
+    with pytest.raises(UsageError, match="3 cameras"):
+        VirtualDemo(tmp_path, cameras=3)

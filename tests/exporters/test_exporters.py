@@ -1,0 +1,233 @@
+"""Every format gives back what was written; LeRobot's own reader opens its folder; a robot's limits are respected."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+from tacdata import registry
+from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
+from tacdata.errors import FormatError, UsageError
+from tacdata.exporters.exporter import BASE, ROOM, exporter
+from tacdata.exporters.joints import read_joints
+from tacdata.replay.inverse_kinematics import Kinematics, follow
+from tacdata.replay.robot import read_robot
+from tacdata.replay.targets import targets_of
+from tacdata.sensor import default_sensor
+
+GAINS = {"thumb": 0.004, "index": 0.010}
+NETWORK = {"hash": "f" * 64, "network": "stand-in", "epoch": 1, "lookahead": 4, "sensor": "0"}
+
+
+def demonstration(rows=40, network=NETWORK, number=0):
+    rng = np.random.default_rng(number)
+    seconds = np.arange(rows) / 30
+    tracks = {}
+    for k, name in enumerate(("thumb", "index")):
+        turns = Rotation.from_rotvec(0.3 * np.sin(seconds[:, None] * (1, 2, 3) + k)).as_quat()
+        place = 0.05 * np.stack([np.sin(seconds + k), np.cos(seconds), 0.5 * seconds], axis=1) + (0.1 * k, 0, 0.2)
+        depth = np.clip(np.sin(seconds * 3), 0, None)[:, None, None] * rng.uniform(0.2, 1.0, (rows, 35, 26))
+        gap = np.zeros(rows, bool)
+        gap[10:14] = k == 1
+        depth[20:21] = np.nan
+        place[:2] = turns[:2] = np.nan  # not yet seen
+        tracks[name] = FingerTrack(
+            name, "right", name, place, turns, np.tile(np.eye(6) * 1e-8, (rows, 1, 1)), gap, rows, 0,
+            rng.normal(0, 100, (rows, 24)).astype(np.float32), depth.astype(np.float32) if network else None,
+        )  # fmt: skip
+    time_ns = 1_700_000_000_000_000_000 + np.rint(seconds * 1e9).astype(np.int64)
+    name = f"episode-{number:06d}.mcap"
+    sensors = dict.fromkeys(tracks, default_sensor())
+    return Demonstration(name, "e" * 64, "grasp", "table", 30.0, time_ns, tracks, sensors, network=network)
+
+
+def fingers_urdf(velocity=5.0, reach=0.5, mimic=""):
+    """Two fingers, each of three slides and three hinges on one base."""
+    parts = ['<link name="base"/>']
+    for finger in ("thumb", "index"):
+        parent = "base"
+        axes = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1", "yaw": "0 0 1", "pitch": "0 1 0", "roll": "1 0 0"}
+        for name, axis in axes.items():
+            kind, end = ("prismatic", reach) if len(name) == 1 else ("revolute", 3.0)
+            extra = mimic if (finger, name) == ("index", "x") else ""
+            parts.append(
+                f'<link name="{finger}_{name}_link"><visual><geometry><mesh filename="package://no/where.stl"/>'
+                f'</geometry></visual></link><joint name="{finger}_{name}" type="{kind}"><parent link="{parent}"/>'
+                f'<child link="{finger}_{name}_link"/><axis xyz="{axis}"/>{extra}'
+                f'<limit lower="{-end}" upper="{end}" effort="1" velocity="{velocity}"/></joint>'
+            )
+            parent = f"{finger}_{name}_link"
+        parts.append(
+            f'<link name="{finger}_tip"/><joint name="{finger}_end" type="fixed"><parent link="{parent}"/>'
+            f'<child link="{finger}_tip"/><origin xyz="0 0 0.02"/></joint>'
+        )
+    return f'<robot name="two">{"".join(parts)}</robot>'
+
+
+def robot(tmp_path, text=None, **more):
+    (tmp_path / "two.urdf").write_text(text or fingers_urdf())
+    document = {
+        "version": "1.0", "name": "two", "urdf": "two.urdf",
+        "base": {"position": [0.1, 0.0, 0.05], "quaternion": [0.0, 0.0, 0.3826834, 0.9238795]},
+        "fingers": {"thumb": {"link": "thumb_tip"}, "index": {"link": "index_tip", "position": [0.0, 0.0, 0.01]}},
+        "tolerance": {"position": 0.0001, "rotation": 0.001}, **more,
+    }  # fmt: skip
+    path = tmp_path / "robot.yaml"
+    path.write_text(yaml.safe_dump(document))
+    return path
+
+
+@pytest.mark.parametrize("name", registry.names(ROOM, BASE))
+@pytest.mark.parametrize("gains", [None, GAINS])
+def test_what_is_written_is_read_back(tmp_path, name, gains):
+    episodes = [targets_of(demonstration(number=k), gains) for k in range(2)]
+    out = tmp_path / "out"
+    exporter(name, robot(tmp_path)).write(episodes, out)
+    again = exporter(name, robot(tmp_path)).read(out)
+    tolerance = 1e-6 if name == "lerobot" else 0.0  # LeRobot's actions are float32
+    assert len(again) == 2
+    for one, other in zip(episodes, again, strict=True):
+        for field in ("position", "quaternion", "seen", "depth"):
+            pair = getattr(one, field), getattr(other, field)
+            assert np.allclose(*pair, atol=tolerance, rtol=0, equal_nan=True), field
+        for field in ("time_ns", "gap"):
+            assert np.array_equal(getattr(one, field), getattr(other, field))
+        for field in ("fingers", "kind", "gains", "frame", "rate", "task", "network", "recording", "remarks"):
+            assert getattr(one, field) == getattr(other, field), field
+    with pytest.raises(UsageError, match="exists"):
+        exporter(name, robot(tmp_path)).write(episodes, out)
+    with pytest.raises(UsageError):
+        exporter(name, robot(tmp_path)).read(tmp_path / "nothing")
+
+
+@pytest.mark.parametrize("name", ["csv", "parquet", "joints"])
+def test_a_damaged_file_is_refused_in_words(tmp_path, name):
+    out = tmp_path / "out"
+    writer = exporter(name, robot(tmp_path))
+    writer.write([targets_of(demonstration(), GAINS)], out)
+    (path,) = out.glob("*.csv" if name == "csv" else "*.parquet")
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(FormatError):
+        writer.read(out)
+
+
+def test_compensated_targets_move_along_the_pads_normals():
+    made = demonstration()
+    targets = targets_of(made, GAINS)
+    assert len(targets.time_ns) == 38  # two rows before anything was seen
+    for k, name in enumerate(targets.fingers):
+        normal = Rotation.from_quat(targets.quaternion[:, k]).as_matrix()[:, :, 2]
+        wanted = GAINS[name] * np.nan_to_num(targets.depth[:, k])[:, None] * normal
+        assert np.allclose(targets.position[:, k] - targets.seen[:, k], wanted, atol=1e-12)
+        assert np.nanmax(targets.depth[:, k]) > 0.9
+    assert any("not moved at 1 times" in words for words in targets.remarks)
+    assert np.array_equal(targets_of(made, None).position, targets.seen)
+
+
+def test_what_cannot_be_made_is_refused():
+    with pytest.raises(UsageError, match="without predicted depth"):
+        targets_of(demonstration(network=None), GAINS)
+    with pytest.raises(UsageError, match="no path for middle"):
+        targets_of(demonstration(), None, ["middle"])
+    with pytest.raises(UsageError, match="no gain for index"):
+        targets_of(demonstration(), {"thumb": 0.1})
+    with pytest.raises(UsageError, match="did you mean 'lerobot'"):
+        exporter("lerobt")
+    with pytest.raises(UsageError, match="without a robot"):
+        exporter("joints")
+
+
+def test_lerobots_info_calls_predictions_predictions(tmp_path):
+    out = tmp_path / "out"
+    exporter("lerobot").write([targets_of(demonstration(), GAINS)], out)
+    features = json.loads((out / "meta/info.json").read_text())["features"]
+    maps = features["observation.predicted_depth.index"]
+    assert maps["info"]["prediction"] is True and maps["info"]["checkpoint"] == NETWORK["hash"]
+    parts = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    assert features["action"]["names"] == [f"{finger}.{part}" for finger in ("thumb", "index") for part in parts]
+
+
+@pytest.mark.slow
+def test_stock_lerobot_opens_the_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "cache"))
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+    episodes = [targets_of(demonstration(number=k), GAINS) for k in range(2)]
+    exporter("lerobot").write(episodes, tmp_path / "out")
+    opened = LeRobotDataset("own/demo", root=tmp_path / "out")
+    assert len(opened) == 76
+    item = opened[40]
+    wanted = np.concatenate([episodes[1].position[2], episodes[1].quaternion[2]], axis=-1).ravel()
+    assert np.allclose(item["action"].numpy(), wanted, atol=1e-6)
+    maps = episodes[1].source.tracks["index"].depth[4]
+    assert np.allclose(item["observation.predicted_depth.index"].numpy()[0], maps, atol=1e-6)  # mm
+
+
+def test_joint_values_bring_the_fingertips_to_their_targets(tmp_path):
+    targets = targets_of(demonstration(), GAINS)
+    described = read_robot(robot(tmp_path))
+    path, model = follow(described, targets)
+    assert not path.unreached and not path.too_fast and np.isfinite(path.values).all()
+    assert [joint.name for joint in path.joints][:2] == ["thumb_x", "thumb_y"] and path.joints[3].unit == "rad"
+    for row in (0, 17, 37):
+        places, turns = model.tips(path.values[row])
+        assert np.abs(places - targets.position[row]).max() < 1e-4
+        wanted = Rotation.from_quat(targets.quaternion[row]).as_matrix()
+        assert np.abs(turns - wanted).max() < 1e-3
+
+
+def test_targets_out_of_reach_are_named_and_never_clipped(tmp_path):
+    targets = targets_of(demonstration(), GAINS)
+    writer = exporter("joints", robot(tmp_path, fingers_urdf(reach=0.1)))
+    said = writer.write([targets], tmp_path / "out")
+    assert any("index does not reach" in words for words in said)
+    ((_, values, header),) = read_joints(tmp_path / "out")
+    rows = header["unreached"]["index"]
+    assert rows and np.isnan([values["thumb_x"][k] for k in rows]).all()
+    reached = np.setdiff1d(np.arange(38), [k for rows in header["unreached"].values() for k in rows])
+    assert np.isfinite(values["thumb_x"][reached]).all()
+    assert max(np.abs(values["index_x"][reached]), default=0) <= 0.1 + 1e-9
+
+
+def test_workspace_and_velocity_limits_are_checked(tmp_path):
+    targets = targets_of(demonstration(), GAINS)
+    slow = read_robot(robot(tmp_path, fingers_urdf(velocity=0.04)))
+    path, _ = follow(slow, targets)
+    speed = np.abs(np.diff(path.values, axis=0)) * 30
+    for k, joint in enumerate(path.joints):
+        assert joint.velocity == 0.04
+        assert set(path.too_fast.get(joint.name, ())) == set(1 + np.flatnonzero(speed[:, k] > 0.04 * (1 + 1e-6)))
+    assert path.too_fast
+    small = read_robot(robot(tmp_path, workspace={"min": [-1, -1, -1], "max": [1, 1, 0.16]}))
+    path, _ = follow(small, targets)
+    high = targets.position[:, 0, 2] - 0.05 > 0.16
+    assert high.any() and path.outside_workspace["thumb"] == tuple(np.flatnonzero(high))
+    assert np.isnan(path.values[high]).all() and np.isfinite(path.values[~high]).any()
+
+
+def test_a_mimic_joint_follows_or_the_target_is_not_reached(tmp_path):
+    targets = targets_of(demonstration(rows=6), GAINS)
+    tied = fingers_urdf(mimic='<mimic joint="thumb_x" multiplier="1.0" offset="0.0"/>')
+    path, model = follow(read_robot(robot(tmp_path, tied)), targets)
+    assert model.model.neq == 1
+    assert set(path.unreached) & {"thumb", "index"}  # both cannot have the same x in the base's frame
+
+
+def test_a_robot_file_is_checked(tmp_path):
+    for more, words in (
+        ({"fingers": {"thumb": {"link": "no_tip"}}}, "link no_tip"),
+        ({"home": {"elbow": 1.0}}, "joint elbow"),
+        ({"urdf": "none.urdf"}, "no URDF"),
+        ({"workspace": {"min": [0, 0, 0], "max": [1, 0, 1]}}, "min below max"),
+    ):
+        with pytest.raises((FormatError, UsageError), match=words):
+            read_robot(robot(tmp_path, **more))
+    path = robot(tmp_path)
+    (tmp_path / "two.urdf").write_text("<robot><link")
+    with pytest.raises(FormatError, match="no XML"):
+        read_robot(path)
+    with pytest.raises(UsageError, match="no fingertip for middle"):
+        Kinematics(read_robot(robot(tmp_path)), ("middle",))

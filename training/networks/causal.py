@@ -1,0 +1,15 @@
+"""The paper's network over the newest nine frames: no look-ahead, so no delay beyond link and computing.
+
+Everything but the window is as in `paper`. What the four frames to come tell the paper's network (whether a press is
+still deepening) this one must guess from the past.
+"""
+
+from __future__ import annotations
+
+from training.networks.paper import Paper
+
+
+class Causal(Paper):
+    """Nine frames, the newest of which is the target."""
+
+    offsets = (-8, -7, -6, -5, -4, -3, -2, -1, 0)
