@@ -178,14 +178,16 @@ class FittedResponse(Response):
     @staticmethod
     def _design(basis: BSpline, depth: np.ndarray) -> np.ndarray:
         low, high = basis.t[0], basis.t[-1]
-        inside = np.clip(depth, low, high)
+        # Where rows wait in the air, play or delay would leave the outermost spline undecided: flat there.
+        start = min(basis.t[4], max(low, 0.0))
+        inside = np.clip(depth, start, high)
         design = BSpline.design_matrix(inside, basis.t, 3).toarray()
-        beyond = depth - inside
+        # Deeper it goes on straight. Farther away than any row read it stays as it is: in the air nothing presses.
+        beyond = np.maximum(depth - high, 0.0)
         if np.any(beyond):
             step = 1e-3 * (high - low)
-            near = BSpline.design_matrix(np.where(depth > high, high - step, low + step), basis.t, 3).toarray()
-            slope = (design - near) / np.where(depth > high, step, -step)[:, None]
-            design = design + slope * beyond[:, None]
+            near = BSpline.design_matrix(np.full(len(depth), high - step), basis.t, 3).toarray()
+            design = design + (design - near) * (beyond / step)[:, None]
         return design
 
 

@@ -35,7 +35,9 @@ def _streams(axis: Any, found: Judgement) -> None:
     course = found.problem.setting.course.reduced
     first, last = residual(found.problem), residual(found.final)
     power = np.square(first).mean(axis=1)
-    worst = np.argsort([-power[course.episode == e].mean() for e in range(course.episodes)])[:3]
+    # Sealed episodes have no rows here.
+    read = np.unique(course.episode)
+    worst = read[np.argsort([-power[course.episode == e].mean() for e in read])[:3]]
     stream = int(np.argmax(np.square(first).mean(axis=0)))
     at = 0.0
     for number, e in enumerate(worst):

@@ -18,28 +18,35 @@ ENOUGH = 20
 """With fewer episodes none is sealed: all are needed for the verdict."""
 KEPT = 2
 """Episodes of a place and indenter that stay open at least."""
+WITHIN = 0.02
+"""By how much a sealed episode may go deeper than all open ones of its place [1]."""
 RESAMPLED = 2000
 STRENGTHS = (1e-3, 1e-2, 1e-1, 1.0)
 """Weights of the ceiling's ridge to choose from, over the mean diagonal [1]."""
 
 
 def chosen(course: Course) -> np.ndarray:
-    """Return which episodes are sealed, by the hash of session and name, shape (k,), int64."""
+    """Return which episodes are sealed, by the hash of session and name, shape (k,), int64.
+
+    An episode deeper than all that stay open at its place is left open: a response fitted to the others says nothing of
+    such depths.
+    """
     if course.episodes < ENOUGH:
         return np.zeros(0, dtype=np.int64)
     keys = [f"{course.session[k]}/{course.names[k]}" for k in range(course.episodes)]
     order = sorted(range(course.episodes), key=lambda k: hashlib.sha256(keys[k].encode()).digest())
     tool = np.array([course.tool[course.episode == k][0] for k in range(course.episodes)])
-    left: dict[tuple[int, int], int] = {}
+    depth = np.array([course.tip[course.episode == k, 2].max() for k in range(course.episodes)])
+    left: dict[tuple[int, int], list[int]] = {}
     for k in range(course.episodes):
-        key = int(course.site[k]), int(tool[k])
-        left[key] = left.get(key, 0) + 1
+        left.setdefault((int(course.site[k]), int(tool[k])), []).append(k)
     found: list[int] = []
     for k in order:
-        key = int(course.site[k]), int(tool[k])
-        if len(found) < int(SHARE * course.episodes) and left[key] > KEPT:
+        others = [other for other in left[int(course.site[k]), int(tool[k])] if other != k]
+        enough = len(others) >= KEPT and depth[others].max() >= (1 - WITHIN) * depth[k]
+        if len(found) < int(SHARE * course.episodes) and enough:
             found.append(k)
-            left[key] -= 1
+            left[int(course.site[k]), int(tool[k])] = others
     return np.sort(np.array(found, dtype=np.int64))
 
 

@@ -1,9 +1,12 @@
 """Episodes that are put aside, and what is shown on them."""
 
+from dataclasses import replace
+
 import numpy as np
 from pressing import course
 
 from tacdata import documents
+from tacdata.discrepancy.fitted_response import FittedResponse
 from tacdata.discrepancy.judged import judged
 from tacdata.discrepancy.sealed import ENOUGH, chosen, without_readings
 from tacdata.discrepancy.spec import read_spec
@@ -19,6 +22,15 @@ def test_a_fifth_is_sealed_by_name_and_never_a_whole_place():
     assert np.array_equal(sealed, chosen(course(episodes=24, seed=5)))  # names decide, not readings
     assert len(np.unique(np.delete(made.site, sealed))) == 2
     assert len(chosen(course(episodes=ENOUGH - 1))) == 0
+
+
+def test_an_episode_deeper_than_those_that_stay_open_is_not_sealed():
+    """A fitted response would be continued to depths that it never saw."""
+    made = course(episodes=24)
+    for k in chosen(made):
+        tip = made.tip.copy()
+        tip[made.episode == k, 2] += 0.6
+        assert k not in chosen(replace(made, tip=tip))
 
 
 def test_sealed_readings_are_not_read_but_their_path_stays():
@@ -46,3 +58,15 @@ def test_the_gate_can_be_had_alone():
     assert done.found.gap
     assert not done.verdict["effects"]
     assert "stopped after gate: a gap" in done.verdict["why"]
+
+
+def test_a_fitted_response_says_nothing_new_of_the_air():
+    """A first episode may begin at the machine's home, far above all others."""
+    made = course(episodes=12)
+    response = FittedResponse(made)
+    here, far = made.tip.copy(), made.tip.copy()
+    here[:, 2], far[:, 2] = made.tip[made.read, 2].min(), -25.0
+    assert np.array_equal(response.load(far, made.tool), response.load(here, made.tool))
+    deeper = here.copy()
+    deeper[:, 2] = 1.02 * made.span
+    assert (response.load(deeper, made.tool) > response.load(made.tip, made.tool).max(axis=0) * 0.2).any()
