@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 RESOURCE = "press"
 """What a worker has one of: it solves one batch at a time."""
-AHEAD = 2
-"""Tasks given to a worker, which takes them in order, so that it need not wait for the next one."""
 CONNECT_SECONDS = 10
 """How long a scheduler may take to answer."""
 ALONE_SECONDS = 30.0
@@ -104,7 +102,8 @@ class DaskPool:
         self._batch = ON_A_CARD if any(device.startswith("cuda") for device in devices) else 1
         self._roster, self._numbers = Roster(self._ledger), itertools.count()
         self._given: dict[str, list[_Task]] = {}
-        """Address of a worker -> its tasks, in the order in which it takes them."""
+        """Address of a worker -> its task. One at a time: a dying worker takes along what it has not handed over yet, and
+        a press that does no harm would count as the deadly one."""
         self._refused: dict[str, str] = {}
         """Address of a worker -> why it gets no tasks."""
         self._seen: set[str] = set()
@@ -137,14 +136,15 @@ class DaskPool:
         if not wanted and not any(self._given.values()):
             return
         client = self._connected()
-        for address, tasks in self._given.items():
+        for address, tasks in list(self._given.items()):
             for task in [task for task in tasks if task.future.status == "finished"]:
                 tasks.remove(task)
                 self._take_in(task.future.result(), task, address)
-            first = tasks[:1]  # a worker takes its tasks in order: it was at this one, the others never began
             for task in [task for task in tasks if task.future.status in ("error", "cancelled", "lost")]:
-                tasks.remove(task)
-                self._give_back(task, task in first)
+                self._give_back(task, began=True)
+                # Nothing more goes there before the scheduler says that it is alive: it would be lost, and blamed.
+                self._given.pop(address, None)
+                self._looked = time.monotonic()
         if time.monotonic() - self._looked > LOOK_SECONDS:
             self._look(client)
         self._give_out(client)
@@ -200,9 +200,9 @@ class DaskPool:
         self._refused = {address: why for address, why in self._refused.items() if address in there}
         there -= self._refused.keys()
         for address in self._given.keys() - there:
-            for number, task in enumerate(self._given.pop(address)):
+            for task in self._given.pop(address):
                 task.future.cancel(force=True)
-                self._give_back(task, number == 0 and address not in self._refused)
+                self._give_back(task, address not in self._refused)
         for address in there:
             self._given.setdefault(address, [])
         if there:
@@ -217,16 +217,15 @@ class DaskPool:
             )  # fmt: skip
 
     def _give_out(self, client: Client) -> None:
-        for ahead in range(AHEAD):
-            for address, tasks in self._given.items():
-                while len(tasks) <= ahead:
-                    owner = f"{owner_name()}#{next(self._numbers)}"
-                    leases = self._claimed(owner)
-                    if not leases:
-                        return
-                    todo = [lease for lease in leases if not self._found(lease, owner)]
-                    if todo:
-                        tasks.append(_Task(self._submit(client, address, todo), owner, todo))
+        for address, tasks in self._given.items():
+            while not tasks:
+                owner = f"{owner_name()}#{next(self._numbers)}"
+                leases = self._claimed(owner)
+                if not leases:
+                    return
+                todo = [lease for lease in leases if not self._found(lease, owner)]
+                if todo:
+                    tasks.append(_Task(self._submit(client, address, todo), owner, todo))
 
     def _claimed(self, owner: str) -> list[Lease]:
         for version in self._ledger.offered():

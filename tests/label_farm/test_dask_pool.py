@@ -37,8 +37,7 @@ def test_a_cluster_labels_and_a_press_that_kills_its_worker_is_a_failure(tmp_pat
     assert "episode 3: no label: no equilibrium" in shown.stdout
     counted = [line.split()[1] for line in (tmp_path / "solves.log").read_text().splitlines()]
     assert (counted.count("-5.95"), counted.count("-5.9")) == (2, 3)
-    # A result that its worker had not yet handed over goes with it.
-    assert all(counted.count(x) <= 2 for x in ("-6", "-5.85", "-5.8", "-5.75"))
+    assert all(counted.count(x) == 1 for x in ("-6", "-5.85", "-5.8", "-5.75"))
 
 
 @pytest.mark.slow
