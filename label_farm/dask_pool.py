@@ -102,8 +102,8 @@ class DaskPool:
         self._batch = ON_A_CARD if any(device.startswith("cuda") for device in devices) else 1
         self._roster, self._numbers = Roster(self._ledger), itertools.count()
         self._given: dict[str, list[_Task]] = {}
-        """Address of a worker -> its task. One at a time: a dying worker takes along what it has not handed over yet, and
-        a press that does no harm would count as the deadly one."""
+        """Address of a worker -> its task. One at a time: a dying worker takes along what it has not handed over yet,
+        and a press that does no harm would count as the deadly one."""
         self._refused: dict[str, str] = {}
         """Address of a worker -> why it gets no tasks."""
         self._seen: set[str] = set()
