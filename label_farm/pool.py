@@ -153,10 +153,13 @@ class Pool:
                 slot.process.kill()
                 slot.process.wait()
             self._close(slot)
+        stopped = list(self._slots)
+        self._slots.clear()
+        # The ledger may lie on a full disk; the processes are gone by now in any case.
+        for slot in stopped:
             self._ledger.release(slot.owner, blame=False)
             self._roster.leave(slot.owner)
             slot.log.unlink(missing_ok=True)
-        self._slots.clear()
 
     def close(self) -> None:
         """Stop and let go of the ledger."""
