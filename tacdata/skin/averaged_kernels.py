@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from tacdata.skin.constitutive import kinematics
+from tacdata.skin.element_functions import element_functions
 from tacdata.skin.materials import load_law
 
 _BEARABLE = 1.0
@@ -27,44 +28,11 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
     volume = kinematics.volume(real)
     cofactor_change, volume_change = volume.cofactor_change, volume.change
     cross, shifted = volume.cross, volume.shifted
-    Parameters, vec3 = kinematics.parameters(real), wp.types.vector(3, real)
+    of_element = element_functions(real)
+    gather, slope, gradient, add = of_element.gather, of_element.slope, of_element.gradient, of_element.add
+    constants, stretch, Nodal = of_element.constants, of_element.stretch, of_element.Nodal
     bearable = wp.constant(real(_BEARABLE))
-    mat33, Four = kinematics.matrix(real), wp.types.vector(4, real)
-    Nodal = wp.types.matrix((10, 3), real)
-
-    @wp.func
-    def gather(u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), e: int, b: int):
-        values = Nodal()
-        for a in range(10):
-            n = tets[e, a]
-            for i in range(3):
-                values[a, i] = u[n, i, b]
-        return values
-
-    @wp.func
-    def slope(slopes: wp.array4d(dtype=real), e: int, q: int, a: int, s: real):
-        return vec3(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2] / s)
-
-    @wp.func
-    def gradient(values: Nodal, slopes: wp.array4d(dtype=real), e: int, q: int, s: real):
-        H = mat33()
-        for a in range(10):
-            H += wp.outer(vec3(values[a, 0], values[a, 1], values[a, 2]), slope(slopes, e, q, a, s))
-        return H
-
-    @wp.func
-    def stretch(slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), e: int, b: int):
-        s = real(1.0)
-        if slab[e] == 1:
-            s = thickness[b]
-        return s
-
-    @wp.func
-    def constants(m: wp.array2d(dtype=real), b: int):
-        values = Parameters()
-        for k in range(8):
-            values[k] = m[k, b]
-        return values
+    Four = wp.types.vector(4, real)
 
     @wp.func
     def at_corners(field: wp.array2d(dtype=real), corners: wp.array2d(dtype=wp.int32), e: int, b: int):
@@ -79,13 +47,6 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
         for a in range(4):
             value += shapes[q, a] * values[a]
         return value
-
-    @wp.func
-    def add(values: Nodal, tets: wp.array2d(dtype=wp.int32), e: int, b: int, total: wp.array3d(dtype=real)):
-        for a in range(10):
-            n = tets[e, a]
-            for i in range(3):
-                wp.atomic_add(total, n, i, b, values[a, i])
 
     @wp.kernel(module="unique", enable_backward=False)
     def swelling(

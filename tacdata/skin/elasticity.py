@@ -16,6 +16,7 @@ import warp as wp
 
 from tacdata.skin.averaged_volume import AveragedVolume
 from tacdata.skin.conditions import Conditions
+from tacdata.skin.element_functions import element_functions
 from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
 
@@ -32,51 +33,9 @@ def _kernels(law_name: str, real: type) -> SimpleNamespace:
     law = load_law(law_name)
     energy_of, stress_of = law.energy_function(real, "H"), law.stress_function(real, "H")
     tangent_of = law.tangent_function(real, "H")
-    Parameters = wp.types.vector(length=8, dtype=real)
-    vec3, mat33 = wp.types.vector(3, real), wp.types.matrix((3, 3), real)
-    Nodal = wp.types.matrix((10, 3), real)
-
-    @wp.func
-    def gather(u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), e: int, b: int):
-        values = Nodal()
-        for a in range(10):
-            n = tets[e, a]
-            for i in range(3):
-                values[a, i] = u[n, i, b]
-        return values
-
-    @wp.func
-    def slope(slopes: wp.array4d(dtype=real), e: int, q: int, a: int, s: real):
-        return vec3(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2] / s)
-
-    @wp.func
-    def gradient(values: Nodal, slopes: wp.array4d(dtype=real), e: int, q: int, s: real):
-        H = mat33()
-        for a in range(10):
-            g = slope(slopes, e, q, a, s)
-            H += wp.outer(vec3(values[a, 0], values[a, 1], values[a, 2]), g)
-        return H
-
-    @wp.func
-    def add(values: Nodal, tets: wp.array2d(dtype=wp.int32), e: int, b: int, total: wp.array3d(dtype=real)):
-        for a in range(10):
-            n = tets[e, a]
-            for i in range(3):
-                wp.atomic_add(total, n, i, b, values[a, i])
-
-    @wp.func
-    def constants(m: wp.array2d(dtype=real), b: int):
-        values = Parameters()
-        for k in range(8):
-            values[k] = m[k, b]
-        return values
-
-    @wp.func
-    def stretch(slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), e: int, b: int):
-        s = real(1.0)
-        if slab[e] == 1:
-            s = thickness[b]
-        return s
+    of_element = element_functions(real)
+    gather, slope, gradient, add = of_element.gather, of_element.slope, of_element.gradient, of_element.add
+    constants, stretch, Nodal = of_element.constants, of_element.stretch, of_element.Nodal
 
     @wp.kernel(module="unique", enable_backward=False)
     def internal_force(
