@@ -182,10 +182,11 @@ def gain_steps(found: Answers) -> dict[int, tuple[int, float]]:
     ratio -= _common(found, ratio)
     centers = np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in ratio.T])
     usual = 1.4826 * float(np.median(np.abs(ratio - centers)[near])) if near.any() else 0.0
+    scatter = _scatter(found, ratio - centers, usual)
     steps = {}
     for channel in range(ratio.shape[1]):
         rows = np.flatnonzero(near[:, channel])
-        step = _step(ratio[rows, channel], usual)
+        step = _step(ratio[rows, channel], scatter[rows])
         if step is not None:
             steps[channel] = (int(rows[step[0]]), float(np.exp(step[1])))
     return steps
@@ -218,15 +219,32 @@ def _common(found: Answers, ratio: np.ndarray) -> np.ndarray:
     return shared
 
 
-def _step(values: np.ndarray, usual: float) -> tuple[int, float] | None:
-    """Return where values step and by how much, if they do beyond doubt; ``usual`` is every channel's scatter."""
+def _scatter(found: Answers, rest: np.ndarray, usual: float) -> np.ndarray:
+    """Return what every press's answers are off by [1], shape (presses,): an indenter that is not round fits worse.
+
+    Presses of one indenter often follow each other, and its misfit must not pass for a step.
+    """
+    scatter = np.full(len(rest), max(usual, 0.03))
+    for name in np.unique(found.indenters):
+        rows = found.indenters == name
+        own = rest[rows][np.isfinite(rest[rows])]
+        if len(own):
+            scatter[rows] = np.maximum(scatter[rows], np.sqrt(np.mean(np.square(own))))
+    return scatter
+
+
+def _step(values: np.ndarray, usual: np.ndarray) -> tuple[int, float] | None:
+    """Return where values step and by how much, if they do beyond doubt; ``usual``: scatter of each, shape (n,)."""
     best: tuple[float, int, float] | None = None
     for at in range(SIDE, len(values) - SIDE + 1):
         before, after = values[:at], values[at:]
         change = float(np.median(after) - np.median(before))
-        spread = np.concatenate([before - np.median(before), after - np.median(after)])
-        scatter = max(1.4826 * float(np.median(np.abs(spread))), usual, 0.03)
-        sure = abs(change) / (scatter * np.sqrt(1 / len(before) + 1 / len(after)))
+        # By standard deviation on either side: an answer after the step that is as before speaks against it.
+        variance = sum(
+            max(float(np.var(side, ddof=1)), float(np.mean(np.square(said)))) / len(side)
+            for side, said in ((before, usual[:at]), (after, usual[at:]))
+        )
+        sure = abs(change) / np.sqrt(variance)
         if best is None or sure > best[0]:
             best = sure, at, change
     if best is None or best[0] < SURE or abs(best[2]) < np.log1p(STEP):
