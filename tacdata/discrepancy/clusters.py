@@ -5,6 +5,9 @@ own fit scatters as the noise does, whatever memory or tails that has, and howev
 large leverage count as if they were left out (HC3: MacKinnon & White, J. Econometrics 29, 1985, 305), successive ones
 that have something in common are taken together (cluster-robust), and the few that remain are paid for by an F
 distribution with the degrees of freedom of their leverage (after Bell & McCaffrey, Survey Methodology 28, 2002, 169).
+How much a score scatters, against what the noise makes, is told from few episodes where few excite a candidate; all
+candidates of a kind lend each other what they have in common (empirical Bayes: Smyth, Stat. Appl. Genet. Mol. Biol. 3,
+2004, article 3).
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtrc, ndtri
+from scipy.special import digamma, fdtrc, ndtri, polygamma
 
 EACH = 5
 """Successive episodes that are taken together where they have something in common [1]."""
@@ -25,6 +28,10 @@ CLOCKWISE = 0.0
 LEVERAGE = 0.6
 """A candidate of which one stretch holds a larger share of all information is not judged [1]."""
 FLOOR = 1e-300
+LENT = 20.0
+"""Most degrees of freedom that candidates lend each other: many look alike [1]."""
+LENDERS = 8
+"""Fewer candidates of a kind lend nothing [1]."""
 
 
 @dataclass(frozen=True)
@@ -39,24 +46,71 @@ class Clustered:
     """Stretch of each episode, shape (episodes,), int64."""
     freedom: tuple[float, float]
     """Degrees of freedom of the statistic: of the pull, of the scatter [1]."""
+    expected: float = 1.0
+    """What `power` is if nothing but the noise shakes [1]."""
 
     @property
     def power(self) -> float:
-        """Mean square of the pull by chance [1]."""
+        """Mean square of the pull by chance, as these episodes scatter [1]."""
         return max(float(np.sum(np.square(self.scatter))), 1e-12)
 
-    def score(self) -> float:
-        """Return the standard normal score of the pull [1]."""
-        return float(_normal(np.array([np.sum(np.square(self.pull)) / self.power]), *self.freedom)[0])
+    def score(self, lent: Lent | None = None) -> float:
+        """Return the standard normal score of the pull [1], with what other candidates lend."""
+        power, (first, second) = self.power, self.freedom
+        if lent is not None:
+            power = (second * power + lent.freedom * lent.excess * self.expected) / (second + lent.freedom)
+            second = second + lent.freedom
+        return float(_normal(np.array([np.sum(np.square(self.pull)) / power]), first, second)[0])
 
-    def by_chance(self, signs: np.ndarray) -> np.ndarray:
-        """Return the scores that flips of stretches give [1], shape (flips,).
+    def by_chance(self, normal: np.ndarray) -> np.ndarray:
+        """Return the scores that scatter alone gives, shape (draws,).
+
+        Every stretch's say is multiplied by a normal number, which keeps what candidates have in common and stays
+        right for few stretches, where signs do not (Chernozhukov, Chetverikov & Kato, Ann. Stat. 41, 2013, 2786).
 
         Args:
-            signs: Of each stretch's number, at least as many as there are, shape (flips, stretches or more).
+            normal: Of each stretch's number, at least as many as there are, shape (draws, stretches or more).
         """
-        pulls = signs[:, : len(self.scatter)] @ self.scatter
+        pulls = normal[:, : len(self.scatter)] @ self.scatter
         return _normal(np.sum(np.square(pulls), axis=1) / self.power, self.freedom[0], 1e6)
+
+
+@dataclass(frozen=True)
+class Lent:
+    """What all candidates of a kind say of how much scores scatter."""
+
+    excess: float
+    """Square of the scatter over what the noise makes [1]."""
+    freedom: float
+    """Degrees of freedom that this is worth [1]."""
+
+
+def lent(scores: list[Clustered]) -> Lent | None:
+    """Return what candidates have in common; None if they are too few to say.
+
+    By medians, so that a few candidates that miss what is there do not count.
+    """
+    told = [s for s in scores if np.any(s.pull)]
+    if len(told) < LENDERS:
+        return None
+    half = 0.5 * np.array([s.freedom[1] for s in told])
+    log = np.log([s.power / max(s.expected, 1e-12) for s in told]) - digamma(half) + np.log(half)
+    middle = float(np.median(log))
+    spread = float(1.4826 * np.median(np.abs(log - middle))) ** 2 - float(np.mean(polygamma(1, half)))
+    freedom = min(2 * _trigamma_inverse(spread), LENT) if spread > 0 else LENT
+    return Lent(float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2))), freedom)
+
+
+def _trigamma_inverse(value: float) -> float:
+    """Return x with trigamma(x) = value > 0, by Newton's method on its inverse (Smyth 2004, appendix)."""
+    x = 0.5 + 1 / value
+    for _ in range(30):
+        now = float(polygamma(1, x))
+        step = now * (1 - now / value) / float(polygamma(2, x))
+        x = max(x + step, 1e-3)
+        if abs(step) < 1e-8 * x:
+            break
+    return x
 
 
 def clustered(gram: np.ndarray, columns: np.ndarray, clock: bool) -> Clustered:
@@ -93,7 +147,8 @@ def clustered(gram: np.ndarray, columns: np.ndarray, clock: bool) -> Clustered:
     if not told.any():
         return _nothing(len(gram))
     scatter = together[:, told] / (1 - heavy[:, told])
-    return Clustered(pull[told], scatter, of, _freedom(scatter, heavy[:, told]))
+    expected = float(np.sum(heavy[:, told] / (1 - heavy[:, told])))
+    return Clustered(pull[told], scatter, of, _freedom(scatter, heavy[:, told]), expected)
 
 
 def _nothing(episodes: int) -> Clustered:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.discrepancy.excitation import inseparable
-from tacdata.discrepancy.judge import ALPHA, Judgement, Member
+from tacdata.discrepancy.judge import DECOYS, GATE, Judgement, Member
 from tacdata.effects import Placed, load
 
 LEFT = 0.05
@@ -20,8 +20,6 @@ SURE = 3.0
 """Without any effect that helps, leftovers must show by so many standard errors to be called a gap [1]."""
 BEYOND = 3.0
 """A channel's gain is more than calibration's business beyond so many of its standard deviations [1]."""
-DECOYS = 0.05
-"""No effect is named that more decoys do as well as [1]."""
 COMMON = ("modulus", "thickness")
 """What a common gain cannot be told from without a force reading."""
 
@@ -77,7 +75,7 @@ def status(found: Judgement) -> str:
         return "unknown" if found.gap else "none"
     if not found.gap and not answer:
         return "none"
-    if not answer and found.tested.p_generic > ALPHA and found.left.t < SURE:
+    if not answer and found.tested.p_generic > GATE and found.left.t < SURE:
         return "none"  # one effect in a hundred flips, and nothing that bears it out
     if not answer or not adequate(found):
         return "unknown"

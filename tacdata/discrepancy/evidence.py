@@ -10,11 +10,12 @@ an episode, so that every fit, fold, bootstrap and sign flip afterwards is a sma
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tacdata.chain import Course
+from tacdata.discrepancy.own_errors import Own, without
 
 
 @dataclass(frozen=True)
@@ -134,131 +135,47 @@ def _cleaned(
     jitter: np.ndarray,
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:  # fmt: skip
     white = whiten(columns, course, noise)
-    flat = Noise(np.ones(1), noise.memory, noise.offset)
-    shared = None if features is None else whiten(features[:, None, :], course, flat)[:, 0]
-    offset = whiten(np.ones((course.rows, 1, 1)), course, flat)[:, 0]
+    streams = white.shape[1]
+    flat = replace(noise, scale=np.ones(1))
+    shared = None if features is None else whiten(features[:, None, :], course, replace(flat, missing=None))[:, 0]
+    offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
     moved = whiten(jitter, course, noise)
     swung = None if noise.swing is None else whiten(noise.swing[:, :, None], course, noise)[:, :, 0]
+    seen = streams - (3 if noise.tag is not None else 0)
     order = np.argsort(context, kind="stable")
     for group in np.split(order, np.flatnonzero(np.diff(context[order])) + 1):
-        swing = None if swung is None else swung[group]
-        yield (
-            group,
-            _project(white[group], moved[group], course.episode[group], offset[group], shared, group, noise, swing),
-        )
+        local = course.episode[group]
+        rows = np.argsort(local, kind="stable")
+        spans = np.split(rows, np.flatnonzero(np.diff(local[rows])) + 1)
+        part = np.empty_like(white[group])
+        own = Own(
+            _turned(offset[group, :seen]), noise.offset,
+            None if swung is None else _turned(swung[group, :seen]),
+            _turned(moved[group, :seen]),
+            None if shared is None else _features(shared[group], offset[group, :seen]),
+        )  # fmt: skip
+        part[:, :seen] = _turned(without(_turned(white[group, :seen]), spans, own))
+        if seen < streams:
+            # A tag knows nothing of the response: it has a free offset for the place, and each episode's own.
+            own = Own(
+                _turned(offset[group, seen:]), float(noise.tag or 1.0), features=_turned(offset[group, seen:, None])
+            )
+            part[:, seen:] = _turned(without(_turned(white[group, seen:]), spans, own))
+        yield group, part
 
 
-def _project(
-    white: np.ndarray, moved: np.ndarray, episode: np.ndarray, offset: np.ndarray, shared: np.ndarray | None,
-    group: np.ndarray, noise: Noise, swing: np.ndarray | None,
-) -> np.ndarray:  # fmt: skip
-    """Return one group's columns without what features, offsets and errors of pose explain."""
-    numbers, local = np.unique(episode, return_inverse=True)
-    own = np.zeros((len(white), len(numbers)), dtype=np.float32)
-    own[np.arange(len(white)), local] = offset[:, 0]
-    design = own if shared is None else np.column_stack([own, shared[group]])
-    used = np.abs(design).max(axis=0) > 1e-9
-    prior = 0.0 if np.isinf(noise.offset) else noise.offset**-2
-    ridge = np.where(np.arange(design.shape[1]) < len(numbers), prior, 0.0)[used]
-    seen = white.shape[1] - (3 if noise.tag is not None else 0)
-    order = np.argsort(local, kind="stable")
-    spans = np.split(order, np.flatnonzero(np.diff(local[order])) + 1)
-    group_of = _Group(design[:, used], ridge, spans)
-    result = np.empty_like(white)
-    result[:, :seen] = group_of.left(white[:, :seen], moved[:, :seen], None if swing is None else swing[:, :seen])
-    if seen < white.shape[1]:
-        result[:, seen:] = _without_offsets(white[:, seen:], own, noise)
-    return result
+def _turned(values: np.ndarray) -> np.ndarray:
+    """Return values with rows and streams exchanged."""
+    return np.ascontiguousarray(np.swapaxes(values, 0, 1))
 
 
-class _Group:
-    """Rows of one place: a projection C = 1 - D K D' shared by all streams, and episodes' own columns T beside it.
+def _features(shared: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """Return features of each stream, shape (streams, n, p), without those that are nowhere and where nothing was read.
 
-    T is only ever seen through D'T and sums over an episode's rows: its columns are as many as episodes.
+    Args:
+        shared: Whitened features, shape (n, k).
+        offset: Whitened constants, 0 where nothing was read, shape (n, streams).
     """
-
-    def __init__(self, design: np.ndarray, ridge: np.ndarray, spans: list[np.ndarray]) -> None:
-        """Prepare the projection.
-
-        Args:
-            design: D, shape (n, p).
-            ridge: Weights of its priors, shape (p,).
-            spans: Rows of each episode.
-        """
-        wide = design.astype(np.float64)
-        self._gram = wide.T @ wide
-        least = 1e-8 * max(float(np.trace(self._gram)) / max(len(self._gram), 1), 1e-12)
-        self._inverse = np.linalg.pinv(self._gram + np.diag(ridge + least), hermitian=True)
-        self._twice = 2 * self._inverse - self._inverse @ self._gram @ self._inverse
-        self._design, self._spans = design.astype(np.float32), spans
-
-    def left(self, white: np.ndarray, moved: np.ndarray, swing: np.ndarray | None) -> np.ndarray:
-        """Return columns (n, streams, k) without design, errors of pose (all streams alike) and swings (each alone)."""
-        streams, kinds = white.shape[1], moved.shape[2]
-        known = self._inner(white)
-        result = white - self._said(self._inverse @ known).reshape(white.shape)
-        known = known - self._gram @ (self._inverse @ known)  # D'C
-        beside = self._beside(moved)  # p, streams, episodes, kinds
-        size = len(self._spans) * kinds
-        flat = beside.reshape(len(self._gram), streams, size)
-        twice = np.tensordot(self._twice, flat, axes=1)
-        matrix = np.eye(size) - np.tensordot(flat, twice, axes=([0, 1], [0, 1]))
-        right = np.empty((size, white.shape[2]))
-        for e, rows in enumerate(self._spans):
-            part = slice(e * kinds, (e + 1) * kinds)
-            own = moved[rows].reshape(-1, kinds)
-            matrix[part, part] += (own.T @ own).astype(np.float64)
-            right[part] = own.T @ result[rows].reshape(len(own), -1)
-        inverse = self._inverse
-        shared = np.tensordot(flat, np.tensordot(inverse, known.reshape(len(inverse), streams, -1), axes=1),
-                              axes=([0, 1], [0, 1]))  # fmt: skip
-        weights = np.linalg.solve(matrix, right - shared)
-        result, known = self._less(result, known, moved, weights.reshape(-1, kinds, white.shape[2]), flat @ weights)
-        return result if swing is None else self._steadied(result, known, swing)
-
-    def _less(
-        self, result: np.ndarray, known: np.ndarray, moved: np.ndarray, weights: np.ndarray, through: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Take C T z off, and from D' of it; ``through`` is D'T z, shape (p, streams, k)."""
-        for e, rows in enumerate(self._spans):
-            result[rows] -= moved[rows] @ weights[e].astype(np.float32)
-        inner = through.reshape(len(self._gram), -1)
-        result += self._said(self._inverse @ inner).reshape(result.shape)
-        return result, known - inner + self._gram @ (self._inverse @ inner)
-
-    def _steadied(self, result: np.ndarray, known: np.ndarray, swing: np.ndarray) -> np.ndarray:
-        streams, width = result.shape[1:]
-        beside = self._beside(swing[:, :, None])[:, :, :, 0].transpose(1, 0, 2)  # streams, p, episodes
-        matrix = np.eye(len(self._spans)) - beside.transpose(0, 2, 1) @ (self._twice @ beside)
-        right = np.empty((streams, len(self._spans), width))
-        for e, rows in enumerate(self._spans):
-            matrix[:, e, e] += np.square(swing[rows]).sum(axis=0)
-            right[:, e] = np.einsum("ns,nsk->sk", swing[rows], result[rows], optimize=True)
-        inner = (self._inverse @ known).reshape(len(self._gram), streams, width).transpose(1, 0, 2)
-        weights = np.linalg.solve(matrix, right - beside.transpose(0, 2, 1) @ inner)
-        for e, rows in enumerate(self._spans):
-            result[rows] -= swing[rows][:, :, None] * weights[:, e].astype(np.float32)
-        through = (beside @ weights).transpose(1, 0, 2).reshape(len(self._gram), -1)
-        return result + self._said(self._inverse @ through).reshape(result.shape)
-
-    def _inner(self, block: np.ndarray) -> np.ndarray:
-        return (self._design.T @ block.reshape(len(block), -1)).astype(np.float64)
-
-    def _said(self, weights: np.ndarray) -> np.ndarray:
-        return self._design @ weights.astype(np.float32)
-
-    def _beside(self, block: np.ndarray) -> np.ndarray:
-        """Return D'T of episodes' own columns (n, streams, kinds), shape (p, streams, episodes, kinds)."""
-        parts = [self._design[rows].T @ block[rows].reshape(len(rows), -1) for rows in self._spans]
-        return np.stack([p.reshape(len(self._gram), *block.shape[1:]) for p in parts], axis=2).astype(np.float64)
-
-
-def _without_offsets(block: np.ndarray, own: np.ndarray, noise: Noise) -> np.ndarray:
-    """Return a tag's streams of one place without their offset there and, by its prior, each episode's own."""
-    design = np.column_stack([own.sum(axis=1), own]).astype(np.float64)
-    gram = design.T @ design
-    ridge = np.full(len(gram), float(noise.tag or 1.0) ** -2)
-    ridge[0] = 1e-8 * max(float(gram[0, 0]), 1e-12)
-    factor = np.linalg.solve(gram + np.diag(ridge), design.T)
-    flat = block.reshape(len(block), -1)
-    return (flat - design @ (factor @ flat)).astype(np.float32).reshape(block.shape)
+    used = shared[:, np.abs(shared).max(axis=0) > 1e-9]
+    there = (offset != 0).T.astype(np.float32)
+    return there[:, :, None] * used[None]

@@ -1,4 +1,4 @@
-"""Fits, folds and flips on Gram matrices."""
+"""Fits, folds and flips of sign on Gram matrices."""
 
 from __future__ import annotations
 

@@ -34,6 +34,24 @@ def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndar
     return result.astype(np.float32)
 
 
+def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
+    """Return columns of what changes over a session, shape (n, streams, k), float32: gains and depths with the clock.
+
+    They tell slow changes from what differs from one visit of a place to the next; they are no evidence themselves.
+    """
+    streams = Streams.of(course)
+    rise = streams.predicted(predict(course, response, placed))
+    rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
+    if streams.tag:
+        rise[:, -3:] = 0.0
+    own = [histories(course)[:, k] for k in CLOCK]
+    if course.temperature is not None:
+        own.append((course.temperature - course.temperature.mean()) / max(float(np.std(course.temperature)), 1e-9))
+    follow = np.stack(own, axis=-1)[streams.rows][:, None, :]
+    slope = depth_slope(course, response, placed)[:, :, None] * (0.1 * course.stroke)
+    return np.concatenate([rise[:, :, None] * follow, slope * follow], axis=2).astype(np.float32)
+
+
 def histories(course: Course) -> np.ndarray:
     """Return what a path remembers, each of size about 1, shape (n, k)."""
     depth = np.maximum(course.tip[:, 2], 0.0)

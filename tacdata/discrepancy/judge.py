@@ -15,7 +15,9 @@ from tacdata.discrepancy.search import Left, Tested, best_shapes, fitted, held_o
 from tacdata.effects import Placed, load
 
 ALPHA = 0.01
-"""Share of flips that may do as well, over all candidates together."""
+"""Share of decoys that may do as well, over all candidates together."""
+GATE = 0.5 * ALPHA
+"""The same for each of the gate's two looks: at all effects, and at columns that belong to none."""
 MOST = 4
 """Most effects in one verdict."""
 TOP = 8
@@ -38,6 +40,8 @@ SURE_PAIR = 3.0
 """A pair of which neither is significant must help by so many standard errors over episodes [1]."""
 FAR, BEHIND = 5.0, 0.8
 """Rivals are not refined that are behind to first order by so many standard errors and this share of the gain [1]."""
+DECOYS = 0.05
+"""No effect is named that more decoys do as well as [1]."""
 BOOTSTRAPS = 200
 CLOSE = 0.5
 """Candidates with at least this share of the best gain may be rivals [1]."""
@@ -68,7 +72,7 @@ class Member:
     selected: float = 1.0
     """Share of resamplings of the episodes in which its mechanism explains most [1]."""
     decoys: float = 0.0
-    """Share of decoys, sign-flipped copies of all effects, that do as well [1]."""
+    """Share of decoys, all effects with chance scores, that do as well [1]."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +119,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     same = frame(setting)
     problem = prepare(setting, same)
     tested = test(problem)
-    gap = bool(min(tested.p.min(initial=1.0), tested.p_generic) <= ALPHA)
+    gap = bool(min(tested.p.min(initial=1.0), tested.p_generic) <= GATE)
     nothing = refine(setting, [], problem.frame)
     now, current, members = problem, nothing, []
     verdicts, beaten = tested, _beaten(problem, tested, {})
@@ -149,6 +153,13 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         problem = prepare(setting, same)
     found, current = _members(setting, current, problem)
     found = [replace(m, decoys=_decoys(setting, current, k, same, beaten)) for k, m in enumerate(found)]
+    while len(found) > 1 and max(m.decoys for m in found) > DECOYS:
+        # Held-out episodes lie between others: a slow wander helps there, and is no effect.
+        weakest = max(range(len(found)), key=lambda k: found[k].decoys)
+        rest = [p for k, p in enumerate(current.placed) if k != weakest]
+        current = refine(replace(setting, response=current.response), rest, same, AGAIN)
+        found, current = _members(setting, current, problem)
+        found = [replace(m, decoys=_decoys(setting, current, k, same, beaten)) for k, m in enumerate(found)]
     if found and [p.effect.name for p in current.placed] != [p.effect.name for p in now.placed]:
         now = prepare(replace(setting, response=current.response), same, current.placed)
     left = leftovers(now)

@@ -42,7 +42,7 @@ def judged(
         parents: Name to content hash of what is judged.
         without: Mechanisms that are not tried.
         until: The last step to make (`tacdata.discrepancy.judge.STEPS`).
-        decoys: Whether effects race with sign-flipped copies of all.
+        decoys: Whether effects race with copies of all whose scores are chance.
 
     Raises:
         FormatError: If recordings and spec do not fit together.

@@ -8,7 +8,7 @@ from tacdata.discrepancy.fit import eliminated
 from tacdata.discrepancy.problem import Problem
 
 SEEN = 4.0
-"""Standard errors over episodes at which the sign flips find an effect about half the time [1]."""
+"""Standard errors over episodes at which an effect is found about half the time [1]."""
 
 
 def limits(problem: Problem) -> dict[str, float]:

@@ -13,7 +13,7 @@ from tacdata.discrepancy.candidates import Board, Candidate, build
 from tacdata.discrepancy.evidence import Evidence, Noise
 from tacdata.discrepancy.fit import fold_of, solve
 from tacdata.discrepancy.fitted_response import contexts
-from tacdata.discrepancy.generic import depth_slope, generic
+from tacdata.discrepancy.generic import depth_slope, generic, slow
 from tacdata.discrepancy.spline_response import taken_up
 from tacdata.discrepancy.streams import Streams
 from tacdata.discrepancy.tangent import Tangent, tangents
@@ -44,7 +44,7 @@ class Setting:
     given: tuple[Placed, ...] = ()
     """Effects that the model has already, with their numbers fixed."""
     decoys: bool = True
-    """Whether effects race with sign-flipped copies of all; without, each is tested alone (to see what that costs)."""
+    """Whether effects race with copies of all by chance; without, each is tested alone (to see what that costs)."""
 
 
 @dataclass(frozen=True)
@@ -111,20 +111,19 @@ def frame(setting: Setting) -> Frame:
     extra, ridge = nuisance_columns(setting, setting.given)
     rich = generic(course, response, list(setting.given))
     residual = streams.measured(course) - streams.predicted(said)
-    every = np.concatenate([extra, rich], axis=2)
+    every = np.concatenate([extra, rich, slow(course, response, list(setting.given))], axis=2)
     known = told(residual.astype(np.float32), every, reduced, context, features, errors)
-    errors = errors * _jitter_told(residual, every, reduced, known, context, features, errors)
     rise = streams.predicted(said).astype(np.float32)
     rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
     rise[:, course.channels + (course.force is not None) :] = 0.0
-    local = noise.number_within(context, reduced.episode)
-    apart = rise[:, :, None] * (local[:, None, None] == np.arange(local.max() + 1))
-    bare = _rich_left(residual, every, reduced, known, context, features, errors)
-    both = np.concatenate([bare[:, :, None], apart], axis=2)
-    white = evidence.cleaned(both, reduced, known, context, features, errors)
-    spread = noise.gain_spread(white[:, :, 0], white[:, :, 1:], context)
-    known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
-    beside = evidence.cleaned(every, reduced, known, context, features, errors)
+    prior = errors
+    for _ in range(ROUNDS):
+        # Errors of pose and of gain explain much of the same: each is told beside the other.
+        errors = prior * _jitter_told(residual, every, reduced, known, context, features, prior)
+        known = replace(known, swing=None)
+        spread = _swing_told(residual, every, reduced, known, context, features, errors, rise)
+        known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
+    beside = evidence.cleaned(every[:, :, : extra.shape[2] + rich.shape[2]], reduced, known, context, features, errors)
     return Frame(context, features, errors, ridge, beside, known, fold_of(course.episodes))
 
 
@@ -162,6 +161,8 @@ def _rise(setting: Setting, frame: Frame) -> float:
     return float(np.sqrt(np.sum(np.square(rise / frame.noise.scale[: course.channels]))))
 
 
+ROUNDS = 2
+"""How often errors of pose and of gain are told beside each other [1]."""
 LEAST, MOST = 0.1, 10.0
 """Errors of pose are told to be between these, in standard deviations of the prior [1]."""
 
@@ -170,17 +171,45 @@ def _jitter_told(
     residual: np.ndarray, rich: np.ndarray, course: Course, known: Noise, context: np.ndarray,
     features: np.ndarray | None, errors: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Return how large episodes' own errors of pose are [prior sizes], by successive episodes, shape (kinds,)."""
+    """Return how large episodes' own errors of pose are [prior sizes], shape (kinds,).
+
+    Told by successive episodes of the same place, as an offset that differs from place to place is no error of an
+    episode's own; by successive ones anywhere where places are not visited again.
+    """
     left = _rich_left(residual, rich, course, known, context, features, errors)
     columns = np.concatenate([left[:, :, None].astype(np.float32), errors], axis=2)
     gram = evidence.collect(columns, course, known, context, features, np.zeros_like(errors[:, :, :1])).gram
-    gram = gram[gram[:, 0, 0] > 0]  # sealed episodes say nothing
+    there = gram[:, 0, 0] > 0  # sealed episodes say nothing
+    place = np.zeros(course.episodes, dtype=np.int64)
+    place[course.episode] = context
+    gram, place = gram[there], place[there]
     kinds = errors.shape[2]
     inner = gram[:, 1:, 1:] + 1e-3 * np.eye(kinds)
     found = np.linalg.solve(inner, gram[:, 1:, :1])[:, :, 0]
     variance = np.diagonal(np.linalg.inv(inner), axis1=1, axis2=2)
-    spread = [noise.spread_of(np.diff(found[:, k]), variance[1:, k] + variance[:-1, k]) for k in range(kinds)]
-    return np.clip(spread, LEAST, MOST) if len(found) > noise.FEW_GAPS else np.ones(kinds)
+    order = np.argsort(place, kind="stable")
+    again = np.diff(place[order]) == 0
+    if again.sum() < noise.FEW_GAPS:
+        order, again = np.arange(len(place)), np.ones(max(len(place) - 1, 0), dtype=bool)
+    before, after = order[:-1][again], order[1:][again]
+    spread = [
+        noise.spread_of(found[after, k] - found[before, k], variance[after, k] + variance[before, k])
+        for k in range(kinds)
+    ]
+    return np.clip(spread, LEAST, MOST) if len(before) >= noise.FEW_GAPS else np.ones(kinds)
+
+
+def _swing_told(
+    residual: np.ndarray, rich: np.ndarray, course: Course, known: Noise, context: np.ndarray,
+    features: np.ndarray | None, errors: np.ndarray, rise: np.ndarray,
+) -> float:  # fmt: skip
+    """Return how far an episode's gain of a stream is off the next one's at its place [1]."""
+    local = noise.number_within(context, course.episode)
+    apart = rise[:, :, None] * (local[:, None, None] == np.arange(local.max() + 1))
+    bare = _rich_left(residual, rich, course, known, context, features, errors)
+    both = np.concatenate([bare[:, :, None], apart], axis=2)
+    white = evidence.cleaned(both, course, known, context, features, errors)
+    return noise.gain_spread(white[:, :, 0], white[:, :, 1:], context)
 
 
 def _rich_left(

@@ -1,4 +1,4 @@
-"""Which missing effect the residual asks for: tests by episode-wise sign flips, fits, rivals, leftovers."""
+"""Which missing effect the residual asks for: tests by how episodes scatter, fits, rivals, leftovers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from tacdata.discrepancy import evidence
 from tacdata.discrepancy.candidates import Candidate, StandIn
-from tacdata.discrepancy.clusters import clustered
+from tacdata.discrepancy.clusters import clustered, lent
 from tacdata.discrepancy.evidence import Noise
 from tacdata.discrepancy.fit import eliminated, flips, gains, solve, t_value
 from tacdata.discrepancy.generic import histories
@@ -24,12 +24,12 @@ NUMERICS = 0.001
 
 @dataclass(frozen=True)
 class Tested:
-    """What the sign flips say of every candidate."""
+    """What chance says of every candidate."""
 
     z: np.ndarray
-    """Standard score of each candidate's gain among its flips [1], shape (candidates,)."""
+    """Standard score of each candidate [1], shape (candidates,)."""
     p: np.ndarray
-    """Share of flips in which any candidate does as well [1], shape (candidates,): corrected for their number."""
+    """Share of draws in which any decoy does as well [1], shape (candidates,): corrected for their number."""
     gain: np.ndarray
     """By how much half the whitened energy falls [nats], shape (candidates,)."""
     p_generic: float
@@ -37,19 +37,22 @@ class Tested:
 
 
 def test(problem: Problem, seed: int = 0) -> Tested:
-    """Test every candidate by how the episodes' scores scatter, and all together by flips of whole episodes.
+    """Test every candidate by how the episodes' scores scatter, and all together against decoys.
 
-    An episode's score has, without a missing effect, no preferred sign; whatever memory or tails its noise has,
-    flipping whole episodes (or stretches of them) keeps them.
+    Decoys are all candidates again, with the scatter of each episode (or stretch of them) times a normal number in
+    place of its score: what candidates have in common stays, whatever memory or tails the noise has.
     """
     fixed = np.concatenate([problem.nuisances, problem.tangent.columns]).astype(int)
     ridge = np.concatenate([problem.ridge, np.zeros(len(problem.tangent.columns))])
     gram = eliminated(problem.evidence.gram, fixed, ridge)
-    signs = flips(len(gram), FLIPS, seed)
+    normal = np.random.default_rng([seed, 13]).normal(size=(FLIPS, len(gram)))
     scores = [clustered(gram, c.columns, follows_clock(c.effect)) for c in problem.candidates]
-    z = np.array([s.score() for s in scores])
-    # The same signs for all, so that candidates that look alike do so by chance as well.
-    chance = np.stack([s.by_chance(signs) for s in scores], axis=1) if scores else np.zeros((FLIPS, 1))
+    clock = [follows_clock(c.effect) for c in problem.candidates]
+    # Those that follow the clock meet what wanders, each in another way: they lend and borrow nothing.
+    others = lent([s for s, own in zip(scores, clock, strict=True) if not own])
+    z = np.array([s.score(None if own else others) for s, own in zip(scores, clock, strict=True)])
+    # The same numbers for all, so that candidates that look alike do so by chance as well.
+    chance = np.stack([s.by_chance(normal) for s in scores], axis=1) if scores else np.zeros((FLIPS, 1))
     top = chance.max(axis=1)
     z = np.where([_numerics(problem, gram, c) for c in problem.candidates], np.minimum(z, 0.0), z)
     p = (1 + (top[:, None] >= z).sum(axis=0)) / (FLIPS + 1) if problem.setting.decoys else ndtr(-z)

@@ -47,6 +47,8 @@ def kept(rng, rows, realism):
     there = rng.random(len(rows)) > 0.03
     there[[0, -1]] = True
     rows = rows[there]
-    said = np.where(rng.random(len(rows)) < 0.02, np.roll(rows, 1), rows)
+    twice = rng.random(len(rows)) < 0.02
+    twice[1:] &= ~twice[:-1]
+    said = np.where(twice, np.roll(rows, 1), rows)
     said[0] = rows[0]
     return rows, said

@@ -95,9 +95,11 @@ def make(seed, effects, **given):
     rows, said = noise.kept(rng, frames(w, seed), settings["realism"])
     clean = idle + read(w, w.rise, said) * own
     clean += noise.wandering(settings["realism"]) * wander(rng, w, 40.0, skin.CHANNELS)[said]
+    readings = noise.shaken(rng, w.clock[rows], clean, settings["noise"], settings["realism"])
+    again = np.flatnonzero(said != rows)
+    readings[again] = readings[again - 1]  # a frame said twice has the noise of the first time
     data = {
-        "time": w.clock[rows], "episode": w.episode[rows],
-        "readings": noise.shaken(rng, w.clock[rows], clean, settings["noise"], settings["realism"]),
+        "time": w.clock[rows], "episode": w.episode[rows], "readings": readings,
         "tool": w.tool[[r[0] for r in w.presses]], "session": w.session,
         "site": w.site[[r[0] for r in w.presses]], "centers": skin.centers(), "radii": np.array(RADII),
         "path_time": w.clock[::2], "path_episode": w.episode[::2], "path": w.command[::2],

@@ -1,0 +1,75 @@
+"""What generalized least squares leaves, against the same written out with whole covariance matrices."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tacdata.discrepancy.own_errors import Own, without
+
+STREAMS, LENGTHS, KINDS, FEATURES, WIDTH = 3, (7, 5, 9), 2, 4, 5
+
+
+def made(rng):
+    count = sum(LENGTHS)
+    return {
+        "columns": rng.normal(size=(STREAMS, count, WIDTH)),
+        "offset": np.ones((STREAMS, count)),
+        "swing": 3 * rng.normal(size=(STREAMS, count)),
+        "moved": 2 * rng.normal(size=(STREAMS, count, KINDS)),
+        "features": rng.normal(size=(STREAMS, count, FEATURES)),
+    }
+
+
+def dense(columns, spans, prior, offset, swing, moved, features):
+    """Return the products of columns under the covariance written out, free directions taken out."""
+    streams, count, width = columns.shape
+    cov, free = np.eye(streams * count), []
+    for rows in spans:
+        pose = np.zeros((streams, count, moved.shape[2]))
+        pose[:, rows] = moved[:, rows]
+        cov += pose.reshape(-1, moved.shape[2]) @ pose.reshape(-1, moved.shape[2]).T
+        constant = 1e9 if np.isinf(prior) else prior**2
+        power = np.zeros(streams)
+        for s in range(streams):
+            one, gain = offset[s, rows], swing[s, rows]
+            power[s] = gain @ gain - constant * (one @ gain) ** 2 / (1 + constant * one @ one)
+            own = np.zeros((streams, count))
+            own[s, rows] = one
+            if np.isinf(prior):
+                free.append(own.ravel())
+            else:
+                cov += prior**2 * np.outer(own, own)
+        # Gains whose mean, weighted by what the streams tell of it, is 0.
+        centred = np.eye(streams) - np.outer(np.ones(streams), power / power.sum())
+        gains = np.zeros((streams, count, streams))
+        gains[:, rows] = swing[:, rows, None] * centred[:, None, :]
+        cov += gains.reshape(-1, streams) @ gains.reshape(-1, streams).T
+    for s in range(streams):
+        for p in range(features.shape[2]):
+            one = np.zeros((streams, count))
+            one[s] = features[s, :, p]
+            free.append(one.ravel())
+    inverse = np.linalg.inv(cov)
+    flat = columns.reshape(-1, width)
+    if free:
+        design = np.array(free).T
+        pulled = design.T @ inverse
+        inverse = inverse - pulled.T @ np.linalg.solve(design.T @ inverse @ design, pulled)
+    return flat.T @ inverse @ flat
+
+
+@pytest.mark.parametrize("prior", [0.7, np.inf])
+@pytest.mark.parametrize("features", [0, FEATURES])
+def test_products_are_those_of_generalized_least_squares(prior, features):
+    given = made(np.random.default_rng(3))
+    given["features"] = given["features"][:, :, :features]
+    edges = np.cumsum((0, *LENGTHS))
+    spans = [np.arange(a, b) for a, b in pairwise(edges)]
+    expected = dense(given["columns"], spans, prior, given["offset"], given["swing"], given["moved"], given["features"])
+    own = Own(
+        given["offset"].astype(np.float32), prior, given["swing"].astype(np.float32), given["moved"].astype(np.float32),
+        given["features"].astype(np.float32) if features else None,
+    )  # fmt: skip
+    left = without(given["columns"].astype(np.float32), spans, own).reshape(-1, WIDTH)
+    assert left.T @ left == pytest.approx(expected, rel=2e-4, abs=2e-4 * np.abs(expected).max())
