@@ -32,7 +32,7 @@ def course_of(data):
     for e in range(int(data["episode"].max()) + 1):
         rows, way = data["episode"] == e, data["path_episode"] == e
         values = np.column_stack([data["readings"][rows].astype(float), *(x[rows] for x in extra)])
-        parts.append(rows_of(data["time"][rows], values, data["path_time"][way], data["path"][way]))
+        parts.append(rows_of(data["time"][rows], values, data["path_time"][way], data["path"][way], channels))
     values = np.concatenate([p.values for p in parts])
     episode, at, streams = np.repeat(np.arange(len(parts)), [len(p.time) for p in parts]), channels, {}
     for name, width in (("force", 1), ("tag", 3), ("temperature", 1)):

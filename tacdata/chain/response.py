@@ -32,6 +32,10 @@ class Response(ABC):
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return the readings of loads, shape (n, channels)."""
 
+    def rougher(self) -> Response | None:
+        """Return the same response told a little worse, to see how far numerics matter; None where there are none."""
+        return None
+
     def features(self, course: Course) -> np.ndarray | None:
         """Return columns of pose alone that the response could be corrected by, shape (n, k); None for none."""
         return None

@@ -32,7 +32,9 @@ class Rows:
     """Readings behind each row [1], shape (n,); 0 in between."""
 
 
-def rows_of(time: np.ndarray, values: np.ndarray, path_time: np.ndarray, path: np.ndarray) -> Rows:
+def rows_of(
+    time: np.ndarray, values: np.ndarray, path_time: np.ndarray, path: np.ndarray, channels: int | None = None
+) -> Rows:  # fmt: skip
     """Lay out the rows of one episode.
 
     Args:
@@ -40,11 +42,10 @@ def rows_of(time: np.ndarray, values: np.ndarray, path_time: np.ndarray, path: n
         values: Readings and whatever else belongs to those times, shape (m, k).
         path_time: Times of the commanded path [s], shape (p,), increasing.
         path: x, y, depth [mm], shape (p, 3), linear in between.
+        channels: How many of the first columns are the sensor's, None for all: a frame that repeats them is a copy.
     """
-
-    values = without_spikes(values)
-    new = ~copies(values)
-    time, values = time[new], values[new]
+    new = ~copies(values[:, :channels])
+    time, values = time[new], without_spikes(values[new])
 
     def tip_at(when: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(when, path_time, path[:, axis]) for axis in range(3)], axis=-1)

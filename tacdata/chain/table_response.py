@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,7 @@ class TableResponse(Response):
         self.x, self.y, self.depth, self.tools = x, y, depth, tools
         self._curve = curve_load, curve_signal
         self.gain, self.offset = gain, offset
+        self._rough = False
         both = np.concatenate([load, force[..., None]], axis=-1)
         # Splines with mirrored ends, one more node around, so that the four nodes of a place always exist.
         self._splines = [
@@ -50,7 +52,14 @@ class TableResponse(Response):
             )
             for t in range(len(both))
         ]  # fmt: skip
+        self._nodes = [np.pad(table, ((1, 2), (1, 2), (1, 2), (0, 0)), mode="reflect") for table in both]
         self._kept: dict[int, np.ndarray] = {}
+
+    def rougher(self) -> TableResponse:
+        """Return the same table read by polynomials through four nodes: off the splines by about the splines' error."""
+        other = copy.copy(self)
+        other._rough, other._kept = True, {}
+        return other
 
     @classmethod
     def read(cls, path: Path) -> TableResponse:
@@ -81,8 +90,8 @@ class TableResponse(Response):
     def with_tools(self, order: list[int]) -> TableResponse:
         """Return the same response with its tools in another order, or fewer."""
         other = copy.copy(self)
-        other._splines, other.tools = [self._splines[k] for k in order], tuple(self.tools[k] for k in order)
-        other._kept = {}
+        other._splines, other._nodes = [self._splines[k] for k in order], [self._nodes[k] for k in order]
+        other.tools, other._kept = tuple(self.tools[k] for k in order), {}
         return other
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
@@ -107,10 +116,11 @@ class TableResponse(Response):
             return self._kept[key]
         result = np.zeros((len(pose), self._splines[0].shape[-1]))
         touching = pose[:, 2] > 0
-        for t, spline in enumerate(self._splines):
+        weights = _lagrange if self._rough else _spline
+        for t, table in enumerate(self._nodes if self._rough else self._splines):
             rows = np.flatnonzero(touching & (tool == t))
             if len(rows):
-                result[rows] = _cubic(spline, self._places(pose[rows]))
+                result[rows] = _cubic(table, self._places(pose[rows]), weights)
         if len(self._kept) >= KEPT:
             self._kept.pop(next(iter(self._kept)))
         self._kept[key] = result
@@ -125,13 +135,23 @@ class TableResponse(Response):
         return np.clip(np.stack([column, row, root], axis=-1), 0.0, last)
 
 
-def _cubic(spline: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return cubic B-spline values of a padded coefficient array at places [nodes], shape (n, channels)."""
+def _spline(t: np.ndarray) -> np.ndarray:
+    """Return the weights of four B-spline coefficients at a share of the way between the middle two."""
+    return np.stack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]) / 6
+
+
+def _lagrange(t: np.ndarray) -> np.ndarray:
+    """Return the weights of four nodes of the cubic through them."""
+    back, on, two = t + 1, t - 1, t - 2
+    return np.stack([-t * on * two / 6, back * on * two / 2, -back * t * two / 2, back * t * on / 6])
+
+
+def _cubic(table: np.ndarray, place: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return what a padded array of coefficients or nodes says at places [nodes], shape (n, channels)."""
     node = np.floor(place).astype(np.int64)
-    t = place - node
-    weights = np.stack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]) / 6
-    _, b, c, channels = spline.shape
-    flat = spline.reshape(-1, channels)
+    weights = of(place - node)
+    _, b, c, channels = table.shape
+    flat = table.reshape(-1, channels)
     result = np.zeros((len(place), channels))
     for i in range(4):
         for j in range(4):

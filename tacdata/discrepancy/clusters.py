@@ -28,10 +28,10 @@ CLOCKWISE = 0.0
 LEVERAGE = 0.6
 """A candidate of which one stretch holds a larger share of all information is not judged [1]."""
 FLOOR = 1e-300
-LENT = 20.0
-"""Most degrees of freedom that candidates lend each other: many look alike [1]."""
-LENDERS = 8
-"""Fewer candidates of a kind lend nothing [1]."""
+LENT = 1.0
+"""Most degrees of freedom that effects lend each other, of their number: many look alike [1]."""
+LENDERS = 5
+"""Fewer effects of a kind lend nothing [1]."""
 
 
 @dataclass(frozen=True)
@@ -85,19 +85,24 @@ class Lent:
     """Degrees of freedom that this is worth [1]."""
 
 
-def lent(scores: list[Clustered]) -> Lent | None:
-    """Return what candidates have in common; None if they are too few to say.
+def lent(effects: dict[str, list[Clustered]]) -> Lent | None:
+    """Return what effects of a kind have in common; None if they are too few to say.
 
-    By medians, so that a few candidates that miss what is there do not count.
+    By medians, so that a few that miss what is there do not count.
+
+    Args:
+        effects: Each with the scores of its shapes, which are much alike.
     """
-    told = [s for s in scores if np.any(s.pull)]
+    told = [[s for s in shapes if np.any(s.pull)] for shapes in effects.values()]
+    told = [shapes for shapes in told if shapes]
     if len(told) < LENDERS:
         return None
-    half = 0.5 * np.array([s.freedom[1] for s in told])
-    log = np.log([s.power / max(s.expected, 1e-12) for s in told]) - digamma(half) + np.log(half)
+    half = 0.5 * np.array([np.median([s.freedom[1] for s in shapes]) for shapes in told])
+    excess = [np.median([s.power / max(s.expected, 1e-12) for s in shapes]) for shapes in told]
+    log = np.log(excess) - digamma(half) + np.log(half)
     middle = float(np.median(log))
     spread = float(1.4826 * np.median(np.abs(log - middle))) ** 2 - float(np.mean(polygamma(1, half)))
-    freedom = min(2 * _trigamma_inverse(spread), LENT) if spread > 0 else LENT
+    freedom = min(2 * _trigamma_inverse(spread), LENT * len(told)) if spread > 0 else LENT * len(told)
     return Lent(float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2))), freedom)
 
 

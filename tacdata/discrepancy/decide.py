@@ -20,6 +20,8 @@ SURE = 3.0
 """Without any effect that helps, leftovers must show by so many standard errors to be called a gap [1]."""
 BEYOND = 3.0
 """A channel's gain is more than calibration's business beyond so many of its standard deviations [1]."""
+OUTLYING = 4.0
+"""... and more than so many of what the other channels' gains scatter by [1]."""
 COMMON = ("modulus", "thickness")
 """What a common gain cannot be told from without a force reading."""
 
@@ -61,7 +63,9 @@ def calibrated(found: Judgement) -> list[Member]:
         rivals = COMMON if found.problem.setting.course.force is None else ()
         made.append(Member(placed, {"e": error}, (), rivals, {}, abs(common) / max(error, 1e-9)))
     own = found.gains - common
-    far = np.abs(own) > BEYOND * prior
+    # A channel stands out against its own kind: calibration may be worse than was thought.
+    usual = 1.4826 * float(np.median(np.abs(own)))
+    far = np.abs(own) > np.maximum(BEYOND * prior, OUTLYING * usual)
     if far.any():
         placed = Placed(load("channel_gain"), {"e": np.where(far, own, 0.0)})
         made.append(Member(placed, {"e": prior}, (), (), {}, float(np.abs(own).max() / prior)))

@@ -192,8 +192,8 @@ def _gains(problem: Problem) -> np.ndarray:
     if not len(problem.nuisances) or "channel_gain" not in problem.setting.nuisance:
         return np.zeros(channels)
     _, values = fitted(problem, [], np.arange(len(problem.folds)))
-    unit = load("channel_gain").amplitudes[0].typical
-    return np.broadcast_to(values[len(problem.tangent.columns) :] * unit, (channels,)).copy()
+    unit, first = load("channel_gain").amplitudes[0].typical, len(problem.tangent.columns)
+    return np.broadcast_to(values[first : len(values) - channels] * unit, (channels,)).copy()
 
 
 def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:

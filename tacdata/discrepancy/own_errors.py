@@ -163,7 +163,7 @@ class _Free:
         mean = np.einsum("spp->s", self._blocks) / width
         floor = LEAST * np.maximum(mean, 1e-12)[:, None, None] * np.eye(width)
         blocks = self._blocks + floor
-        right, joint = sum(self._right), np.concatenate(self._joints, axis=1)
+        right, joint = np.sum(self._right, axis=0), np.concatenate(self._joints, axis=1)
         count = joint.shape[1]
         both = np.concatenate([right, joint.reshape(streams, width, count)], axis=2)
         solved = np.linalg.solve(blocks, both)

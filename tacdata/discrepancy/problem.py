@@ -23,6 +23,8 @@ NUISANCE = {"channel_gain": 0.05}
 """What calibration leaves open of a response that was not fitted: standard deviations in the effects' own units."""
 AMPLITUDES = ("gain", "modulus")
 """What all channels' gains have in common: read off their calibration too, and not to be told apart."""
+IDLE = 0.01
+"""Standard deviation of what is known of the readings without load, of the largest rise [1]."""
 JITTER = (0.02, 0.02, 0.01)
 """Standard deviation of an episode's own errors of x, y and depth [mm] where the response is not fitted."""
 MODEL = 0.003
@@ -84,6 +86,8 @@ class Problem:
     """Columns that belong to no effect, from 0, shape (k,), int64."""
     rise: float
     """What presses add to all readings, root of the sum of squares in noise scales [1]."""
+    numerics: int | None = None
+    """Column of what the response itself is off about, from 0; None if it has no numerics."""
 
     @property
     def candidates(self) -> list[Candidate]:
@@ -142,16 +146,29 @@ def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Pr
     board = build(course, response, [*setting.given, *placed], setting.effects, taken)
     moving = tangents(course, response, placed, setting.given)
     count = board.values.shape[2] - 1
-    first = count + moving.values.shape[2]
-    values = np.concatenate([board.values, moving.values], axis=2)
+    numerics = _numerics(setting, placed)
+    last = count + moving.values.shape[2]
+    first = last + (numerics is not None)
+    values = np.concatenate([board.values, moving.values, *([] if numerics is None else [numerics])], axis=2)
     features = taken_up(course, response, [*setting.given, *placed])
     found = evidence.collect(values, course.reduced, frame.noise, frame.context, features, frame.errors, frame.beside)
     second = first + len(frame.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
     board = replace(board, values=board.values[:, :, :1])
     return Problem(
-        setting, frame, tuple(placed), board, found, moving.at(count), nuisances, rich, _rise(setting, frame)
-    )
+        setting, frame, tuple(placed), board, found, moving.at(count), nuisances, rich, _rise(setting, frame),
+        None if numerics is None else last,
+    )  # fmt: skip
+
+
+def _numerics(setting: Setting, placed: Sequence[Placed]) -> np.ndarray | None:
+    """Return what a response is off about, shape (m, streams, 1); None where it has no numerics."""
+    rough = setting.response.rougher()
+    if rough is None:
+        return None
+    streams, every = Streams.of(setting.course), [*setting.given, *placed]
+    now, other = (streams.predicted(predict(setting.course, r, every)) for r in (setting.response, rough))
+    return (now - other)[:, :, None].astype(np.float32)
 
 
 def _rise(setting: Setting, frame: Frame) -> float:
@@ -253,13 +270,16 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
         return np.zeros((len(course.read), width, 0), dtype=np.float32), np.zeros(0)
     effects = [load(name) for name in setting.nuisance]
     board = build(course, response, placed, effects)
+    idle = np.zeros((len(course.read), board.values.shape[1], course.channels), dtype=np.float32)
+    said = predict(course, response, placed).signal[course.read] - response.signal(np.zeros((1, course.channels)))
+    idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * float(np.abs(said).max())
     weights = [
         (p.typical / setting.nuisance[c.effect.name]) ** 2
         for c in board.candidates
         for p in c.effect.amplitudes
         for _ in range(len(c.columns) // len(c.effect.amplitudes))
     ]
-    return board.values[:, :, 1:], np.array(weights)
+    return np.concatenate([board.values[:, :, 1:], idle], axis=2), np.array([*weights, *np.ones(course.channels)])
 
 
 def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:

@@ -163,7 +163,7 @@ def _strokes_of(
             continue
         origin = time_ns[0]
         path_time = (episode.tip_ns - origin) * 1e-9
-        laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, episode.tip)
+        laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, episode.tip, len(kept))
         deepest = laid.tip[np.argmax(laid.tip[:, 2])]
         name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
         made.append(_Stroke(name, session, float(origin) * 1e-9, laid, tool, deepest[:2]))

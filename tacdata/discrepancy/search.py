@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from tacdata.discrepancy import evidence
 from tacdata.discrepancy.candidates import Candidate, StandIn
-from tacdata.discrepancy.clusters import clustered, lent
+from tacdata.discrepancy.clusters import Clustered, clustered, lent
 from tacdata.discrepancy.evidence import Noise
 from tacdata.discrepancy.fit import eliminated, flips, gains, solve, t_value
 from tacdata.discrepancy.generic import histories
@@ -18,8 +18,10 @@ from tacdata.discrepancy.problem import Problem
 from tacdata.effects import Effect
 
 FLIPS = 999
-NUMERICS = 0.001
-"""What has no memory and explains less, over what presses add to readings, may be the table's own error [1]."""
+NUMERICS = 0.0002
+"""What has no memory and explains less, over what presses add to readings, may be rounding of any table [1]..."""
+LIKE_IT = 3.0
+"""...or if it explains less than so many times what it would find in the response's own error [1]."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +50,8 @@ def test(problem: Problem, seed: int = 0) -> Tested:
     normal = np.random.default_rng([seed, 13]).normal(size=(FLIPS, len(gram)))
     scores = [clustered(gram, c.columns, follows_clock(c.effect)) for c in problem.candidates]
     clock = [follows_clock(c.effect) for c in problem.candidates]
-    # Those that follow the clock meet what wanders, each in another way: they lend and borrow nothing.
-    others = lent([s for s, own in zip(scores, clock, strict=True) if not own])
-    z = np.array([s.score(None if own else others) for s, own in zip(scores, clock, strict=True)])
+    kinds = {kind: lent(_by_effect(problem, scores, clock, kind)) for kind in (False, True)}
+    z = np.array([s.score(kinds[own]) for s, own in zip(scores, clock, strict=True)])
     # The same numbers for all, so that candidates that look alike do so by chance as well.
     chance = np.stack([s.by_chance(normal) for s in scores], axis=1) if scores else np.zeros((FLIPS, 1))
     top = chance.max(axis=1)
@@ -60,6 +61,16 @@ def test(problem: Problem, seed: int = 0) -> Tested:
     return Tested(z, p, gain, _test_generic(problem, gram, seed, top))
 
 
+def _by_effect(
+    problem: Problem, scores: list[Clustered], clock: list[bool], kind: bool
+) -> dict[str, list[Clustered]]:  # fmt: skip
+    result: dict[str, list[Clustered]] = {}
+    for candidate, score, own in zip(problem.candidates, scores, clock, strict=True):
+        if own == kind:
+            result.setdefault(candidate.effect.name, []).append(score)
+    return result
+
+
 def _numerics(problem: Problem, gram: np.ndarray, candidate: Candidate) -> bool:
     """Return whether a candidate without memory asks for less than any table of solved presses is off."""
     setting = problem.setting
@@ -67,10 +78,19 @@ def _numerics(problem: Problem, gram: np.ndarray, candidate: Candidate) -> bool:
         return False
     if not candidate.effect.unjudgeable(setting.course, StandIn(True)):
         return False
-    index = candidate.columns + 1
-    total = gram[:, index][:, :, index].sum(axis=0)
-    values = np.linalg.pinv(total, hermitian=True) @ gram[:, index, 0].sum(axis=0)
-    return float(np.sqrt(max(values @ total @ values, 0.0))) < NUMERICS * problem.rise
+    index, total = candidate.columns + 1, gram.sum(axis=0)
+    return _explained(total, index, 0) < max(NUMERICS * problem.rise, LIKE_IT * _off(problem, total, index)) ** 2
+
+
+def _off(problem: Problem, total: np.ndarray, index: np.ndarray) -> float:
+    """Return how much columns would find in what the response itself is off about [1]."""
+    return 0.0 if problem.numerics is None else float(np.sqrt(_explained(total, index, problem.numerics + 1)))
+
+
+def _explained(total: np.ndarray, index: np.ndarray, of: int) -> float:
+    """Return the square of what columns explain of one other [1]."""
+    pull = total[index, of]
+    return float(max(pull @ np.linalg.pinv(total[np.ix_(index, index)], hermitian=True) @ pull, 0.0))
 
 
 def _test_generic(problem: Problem, gram: np.ndarray, seed: int, top: np.ndarray) -> float:
@@ -83,7 +103,8 @@ def _test_generic(problem: Problem, gram: np.ndarray, seed: int, top: np.ndarray
     root = np.cbrt(np.maximum(table, 0.0))  # nearly normal (Wilson & Hilferty, PNAS 17, 1931, 684)
     z = (root - root[1:].mean(axis=0)) / (root[1:].std(axis=0) + 1e-12)
     if not problem.setting.response.fitted:
-        beyond = 2 * (table[0] - table[1:].mean(axis=0)) > (NUMERICS * problem.rise) ** 2
+        off = LIKE_IT * np.array([_off(problem, total, g + 1) for g in groups])
+        beyond = 2 * (table[0] - table[1:].mean(axis=0)) > np.maximum(NUMERICS * problem.rise, off) ** 2
         z[0] = np.where(beyond, z[0], np.minimum(z[0], 0.0))
     most = np.maximum(z[1:].max(axis=1), top)
     return float((1 + (most >= z[0].max()).sum()) / (FLIPS + 1))

@@ -55,3 +55,15 @@ def test_rows_average_what_is_known():
     assert np.isfinite(read[:, :3]).all()
     assert np.isnan(read[-1, 3])
     assert np.isfinite(read[0, 3])
+
+
+def test_a_copied_frame_with_a_spike_and_a_fresh_force_is_left_out():
+    time = np.arange(70) / 30
+    values = np.column_stack([stroke(1.0), np.random.default_rng(4).normal(size=70)])
+    values[20, 1] += 4000.0
+    values[21, :-1] = values[20, :-1]
+    path = np.array([0, 0.7, 1.2, 1.7, 2.4]), np.array([[0, 0, z] for z in (0, 0, 1, 0, 0)], float)
+    rows = rows_of(time, values, *path, channels=values.shape[1] - 1)
+    read = rows.averaged > 0
+    assert not np.isclose(rows.time[read], time[21]).any()
+    assert np.abs(np.diff(rows.values[read, 1])).max() < 2000.0

@@ -1,0 +1,38 @@
+"""A table of solved presses says about how far it is off between its nodes."""
+
+import numpy as np
+import pytest
+
+from tacdata.chain.table_response import TableResponse
+
+
+def truth(pose):
+    x, y, depth = pose.T
+    spread = 1.0 + 0.3 * depth
+    return np.maximum(depth, 0.0) ** 1.5 * np.exp(-((x - 0.4) ** 2 + y**2) / (2 * spread**2))
+
+
+def table(nodes):
+    x, y, root = np.linspace(-3, 3, nodes), np.linspace(-2, 2, nodes), np.linspace(0, 1, nodes)
+    grid = np.stack(np.meshgrid(x, y, root**2, indexing="ij"), axis=-1)
+    load = truth(grid.reshape(-1, 3)).reshape(1, nodes, nodes, nodes, 1)
+    curve = np.array([0.0, 2.0])
+    return TableResponse(x, y, root**2, load, load[..., 0], curve, curve, np.ones(1), np.zeros(1), ("ball",))
+
+
+@pytest.mark.parametrize("nodes", [9, 14, 25])
+def test_polynomials_and_splines_differ_by_about_the_splines_error(nodes):
+    made, rng = table(nodes), np.random.default_rng(1)
+    pose = rng.uniform([-2.4, -1.5, 0.05], [2.4, 1.5, 0.9], (2000, 3))
+    tool = np.zeros(len(pose), dtype=int)
+    error = np.sqrt(np.mean((made.load(pose, tool)[:, 0] - truth(pose)) ** 2))
+    said = np.sqrt(np.mean((made.load(pose, tool) - made.rougher().load(pose, tool)) ** 2))
+    assert error / 3 < said < 12 * error
+
+
+def test_rougher_says_the_same_at_nodes():
+    made = table(9)
+    pose = np.array([[made.x[3], made.y[5], made.depth[4]], [made.x[6], made.y[2], made.depth[7]]])
+    tool = np.zeros(2, dtype=int)
+    assert made.rougher().load(pose, tool) == pytest.approx(truth(pose)[:, None], rel=1e-9)
+    assert made.load(pose, tool) == pytest.approx(truth(pose)[:, None], rel=1e-6)
