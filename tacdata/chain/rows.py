@@ -9,9 +9,14 @@ import numpy as np
 from tacdata.chain.spikes import copies, without_spikes
 
 BETWEEN = 0.03
-"""Longest way between rows [mm]: readings of a fast press lie farther apart than effects of timing can bear."""
+"""Longest way between rows [mm, and of the deepest point, whichever is more]: readings of a fast press lie farther
+apart than effects of timing can bear."""
 FEW_BETWEEN = 4
 """Most rows put between two readings, and as many where the speed changes."""
+KINK = 0.15
+"""Change of speed from one reading to the next, of the largest speed, that is sudden [1]."""
+SHORT = 0.4
+"""A sudden change of speed over less of the longest way does not matter [1]."""
 SETTLED = 0.4
 """Time after the last motion from which readings are averaged [s]."""
 WIDEST = 0.12
@@ -57,7 +62,8 @@ def rows_of(
     count = np.bincount(group).astype(float)
     mean_time = np.bincount(group, time) / count
     mean = np.stack([_mean(group, column) for column in values.T], axis=-1)
-    between = _between(mean_time, tip_at(mean_time)) if len(mean_time) > 1 else np.zeros(0)
+    longest = BETWEEN * max(1.0, float(path[:, 2].max()))
+    between = _between(mean_time, tip_at(mean_time), longest) if len(mean_time) > 1 else np.zeros(0)
     every = np.concatenate([mean_time, between])
     order = np.argsort(every, kind="stable")
     filled = np.concatenate([mean, np.full((len(between), values.shape[1]), np.nan)])[order]
@@ -87,16 +93,16 @@ def _groups(time: np.ndarray, last: np.ndarray) -> np.ndarray:
     return result
 
 
-def _between(time: np.ndarray, tip: np.ndarray) -> np.ndarray:
+def _between(time: np.ndarray, tip: np.ndarray, longest: float) -> np.ndarray:
     """Return times of rows put between readings where the tip moves fast or changes its speed."""
     gap = np.maximum(np.diff(time), 1e-9)
     way = np.linalg.norm(np.diff(tip, axis=0), axis=1)
     speed = way / gap
-    change = np.abs(np.diff(speed, prepend=speed[:1], append=speed[-1:])) > 0.05 * max(
+    change = np.abs(np.diff(speed, prepend=speed[:1], append=speed[-1:])) > KINK * max(
         float(speed.max(initial=0)), 1e-9
     )
     kink = change[:-1] | change[1:]
-    wanted = np.where(kink & (gap < 0.2), FEW_BETWEEN, np.ceil(way / BETWEEN) - 1)
+    wanted = np.where(kink & (gap < 0.2) & (way > SHORT * longest), FEW_BETWEEN, np.ceil(way / longest) - 1)
     parts = []
     for i in np.flatnonzero(wanted > 0):
         count = int(min(wanted[i], FEW_BETWEEN))

@@ -40,9 +40,9 @@ def run(
     if fem:
         spec = _solved(recordings, spec, out)
     model = read_spec(spec)
-    print("base: " + ("a response fitted to these recordings" if spec is None else str(spec)))
     with console.status("reading") as status:
         written = judge(recordings, model, out, status.update, stop_after)
+    print("base: " + ("a response fitted to these recordings" if spec is None else str(spec)))
     print(written.text, end="")
     console.print(f"written: {written.folder}", markup=False, highlight=False, soft_wrap=True)
 
