@@ -21,7 +21,9 @@ SURE = 3.0
 BEYOND = 3.0
 """A channel's gain is more than calibration's business beyond so many of its standard deviations [1]."""
 OUTLYING = 4.0
-"""... and more than so many of what the other channels' gains scatter by [1]."""
+"""... or, where all together scatter little, of what the others scatter by [1]."""
+WIDE = 2.0
+"""Gains scatter more than calibration leaves open beyond so many of its standard deviations [1]."""
 COMMON = ("modulus", "thickness")
 """What a common gain cannot be told from without a force reading."""
 
@@ -53,19 +55,21 @@ def _hidden(found: Judgement, member: Member) -> list[str]:
 def calibrated(found: Judgement) -> list[Member]:
     """Return gains that are beyond what calibration leaves open: common to all channels, or of some."""
     prior = found.problem.setting.nuisance.get("channel_gain")
-    if prior is None or not np.any(found.gains):
+    known = found.gains[np.isfinite(found.gains)]
+    if prior is None or not np.any(known):
         return []
     made = []
-    common = float(np.median(found.gains))
-    if abs(common) > BEYOND * prior / np.sqrt(len(found.gains)) * 2:
+    common = float(np.median(known))
+    if abs(common) > BEYOND * prior / np.sqrt(len(known)) * 2:
         placed = Placed(load("gain"), {"e": np.array(common)})
-        error = float(1.25 * np.std(found.gains) / np.sqrt(len(found.gains)))
+        error = float(1.25 * np.std(known) / np.sqrt(len(known)))
         rivals = COMMON if found.problem.setting.course.force is None else ()
         made.append(Member(placed, {"e": error}, (), rivals, {}, abs(common) / max(error, 1e-9)))
-    own = found.gains - common
-    # A channel stands out against its own kind: calibration may be worse than was thought.
-    usual = 1.4826 * float(np.median(np.abs(own)))
-    far = np.abs(own) > np.maximum(BEYOND * prior, OUTLYING * usual)
+    own = np.nan_to_num(found.gains - common)
+    spread = float(np.sqrt(np.mean(np.square(known - common))))
+    # Gains may all be worse than calibration was thought to be; else a channel must stand out against its kind.
+    usual = prior if spread > WIDE * prior else max(prior, 1.4826 * float(np.median(np.abs(known - common))))
+    far = np.abs(own) > (BEYOND if spread > WIDE * prior else OUTLYING) * usual
     if far.any():
         placed = Placed(load("channel_gain"), {"e": np.where(far, own, 0.0)})
         made.append(Member(placed, {"e": prior}, (), (), {}, float(np.abs(own).max() / prior)))

@@ -42,6 +42,8 @@ FAR, BEHIND = 5.0, 0.8
 """Rivals are not refined that are behind to first order by so many standard errors and this share of the gain [1]."""
 DECOYS = 0.05
 """No effect is named that more decoys do as well as [1]."""
+TOLD = 3.0
+"""A channel's gain is told by presses that say so many times what its prior does [1]."""
 BOOTSTRAPS = 200
 CLOSE = 0.5
 """Candidates with at least this share of the best gain may be rivals [1]."""
@@ -96,7 +98,8 @@ class Judgement:
     final: Problem
     """The model with the members in place."""
     gains: np.ndarray
-    """Gain of each channel beyond the response's, as a calibration finds it [1], shape (channels,); 0 if fitted."""
+    """Gain of each channel beyond the response's, as calibration finds it [1], shape (channels,); 0 if fitted, NaN for
+    channels that these presses do not stir."""
     until: str = "decide"
     """The last step that was made, one of `STEPS`."""
 
@@ -193,7 +196,11 @@ def _gains(problem: Problem) -> np.ndarray:
         return np.zeros(channels)
     _, values = fitted(problem, [], np.arange(len(problem.folds)))
     unit, first = load("channel_gain").amplitudes[0].typical, len(problem.tangent.columns)
-    return np.broadcast_to(values[first : len(values) - channels] * unit, (channels,)).copy()
+    own = np.broadcast_to(values[first : len(values) - channels] * unit, (channels,)).copy()
+    columns = problem.nuisances[: len(values) - channels - first] + 1
+    power = np.diag(problem.evidence.of(np.arange(len(problem.folds))))[columns]
+    told = power > TOLD * problem.ridge[: len(columns)]
+    return np.where(np.broadcast_to(told, (channels,)), own, np.nan)
 
 
 def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:
