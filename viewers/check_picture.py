@@ -71,12 +71,7 @@ def _noise(axes, report: Report) -> None:
     table = np.array([_numbers(entry.document["taxels"]["idle_noise"]) for entry in report.episodes])
     known = ~np.isnan(table).all(axis=0)
     channels = np.arange(table.shape[1])[known]
-    bad = {
-        k
-        for entry in report.episodes
-        for key in ("stuck", "saturated")
-        for k in entry.document["taxels"][key]
-    }
+    bad = {k for entry in report.episodes for key in ("stuck", "saturated") for k in entry.document["taxels"][key]}
     colors = ["tab:red" if k in bad else "tab:blue" for k in channels]
     axes.bar(channels, np.nanmedian(table[:, known], axis=0), color=colors)
     axes.set(xlabel="channel (red: stuck or at a limit)", ylabel="[counts]", title="noise without contact")

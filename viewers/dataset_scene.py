@@ -10,11 +10,16 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.recording.episode import PHASES
 from training.prediction import Prediction
 from viewers import maps, signals, skin_surface, summary
+from viewers.episode_scene import thinned_remark
 from viewers.scene import Curves, Scene, Span
 
 
 def dataset_scene(
-    dataset: Dataset, number: int, prediction: Prediction | None = None, remarks: tuple[str, ...] = ()
+    dataset: Dataset,
+    number: int,
+    prediction: Prediction | None = None,
+    remarks: tuple[str, ...] = (),
+    total: int | None = None,
 ) -> Scene:
     """Return what a dataset holds of one episode: signals, label and tip, without recording and cameras.
 
@@ -23,16 +28,16 @@ def dataset_scene(
         number: Number of the episode in it.
         prediction: A network's maps for it, if there are any.
         remarks: What else a person should read, each in words.
+        total: Episodes of the whole dataset, where it was not read whole.
 
     Raises:
         UsageError: If the dataset has no such episode.
         FormatError: If the prediction's maps have another grid than the sensor.
     """
-    if not 0 <= number < len(dataset.episodes):
-        raise UsageError(
-            f"--episode {number}", f"0 to {len(dataset.episodes) - 1} in {dataset.root}", "choose one of them"
-        )
-    entry = dataset.episodes[number]
+    count = len(dataset.episodes) if total is None else total
+    entry = next((own for own in dataset.episodes if own.index == number), None)
+    if entry is None:
+        raise UsageError(f"--episode {number}", f"0 to {count - 1} in {dataset.root}", "choose one of them")
     sensor = dataset.sensors[entry.sensor]
     part = slice(entry.start, entry.stop)
     column = {
@@ -63,18 +68,21 @@ def dataset_scene(
         Curves("taxels/raw", "counts", labels, time, column[features.RAW]),
         Curves("force", "N", ("x", "y", "z"), time, column[features.FORCE]),
     )
-    press = entry.press
+    press, drawn = entry.press, maps.thinned(shown)
+    surfaces = skin_surface.surfaces(sensor, int(time[0]), drawn, None)
+    remarks += thinned_remark(shown, drawn)
     return Scene(
         title=f"{dataset.root.resolve().name}/episode {number}",
-        summary=summary.of_dataset_episode(dataset, entry, prediction, shown, remarks),
+        summary=summary.of_dataset_episode(dataset, entry, prediction, shown, remarks, count),
         frame_ns=time,
         frame=np.arange(len(time)),
         footprint=skin_surface.footprint(sensor),
-        curves=curves + maps.error_curves(shown),
-        taxels=signals.taxel_array(sensor, time, state),
-        tip=signals.tip_curves("nominal", time, tip),
-        maps=shown,
-        surfaces=skin_surface.surfaces(sensor, int(time[0]), shown, None),
+        curves=tuple(map(signals.thinned, curves + maps.error_curves(shown))),
+        arrays=(signals.taxel_array(sensor, time, state),),
+        tip=signals.thinned(signals.tip_curves("nominal", time, tip)),
+        maps=drawn,
+        surfaces=surfaces,
+        clouds=(skin_surface.contact_cloud(surfaces[0]),),
         bodies=(skin_surface.indenter_body(sensor, press, time, tip),) if press else (),
         cameras=(),
         phases=phase_spans(time, column[features.PHASE]),

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.labels import Label
-from tacdata.recording.episode import PHASES, Episode
+from tacdata.recording.episode import PHASES, Episode, TaxelStream
 from training.prediction import Prediction
 from viewers import camera_view, maps, signals, skin_surface, summary
-from viewers.scene import Scene
+from viewers.scene import DepthMaps, Scene
 
 
 def episode_scene(
@@ -20,6 +21,8 @@ def episode_scene(
     prediction: Prediction | None = None,
     images: Iterable[tuple[str, int, bytes]] = (),
     remarks: tuple[str, ...] = (),
+    image_times: Mapping[str, tuple[np.ndarray, np.ndarray]] | None = None,
+    unit: str = "counts",
 ) -> Scene:
     """Return what there is to see of a recording.
 
@@ -29,18 +32,16 @@ def episode_scene(
         prediction: A network's maps for it, if there are any.
         images: Camera name, time of exposure [ns] and JPEG image.
         remarks: What else a person should read, each in words.
+        image_times: Camera name -> times of exposure and of arrival [ns], shape (n,) each.
+        unit: Of the board's readings.
 
     Raises:
-        FormatError: If the recording holds no taxel frame, or a map has another grid than the sensor.
+        FormatError: If the recording holds nothing, or a map has another grid than the sensor.
     """
+    if not len(episode.taxels.sample_ns):
+        episode, remarks = _without_taxels(episode), (*remarks, "not one taxel frame: what else there is, is shown")
     time, sensor = episode.taxels.sample_ns, episode.sensor
-    if not len(time):
-        raise FormatError(
-            f"{episode.path}: not one taxel frame",
-            "a recording with taxel frames",
-            "run `tacdata check` on it, or view another episode",
-        )
-    label_pair = (label.time_ns, label.depth) if label else None
+    label_pair = (label.time_ns, np.maximum(label.signed, 0.0)) if label else None
     prediction_pair = (prediction.time_ns, prediction.depth) if prediction else None
     for name, pair in (("label", label_pair), ("prediction", prediction_pair)):
         if pair is not None and pair[1].shape[1:] != sensor.map.shape:
@@ -54,22 +55,59 @@ def episode_scene(
     shown = maps.depth_maps(sensor, label_pair, prediction_pair)
     tip = episode.tip_at(time) if len(episode.tip_ns) else None
     cameras = camera_view.camera_views(episode, images)
-    curves = signals.episode_curves(episode) + (signals.label_curves(label) if label else ())
+    curves = signals.episode_curves(episode, unit) + (signals.label_curves(label) if label else ())
+    curves += tuple(signals.delays(f"camera {name}", *pair) for name, pair in (image_times or {}).items())
+    curves += maps.error_curves(shown)
+    drawn = maps.thinned(shown)
+    surfaces = skin_surface.surfaces(sensor, int(time[0]), drawn, (label.time_ns, label.signed) if label else None)
+    remarks += thinned_remark(shown, drawn)
     return Scene(
         title=f"{episode.path.resolve().parent.name}/{episode.path.stem}",
         summary=summary.of_episode(episode, label, prediction, shown, cameras, remarks),
         frame_ns=time,
         frame=_counter(episode.taxels.counter),
         footprint=skin_surface.footprint(sensor),
-        curves=curves + maps.error_curves(shown),
-        taxels=signals.taxel_array(sensor, time, change),
-        tip=None if tip is None else signals.tip_curves("nominal", time, tip),
-        maps=shown,
-        surfaces=skin_surface.surfaces(sensor, int(time[0]), shown, label.signed if label else None),
+        curves=tuple(map(signals.thinned, curves)),
+        arrays=(signals.taxel_array(sensor, time, change, unit=unit),),
+        tip=None if tip is None else signals.thinned(signals.tip_curves("nominal", time, tip)),
+        maps=drawn,
+        surfaces=surfaces,
+        clouds=(skin_surface.contact_cloud(surfaces[0]),) if drawn else (),
         bodies=() if tip is None else (skin_surface.indenter_body(sensor, episode.press, time, tip),),
         cameras=cameras,
         phases=signals.spans(episode.phases),
+        device_ns=_device_times(episode),
     )
+
+
+def _without_taxels(episode: Episode) -> Episode:
+    """Return an episode whose board said nothing, with missing readings at the times of its other streams.
+
+    Raises:
+        FormatError: If there is no other stream.
+    """
+    streams = [episode.cnc.sample_ns, episode.tip_ns, *(tags.sample_ns for tags in episode.tags)]
+    time = next((own for own in streams if len(own) > 1), None)
+    if time is None:
+        raise FormatError(
+            f"{episode.path}: not one taxel frame, and no other stream",
+            "a recording with readings",
+            "run `tacdata check` on it, or view another episode",
+        )
+    counts = np.full((len(time), episode.sensor.taxels.count), np.nan)
+    return replace(episode, taxels=TaxelStream(time, time, np.full(len(time), -1), counts))
+
+
+def thinned_remark(maps: tuple[DepthMaps, ...], drawn: tuple[DepthMaps, ...]) -> tuple[str, ...]:
+    """Return in words how many maps are drawn, where it is not all."""
+    if not maps or len(maps[0].time_ns) == len(drawn[0].time_ns):
+        return ()
+    return (f"{len(drawn[0].time_ns)} of {len(maps[0].time_ns)} maps are drawn, the deepest of each stretch",)
+
+
+def _device_times(episode: Episode) -> np.ndarray:
+    own = episode.taxels.device_ns
+    return own if own is not None and len(own) and (own >= 0).all() else np.zeros(0, dtype=np.int64)
 
 
 def _counter(counter: np.ndarray) -> np.ndarray:

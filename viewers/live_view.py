@@ -23,7 +23,7 @@ WAITING = 16
 """Values that wait for the viewer; more are dropped [count]."""
 START = 30.0
 """Longest wait for the viewer [s of real time]; the recording does not begin before."""
-PATIENCE = 5.0
+PATIENCE = 15.0
 """How long the viewer may take to end [s of real time]."""
 NICENESS = 10
 """By how much the process gives way to others (Unix)."""
@@ -67,6 +67,8 @@ def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
 
         yield watch
     finally:
+        with suppress(Full):
+            values.put(None, timeout=PATIENCE)  # stands behind everything that was given
         ending.set()
         for end in (lambda: None, process.terminate, process.kill):
             if process.is_alive():
@@ -103,10 +105,14 @@ def _show(where: str, columns: int, rows: int, values: Any, started: Any, ending
         drawing = _Drawing(recording, columns, rows)
         while True:
             try:
-                drawing.take(*values.get(timeout=0.2))
+                value = values.get(timeout=PATIENCE / 2)
             except Empty:
                 if ending.is_set():
                     break
+                continue
+            if value is None:
+                break
+            drawing.take(*value)
         recording.flush()
         recording.disconnect()
         # Rerun reports on the terminal that its server goes away, which it does because we end it.

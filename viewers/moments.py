@@ -13,7 +13,7 @@ def moments(scene: Scene) -> tuple[tuple[str, int], ...]:
     They are found in the label's maps, else in the prediction's, else in the taxels' signal; what never
     happens (in a recording that breaks off, say) is left out.
     """
-    shown = scene.map_named("label") or scene.map_named("prediction")
+    shown = scene.map_named("label") or scene.map_named("prediction") or next(iter(scene.maps), None)
     time = shown.time_ns if shown else scene.taxels.time_ns
     values = shown.values if shown else np.nan_to_num(np.abs(scene.taxels.values))
     strength = values.reshape(len(values), -1).max(axis=1)

@@ -17,7 +17,7 @@ class NullBackend(Backend):
         """Remember the parts of ``scene``."""
         self.calls.append(("scene", scene.title, len(scene.frame_ns)))
         self.calls += [("curves", c.name, len(c.time_ns)) for c in scene.curves]
-        self.calls.append(("taxels", "taxels", len(scene.taxels.time_ns)))
+        self.calls += [("taxels", a.name or "taxels", len(a.time_ns)) for a in scene.arrays]
         if scene.tip is not None:
             self.calls.append(("curves", scene.tip.name, len(scene.tip.time_ns)))
         self.calls += [("map", m.name, len(m.time_ns)) for m in scene.maps]
@@ -27,3 +27,6 @@ class NullBackend(Backend):
             self.calls.append(("images", camera.name, len(camera.image_ns)))
             self.calls.append(("cube", camera.name, len(camera.cube_ns)))
         self.calls += [("phase", p.name, 1) for p in scene.phases]
+        self.calls += [("trail", t.name, len(t.position)) for t in scene.trails]
+        self.calls += [("cloud", c.name, len(c.time_ns)) for c in scene.clouds]
+        self.calls += [("bars", b.name, len(b.values)) for b in scene.bars]

@@ -11,18 +11,19 @@ from tacdata.errors import UsageError
 
 RERUN, PICTURE = ".rrd", ".png"
 """Endings of the files."""
+FILMS = (".mp4", ".gif")
+"""Endings of films."""
 
 
-def new_file(path: Path, suffix: str) -> Path:
+def new_file(path: Path, *suffixes: str) -> Path:
     """Return ``path`` if it can become a new file.
 
     Raises:
-        UsageError: If it exists or has another ending than ``suffix``.
+        UsageError: If it exists, or has none of the endings ``suffixes``.
     """
-    if path.suffix != suffix:
-        raise UsageError(
-            f"output file {path}", f"a name that ends in {suffix}", f"use {path.with_suffix(suffix)}"
-        )
+    if path.suffix not in suffixes:
+        allowed = f"a name that ends in {' or '.join(suffixes)}"
+        raise UsageError(f"output file {path}", allowed, f"use {path.with_suffix(suffixes[0])}")
     if path.exists():
         raise UsageError(f"{path} exists", "a new file", "choose another name, or delete it")
     return path

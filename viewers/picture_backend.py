@@ -13,6 +13,7 @@ from viewers import picture_panels as panels
 from viewers.backend import Backend
 from viewers.moments import moments
 from viewers.output_file import PICTURE, new_file, written_beside
+from viewers.picture_other import other_page
 from viewers.picture_skin import skin
 from viewers.scene import Scene
 from viewers.summary import plain
@@ -32,7 +33,7 @@ WIDTH, TITLE, LINE, SIGNALS, ROW = 16.0, 0.65, 0.2, 5.6, 2.6
 
 
 class PictureBackend(Backend):
-    """One page an episode: signals, skin, maps at chosen moments, taxels and tip."""
+    """One page a scene; of an episode signals, skin, maps at chosen moments, taxels and tip."""
 
     def __init__(self, path: Path, resolution: int = 100) -> None:
         """Take the file to write and its resolution [dots per inch].
@@ -45,7 +46,7 @@ class PictureBackend(Backend):
     def draw(self, scene: Scene) -> None:
         """Write the page; a crash leaves none rather than half of one."""
         with rc_context(STYLE), written_beside(self._path) as temporary:
-            figure = page(scene)
+            figure = page(scene) if scene.kind == "episode" else other_page(scene)
             FigureCanvasAgg(figure)
             figure.savefig(temporary, dpi=self._resolution)
 

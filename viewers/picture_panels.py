@@ -36,7 +36,7 @@ def signals(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
     colors = taxel_colors(scene.taxels.columns, scene.taxels.rows) / 255
     for values, color in zip(change.values.T, colors, strict=True):
         upper.plot(time, values, color=tuple(color), linewidth=1.3)
-    upper.set_ylabel("change since rest [counts]")
+    upper.set_ylabel(f"change since rest [{change.unit}]")
     upper.set_title("Taxel signals", pad=20 if scene.phases else 6)
     key(upper, scene)
     if scene.tip is not None:
@@ -105,7 +105,7 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
         for axes, shown in zip(row, scene.maps, strict=True):
             image(axes, picture_at(shown, moment).T, (shown.x, shown.y), shown.scale)
             tip_mark(axes, scene, moment)
-            if shown.name == "error":
+            if shown.scale.signed:
                 rmse = np.sqrt(np.mean(picture_at(shown, moment).astype(float) ** 2))
                 axes.text(
                     0.98,
@@ -117,20 +117,18 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
                     color=INK,
                 )
     for axes, shown in zip(grid[0], scene.maps, strict=True):
-        axes.set_title(TITLES[shown.name])
+        axes.set_title(TITLES.get(shown.name, shown.name))
     for axes in grid[-1]:
         axes.set_xlabel("x [mm]")
-    depths = [k for k, m in enumerate(scene.maps) if m.name != "error"]
-    bar = figure.colorbar(
-        mappable(scene.maps[0].scale), ax=grid[:, depths], location="bottom", shrink=0.7, aspect=40
-    )
+    depths = [k for k, m in enumerate(scene.maps) if not m.scale.signed]
+    bar = figure.colorbar(mappable(scene.maps[0].scale), ax=grid[:, depths], location="bottom", shrink=0.7, aspect=40)
     bar.set_label("depth [mm]")
-    for k, shown in enumerate(scene.maps):
-        if shown.name == "error":
-            bar = figure.colorbar(
-                mappable(shown.scale), ax=grid[:, k], location="bottom", shrink=0.9, aspect=25
-            )
-            bar.set_label("predicted minus labelled depth [mm]")
+    signed = [k for k, m in enumerate(scene.maps) if m.scale.signed]
+    if signed:
+        scale = scene.maps[signed[0]].scale
+        bar = figure.colorbar(mappable(scale), ax=grid[:, signed], location="bottom", shrink=0.9, aspect=25)
+        single = len(signed) == 1 and scene.maps[signed[0]].name == "error"
+        bar.set_label("predicted minus labelled depth [mm]" if single else "difference of depth [mm]")
 
 
 def image(axes: Axes, values: np.ndarray, centers: tuple[np.ndarray, np.ndarray], scale: ColorScale) -> None:
@@ -166,8 +164,8 @@ def taxels_and_tip(figure: SubFigure, scene: Scene, chosen: Moments, stacked: bo
     image(first, values, (centers[0, :, 0], centers[:, 0, 1]), taxels.scale)
     tip_mark(first, scene, moment)
     first.set_title(f"Taxels at {seconds(scene, np.array(moment)):.2f} s")
-    figure.colorbar(mappable(taxels.scale), ax=first, shrink=0.8).set_label("change since rest [counts]")
-    low, high = scene.footprint
+    figure.colorbar(mappable(taxels.scale), ax=first, shrink=0.8).set_label(f"change since rest [{taxels.scale.unit}]")
+    low, high = scene.corners
     second.add_patch(Rectangle(low[:2], *(high - low)[:2], fill=False, edgecolor="0.6"))
     for x, y, _ in taxels.centers:
         second.add_patch(Circle((x, y), taxels.radius, facecolor="0.92", edgecolor="0.75"))

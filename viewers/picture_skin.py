@@ -14,8 +14,8 @@ from viewers.picture_panels import Moments, mappable, seconds
 from viewers.scene import Body, Scene
 
 
-def skin(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
-    """Draw the skin with the indenter at the deepest moment."""
+def skin(figure: SubFigure, scene: Scene, chosen: Moments, bar: bool = True) -> None:
+    """Draw the skin with the indenter at the deepest moment, with a bar of its colours."""
     surface = scene.surfaces[0]
     moment = dict(chosen)["deepest"]
     index, shaded = nearest(surface.time_ns, moment), surface.name != "undeformed"
@@ -33,7 +33,7 @@ def skin(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
         edgecolor=(1, 1, 1, 0.25 if shaded else 0.8),
         shade=False,
     )
-    low, high = scene.footprint
+    low, high = scene.corners
     for level in (low[2], high[2]):
         axes.plot(
             *zip(*[(a, b, level) for a, b in _corners(low, high)], strict=True),
@@ -46,9 +46,7 @@ def skin(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
     top = high[2]
     for body in scene.bodies:
         top = max(top, _wireframe(axes, body, moment))
-    axes.set(
-        xlabel="x [mm]", ylabel="y [mm]", xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], top)
-    )
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], top))
     axes.set_zlabel("z [mm]")
     axes.set_box_aspect((high[0] - low[0], high[1] - low[1], top - low[2]), zoom=1.05 if shaded else 0.8)
     axes.view_init(elev=42, azim=-62)
@@ -57,7 +55,7 @@ def skin(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.pane.set_visible(False)
     axes.set_title(f"Skin at {seconds(scene, np.array(moment)):.2f} s ({surface.name})", y=1.0)
-    if shaded:
+    if shaded and bar:
         figure.colorbar(mappable(surface.scale), ax=axes, shrink=0.55, pad=0.12).set_label("depth [mm]")
 
 
@@ -69,7 +67,5 @@ def _wireframe(axes: Any, body: Body, moment: int) -> float:
     """Draw a body as thin lines and return the height of its top [mm]."""
     turned = Rotation.from_quat(body.quaternion).apply(body.vertices)
     placed = turned + body.position[nearest(body.time_ns, moment)]
-    axes.plot_trisurf(
-        *placed.T, triangles=body.faces, color=(0.55, 0.6, 0.68, 0.2), linewidth=0, shade=False, zorder=3
-    )
+    axes.plot_trisurf(*placed.T, triangles=body.faces, color=(0.55, 0.6, 0.68, 0.3), linewidth=0, shade=False, zorder=3)
     return float(placed[:, 2].max())

@@ -27,6 +27,16 @@ def find_prediction(folder: Path, time_ns: np.ndarray) -> Prediction | None:
         UsageError: If there is no such folder or no prediction in it.
         FormatError: If a file is damaged.
     """
+    paths = prediction_paths(folder)
+    return next((read_prediction(path) for path in paths if np.isin(_times(path), time_ns).any()), None)
+
+
+def prediction_paths(folder: Path) -> list[Path]:
+    """Return the prediction files of a folder or training run, by name.
+
+    Raises:
+        UsageError: If there is no such folder or no prediction in it.
+    """
     inner = folder / "predictions"
     folder = inner if inner.is_dir() else folder
     paths = sorted(folder.glob(PATTERN)) if folder.is_dir() else []
@@ -36,7 +46,7 @@ def find_prediction(folder: Path, time_ns: np.ndarray) -> Prediction | None:
             "a folder of predictions, or a training run with one",
             "run `tacdata evaluate` first",
         )
-    return next((read_prediction(path) for path in paths if np.isin(_times(path), time_ns).any()), None)
+    return paths
 
 
 def _times(path: Path) -> np.ndarray:

@@ -1,18 +1,38 @@
-"""The camera images of a recording."""
+"""The camera images of a recording, as many as can be looked at."""
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from mcap.data_stream import ReadDataStream
+from mcap.reader import SeekingReader
+from mcap.records import Chunk, ChunkIndex, MessageIndex
+from mcap.stream_reader import get_chunk_data_stream
 
 from tacdata.recording import channels
 from tacdata.recording.mcap_records import read_records
+from viewers.thinning import IMAGES, evenly
+
+RECORD = 1 + 8
+"""Opcode and length before a record's body [bytes] (MCAP specification, "Records")."""
+MESSAGE = 2 + 4 + 8 + 8
+"""Channel, sequence and two times before a message's data [bytes] (MCAP specification, "Message")."""
 
 
-def recorded_images(path: Path, cameras: tuple[str, ...]) -> Iterator[tuple[str, int, bytes]]:
-    """Yield camera name, time of exposure [ns] and JPEG image of every image in a recording.
+def recorded_images(path: Path, cameras: tuple[str, ...], most: int = IMAGES) -> Iterator[tuple[str, int, bytes]]:
+    """Yield camera name, time of exposure [ns] and JPEG image of a recording's images.
+
+    A finished file says where its images lie, and only those that are wanted are read; one that breaks off is
+    read from its beginning to its end.
+
+    Args:
+        path: The recording.
+        cameras: Names of the cameras.
+        most: Images of a camera, taken at equal distance where there are more.
 
     Raises:
         UsageError: If there is no such file.
@@ -20,8 +40,57 @@ def recorded_images(path: Path, cameras: tuple[str, ...]) -> Iterator[tuple[str,
     """
     if not cameras:
         return
-    records = read_records(path)
+    try:
+        found = _indexed(path, cameras, most)
+    except Exception:  # a damaged index raises whatever the parser stumbles over; the records tell what is there
+        found = None
+    if found is None:
+        found = _all(path, cameras, most)
+    for camera, data in found:
+        image = CompressedImage.FromString(data)
+        yield camera, image.timestamp.ToNanoseconds(), image.data
+
+
+def _all(path: Path, cameras: tuple[str, ...], most: int) -> list[tuple[str, bytes]]:
+    records, found = read_records(path), []
     for camera in cameras:
-        for message in records.of_topic(channels.image(camera)):
-            image = CompressedImage.FromString(message.data)
-            yield camera, image.timestamp.ToNanoseconds(), image.data
+        messages = records.of_topic(channels.image(camera))
+        found += [(camera, messages[k].data) for k in evenly(len(messages), most)]
+    return found
+
+
+def _indexed(path: Path, cameras: tuple[str, ...], most: int) -> list[tuple[str, bytes]] | None:
+    """Return the wanted images by the file's index, or None if it has none."""
+    with path.open("rb") as stream:
+        summary = SeekingReader(stream).get_summary()
+        if summary is None or not summary.chunk_indexes:
+            return None
+        ids = {channel.topic: number for number, channel in summary.channels.items()}
+        found: list[tuple[str, bytes]] = []
+        for camera in cameras:
+            number = ids.get(channels.image(camera))
+            places = [] if number is None else _places(stream, summary.chunk_indexes, number)
+            found += [(camera, data) for data in _messages(stream, [places[k] for k in evenly(len(places), most)])]
+        return found
+
+
+def _places(stream: IO[bytes], chunks: list[ChunkIndex], channel: int) -> list[tuple[int, int]]:
+    """Return start of the chunk and offset within it of a channel's messages, in the order of writing."""
+    places = []
+    for chunk in sorted(chunks, key=lambda c: c.chunk_start_offset):
+        if channel in chunk.message_index_offsets:
+            stream.seek(chunk.message_index_offsets[channel] + RECORD)
+            index = MessageIndex.read(ReadDataStream(stream))
+            places += [(chunk.chunk_start_offset, offset) for _, offset in sorted(index.records, key=lambda r: r[1])]
+    return places
+
+
+def _messages(stream: IO[bytes], places: list[tuple[int, int]]) -> Iterator[bytes]:
+    opened, content = -1, b""
+    for start, offset in places:
+        if start != opened:
+            stream.seek(start + RECORD)
+            data, length = get_chunk_data_stream(Chunk.read(ReadDataStream(stream)), validate_crc=True)
+            opened, content = start, data.read(length)
+        (size,) = struct.unpack_from("<Q", content, offset + 1)
+        yield content[offset + RECORD + MESSAGE : offset + RECORD + size]

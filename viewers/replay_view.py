@@ -40,13 +40,13 @@ class Replay(Protocol):
         ...
 
 
-def save_replays(path: Path, replays: Mapping[str, Replay], radius: float) -> None:
+def save_replays(path: Path, replays: Mapping[str, Replay], sizes: tuple[float, ...]) -> None:
     """Write replays, by name, beside each other.
 
     Args:
         path: A new Rerun file.
         replays: Name -> replay.
-        radius: Of the ball [m].
+        sizes: Radius of the ball, or half the sizes of the eraser [m].
 
     Raises:
         UsageError: If the file exists or is no Rerun file by its ending.
@@ -62,7 +62,12 @@ def save_replays(path: Path, replays: Mapping[str, Replay], radius: float) -> No
         recording.log(f"{name}/verdict", rr.TextDocument(text), static=True)
         for t, ball, tips in zip(replay.time, replay.ball, replay.tips, strict=True):
             recording.set_time("replay", duration=float(t))
-            recording.log(f"{name}/ball", rr.Points3D([ball + shift], radii=[radius], colors=[BALL], labels=[text]))
+            place = ball + shift
+            if len(sizes) == 1:
+                drawn = rr.Points3D([place], radii=[sizes[0]], colors=[BALL], labels=[text])
+            else:
+                drawn = rr.Boxes3D(centers=[place], half_sizes=[sizes], colors=[BALL], labels=[text])
+            recording.log(f"{name}/ball", drawn)
             colors = [COLORS[k % len(COLORS)] for k in range(len(tips))]
             recording.log(f"{name}/fingertips", rr.Points3D(tips + shift, radii=[PAD] * len(tips), colors=colors))
             recording.log(f"{name}/height_mm", rr.Scalars([1000 * float(ball[2])]))

@@ -7,12 +7,22 @@ from pathlib import Path
 import rerun as rr
 
 from viewers.backend import Backend
+from viewers.comparison_blueprint import comparison_blueprint
+from viewers.hand_blueprint import hand_blueprint
 from viewers.output_file import RERUN, new_file, written_beside
 from viewers.rerun_blueprint import episode_blueprint
 from viewers.rerun_parts import RerunParts
 from viewers.scene import Scene
+from viewers.verdict_blueprint import verdict_blueprint
 
 APPLICATION = "tacdata"
+LAYOUTS = {
+    "episode": episode_blueprint,
+    "hand": hand_blueprint,
+    "verdict": verdict_blueprint,
+    "comparison": comparison_blueprint,
+}
+"""Kind of a scene -> what lays it out."""
 
 
 class RerunBackend(Backend):
@@ -30,7 +40,7 @@ class RerunBackend(Backend):
         """Write the file; a crash leaves none rather than half of one."""
         with written_beside(self._path) as temporary:
             recording = rr.RecordingStream(APPLICATION)
-            recording.save(temporary, default_blueprint=episode_blueprint(scene))
+            recording.save(temporary, default_blueprint=LAYOUTS[scene.kind](scene))
             recording.send_recording_name(scene.title)
             RerunParts(recording, scene).write()
             recording.flush()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from viewers.rerun_parts import HOST
+from viewers.rerun_parts import HOST, entity
 from viewers.scene import Scene
 
 MAP_TITLES = {
@@ -23,7 +23,10 @@ EYE = (-10.0, -16.5, 14.0)
 
 def episode_blueprint(scene: Scene) -> rrb.Blueprint:
     """Return the layout for one episode: skin, maps and curves in rows, text and cameras beside them."""
-    rows: list[rrb.ContainerLike] = [rrb.Horizontal(*[_skin(s.name, scene) for s in scene.surfaces])]
+    skins = [skin_view(s.name, SKIN_TITLES[s.name], scene) for s in scene.surfaces]
+    rows: list[rrb.ContainerLike] = [rrb.Horizontal(*skins)]
+    if scene.clouds:
+        rows = [rrb.Tabs(rrb.Horizontal(*skins, name="Skin"), _contact())]
     shares = [7.0]
     if scene.maps:
         rows.append(rrb.Horizontal(*[_map(m.name, m.scale.high) for m in scene.maps], _heat_map(scene)))
@@ -42,12 +45,23 @@ def episode_blueprint(scene: Scene) -> rrb.Blueprint:
     )
 
 
-def _skin(name: str, scene: Scene) -> rrb.Spatial3DView:
-    others = [f"- /world/skin/{s.name}/**" for s in scene.surfaces if s.name != name]
+def skin_view(name: str, title: str, scene: Scene) -> rrb.Spatial3DView:
+    """Return the view of one of a scene's skins, the others left out of it."""
+    others = [f"- /{entity('world/skin', s.name)}/**" for s in scene.surfaces if s.name != name]
     return rrb.Spatial3DView(
         origin="world",
         contents=["$origin/**", *others],
-        name=SKIN_TITLES[name],
+        name=title,
+        eye_controls=rrb.EyeControls3D(position=EYE, look_target=(0.0, 0.0, 2.6)),
+        line_grid=rrb.LineGrid3D(visible=False),
+    )
+
+
+def _contact() -> rrb.Spatial3DView:
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=["contact/**", "world/footprint", "world/indenter/**"],
+        name="Contact points: pressed in by more than 0.1 mm",
         eye_controls=rrb.EyeControls3D(position=EYE, look_target=(0.0, 0.0, 2.6)),
         line_grid=rrb.LineGrid3D(visible=False),
     )
@@ -57,9 +71,7 @@ def _side(scene: Scene) -> rrb.Container:
     parts: list[rrb.ContainerLike] = [rrb.TextDocumentView(origin="about", name="About")]
     for camera in scene.cameras:
         path = f"cameras/{camera.name}"
-        parts.append(
-            rrb.Spatial2DView(origin=f"{path}/image", contents=f"{path}/**", name=f"Camera {camera.name}")
-        )
+        parts.append(rrb.Spatial2DView(origin=f"{path}/image", contents=f"{path}/**", name=f"Camera {camera.name}"))
     if not scene.maps:
         parts.append(_heat_map(scene))
     return rrb.Vertical(*parts)
@@ -67,7 +79,7 @@ def _side(scene: Scene) -> rrb.Container:
 
 def _map(name: str, high: float) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
-        origin="maps", contents=[f"maps/{name}", "maps/marks/**"], name=MAP_TITLES[name].format(high=high)
+        origin="maps", contents=[entity("maps", name), "maps/marks/**"], name=MAP_TITLES[name].format(high=high)
     )
 
 
@@ -80,14 +92,16 @@ def _curves(scene: Scene) -> rrb.Container:
     """Return the taxels' change beside tabs with everything else that has a course in time."""
     hidden = rrb.PlotLegend(visible=False)
     origin = "curves/taxels/change"
-    first = rrb.TimeSeriesView(origin=origin, name="Change since rest [counts]", plot_legend=hidden)
+    first = rrb.TimeSeriesView(origin=origin, name=f"Change since rest [{scene.taxels.scale.unit}]", plot_legend=hidden)
     tabs: list[rrb.ContainerLike] = []
     if scene.tip is not None:
         tabs.append(rrb.TimeSeriesView(origin="curves/tip/nominal", name="Tip [mm]"))
     for curves in scene.curves:
-        if curves.name == "taxels/change":
+        if curves.name == "taxels/change" or curves.name.startswith("clock/"):
             continue
         title = f"{curves.name.replace('_', ' ').replace('/', ' ')} [{curves.unit}]"
         legend = hidden if curves.name.startswith("taxels/") else None
-        tabs.append(rrb.TimeSeriesView(origin=f"curves/{curves.name}", name=title, plot_legend=legend))
+        tabs.append(rrb.TimeSeriesView(origin=entity("curves", curves.name), name=title, plot_legend=legend))
+    if any(c.name.startswith("clock/") for c in scene.curves):
+        tabs.append(rrb.TimeSeriesView(origin="curves/clock", name="Clock: arrival after sample [ms]"))
     return rrb.Horizontal(first, rrb.Tabs(*tabs))

@@ -7,8 +7,9 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tacdata.errors import UsageError
@@ -20,9 +21,7 @@ GRPC_PORT, WEB_PORT = 9876, 9090
 
 def has_display() -> bool:
     """Say whether a window can be opened."""
-    return sys.platform in ("darwin", "win32") or bool(
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    )
+    return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def require_display() -> None:
@@ -58,9 +57,7 @@ def quiet_environment() -> Iterator[dict[str, str]]:
     """Yield an environment in which Rerun's usage statistics are off, leaving the user's own choice alone."""
     with tempfile.TemporaryDirectory(prefix="tacdata-rerun-") as folder:
         environment = {**os.environ, "XDG_CONFIG_HOME": folder}
-        subprocess.run(
-            [executable(), "analytics", "disable"], env=environment, capture_output=True, timeout=60
-        )
+        subprocess.run([executable(), "analytics", "disable"], env=environment, capture_output=True, timeout=60)
         yield environment
 
 
@@ -153,3 +150,10 @@ def _running(command: list[str], environment: dict[str, str]) -> Iterator[subpro
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+
+
+def until_interrupted() -> None:
+    """Wait for Ctrl-C."""
+    with suppress(KeyboardInterrupt):
+        while True:
+            time.sleep(3600)

@@ -1,19 +1,35 @@
 """What to show, as plain arrays. Backends draw a `Scene`; nothing here knows how.
 
-Lengths are in mm in the sensor's frame, times in ns on the host's clock; a camera's poses are in its own
-frame.
+Lengths are in mm, in the sensor's frame or, for fingers, in that of the demonstration; times in ns on the host's
+clock; a camera's poses are in its own frame.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from viewers.color_scale import ColorScale
+from viewers.scene_space import Body, Cloud, Surface, Trail
 
-UNKNOWN = 160
-"""Grey level of a skin whose depth is not known."""
+__all__ = [
+    "Bars",
+    "Body",
+    "CameraView",
+    "Cloud",
+    "Curves",
+    "DepthMaps",
+    "Scene",
+    "Span",
+    "Surface",
+    "TaxelArray",
+    "Trail",
+]
+
+
+FIRST_HOST_TIME = 10**17
+"""Times before 1973 are no host's clock [ns]."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +64,8 @@ class TaxelArray:
     values: np.ndarray
     """Signal [the scale's unit], shape (n, taxels); taxel k = i + columns * j."""
     scale: ColorScale
+    name: str = ""
+    """Name of the finger that wears it; empty for the one sensor of a press."""
 
     @property
     def grid(self) -> np.ndarray:
@@ -60,7 +78,7 @@ class DepthMaps:
     """Maps on the label's pixel grid."""
 
     name: str
-    """"label", "prediction" or "error"."""
+    """"label", "prediction", "error", or what a comparison calls it."""
     x: np.ndarray
     """Pixel centres along x [mm], shape (pixels_x,)."""
     y: np.ndarray
@@ -70,6 +88,8 @@ class DepthMaps:
     values: np.ndarray
     """Depth, or predicted minus labelled depth [mm], shape (n, pixels_x, pixels_y), float32."""
     scale: ColorScale
+    title: str = ""
+    """What stands above it; without one its name says it."""
 
     @property
     def pictures(self) -> np.ndarray:
@@ -87,62 +107,18 @@ class DepthMaps:
 
 
 @dataclass(frozen=True)
-class Surface:
-    """The skin's outer face at the pixel centres."""
+class Bars:
+    """Numbers with names, in no order of time."""
 
     name: str
-    """"label", "prediction" or "undeformed"."""
-    x: np.ndarray
-    """Pixel centres along x [mm], shape (pixels_x,)."""
-    y: np.ndarray
-    """Pixel centres along y [mm], shape (pixels_y,)."""
-    time_ns: np.ndarray
-    """Times [ns], shape (n,), int64; one entry for a face that does not move."""
-    height: np.ndarray
-    """z of the face [mm], shape (n, pixels_x, pixels_y), float32."""
-    depth: np.ndarray
-    """What colours it [mm], shape (n, pixels_x, pixels_y), float32."""
-    scale: ColorScale
-
-    @property
-    def colors(self) -> np.ndarray:
-        """Colours of the vertices, shape (n, pixels_x * pixels_y, 3), uint8; grey where no depth is known."""
-        if self.name == "undeformed":
-            return np.full((len(self.depth), self.depth[0].size, 3), UNKNOWN, dtype=np.uint8)
-        return self.scale.rgb(self.depth).reshape(len(self.depth), -1, 3)
-
-    @property
-    def faces(self) -> np.ndarray:
-        """Triangles over the vertices in C order, shape (m, 3), int64, counter-clockwise seen from +z."""
-        index = np.arange(len(self.x) * len(self.y)).reshape(len(self.x), len(self.y))
-        a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-        return np.concatenate(
-            [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
-        )
-
-    @property
-    def vertices(self) -> np.ndarray:
-        """Vertices [mm], shape (n, pixels_x * pixels_y, 3), float32."""
-        plane = np.stack(np.meshgrid(self.x, self.y, indexing="ij"), axis=-1).astype(np.float32)
-        plane = np.broadcast_to(plane, (len(self.height), *plane.shape))
-        return np.concatenate([plane, self.height[..., None]], axis=-1).reshape(len(self.height), -1, 3)
-
-
-@dataclass(frozen=True)
-class Body:
-    """A rigid body that moves without turning."""
-
-    name: str
-    vertices: np.ndarray
-    """Vertices in the body's frame [mm], shape (v, 3)."""
-    faces: np.ndarray
-    """Triangles, shape (m, 3), int64."""
-    quaternion: tuple[float, float, float, float]
-    """Orientation in the sensor's frame, xyzw [1]."""
-    time_ns: np.ndarray
-    """Times [ns], shape (n,), int64."""
-    position: np.ndarray
-    """Origin of the body's frame in the sensor's frame [mm], shape (n, 3)."""
+    title: str
+    """What is compared, with the unit."""
+    labels: tuple[str, ...]
+    values: np.ndarray
+    """In the unit that the title says [1], shape (n,); NaN where there is none."""
+    mark: float | None = None
+    """A value worth a line: a threshold or a floor."""
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True)
@@ -168,6 +144,8 @@ class CameraView:
     """Cube orientation in the camera's frame, xyzw [1], shape (p, 4)."""
     cube_side: float
     """Side of the cube [mm], and length of the axes that are drawn."""
+    fingers: tuple[CameraView, ...] = ()
+    """Fingertips seen in the same images, as views without images of their own."""
 
 
 @dataclass(frozen=True)
@@ -192,25 +170,56 @@ class Scene:
     """Sample time of every taxel frame [ns], shape (n,), int64."""
     frame: np.ndarray
     """The device's counter of every taxel frame [frames], shape (n,), int64."""
-    footprint: np.ndarray
-    """Corners of the skin's block: minimum and maximum x, y, z [mm], shape (2, 3)."""
-    curves: tuple[Curves, ...]
-    taxels: TaxelArray
-    tip: Curves | None
+    footprint: np.ndarray | None = None
+    """Corners of the skin's block: minimum and maximum x, y, z [mm], shape (2, 3); None without one skin."""
+    curves: tuple[Curves, ...] = ()
+    arrays: tuple[TaxelArray, ...] = ()
+    """The sensor's taxels; of a demonstration one entry for each finger with a board."""
+    tip: Curves | None = None
     """Nominal x, y, depth of the indenter's lowest point [mm], or None if unknown."""
-    maps: tuple[DepthMaps, ...]
-    surfaces: tuple[Surface, ...]
-    bodies: tuple[Body, ...]
-    cameras: tuple[CameraView, ...]
-    phases: tuple[Span, ...]
+    maps: tuple[DepthMaps, ...] = ()
+    surfaces: tuple[Surface, ...] = ()
+    bodies: tuple[Body, ...] = ()
+    cameras: tuple[CameraView, ...] = ()
+    phases: tuple[Span, ...] = ()
+    trails: tuple[Trail, ...] = ()
+    clouds: tuple[Cloud, ...] = ()
+    bars: tuple[Bars, ...] = ()
+    kind: str = "episode"
+    """Which layout it has: "episode", "hand", "verdict" or "comparison"."""
+    device_ns: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """The board's own time of every taxel frame [ns], shape (n,), int64; empty without one."""
+
+    @property
+    def taxels(self) -> TaxelArray:
+        """The taxels of a press: the first array."""
+        return self.arrays[0]
+
+    @property
+    def on_host_clock(self) -> bool:
+        """Whether times are the host's; else they count from a beginning of their own."""
+        return len(self.frame_ns) > 0 and int(self.frame_ns[0]) > FIRST_HOST_TIME
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Corners of the skin's block [mm], shape (2, 3); of a scene without one the taxels' own."""
+        if self.footprint is not None:
+            return self.footprint
+        return np.stack([self.taxels.centers.min(axis=0), self.taxels.centers.max(axis=0)])
 
     def frame_at(self, time_ns: np.ndarray) -> np.ndarray:
         """Return the counter of the last taxel frame sampled by times [ns], shape (n,).
 
         Times before the first frame get the first one's counter.
         """
+        if not len(self.frame):
+            return np.zeros(len(time_ns), dtype=np.int64)
         index = np.searchsorted(self.frame_ns, time_ns, side="right") - 1
         return self.frame[np.clip(index, 0, len(self.frame) - 1)]
+
+    def device_at(self, time_ns: np.ndarray) -> np.ndarray:
+        """Return times [ns] on the board's own clock, shape (n,), int64, interpolated between taxel frames."""
+        return np.interp(time_ns - self.frame_ns[0], self.frame_ns - self.frame_ns[0], self.device_ns).astype(np.int64)
 
     def map_named(self, name: str) -> DepthMaps | None:
         """Return the maps called ``name``, or None."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from tacdata.labels import Label
 from tacdata.recording.episode import PHASES, Episode, Phase, TagStream
 from tacdata.rig import registration_for
 from tacdata.sensor import Sensor
+from viewers import thinning
 from viewers.color_scale import ColorScale, scale_of
 from viewers.scene import Curves, Span, TaxelArray
 
@@ -41,25 +43,37 @@ def taxel_labels(sensor: Sensor) -> tuple[str, ...]:
     return tuple(f"{k} ({k % columns}, {k // columns})" for k in range(sensor.taxels.count))
 
 
-def taxel_array(sensor: Sensor, time_ns: np.ndarray, change: np.ndarray) -> TaxelArray:
-    """Return the array coloured by the signal change [counts], shape (n, taxels)."""
+def taxel_array(
+    sensor: Sensor, time_ns: np.ndarray, change: np.ndarray, name: str = "", unit: str = "counts"
+) -> TaxelArray:
+    """Return the array coloured by the signal change, at most `thinning.ARRAYS` times.
+
+    Args:
+        sensor: Gives the taxels' places.
+        time_ns: Times [ns], shape (n,).
+        change: Signal change [unit], shape (n, taxels).
+        name: Finger that wears it, if there are several.
+        unit: Of the readings.
+    """
+    rows = thinning.strongest(np.nan_to_num(np.abs(change)).max(axis=1, initial=0.0), thinning.ARRAYS)
     plane = sensor.taxels.centers
     return TaxelArray(
         centers=np.column_stack([plane, np.zeros(len(plane))]),
         radius=sensor.skin.protrusion_radius or 0.25 * min(sensor.taxels.pitch_x, sensor.taxels.pitch_y),
         columns=sensor.taxels.columns,
         rows=sensor.taxels.rows,
-        time_ns=time_ns,
-        values=change,
-        scale=_signal_scale(change),
+        time_ns=time_ns[rows],
+        values=change[rows],
+        scale=_signal_scale(change, unit),
+        name=name,
     )
 
 
-def _signal_scale(change: np.ndarray) -> ColorScale:
+def _signal_scale(change: np.ndarray, unit: str) -> ColorScale:
     # A board whose readings fall under pressure, or fall as much as they rise, needs the scale with a middle.
     known = change[np.isfinite(change)]
     falls = -known.min(initial=0.0) > 0.2 * known.max(initial=0.0)
-    return scale_of(change, "counts", signed=bool(falls))
+    return scale_of(change, unit, signed=bool(falls))
 
 
 def tip_curves(source: str, time_ns: np.ndarray, tip: np.ndarray) -> Curves:
@@ -67,22 +81,18 @@ def tip_curves(source: str, time_ns: np.ndarray, tip: np.ndarray) -> Curves:
     return Curves(f"tip/{source}", "mm", tuple(f"{q}, {source}" for q in ("x", "y", "depth")), time_ns, tip)
 
 
-def episode_curves(episode: Episode) -> tuple[Curves, ...]:
-    """Return every curve that the recording alone gives."""
+def episode_curves(episode: Episode, unit: str = "counts") -> tuple[Curves, ...]:
+    """Return every curve that the recording alone gives; ``unit`` is that of its readings."""
     taxels = episode.taxels
     resting = episode.phase_at(taxels.sample_ns) == PHASES.index("rest")
     labels = taxel_labels(episode.sensor)
     curves = [
-        Curves("taxels/change", "counts", labels, taxels.sample_ns, signal_change(taxels.counts, resting)),
-        Curves("taxels/raw", "counts", labels, taxels.sample_ns, taxels.counts),
-        Curves(
-            "clock/arrival_minus_sample",
-            "ms",
-            ("taxels",),
-            taxels.sample_ns,
-            (taxels.arrival_ns - taxels.sample_ns)[:, None] / 1e6,
-        ),
+        Curves("taxels/change", unit, labels, taxels.sample_ns, signal_change(taxels.counts, resting)),
+        Curves("taxels/raw", unit, labels, taxels.sample_ns, taxels.counts),
+        delays("taxels", taxels.sample_ns, taxels.arrival_ns),
     ]
+    if len(episode.cnc.sample_ns):
+        curves.append(delays("guide", episode.cnc.sample_ns, episode.cnc.arrival_ns))
     if len(episode.cnc.sample_ns) and "registration" in episode.rig:
         reported = registration_for(episode.rig, episode.press.indenter_name).to_sensor(episode.cnc.position)
         curves.append(tip_curves("reported", episode.cnc.sample_ns, reported))
@@ -90,6 +100,11 @@ def episode_curves(episode: Episode) -> tuple[Curves, ...]:
         curves += tag_curves(tags)
     curves += [Curves(f"measured/{m.name}", m.unit, m.names, m.sample_ns, m.values) for m in episode.measured]
     return tuple(curves)
+
+
+def delays(stream: str, sample_ns: np.ndarray, arrival_ns: np.ndarray) -> Curves:
+    """Return by how much later than it was sampled each value came [ms]: what a stream's clock model leaves."""
+    return Curves(f"clock/{stream}", "ms", (stream,), sample_ns, (arrival_ns - sample_ns)[:, None] / 1e6)
 
 
 def tag_curves(tags: TagStream) -> list[Curves]:
@@ -114,3 +129,11 @@ def label_curves(label: Label) -> tuple[Curves, ...]:
 def spans(phases: Sequence[Phase]) -> tuple[Span, ...]:
     """Return the marked phases in the order of time."""
     return tuple(Span(p.name, p.start_ns, p.end_ns) for p in sorted(phases, key=lambda p: p.start_ns))
+
+
+def thinned(curves: Curves) -> Curves:
+    """Return curves of about `thinning.CURVES` rows that keep every peak of the widest curve of each stretch."""
+    if len(curves.time_ns) <= thinning.CURVES:
+        return curves
+    rows = thinning.extremes(np.asarray(curves.values, dtype=float), thinning.CURVES)
+    return replace(curves, time_ns=curves.time_ns[rows], values=curves.values[rows])

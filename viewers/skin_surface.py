@@ -6,13 +6,14 @@ import numpy as np
 
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
+from viewers import thinning
 from viewers.color_scale import scale_of
 from viewers.maps import DEPTH_FLOOR
-from viewers.scene import Body, DepthMaps, Surface
+from viewers.scene import Body, Cloud, DepthMaps, Surface
 
 
 def surfaces(
-    sensor: Sensor, start_ns: int, maps: tuple[DepthMaps, ...], signed: np.ndarray | None
+    sensor: Sensor, start_ns: int, maps: tuple[DepthMaps, ...], signed: tuple[np.ndarray, np.ndarray] | None
 ) -> tuple[Surface, ...]:
     """Return the face at z = thickness - depth for the label and the prediction; without either, undeformed.
 
@@ -20,12 +21,15 @@ def surfaces(
         sensor: Gives the thickness and the pixel grid.
         start_ns: Time of the undeformed face [ns].
         maps: Depth maps; "label" and "prediction" are drawn.
-        signed: The label's map with bulging [mm], shape (n, pixels_x, pixels_y), or None for depth alone.
+        signed: The label's times [ns], shape (n,), ascending, and maps with bulging [mm], shape (n, pixels_x,
+            pixels_y); or None for depth alone.
     """
     top = np.float32(sensor.skin.thickness)
     result = []
     for shown in (m for m in maps if m.name in ("label", "prediction")):
-        drop = signed if shown.name == "label" and signed is not None else shown.values
+        drop = shown.values
+        if shown.name == "label" and signed is not None:
+            drop = signed[1][np.searchsorted(signed[0], shown.time_ns)]
         height = (top - drop).astype(np.float32)
         depth = shown.values.astype(np.float32)
         result.append(Surface(shown.name, shown.x, shown.y, shown.time_ns, height, depth, shown.scale))
@@ -46,6 +50,26 @@ def surfaces(
     return tuple(result)
 
 
+def faces(sensor: Sensor, maps: tuple[DepthMaps, ...]) -> tuple[Surface, ...]:
+    """Return one face for each of some maps, under the map's name."""
+    top = np.float32(sensor.skin.thickness)
+    return tuple(Surface(m.name, m.x, m.y, m.time_ns, top - m.values, m.values, m.scale) for m in maps)
+
+
+def contact_cloud(surface: Surface, threshold: float = DEPTH_FLOOR) -> Cloud:
+    """Return the points of a skin that are pressed in by more than a threshold [mm], time by time."""
+    touched = surface.depth.reshape(len(surface.depth), -1) > threshold
+    return Cloud(
+        "contact",
+        surface.time_ns,
+        touched.sum(axis=1),
+        surface.vertices[touched],
+        surface.depth.reshape(len(touched), -1)[touched],
+        surface.scale,
+        0.3 * float(surface.x[1] - surface.x[0]),
+    )
+
+
 def footprint(sensor: Sensor) -> np.ndarray:
     """Return the corners of the skin's block with its protrusions [mm], shape (2, 3)."""
     half = np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2
@@ -63,12 +87,14 @@ def indenter_body(sensor: Sensor, press: Press, time_ns: np.ndarray, tip: np.nda
     """
     mesh = press.indenter.surface()
     position = np.column_stack([tip[:, :2], sensor.skin.thickness - tip[:, 2]])
+    rows = thinning.strongest(tip[:, 2], thinning.ARRAYS)
+    time_ns, position = time_ns[rows], position[rows]
     half = np.radians(press.yaw) / 2
     return Body(
         "indenter",
         np.asarray(mesh.vertices),
         np.asarray(mesh.faces),
-        (0.0, 0.0, float(np.sin(half)), float(np.cos(half))),
+        np.array([0.0, 0.0, np.sin(half), np.cos(half)]),
         time_ns,
         position,
     )

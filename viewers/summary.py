@@ -56,7 +56,7 @@ def of_episode(
     ]
     if label is not None:
         lines.append(
-            f"- **Label** to {label.depth.max(initial=0.0):.2f} mm, numerical error up to "
+            f"- **Label** to {label.signed.max(initial=0.0):.2f} mm, numerical error up to "
             f"{label.error.max(initial=0.0):.3f} mm"
         )
     lines += of_prediction(prediction, maps)
@@ -73,12 +73,13 @@ def of_dataset_episode(
     entry: DatasetEpisode,
     prediction: Prediction | None,
     maps: tuple[DepthMaps, ...],
-    remarks: tuple[str, ...] = (),
+    remarks: tuple[str, ...],
+    count: int,
 ) -> str:
     """Return what the dataset's episode is, where it comes from, and how the prediction does."""
     sensor, record = dataset.sensors[entry.sensor], entry.record
     frames = entry.stop - entry.start
-    lines = [f"# Episode {entry.index} of {len(dataset.episodes)}", ""]
+    lines = [f"# Episode {entry.index} of {count}", ""]
     if record is not None:
         lines.append(f"- **Press** {of_press(record.configuration)}")
     lines += [
@@ -104,8 +105,7 @@ def of_prediction(prediction: Prediction | None, maps: tuple[DepthMaps, ...]) ->
         return []
     known = "of another dataset" if prediction.part == "other dataset" else f"in its {prediction.part} part"
     return [
-        f"- **Prediction** {prediction.network}, checkpoint {prediction.checkpoint[:12]}, "
-        f"episode {known}" + rmse(maps)
+        f"- **Prediction** {prediction.network}, checkpoint {prediction.checkpoint[:12]}, episode {known}" + rmse(maps)
     ]
 
 

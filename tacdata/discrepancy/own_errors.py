@@ -24,15 +24,15 @@ class Own:
     """What the episodes of one place err by themselves, whitened; streams first."""
 
     offset: np.ndarray
-    """A constant, shape (streams, n)."""
+    """A constant [1], shape (streams, n)."""
     prior: float
     """Its standard deviation, in noise scales [1]; inf leaves it free."""
     swing: np.ndarray | None = None
-    """What one standard deviation of a stream's own gain changes, shape (streams, n)."""
+    """What one standard deviation of a stream's own gain changes [1], shape (streams, n)."""
     moved: np.ndarray | None = None
-    """What one standard deviation of each error of pose changes, shape (streams, n, kinds)."""
+    """What one standard deviation of each error of pose changes [1], shape (streams, n, kinds)."""
     features: np.ndarray | None = None
-    """What all episodes may take up together, each stream by itself, shape (streams, n, p)."""
+    """What all episodes may take up together, each stream by itself [1], shape (streams, n, p)."""
 
 
 def without(columns: np.ndarray, spans: list[np.ndarray], own: Own) -> np.ndarray:

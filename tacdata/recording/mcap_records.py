@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -14,7 +15,7 @@ from google.protobuf.message import DecodeError
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Header, Message, Metadata, Schema
-from mcap.stream_reader import breakup_chunk
+from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 
 from tacdata.errors import FormatError, UsageError
 
@@ -25,6 +26,8 @@ HEAD = 9
 """Opcode and length before each record's body [bytes] (MCAP specification, "Records")."""
 SEARCH = 1 << 20
 """Bytes read at a time while looking for the next chunk behind damage [bytes]."""
+RECORD, MESSAGE = struct.Struct("<BQ"), struct.Struct("<HIQQ")
+"""Head of a record; channel, sequence, log and publish time before a message's data (MCAP specification)."""
 KNOWN = frozenset(opcode.value for opcode in Opcode)
 PRIVATE = 0x80
 """Opcodes from here on are other programs' own."""
@@ -157,11 +160,34 @@ def _content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterat
                 yield Attachment.read(data)
         case Opcode.CHUNK:
             try:
-                content = breakup_chunk(Chunk.read(data), validate_crc=True)
+                content = _chunk_content(Chunk.read(data))
             except Exception as error:  # zstd's, struct's and mcap's own errors share no base
                 damage.append(f"a damaged chunk is left out ({type(error).__name__})")
                 return
             yield from content
+
+
+def _chunk_content(chunk: Chunk) -> list[Schema | Channel | Message]:
+    """Return a chunk's records, its checksum checked; as `breakup_chunk` gives them, in less time."""
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    content, place = stream.read(size), 0
+    records: list[Schema | Channel | Message] = []
+    while place < len(content):
+        opcode, length = RECORD.unpack_from(content, place)
+        place += RECORD.size
+        if place + length > len(content):
+            raise ValueError("a record that is longer than its chunk")
+        body = content[place : place + length]
+        if opcode == Opcode.MESSAGE:
+            channel, sequence, log_time, publish_time = MESSAGE.unpack_from(body)
+            data = body[MESSAGE.size :]
+            records.append(Message(channel, log_time=log_time, data=data, publish_time=publish_time, sequence=sequence))
+        elif opcode == Opcode.SCHEMA:
+            records.append(Schema.read(ReadDataStream(BytesIO(body))))
+        elif opcode == Opcode.CHANNEL:
+            records.append(Channel.read(ReadDataStream(BytesIO(body))))
+        place += length
+    return records
 
 
 def _intact_attachment(body: bytes) -> bool:

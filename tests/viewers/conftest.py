@@ -32,9 +32,7 @@ def tip_path():
     """Return times [ns] and x, y, depth [mm] of a press that comes down, holds and goes up."""
     seconds = np.array([0.0, 1.0, 1.5, 2.3, 2.9, 3.6, 4.0])
     depth = np.array([-5.0, -5.0, 0.0, DEEPEST, DEEPEST, 0.0, -5.0])
-    return START + (1e9 * seconds).astype(np.int64), np.column_stack(
-        [np.full(7, 1.0), np.full(7, -0.5), depth]
-    )
+    return START + (1e9 * seconds).astype(np.int64), np.column_stack([np.full(7, 1.0), np.full(7, -0.5), depth])
 
 
 def dent(sensor, tip):
@@ -42,9 +40,7 @@ def dent(sensor, tip):
     x, y = np.meshgrid(sensor.map.x, sensor.map.y, indexing="ij")
     square = (x - tip[:, 0, None, None]) ** 2 + (y - tip[:, 1, None, None]) ** 2
     deep = np.maximum(tip[:, 2], 0.0)[:, None, None]
-    return (deep * (np.exp(-square / 4.0) - 0.08 * np.exp(-((np.sqrt(square) - 4.0) ** 2)))).astype(
-        np.float32
-    )
+    return (deep * (np.exp(-square / 4.0) - 0.08 * np.exp(-((np.sqrt(square) - 4.0) ** 2)))).astype(np.float32)
 
 
 def made(episode):

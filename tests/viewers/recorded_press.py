@@ -21,9 +21,7 @@ def write_recording(path, episode, images):
         stream.arrival_ns, stream.sample_ns, stream.counter, stream.counts, strict=True
     ):
         writer.taxels(TaxelFrame(int(arrival), int(counter), counts), int(sample))
-    for sample, position, state in zip(
-        episode.cnc.sample_ns, episode.cnc.position, episode.cnc.state, strict=True
-    ):
+    for sample, position, state in zip(episode.cnc.sample_ns, episode.cnc.position, episode.cnc.state, strict=True):
         writer.status(CncStatus(int(sample) - 2_000_000, int(sample) + 2_000_000, state, position, 90.0))
     tags = episode.tags[0]
     for k, (camera, sample, jpeg) in enumerate(images):

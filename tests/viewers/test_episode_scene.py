@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from tacdata.errors import FormatError
-from tacdata.recording.episode import TaxelStream
+from tacdata.recording.episode import CncStream, TaxelStream
 from viewers.episode_scene import episode_scene
 from viewers.null_backend import NullBackend
+from viewers.picture_backend import PictureBackend
+from viewers.rerun_backend import RerunBackend
 
 DEEPEST = 1.2
 
@@ -60,9 +62,7 @@ def test_the_error_is_predicted_minus_labelled_at_equal_times(scene, label, pred
     assert (error.time_ns == label.time_ns[2:]).all()
     assert np.allclose(error.values[70], prediction.depth[70] - label.depth[72], atol=1e-6)
     values = curve(scene, "error").values
-    assert values[70, 0] == pytest.approx(
-        np.sqrt(np.mean((prediction.depth[70] - label.depth[72]) ** 2)), rel=1e-5
-    )
+    assert values[70, 0] == pytest.approx(np.sqrt(np.mean((prediction.depth[70] - label.depth[72]) ** 2)), rel=1e-5)
     assert (values[:, 1] >= values[:, 0]).all()
 
 
@@ -125,9 +125,7 @@ def test_both_clocks_name_the_same_frame(scene, episode):
 
 
 def test_what_is_missing_is_said_and_the_rest_is_shown(episode):
-    scene = episode_scene(
-        replace(episode, tags=(), phases=(), tip_ns=episode.tip_ns[:0], tip=episode.tip[:0])
-    )
+    scene = episode_scene(replace(episode, tags=(), phases=(), tip_ns=episode.tip_ns[:0], tip=episode.tip[:0]))
     assert scene.maps == () and scene.bodies == () and scene.tip is None
     assert [s.name for s in scene.surfaces] == ["undeformed"]
     assert (scene.surfaces[0].height == np.float32(3.3)).all()
@@ -157,8 +155,19 @@ def test_lost_frames_are_counted(episode):
 def test_an_empty_recording_is_refused_in_words(episode):
     empty = np.zeros(0, dtype=np.int64)
     taxels = TaxelStream(empty, empty, empty, np.zeros((0, 24)))
+    cnc = CncStream(empty, empty, np.zeros((0, 3)), ())
     with pytest.raises(FormatError, match="not one taxel frame"):
-        episode_scene(replace(episode, taxels=taxels))
+        episode_scene(replace(episode, taxels=taxels, cnc=cnc, tip_ns=empty, tip=np.zeros((0, 3)), tags=()))
+
+
+def test_without_taxels_the_rest_is_shown(episode, images, tmp_path):
+    empty = np.zeros(0, dtype=np.int64)
+    silent = replace(episode, taxels=TaxelStream(empty, empty, empty, np.zeros((0, 24))))
+    scene = episode_scene(silent, images=images)
+    assert "not one taxel frame" in scene.summary
+    assert len(scene.cameras[0].images) == 30 and scene.bodies[0].position[:, 2].min() == pytest.approx(2.1, abs=0.01)
+    RerunBackend(tmp_path / "silent.rrd").draw(scene)
+    PictureBackend(tmp_path / "silent.png", resolution=20).draw(scene)
 
 
 def test_maps_of_another_sensor_are_refused(episode, label):

@@ -69,9 +69,7 @@ def test_nothing_printed_is_cropped(figures, printed, name):
 def test_no_title_or_label_lies_on_another(printed, name):
     words = [(t, b) for t, b in printed[name] if any(c.isalpha() for c in t)]
     assert len(words) > 8
-    clashes = [
-        (a, b) for (a, p), (b, q) in itertools.combinations(words, 2) if p.padded(-1).overlaps(q.padded(-1))
-    ]
+    clashes = [(a, b) for (a, p), (b, q) in itertools.combinations(words, 2) if p.padded(-1).overlaps(q.padded(-1))]
     assert not clashes
 
 

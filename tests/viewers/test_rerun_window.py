@@ -27,9 +27,7 @@ def other_address():
     """An address of this machine beside the loopback, or None."""
     try:
         return next(
-            a[4][0]
-            for a in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)
-            if a[4][0][:4] != "127."
+            a[4][0] for a in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET) if a[4][0][:4] != "127."
         )
     except (OSError, StopIteration):
         return None
@@ -42,9 +40,7 @@ def test_the_web_viewer_serves_on_the_loopback_only(episode, tmp_path):
         grpc = urlsplit(parse_qs(parts.query)["url"][0].removeprefix("rerun+"))
         assert parts.hostname == grpc.hostname == "127.0.0.1"
         for _ in range(100):
-            if server.poll() is not None or (
-                listens("127.0.0.1", parts.port) and listens("127.0.0.1", grpc.port)
-            ):
+            if server.poll() is not None or (listens("127.0.0.1", parts.port) and listens("127.0.0.1", grpc.port)):
                 break
             time.sleep(0.1)
         assert server.poll() is None

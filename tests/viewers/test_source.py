@@ -39,9 +39,7 @@ def session(recorded, own_label, own_prediction):
     write_label(folder / "labels" / "episode-000003.parquet", own_label)
     other = replace(own_prediction, episode=0, time_ns=own_prediction.time_ns + 10**12)
     write_prediction(folder / "run" / "predictions" / "episode-000000.parquet", other)
-    write_prediction(
-        folder / "run" / "predictions" / "episode-000007.parquet", replace(own_prediction, episode=7)
-    )
+    write_prediction(folder / "run" / "predictions" / "episode-000007.parquet", replace(own_prediction, episode=7))
     return folder
 
 
@@ -107,6 +105,26 @@ def test_a_truncated_recording_is_shown_as_far_as_it_goes(session, tmp_path):
     scene = scene_at(tmp_path / "cut.mcap")
     assert "interrupted or salvaged" in scene.summary
     assert len(scene.frame_ns) > 0
+
+
+def test_a_recording_that_is_still_being_written(session, tmp_path):
+    data = (session / "episode-000003.mcap").read_bytes()
+    (tmp_path / "episode-000003.partial.mcap").write_bytes(data[: len(data) * 9 // 10])
+    scene = scene_at(tmp_path)
+    assert "still being written" in scene.summary and len(scene.frame_ns) > 0
+
+
+def test_of_many_images_some_are_read_at_equal_distance(session):
+    from viewers.recorded_images import recorded_images
+
+    path = session / "episode-000003.mcap"
+    whole = list(recorded_images(path, ("top",)))
+    few = list(recorded_images(path, ("top",), most=4))
+    assert few == [whole[k] for k in (0, 10, 19, 29)]
+    data = path.read_bytes()
+    (path.parent / "cut.mcap").write_bytes(data[:-200])  # without its index, it is read from the beginning
+    assert list(recorded_images(path.parent / "cut.mcap", ("top",), most=4)) == few
+    (path.parent / "cut.mcap").unlink()
 
 
 def test_a_dataset_episode(session, recorded, own_label, tmp_path):

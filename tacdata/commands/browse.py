@@ -1,0 +1,85 @@
+"""List episodes, choose among them and set bad ones aside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tacdata.commands.command import PIPELINE
+
+if TYPE_CHECKING:
+    from viewers.episode_list import EpisodeList
+
+ORDER = 71
+PANEL = PIPELINE
+
+
+def run(
+    path: Annotated[Path, typer.Argument(help="A session or dataset folder.")],
+    where: Annotated[
+        list[str] | None,
+        typer.Option(help="Only those with e.g. depth>0.8, indenter=ball, label=failed, flag!= ; repeatable."),
+    ] = None,
+    sort: Annotated[str, typer.Option(help="Column to sort by; -COLUMN turns it; error: the worst first.")] = "number",
+    predictions: Annotated[
+        Path | None, typer.Option(help="Predictions or a training run: its error a episode.")
+    ] = None,
+    labels: Annotated[Path | None, typer.Option(help="Folder of labels; without it SESSION/labels.")] = None,
+    most: Annotated[int, typer.Option(min=1, help="Rows to print.")] = 40,
+    flag: Annotated[int | None, typer.Option(help="Set this episode aside; say why with --reason.")] = None,
+    unflag: Annotated[int | None, typer.Option(help="Take this episode back.")] = None,
+    reason: Annotated[str, typer.Option(help="Why it is set aside.")] = "",
+    web: Annotated[
+        bool, typer.Option("--web", help="A page on this machine: list, viewer, step from worst to next.")
+    ] = False,
+) -> None:
+    """List, filter and sort episodes; flag bad ones, which training then leaves out; step through them in a browser."""
+    from viewers.flagging import flag_episode, unflag_episode
+    from viewers.list_sources import episodes_at
+
+    if flag is not None or unflag is not None:
+        whole = episodes_at(path, labels)
+        if flag is not None:
+            print(f"set aside: {flag_episode(whole, flag, reason)}")
+        if unflag is not None:
+            print(f"taken back: {unflag_episode(whole, unflag)}")
+        return
+    chosen = episodes_at(path, labels, predictions)
+    for condition in where or ():
+        chosen = chosen.where(condition)
+    chosen = chosen.by(sort)
+    if web:
+        _serve(chosen, labels, predictions)
+        return
+    _print(chosen, most, predictions is not None)
+    if chosen.entries:
+        more = f" --predictions {predictions}" if predictions else ""
+        print(f"next: tacdata view {path} --episode {chosen.entries[0].number}{more}")
+
+
+def _print(chosen: EpisodeList, most: int, scored: bool) -> None:
+    from viewers.list_table import list_table
+
+    print(list_table(chosen, most, scored))
+    for remark in chosen.remarks:
+        print(f"note: {remark}")
+
+
+def serve(path: Path, labels: Path | None, predictions: Path | None) -> None:
+    """Serve the page of a whole session or dataset, the worst episode first where errors are known."""
+    from viewers.list_sources import episodes_at
+
+    _serve(episodes_at(path, labels, predictions).by("error" if predictions else "number"), labels, predictions)
+
+
+def _serve(chosen: EpisodeList, labels: Path | None, predictions: Path | None) -> None:
+    from viewers import rerun_window
+    from viewers.browse_server import browse_server
+
+    with browse_server(chosen, labels, predictions) as address:
+        print(f"open {address}\nCtrl-C ends it", flush=True)
+        if rerun_window.has_display():
+            typer.launch(address)
+        rerun_window.until_interrupted()

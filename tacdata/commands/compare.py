@@ -1,0 +1,88 @@
+"""Compare two label versions, two networks, or a model with what was measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tacdata.commands.command import PIPELINE
+from tacdata.errors import UsageError
+
+if TYPE_CHECKING:
+    from viewers.scene import Scene
+
+ORDER = 72
+PANEL = PIPELINE
+
+
+def run(
+    path: Annotated[Path, typer.Argument(help="A session (labels, networks, models) or dataset (networks).")],
+    labels: Annotated[
+        list[Path] | None, typer.Option(help="Folders of labels, twice; once: against SESSION/labels.")
+    ] = None,
+    predictions: Annotated[
+        list[Path] | None, typer.Option(help="Training runs or folders of predictions, twice.")
+    ] = None,
+    spec: Annotated[
+        list[Path] | None, typer.Option(help="Model specs (.json), e.g. before and after an effect: against readings.")
+    ] = None,
+    episode: Annotated[int | None, typer.Option(min=0, help="Its number there; else the first.")] = None,
+    save: Annotated[Path | None, typer.Option(help="Write a Rerun file (.rrd) instead of opening a window.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write one page (.png) instead of opening a window.")] = None,
+    video: Annotated[Path | None, typer.Option(help="Write a film (.mp4 or .gif) instead of opening a window.")] = None,
+    web: Annotated[bool, typer.Option("--web", help="Serve Rerun's web viewer on this machine.")] = False,
+) -> None:
+    """Show two label versions, two networks, or models and measurement beside each other and as difference."""
+    from viewers import comparison_sources, showing
+
+    output = showing.Output(save, picture, video, web)
+    asked = [name for name, given in (("labels", labels), ("predictions", predictions), ("spec", spec)) if given]
+    if len(asked) != 1:
+        given = "nothing to compare" if not asked else "--" + " and --".join(asked)
+        raise UsageError(given, "one of --labels, --predictions, --spec", "say what to compare")
+    output.check()
+    if labels:
+        scene = comparison_sources.labels_at(path, labels, episode)
+    elif predictions:
+        scene = comparison_sources.predictions_at(path, predictions, episode)
+    else:
+        scene = _models(path, spec or [], episode)
+    print("\n".join(line.removeprefix("- ") for line in scene.summary.splitlines() if line.startswith("- ")))
+    showing.show(scene, output)
+
+
+def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:
+    from dataclasses import replace
+
+    import numpy as np
+
+    from tacdata.discrepancy.recordings import course_of
+    from tacdata.discrepancy.spec import read_spec
+    from tacdata.revision.comparison import Comparison
+    from viewers.comparison_scene import readings_comparison
+    from viewers.comparison_sources import array_of, telling_names
+
+    # A response that is fitted needs every press, so all are read even where one is shown.
+    course = course_of([path])
+    chosen = f"episode-{episode:06d}" if episode is not None else course.names[0]
+    if chosen not in course.names:
+        raise UsageError(f"--episode {episode}: not in {path}", ", ".join(course.names), "choose one of them")
+    rows = np.flatnonzero((course.episode == course.names.index(chosen)) & (course.averaged > 0))
+    measured, said = course.readings[rows], {}
+    models = {name: read_spec(file) for name, file in zip(telling_names(specs), specs, strict=True)}
+    if len(models) == 1:
+        name, own = next(iter(models.items()))
+        effects = " and ".join(entry["effect"] for entry in own.document["effects"])
+        if effects:  # what the effects do is seen beside the same model without them
+            bare = replace(own, document={**own.document, "effects": []})
+            models = {f"without {effects}": bare, f"with {effects}": own}
+    for name, spec in models.items():
+        held = Comparison(course, spec)
+        own = held.said(held.before.response, [])[rows]
+        said[name] = own + (measured - own).mean(axis=0)  # the offset of a press says nothing of a model
+    time = np.round(1e9 * (course.time[rows] - course.time[rows[0]])).astype(np.int64)
+    title = f"{path.resolve().name}/{chosen}: model and measurement"
+    shape, unit = array_of(path, course.channels)
+    return readings_comparison(title, shape, time, measured, said, unit)

@@ -1,0 +1,42 @@
+"""Draw the pictures of README and tutorial anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+ORDER = 170
+PANEL = TOOLS
+
+
+def run(
+    demo: Annotated[Path, typer.Argument(help="What `tacdata demo` made: session, network.")] = Path("demo"),
+    out: Annotated[Path, typer.Option(help="Folder for the pictures; those of before are replaced.")] = Path(
+        "docs/pictures"
+    ),
+    verdict: Annotated[Path | None, typer.Option(help="A verdict folder, for its page too.")] = None,
+    demonstration: Annotated[Path | None, typer.Option(help="A tracked demonstration, for its page too.")] = None,
+) -> None:
+    """Draw the pictures of README and tutorial from what the demo made: small enough for the repository."""
+    from tacdata.errors import UsageError
+    from viewers.list_sources import episodes_at
+    from viewers.small_pictures import small_film, small_page
+    from viewers.source import scene_at
+
+    session, network = demo / "session", demo / "network"
+    if not session.is_dir():
+        raise UsageError(f"no session in {demo}", "the folder that `tacdata demo` made", "run `tacdata demo` first")
+    predictions = network if (network / "predictions").is_dir() else None
+    listed = episodes_at(session, predictions=predictions)
+    shown = max(listed.entries, key=lambda entry: (entry.error is not None, entry.depth or 0.0))
+    scene = scene_at(session, predictions=predictions, episode=shown.number)
+    drawn = [small_page(scene, out / "episode.png"), small_film(scene, out / "press.gif")]
+    for path, name in ((verdict, "verdict.png"), (demonstration, "demonstration.png")):
+        if path is not None:
+            drawn.append(small_page(scene_at(path), out / name))
+    for path in drawn:
+        print(f"{path}: {path.stat().st_size / 1000:.0f} kB")

@@ -1,0 +1,99 @@
+"""Episodes that a person has set aside, with a reason, in a file beside the data.
+
+A flag names the recording by its hash, so that it stays true when a dataset is edited or a session packed anew.
+`tacdata browse` sets flags; whatever learns from a dataset leaves out `flagged_episodes`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import schemas
+from tacdata import documents
+from tacdata.dataset.reader import Dataset
+from tacdata.errors import UsageError
+
+IN_SESSION, IN_DATASET = Path("flags.json"), Path("meta/tacdata_flags.json")
+LONGEST = 500
+"""Letters of a reason."""
+
+
+@dataclass(frozen=True)
+class Flag:
+    """One episode set aside."""
+
+    recording: str
+    """SHA-256 of the recording's file (hex)."""
+    file: str
+    """Name of the recording."""
+    reason: str
+    """Why, in words."""
+    flagged_at: str = ""
+    """Date and time, ISO 8601."""
+
+
+def path_of(folder: Path) -> Path:
+    """Return where a session's or dataset's flags lie."""
+    return folder / (IN_DATASET if (folder / "meta" / "info.json").is_file() else IN_SESSION)
+
+
+def read_flags(folder: Path) -> dict[str, Flag]:
+    """Return the flags of a session or dataset by the recording's hash; none if nothing was ever flagged.
+
+    Raises:
+        FormatError: If the file is damaged.
+    """
+    path = path_of(folder)
+    if not path.is_file():
+        return {}
+    return {entry["recording"]: Flag(**entry) for entry in documents.read(path, "flags")["flags"]}
+
+
+def set_flag(folder: Path, recording: str, file: str, reason: str) -> Flag:
+    """Set an episode aside; a reason given before is replaced.
+
+    Args:
+        folder: The session or dataset.
+        recording: SHA-256 of the recording's file (hex).
+        file: Its name.
+        reason: Why, in words.
+
+    Raises:
+        UsageError: If there is no reason, or a whole story.
+        DeviceError: If the disk refuses it.
+    """
+    reason = " ".join(reason.split())
+    if not reason or len(reason) > LONGEST:
+        given = "a flag without a reason" if not reason else f"a reason of {len(reason)} letters"
+        raise UsageError(given, f"1 to {LONGEST} letters", "say in a sentence what is wrong with the episode")
+    flag = Flag(recording, file, reason, datetime.now(UTC).isoformat(timespec="seconds"))
+    _write(folder, read_flags(folder) | {recording: flag})
+    return flag
+
+
+def clear_flag(folder: Path, recording: str) -> None:
+    """Take a flag away; nothing happens where there is none."""
+    flags = read_flags(folder)
+    if flags.pop(recording, None) is not None:
+        _write(folder, flags)
+
+
+def flagged_episodes(dataset: Dataset) -> dict[int, str]:
+    """Return the episodes of a dataset that were set aside: number -> reason.
+
+    Raises:
+        FormatError: If the file is damaged.
+    """
+    flags = read_flags(dataset.root)
+    return {
+        entry.index: flags[entry.record.recording].reason
+        for entry in dataset.episodes
+        if entry.record is not None and entry.record.recording in flags
+    }
+
+
+def _write(folder: Path, flags: dict[str, Flag]) -> None:
+    entries = [asdict(flag) for flag in sorted(flags.values(), key=lambda flag: (flag.file, flag.recording))]
+    documents.write(path_of(folder), {"version": schemas.version("flags"), "flags": entries}, "flags")

@@ -1,0 +1,76 @@
+"""What the pages say works: Python blocks run, commands are typed with arguments they have, links lead somewhere."""
+
+import os
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer.main
+
+from tacdata.cli import application
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("*/*.md")])
+PAGES = [page for page in PAGES if "decisions" not in page.parts]
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def name(page):
+    return str(page.relative_to(ROOT))
+
+
+def blocks(page, language):
+    return [body for kind, body in BLOCK.findall(page.read_text()) if kind == language]
+
+
+PYTHON = [page for page in PAGES if blocks(page, "python")]
+
+
+@pytest.fixture(scope="module")
+def verbs():
+    return typer.main.get_command(application())
+
+
+@pytest.mark.parametrize("page", PYTHON, ids=name)
+def test_python_blocks_run_as_they_stand(page, tmp_path, monkeypatch, capsys):
+    os.symlink(ROOT / "examples", tmp_path / "examples")
+    monkeypatch.chdir(tmp_path)
+    shared = {}
+    for body in blocks(page, "python"):
+        exec(compile(body, name(page), "exec"), shared)
+    assert capsys.readouterr().out.strip()
+
+
+def commands(page):
+    lines = [line.split("  #")[0].strip() for body in blocks(page, "sh") for line in body.splitlines()]
+    return [shlex.split(line) for line in lines if line.startswith("tacdata ") or line.startswith(".venv/bin/tacdata ")]
+
+
+def known(verbs, words):
+    """Return the verb of a command line, and its words behind the verb's name."""
+    command, rest = verbs, words[1:]
+    while hasattr(command, "commands") and rest and not rest[0].startswith("-"):
+        assert rest[0] in command.commands, f"no verb {rest[0]!r} in: {' '.join(words)}"
+        command, rest = command.commands[rest[0]], rest[1:]
+    return command, rest
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_commands_have_the_arguments_that_they_are_typed_with(page, verbs):
+    for words in commands(page):
+        command, rest = known(verbs, words)
+        options = {option for parameter in command.params for option in parameter.opts + parameter.secondary_opts}
+        typed = {word.split("=")[0] for word in rest if word.startswith("--")} - {"--help"}
+        assert typed <= options, f"{' '.join(words)}: no {typed - options}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_and_pictures_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
+        if not target.startswith("http"):
+            assert (page.parent / target).exists(), f"{name(page)}: {target}"
+
+
+def test_pictures_are_small_enough_for_the_repository():
+    assert sum(path.stat().st_size for path in (ROOT / "docs" / "pictures").iterdir()) < 1_500_000

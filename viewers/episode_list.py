@@ -1,0 +1,163 @@
+"""The episodes of a session or dataset as a list to choose from, without reading what they recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.dataset.flags import Flag
+from tacdata.errors import UsageError
+from tacdata.plans import Press
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One episode. Numbers that are not known are None."""
+
+    number: int
+    """In the session or dataset."""
+    file: str
+    """Name of the recording."""
+    indenter: str = ""
+    """The plan's name of the indenter."""
+    shape: str = ""
+    """Its shape."""
+    x: float | None = None
+    """Place [mm]."""
+    y: float | None = None
+    """Place [mm]."""
+    depth: float | None = None
+    """Nominal depth [mm]."""
+    rate: float | None = None
+    """Speed of the press [mm/s]."""
+    quality: float | None = None
+    """Share of frames that are valid, or that came [1]."""
+    label: str = ""
+    """State of the label: complete, stale, failed, waiting or none."""
+    part: str = ""
+    """What a network knew of it: train, validation, test."""
+    error: float | None = None
+    """Pixel root mean square error of a network over all frames [mm]."""
+    flag: str = ""
+    """Why it is set aside; empty for one that is not."""
+    recording: str = ""
+    """SHA-256 of the recording's file, where it is known without reading it."""
+
+
+UNITS = {"x": "mm", "y": "mm", "depth": "mm", "rate": "mm/s", "error": "mm"}
+SHOWN = tuple(f.name for f in fields(Entry) if f.name != "recording")
+"""What can be listed, filtered and sorted by."""
+OPERATORS: dict[str, Callable[[Any, Any], bool]] = {
+    "!=": lambda a, b: a != b,
+    "<=": lambda a, b: a <= b,
+    ">=": lambda a, b: a >= b,
+    "=": lambda a, b: a == b,
+    "<": lambda a, b: a < b,
+    ">": lambda a, b: a > b,
+}
+WORDS = frozenset(("file", "indenter", "shape", "label", "part", "flag"))
+
+
+@dataclass(frozen=True)
+class EpisodeList:
+    """What a session or dataset holds."""
+
+    root: Path
+    kind: str
+    """"session" or "dataset"."""
+    entries: tuple[Entry, ...]
+    remarks: tuple[str, ...] = ()
+    """What should be said of the list, in words."""
+
+    def where(self, condition: str) -> EpisodeList:
+        """Return those that fulfil a condition such as ``depth>0.8``, ``indenter=ball`` or ``flag=``.
+
+        Raises:
+            UsageError: If it cannot be understood.
+        """
+        key, sign, wanted = _parsed(condition)
+        test = OPERATORS[sign]
+        kept = tuple(e for e in self.entries if getattr(e, key) is not None and test(getattr(e, key), wanted))
+        return replace(self, entries=kept)
+
+    def by(self, key: str) -> EpisodeList:
+        """Return them sorted by a column; ``-key`` or an error sorts the greatest first, what is unknown last.
+
+        Raises:
+            UsageError: If there is no such column.
+        """
+        name = key.lstrip("-")
+        _known(name)
+        falling = key.startswith("-") or name == "error"
+        known = [e for e in self.entries if getattr(e, name) is not None]
+        unknown = tuple(e for e in self.entries if getattr(e, name) is None)
+        ordered = sorted(known, key=lambda e: getattr(e, name), reverse=falling)
+        return replace(self, entries=(*ordered, *unknown))
+
+    def numbered(self, number: int) -> Entry:
+        """Return the episode of a number.
+
+        Raises:
+            UsageError: If there is none.
+        """
+        found = next((e for e in self.entries if e.number == number), None)
+        if found is None:
+            numbers = sorted(e.number for e in self.entries)
+            allowed = f"{numbers[0]} to {numbers[-1]}" if numbers else "none is there"
+            raise UsageError(f"episode {number}: not in {self.root}", allowed, "choose one of them")
+        return found
+
+
+def with_flags(entries: tuple[Entry, ...], flags: dict[str, Flag]) -> tuple[Entry, ...]:
+    """Return entries with the reasons why they are set aside, found by the recording's hash, else by its name."""
+    by_file = {flag.file: flag.reason for flag in flags.values()}
+    return tuple(
+        replace(e, flag=flags[e.recording].reason if e.recording in flags else "" if e.recording else
+                by_file.get(e.file, ""))
+        for e in entries
+    )  # fmt: skip
+
+
+def of_press(number: int, file: str, press: Press | None) -> Entry:
+    """Return an entry with the nominal configuration."""
+    if press is None:
+        return Entry(number, file)
+    return Entry(number, file, press.indenter_name, press.indenter.shape, press.x, press.y, press.depth, press.speed)
+
+
+def errors_of(depth: np.ndarray, time_ns: np.ndarray, predicted: np.ndarray, predicted_ns: np.ndarray) -> float | None:
+    """Return a prediction's pixel root mean square error over the frames that both hold [mm], or None.
+
+    Args:
+        depth: Labels [mm], shape (n, pixels_x, pixels_y).
+        time_ns: Their times [ns], shape (n,).
+        predicted: Predictions [mm], shape (m, pixels_x, pixels_y).
+        predicted_ns: Their times [ns], shape (m,).
+    """
+    _, ours, theirs = np.intersect1d(time_ns, predicted_ns, return_indices=True)
+    if not len(ours) or depth.shape[1:] != predicted.shape[1:]:
+        return None
+    return float(np.sqrt(np.mean(np.square(predicted[theirs] - depth[ours], dtype=np.float64))))
+
+
+def _parsed(condition: str) -> tuple[str, str, Any]:
+    sign = next((s for s in OPERATORS if s in condition), None)
+    if sign is None:
+        raise UsageError(f"--where {condition}", "KEY OP VALUE with " + " ".join(OPERATORS), "for example depth>0.8")
+    key, _, value = (part.strip() for part in condition.partition(sign))
+    _known(key)
+    if key in WORDS:
+        return key, sign, value
+    try:
+        return key, sign, float(value)
+    except ValueError:
+        raise UsageError(f"--where {condition}: {value!r} is no number", f"a number for {key}", "correct it") from None
+
+
+def _known(key: str) -> None:
+    if key not in SHOWN:
+        raise UsageError(f"no column {key!r}", ", ".join(SHOWN), "name one of them")

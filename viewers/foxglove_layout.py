@@ -1,0 +1,91 @@
+"""A layout for Foxglove that shows a recording as it lies on the disk, without our code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tacdata import documents
+from tacdata.recording import channels
+from tacdata.recording.mcap_records import read_records
+from viewers.color_scale import HUES
+from viewers.output_file import new_file
+
+ENDING = ".json"
+
+
+def write_foxglove_layout(recording: Path, out: Path) -> None:
+    """Write a layout that fits a recording's boards and cameras; in Foxglove: Layouts, Import from file.
+
+    Args:
+        recording: The recording (.mcap).
+        out: New file (.json).
+
+    Raises:
+        UsageError: If there is no recording, or the file exists or does not end in .json.
+        FormatError: If it is no MCAP file.
+    """
+    import json
+
+    new_file(out, ENDING)
+    records = read_records(recording, images=False)
+    documents.write_text(
+        out, json.dumps(foxglove_layout({c.topic for c in records.channels.values()}), indent=1) + "\n"
+    )
+
+
+def foxglove_layout(topics: set[str]) -> dict[str, Any]:
+    """Return a layout over those of a recording's topics that it has: readings, guide, images, phases, log.
+
+    Args:
+        topics: The recording's topics.
+    """
+    panels: dict[str, dict[str, Any]] = {}
+    for topic in sorted(t for t in topics if t == channels.TAXELS or t.startswith(channels.TAXELS + "/")):
+        panels[f"Plot!{_name(topic)}"] = _plot(f"{topic} [counts]", [f"{topic}.counts[:]"])
+    if channels.STATUS in topics:
+        axes = [f"{channels.STATUS}.position.{axis}" for axis in "xyz"]
+        panels["Plot!guide"] = _plot("Guide, machine position [mm]", axes)
+    for topic in sorted(t for t in topics if t.endswith("/image")):
+        panels[f"Image!{_name(topic)}"] = {"imageMode": {"imageTopic": topic}}
+    for topic in sorted(t for t in topics if t.endswith("/cube") or t.endswith("/view")):
+        panels[f"Plot!{_name(topic)}"] = _plot(f"{topic}: reprojection [px]", [f"{topic}.reprojection"])
+    if channels.PHASE in topics:
+        panels["StateTransitions!phases"] = {
+            "isSynced": True, "paths": [{"value": f"{channels.PHASE}.name", "timestampMethod": "receiveTime"}],
+        }  # fmt: skip
+    if channels.LOG in topics:
+        panels["RosOut!log"] = {"topicToRender": channels.LOG, "minLogLevel": 1, "searchTerms": []}
+    layout = {
+        "configById": panels, "globalVariables": {}, "userNodes": {}, "playbackConfig": {"speed": 1},
+    }  # fmt: skip
+    return layout | ({"layout": _split(list(panels))} if panels else {})
+
+
+def _plot(title: str, paths: list[str]) -> dict[str, Any]:
+    lines = [
+        {
+            "value": path, "enabled": True, "timestampMethod": "receiveTime",
+            "color": "#{:02x}{:02x}{:02x}".format(*HUES[k % len(HUES)]),
+        }
+        for k, path in enumerate(paths)
+    ]  # fmt: skip
+    return {
+        "title": title, "paths": lines, "xAxisVal": "timestamp", "isSynced": True, "showLegend": len(paths) > 1,
+        "showXAxisLabels": True, "showYAxisLabels": True, "legendDisplay": "floating",
+    }  # fmt: skip
+
+
+def _split(names: list[str], across: bool = True) -> Any:
+    """Return a mosaic that halves the space again and again."""
+    if len(names) == 1:
+        return names[0]
+    half = (len(names) + 1) // 2
+    return {
+        "direction": "row" if across else "column", "splitPercentage": 50,
+        "first": _split(names[:half], not across), "second": _split(names[half:], not across),
+    }  # fmt: skip
+
+
+def _name(topic: str) -> str:
+    return topic.strip("/").replace("/", "-")

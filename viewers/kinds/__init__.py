@@ -1,0 +1,1 @@
+"""What can be viewed, one kind a file."""

@@ -1,0 +1,41 @@
+"""A dataset folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from viewers.kinds.kind import Asked, Kind
+from viewers.scene import Scene
+
+MARK = Path("meta/info.json")
+
+
+class Dataset(Kind):
+    """An episode of a dataset that `tacdata pack` wrote."""
+
+    ORDER, NOUN = 40, "a dataset folder"
+
+    def claims(self, path: Path) -> bool:
+        """A LeRobot folder."""
+        return (path / MARK).is_file()
+
+    def scene(self, path: Path, asked: Asked) -> Scene:
+        """Return one episode, the first if none is named."""
+        from tacdata.dataset import features
+        from viewers.dataset_scene import dataset_scene
+        from viewers.single_episode import read_single
+        from viewers.source import prediction_for
+
+        if asked.labels is not None:
+            raise UsageError("--labels with a dataset", "a dataset holds its labels", "leave it out")
+        number = asked.episode or 0
+        dataset, count = read_single(path, number)
+        prediction, remarks = None, []
+        entry = next((own for own in dataset.episodes if own.index == number), None)
+        if asked.predictions is not None and entry is not None:
+            time = np.asarray(dataset[features.TIME][entry.start : entry.stop])
+            prediction, remarks = prediction_for(asked.predictions, time, entry.sensor)
+        return dataset_scene(dataset, number, prediction, tuple(remarks), count)

@@ -1,0 +1,91 @@
+"""What a kind's file holds: how to tell that a path is of this kind, and how to make a scene of it.
+
+``viewers/kinds/my_kind.py`` defines one class derived from `Kind`; `viewers.source` asks every kind in the order of
+`ORDER`, the narrowest first.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from tacdata import registry
+from tacdata.errors import UsageError
+from viewers.scene import Scene
+
+ROOM, BASE = "viewers.kinds", "kind"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a person asks to see beside the path."""
+
+    labels: Path | None = None
+    """Folder of labels."""
+    predictions: Path | None = None
+    """Folder of predictions, or a training run."""
+    episode: int | None = None
+    """Number of the episode in a folder."""
+
+
+class Kind(ABC):
+    """A kind of path that can be viewed."""
+
+    ORDER: ClassVar[int]
+    """Its place among the kinds: those that ask for less of a path come later."""
+    NOUN: ClassVar[str]
+    """What it is called in messages."""
+
+    @abstractmethod
+    def claims(self, path: Path) -> bool:
+        """Say whether a path is of this kind, by its name and what lies in it; nothing large is read."""
+
+    @abstractmethod
+    def scene(self, path: Path, asked: Asked) -> Scene:
+        """Return the scene.
+
+        Raises:
+            UsageError: If what is asked for is not there, or means nothing for this kind.
+            FormatError: If a file is damaged.
+        """
+
+
+def kinds() -> list[Kind]:
+    """Return one of every kind, the narrowest first."""
+    members: list[Any] = [registry.load(ROOM, BASE, name, Kind) for name in registry.names(ROOM, BASE)]
+    found: list[Kind] = [member() for member in members]
+    return sorted(found, key=lambda kind: kind.ORDER)
+
+
+def kind_of(path: Path) -> Kind:
+    """Return the kind of a path.
+
+    Raises:
+        UsageError: If there is nothing, or nothing that can be viewed.
+    """
+    known = kinds()
+    for kind in known if path.exists() else ():
+        if kind.claims(path):
+            return kind
+    given = f"{path} is no recording, nor anything else that can be viewed" if path.exists() else ""
+    raise UsageError(
+        given or f"no file or folder {path}", "; ".join(dict.fromkeys(k.NOUN for k in known)), "check the path"
+    )
+
+
+def refuse(asked: Asked, noun: str, *allowed: str) -> None:
+    """Refuse options that mean nothing for a kind.
+
+    Raises:
+        UsageError: Naming the first of them.
+    """
+    for name in ("labels", "predictions", "episode"):
+        value = getattr(asked, name)
+        if value is not None and name not in allowed:
+            raise UsageError(
+                f"--{name} {value} with {noun}",
+                " or ".join(f"--{n}" for n in allowed) or "neither",
+                f"leave --{name} out",
+            )

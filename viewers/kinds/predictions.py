@@ -1,0 +1,69 @@
+"""What a network predicted, without the data that it predicted from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tacdata.errors import TacdataError, UsageError
+from tacdata.sensor import Sensor
+from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.scene import Scene
+
+CHECKPOINT = "best.safetensors"
+
+
+class Predictions(Kind):
+    """A training run with predictions, their folder, or one file of it."""
+
+    ORDER, NOUN = 25, "a training run or predictions"
+
+    def claims(self, path: Path) -> bool:
+        """A folder with a checkpoint, or files that `tacdata evaluate` wrote."""
+        import pyarrow.parquet as pq
+
+        from training.prediction import HEADER
+        from viewers.prediction_files import PATTERN
+
+        if (path / CHECKPOINT).is_file():
+            return True
+        file = next(path.glob(PATTERN), None) if path.is_dir() else path
+        if file is None or file.suffix != ".parquet":
+            return False
+        try:
+            return HEADER in (pq.read_schema(file).metadata or {})
+        except Exception:  # a damaged file is of no kind; whoever asks for it says more
+            return False
+
+    def scene(self, path: Path, asked: Asked) -> Scene:
+        """Return one episode's predicted maps, the first if none is named."""
+        from training.prediction import file_name, read_prediction
+        from viewers.prediction_files import prediction_paths
+        from viewers.prediction_scene import prediction_scene
+
+        refuse(asked, "predictions", "episode")
+        files = [path] if path.is_file() else prediction_paths(path)
+        wanted = files[0]
+        if asked.episode is not None:
+            named = {file.name: file for file in files}
+            if file_name(asked.episode) not in named:
+                known = ", ".join(str(int(file.stem.rsplit("-", 1)[-1])) for file in files[:20])
+                raise UsageError(f"--episode {asked.episode}: no prediction in {path}", known, "choose one of them")
+            wanted = named[file_name(asked.episode)]
+        prediction = read_prediction(wanted)
+        sensor = _sensor(path, prediction.sensor)
+        title = f"{wanted.resolve().parents[1].name}/{wanted.stem}"
+        return prediction_scene(title, prediction, sensor, len(files))
+
+
+def _sensor(path: Path, wanted: str) -> Sensor | None:
+    """Return the sensor that the network was trained for, if its checkpoint lies beside its predictions."""
+    for folder in (path, *path.resolve().parents[:2]):
+        if (folder / CHECKPOINT).is_file():
+            from training.checkpoint import load
+
+            try:
+                sensor = load(folder).sensor
+            except TacdataError:
+                return None
+            return sensor if sensor.content_hash == wanted else None
+    return None

@@ -1,0 +1,25 @@
+"""A recorded press, finished, broken off or still being written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.scene import Scene
+
+
+class Recording(Kind):
+    """One recording with what lies beside it."""
+
+    ORDER, NOUN = 60, "a recording (.mcap)"
+
+    def claims(self, path: Path) -> bool:
+        """An MCAP file."""
+        return path.is_file() and path.suffix == ".mcap"
+
+    def scene(self, path: Path, asked: Asked) -> Scene:
+        """Return the press; of a file that is still being written what has reached the disk."""
+        from viewers.source import recording_scene
+
+        refuse(asked, "one recording", "labels", "predictions")
+        return recording_scene(path, asked.labels, asked.predictions)

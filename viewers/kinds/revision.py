@@ -1,0 +1,32 @@
+"""What `tacdata revise` made of a verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.scene import Scene
+
+FILE, TABLE, CURVES = "revision.json", "gap.md", "gap.rrd"
+
+
+class Revision(Kind):
+    """The folder of a revision."""
+
+    ORDER, NOUN = 11, "a revision"
+
+    def claims(self, path: Path) -> bool:
+        """A folder with a revision in it."""
+        return (path / FILE).is_file()
+
+    def scene(self, path: Path, asked: Asked) -> Scene:
+        """Return the gap before and after, with the readings of telling episodes."""
+        from tacdata import documents
+        from viewers.gap_curves import read_gap_curves
+        from viewers.verdict_scene import revision_scene
+
+        refuse(asked, "a revision")
+        document = documents.read(path / FILE, "revision")
+        table = (path / TABLE).read_text() if (path / TABLE).is_file() else "No gap was computed."
+        curves = read_gap_curves(path / CURVES) if (path / CURVES).is_file() else ()
+        return revision_scene(path.resolve().name, document, table, curves)

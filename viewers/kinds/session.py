@@ -1,0 +1,50 @@
+"""A session folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tacdata.errors import UsageError
+from tacdata.recording import file_names
+from viewers.kinds.kind import Asked, Kind
+from viewers.scene import Scene
+
+
+class Session(Kind):
+    """An episode of a folder that `tacdata record` wrote."""
+
+    ORDER, NOUN = 90, "a session folder"
+
+    def claims(self, path: Path) -> bool:
+        """Any folder: what is missing in it is said when it is opened."""
+        return path.is_dir()
+
+    def scene(self, path: Path, asked: Asked) -> Scene:
+        """Return one episode, the first if none is named."""
+        from viewers.source import recording_scene
+
+        return recording_scene(episode_of(path, asked.episode), asked.labels, asked.predictions)
+
+
+def episode_of(folder: Path, episode: int | None) -> Path:
+    """Return the recording of an episode, the first finished one if none is named; else one that is unfinished.
+
+    Raises:
+        UsageError: If there is none, or none of that number.
+    """
+    finished, begun = file_names.finished(folder), file_names.unfinished(folder)
+    if not finished and begun and episode is None:
+        return begun[0]
+    if not finished:
+        raise UsageError(
+            f"{folder} holds no finished recording",
+            "a folder that tacdata record, pack, track, export, discrepancy or revise wrote",
+            f"view one that was broken off, or is being written: {begun[0]}" if begun else "check the path",
+        )
+    if episode is None:
+        return next(iter(finished.values()))
+    if episode not in finished:
+        numbers = sorted(finished)
+        known = ", ".join(map(str, numbers)) if len(numbers) <= 20 else f"{numbers[0]} to {numbers[-1]}"
+        raise UsageError(f"--episode {episode}: not in {folder}", known, "choose one of them")
+    return finished[episode]

@@ -1,0 +1,53 @@
+"""Fingertip targets that `tacdata export` wrote for a robot, in any of its formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tacdata.errors import UsageError
+from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.scene import Scene
+
+MARKS = {
+    "lerobot": "meta/tacdata_targets.json",
+    "joints": "*.joints.parquet",
+    "csv": "episode-*.csv",
+    "parquet": "episode-*.parquet",
+}
+"""Format -> what lies in its folder; the first that fits is read."""
+OURS = ("*.mcap", "*.tracks.parquet")
+"""What a folder of targets never holds."""
+
+
+class Targets(Kind):
+    """One demonstration's targets."""
+
+    ORDER, NOUN = 30, "a folder of tacdata export"
+
+    def claims(self, path: Path) -> bool:
+        """A folder with the files of one of the formats, and no recordings."""
+        return path.is_dir() and _format(path) is not None
+
+    def scene(self, path: Path, asked: Asked) -> Scene:
+        """Return the targets of one demonstration, the first if none is named."""
+        from tacdata.exporters.exporter import exporter
+        from tacdata.exporters.joints import read_joints
+        from viewers.hand_scene import targets_scene
+
+        refuse(asked, "targets", "episode")
+        name, number = _format(path) or "", asked.episode or 0
+        if name == "joints":
+            found = [(targets, joints) for targets, joints, _ in read_joints(path)]
+        else:
+            found = [(targets, None) for targets in exporter(name).read(path)]
+        if number >= len(found):
+            raise UsageError(f"--episode {number}: not in {path}", f"0 to {len(found) - 1}", "choose one of them")
+        targets, joints = found[number]
+        title = f"{path.resolve().name}/{Path(targets.recording).stem}"
+        return targets_scene(title, targets, len(found) - 1, joints)
+
+
+def _format(path: Path) -> str | None:
+    if any(next(path.glob(pattern), None) for pattern in OURS):
+        return None
+    return next((name for name, pattern in MARKS.items() if next(path.glob(pattern), None)), None)

@@ -1,0 +1,31 @@
+"""A verdict of `tacdata discrepancy`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.scene import Scene
+
+FILE = "verdict.json"
+
+
+class Verdict(Kind):
+    """A folder with a verdict, or the verdict itself."""
+
+    ORDER, NOUN = 10, "a verdict"
+
+    def claims(self, path: Path) -> bool:
+        """A folder with a verdict in it, or a file of that name."""
+        return (path / FILE).is_file() or (path.is_file() and path.name == FILE)
+
+    def scene(self, path: Path, asked: Asked) -> Scene:
+        """Return it in words and bars."""
+        from tacdata import documents
+        from viewers.verdict_scene import verdict_scene
+
+        refuse(asked, "a verdict")
+        file = path if path.is_file() else path / FILE
+        picture = file.with_suffix(".png")
+        document = documents.read(file, "verdict")
+        return verdict_scene(file.resolve().parent.name, document, picture.name if picture.is_file() else None)

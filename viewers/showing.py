@@ -1,0 +1,112 @@
+"""Shows a scene as a person asked: a window, a browser, or files that need no display."""
+
+from __future__ import annotations
+
+import tempfile
+import webbrowser
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from tacdata.errors import UsageError
+from viewers import output_file, rerun_window
+from viewers.scene import Scene
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where a scene goes; without any of these into a window."""
+
+    save: Path | None = None
+    """New Rerun file (.rrd)."""
+    picture: Path | None = None
+    """New page (.png)."""
+    video: Path | None = None
+    """New film (.mp4 or .gif)."""
+    web: bool = False
+    """Serve Rerun's web viewer on this machine."""
+
+    @property
+    def opens(self) -> bool:
+        """Whether somebody is to look now."""
+        return self.web or not (self.save or self.picture or self.video)
+
+    @property
+    def only_web(self) -> bool:
+        """Whether a browser is all that is asked for."""
+        return self.web and not (self.save or self.picture or self.video)
+
+    def check(self) -> None:
+        """Refuse what cannot be done, before anything is read.
+
+        Raises:
+            UsageError: If a file exists or has a wrong ending, or there is no display for a window.
+        """
+        for file, suffixes in (
+            (self.save, (output_file.RERUN,)),
+            (self.picture, (output_file.PICTURE,)),
+            (self.video, output_file.FILMS),
+        ):
+            if file is not None:
+                output_file.new_file(file, *suffixes)
+        if self.opens and not self.web:
+            rerun_window.require_display()
+
+
+def show(scene: Scene, output: Output) -> None:
+    """Write the files that were asked for, then open what is to be opened.
+
+    Raises:
+        UsageError: If a file exists, or the viewer breaks down.
+    """
+    if output.save is not None:
+        write_rerun(scene, output.save)
+        print(f"saved {output.save}; look at it with: tacdata view {output.save}")
+    if output.picture is not None:
+        from viewers.picture_backend import PictureBackend
+
+        PictureBackend(output.picture).draw(scene)
+        print(f"saved {output.picture}")
+    if output.video is not None:
+        from viewers.film_backend import FilmBackend
+
+        FilmBackend(output.video).draw(scene)
+        print(f"saved {output.video}")
+    if output.opens:
+        with tempfile.TemporaryDirectory(prefix="tacdata-view-") as folder:
+            file = output.save or Path(folder) / "episode.rrd"
+            if output.save is None:
+                write_rerun(scene, file)
+            show_file(file, output.web)
+
+
+def show_saved(path: Path, output: Output) -> None:
+    """Open a Rerun file that was saved.
+
+    Raises:
+        UsageError: If it is to be saved or drawn again.
+    """
+    if output.save or output.picture or output.video:
+        given = f"{path} with --save, --picture or --video"
+        raise UsageError(given, "a recording, session, dataset, ...", "leave them out")
+    show_file(path, output.web)
+
+
+def write_rerun(scene: Scene, file: Path) -> None:
+    """Write a Rerun file."""
+    from viewers.rerun_backend import RerunBackend
+
+    RerunBackend(file).draw(scene)
+
+
+def show_file(file: Path, web: bool) -> None:
+    """Open a Rerun file; ends when the window is closed, or with Ctrl-C."""
+    with suppress(KeyboardInterrupt):
+        if not web:
+            rerun_window.window(file)
+            return
+        with rerun_window.web_server(file) as (server, address):
+            print(f"open {address}\nCtrl-C ends it", flush=True)
+            if rerun_window.has_display():
+                webbrowser.open(address)
+            rerun_window.wait_for(server)

@@ -1,0 +1,59 @@
+"""Which rows of a long recording are drawn: few enough to stay light, chosen so that peaks stay in sight."""
+
+from __future__ import annotations
+
+import numpy as np
+
+MAPS, CURVES, ARRAYS, IMAGES = 600, 6000, 3000, 900
+"""Most maps and skins, rows of a set of curves, pictures of the taxels, and images of a camera that are drawn."""
+
+
+def strongest(strength: np.ndarray, most: int) -> np.ndarray:
+    """Return the row of the greatest strength in each of ``most`` stretches of equal length, ascending.
+
+    All rows, where there are no more than ``most``.
+
+    Args:
+        strength: How much there is to see in each row, shape (n,).
+        most: Rows to keep at most.
+    """
+    if len(strength) <= most:
+        return np.arange(len(strength))
+    starts = np.linspace(0, len(strength), most + 1).astype(int)[:-1]
+    highest = np.maximum.reduceat(strength, starts)
+    stretch = np.repeat(np.arange(most), np.diff(np.append(starts, len(strength))))
+    found = np.flatnonzero(strength == highest[stretch])
+    return found[np.unique(stretch[found], return_index=True)[1]]
+
+
+def extremes(values: np.ndarray, most: int) -> np.ndarray:
+    """Return rows that keep the course of curves: the ends of the widest change in each stretch, ascending.
+
+    In each of ``most / 2`` stretches of equal length the curve that spans the largest part of its own whole range
+    decides; its lowest and highest row are kept, and the first and last row of all.
+
+    Args:
+        values: Curves, shape (n, curves); NaN where nothing was measured.
+        most: Rows to keep, about.
+    """
+    count = len(values)
+    if count <= most:
+        return np.arange(count)
+    edges = np.linspace(0, count, most // 2 + 1).astype(int)
+    high = np.where(np.isfinite(values), values, -np.inf)
+    low = np.where(np.isfinite(values), values, np.inf)
+    tops, bottoms = np.maximum.reduceat(high, edges[:-1]), np.minimum.reduceat(low, edges[:-1])
+    whole = np.maximum(tops.max(axis=0) - bottoms.min(axis=0), 1e-300)
+    widest = np.argmax(np.nan_to_num((tops - bottoms) / whole, nan=-1.0, posinf=-1.0, neginf=-1.0), axis=1)
+    kept = {0, count - 1}
+    for a, b, k in zip(edges[:-1].tolist(), edges[1:].tolist(), widest.tolist(), strict=True):
+        kept.add(a + int(np.argmax(high[a:b, k])))
+        kept.add(a + int(np.argmin(low[a:b, k])))
+    return np.array(sorted(kept))
+
+
+def evenly(count: int, most: int) -> np.ndarray:
+    """Return rows at equal distance, at most ``most`` of ``count``, the first and last among them."""
+    if count <= most:
+        return np.arange(count)
+    return np.unique(np.linspace(0, count - 1, most).round().astype(int))

@@ -1,0 +1,119 @@
+"""From a discrepancy verdict, and what a revision made of it, to a scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewers.scene import Bars, Curves, Scene
+
+GATE = 0.01
+"""Largest share of sign flips at which a gap counts as one (`tacdata.discrepancy`)."""
+SURELY = 2.33
+"""Standard errors by which a name must be better than another (`tacdata.discrepancy`)."""
+
+
+def verdict_scene(title: str, verdict: dict[str, Any], picture: str | None = None) -> Scene:
+    """Return a verdict in words and bars.
+
+    Args:
+        title: What stands on top.
+        verdict: The document (`schemas/verdict.schema.json`).
+        picture: Name of the picture that lies beside it, if one does.
+    """
+    return _scene(
+        title, verdict_words(title, verdict, picture), (*_left(verdict), *_margins(verdict), *_limits(verdict))
+    )
+
+
+def revision_scene(title: str, revision: dict[str, Any], table: str, curves: tuple[Curves, ...]) -> Scene:
+    """Return what a revision did: the gap before and after, and readings of telling episodes.
+
+    Args:
+        title: What stands on top.
+        revision: The document (`schemas/revision.schema.json`).
+        table: The gap as a Markdown table.
+        curves: Readings measured, before and after, one entry an episode.
+    """
+    gap = revision["gap"] or {}
+    rows = [entry for entry in gap.values() if isinstance(entry, dict) and "before" in entry]
+    names = [f"{entry['name']}, {when}" for entry in rows for when in ("before", "after")]
+    values = np.array([entry[when] for entry in rows for when in ("before", "after")], float)
+    added = ", ".join(f"**{entry['effect'] if isinstance(entry, dict) else entry}**" for entry in revision["added"])
+    lines = [
+        f"# {title}",
+        "",
+        f"- **Verdict** {revision['status']}",
+        f"- **Added** {added or 'nothing'}",
+        "",
+        table,
+        "",
+    ]
+    lines += [f"- next: {press}" for press in (revision.get("next") or {}).get("presses", [])]
+    bars = (Bars("gap", "Mean square over the noise; 1 is the floor", tuple(names), values, 1.0),) if rows else ()
+    return _scene(title, "\n".join(lines), bars, curves)
+
+
+def _scene(title: str, words: str, bars: tuple[Bars, ...], curves: tuple[Curves, ...] = ()) -> Scene:
+    time = np.unique(np.concatenate([c.time_ns for c in curves])) if curves else np.zeros(0, np.int64)
+    return Scene(title, words, time, np.arange(len(time)), curves=curves, bars=bars, kind="verdict")
+
+
+def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> str:
+    """Return the verdict as Markdown: the answer first, what it rests on, what to do next."""
+    lines = [f"# {title}: {verdict['status']}", "", verdict["why"] + ".", ""]
+    for effect in verdict["effects"]:
+        lines += [f"## {effect['title']} ({effect['effect']}, {effect['stage']}): {effect['status']}", ""]
+        for name, p in effect["parameters"].items():
+            value = np.ravel(p["value"])
+            shown = f"{value[0]:.4g}" if len(value) == 1 else f"{value.min():.3g} to {value.max():.3g}, one a channel"
+            lines.append(f"- {name} = {shown} {p['unit']}" + (f" ± {p['error']:.2g}" if p["error"] is not None else ""))
+        if effect["alternatives"]:
+            lines.append(f"- could also be: {', '.join(effect['alternatives'])}")
+        lines.append(f"- told apart by: {effect['experiment']}")
+        if effect.get("confidence") is not None:
+            lines.append(f"- probability that the name is right: {effect['confidence']:.0%}")
+    gate, left = verdict["gate"], verdict["left"]
+    lines += [
+        "", f"**Gap** p = {gate['p']:.3g} ({'there is one' if gate['gap'] else 'none'}: {GATE:g} or less says so). "
+        f"**Left** {left['share']:.1%} of what could be explained.", "",
+    ]  # fmt: skip
+    for heading, items in (
+        ("Where it lives", verdict["located"]), ("Next", verdict["next"]), ("Of these recordings", verdict["remarks"]),
+    ):  # fmt: skip
+        if items:
+            lines += [f"## {heading}", "", *(f"- {item}" for item in items), ""]
+    if verdict["unjudgeable"]:
+        lines += ["Cannot be judged here: " + ", ".join(verdict["unjudgeable"]) + ".", ""]
+    if picture:
+        lines.append(f"A page with the residuals lies beside it: {picture}.")
+    return "\n".join(lines)
+
+
+def _left(verdict: dict[str, Any]) -> list[Bars]:
+    names, left = ("before", "after", "noise floor"), verdict["left"]
+    values = np.array([left["before"], left["after"], left["floor"]], float)
+    return [Bars("gap", "Residual: mean square over the noise", names, values, 1.0)]
+
+
+def _margins(verdict: dict[str, Any]) -> list[Bars]:
+    found = []
+    for effect in verdict["effects"]:
+        if effect["margins"]:
+            rivals = sorted(effect["margins"].items(), key=lambda pair: pair[1])
+            title = f"{effect['effect']}: by how many standard errors better than"
+            found.append(
+                Bars(f"margins/{effect['effect']}", title, tuple(n for n, _ in rivals),
+                     np.array([v for _, v in rivals], float), SURELY)
+            )  # fmt: skip
+    return found
+
+
+def _limits(verdict: dict[str, Any]) -> list[Bars]:
+    """Return how small an effect would have been seen, those that these recordings excite."""
+    known = sorted(((n, v) for n, v in verdict["limits"].items() if v), key=lambda pair: pair[1])
+    if not known:
+        return []
+    title = "Would be found half the time at this part of its usual size"
+    return [Bars("limits", title, tuple(n for n, _ in known), np.array([v for _, v in known], float), 1.0, True)]
