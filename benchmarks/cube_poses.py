@@ -33,6 +33,8 @@ from tacdata.virtual_rig.render import render_scene
 INTRINSICS: dict[str, Any] = {"width": 1280, "height": 720, "fx": 900.0, "fy": 900.0, "cx": 639.5, "cy": 359.5}
 LENS = {**INTRINSICS, "distortion": [-0.25, 0.06, 0.001, 0.001, 0.0]}
 CUBE: dict[str, Any] = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}
+FOLLOWED = 6
+"""Sequences in which a cube is followed by one face [count]."""
 FLIPPED = 3.0
 """Rotation error [deg] from which a pose counts as wrong."""
 
@@ -65,6 +67,32 @@ def cover(random: np.random.Generator, pose: np.ndarray, share: float) -> Look:
     corners = (edge - size * aside, edge + size * aside, edge + size * (aside + out), edge + size * (out - aside))
     outline: Polygon = tuple((float(x), float(y)) for x, y in corners)
     return Look(covers=(outline,), cover=float(random.uniform(30, 200)))
+
+
+def one_face(random: np.random.Generator, pose: np.ndarray, blur: float, noise: float) -> Look:
+    """Cover every face in view but the one that looks most at the camera, as a palm or an object does."""
+    turn, place = pose[:3, :3], pose[:3, 3]
+    outs = {face: _out(face) for face in CUBE["ids"]}
+    facing = {face: float(-(turn @ out) @ (place + 0.01 * turn @ out)) for face, out in outs.items()}
+    kept = max(facing, key=lambda face: facing[face])
+    covers = tuple(_outline(pose, outs[face]) for face, toward in facing.items() if toward > 0 and face != kept)
+    return Look(blur=blur, noise=noise, covers=covers, cover=float(random.uniform(30, 200)))
+
+
+def _out(face: str) -> np.ndarray:
+    """Return a face's normal in the cube's frame [1], shape (3,)."""
+    out = np.zeros(3)
+    out["xyz".index(face[1])] = 1.0 if face[0] == "+" else -1.0
+    return out
+
+
+def _outline(pose: np.ndarray, out: np.ndarray) -> Polygon:
+    """Return where a face of the cube is seen [px], a trifle smaller than it is, so that its neighbours stay whole."""
+    axis = int(np.abs(out).argmax())
+    first, second = (np.eye(3)[k] for k in range(3) if k != axis)
+    corners = [0.01 * out + 0.0097 * (a * first + b * second) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    seen = [pose[:3, :3] @ corner + pose[:3, 3] for corner in corners]
+    return tuple((float(900 * p[0] / p[2] + 639.5), float(900 * p[1] / p[2] + 359.5)) for p in seen)
 
 
 def shadow(random: np.random.Generator, pose: np.ndarray) -> Look:
@@ -125,6 +153,8 @@ CONDITIONS = {
     "moving 2 mm": Condition(lambda random, pose: moving(random, 0.002)),
     "covered 25 %": Condition(lambda random, pose: cover(random, pose, 0.25)),
     "covered 40 %": Condition(lambda random, pose: cover(random, pose, 0.4)),
+    "all faces but one covered": Condition(lambda random, pose: one_face(random, pose, 0.7, 2.0)),
+    "all faces but one covered, 1.2 px, noise 5": Condition(lambda random, pose: one_face(random, pose, 1.2, 5.0)),
     "light falls to 20 %": Condition(lambda random, pose: Look(fall=0.8)),
     "sharp shadow": Condition(shadow),
     "dark, gain 0.25": Condition(lambda random, pose: Look(gain=0.25)),
@@ -187,6 +217,36 @@ def accuracy(condition: Condition, images: int, seed: int = 0) -> dict[str, floa
     return figures | {"ambiguous": int(found[:, 2].sum()), "wrong": int(wrong.sum())}
 
 
+def followed(images: int, seed: int) -> dict[str, float]:
+    """Return how a tracker follows a cube of which one face stays visible: errors, and jumps between its two poses.
+
+    Blur 1.2 px, noise 5. A jump is a change from image to image that differs from the true one by more than `FLIPPED`.
+    """
+    random = np.random.default_rng([seed, 4])
+    begin, axis = random_pose(random, 0.4), random.normal(size=3)
+    axis, rows, last = axis / np.linalg.norm(axis), [], None
+    tip = {"position": [0.0, 0.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+    document = {"version": "1.0", "fingers": {"index": {"cube": CUBE, "tip": tip}}}
+    tracker = FingerTracker(INTRINSICS, fingers_of(document))
+    for step in range(images):
+        truth = begin.copy()
+        truth[:3, :3] = Rotation.from_rotvec(np.radians(40) * np.sin(0.05 * step) * axis).as_matrix() @ begin[:3, :3]
+        truth[0, 3] += 0.02 * np.sin(0.1 * step)
+        image = render_scene([(truth, CUBE)], INTRINSICS, random, one_face(random, truth, 1.2, 5.0))
+        cube = tracker.update(image).cubes.get("index")
+        if cube is None:
+            last = None
+            continue
+        off = Rotation.from_matrix(cube.matrix[:3, :3] @ truth[:3, :3].T)
+        jumped = last is not None and np.degrees((off * last.inv()).magnitude()) > FLIPPED
+        last = off
+        rows.append((*errors(cube, truth), float(jumped), float(cube.ambiguous)))
+    found = np.array(rows, float).reshape(-1, 4)
+    wrong = (found[:, 1] > FLIPPED) & (found[:, 3] == 0)
+    figures: dict[str, float] = {"images": images, "found": len(found), "jumps": int(found[:, 2].sum())}
+    return figures | {"ambiguous": int(found[:, 3].sum()), "wrong": int(wrong.sum())}
+
+
 def costs(images: int) -> Iterator[tuple[str, float]]:
     """Yield what is looked at and its cost [ms of CPU, median]."""
     random = np.random.default_rng(1)
@@ -238,6 +298,11 @@ def main() -> None:
             f"{name:<54}{row['found']:>4}/{row['images']:<3}{position:>18}{rotation:>18}"
             f"{row['ambiguous']:>8}{row['wrong']:>7}{row['ms']:>7.1f}",
             flush=True,
+        )
+    for seed in range(FOLLOWED) if not options.only or "followed".startswith(wanted) else ():
+        row = figures[f"followed {seed}"] = followed(2 * options.images, seed)
+        print(
+            f"followed by one face, {seed}: " + ", ".join(f"{key} {value:g}" for key, value in row.items()), flush=True
         )
     for name, milliseconds in costs(30) if not options.only else ():
         figures[name] = milliseconds

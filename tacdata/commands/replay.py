@@ -3,65 +3,98 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tacdata.commands.command import TOOLS
+
+if TYPE_CHECKING:
+    from tacdata.replay.scene import Scene
+    from tacdata.replay.trials import Trials
 
 ORDER = 123
 PANEL = TOOLS
 
 
 def run(
-    path: Annotated[Path, typer.Argument(help="A recorded grasp that tacdata track worked up with a network.")],
+    paths: Annotated[list[Path], typer.Argument(help="Recordings that tacdata track worked up with a network.")],
     task: Annotated[str | None, typer.Option(help="Task whose gains are taken; default: the demonstration's.")] = None,
     gains: Annotated[Path | None, typer.Option(help="Gains file (YAML); default: the paper's.")] = None,
     seeds: Annotated[int, typer.Option(min=1, max=10000, help="Trials of each kind, a world of its own each.")] = 40,
     radius: Annotated[float, typer.Option(help="Radius of the ball [mm].")] = 35.0,
-    mass: Annotated[float, typer.Option(help="Mass of the ball [kg].")] = 0.18,
+    mass: Annotated[float | None, typer.Option(help="Of the object [kg]; default: ball 0.18, eraser 0.12.")] = None,
     stiffness: Annotated[float, typer.Option(help="Of the springs that hold the robot's fingertips [N/m].")] = 300.0,
     out: Annotated[Path | None, typer.Option(help="File for the result (JSON).")] = None,
-    view: Annotated[Path | None, typer.Option(help="Rerun file (.rrd): both replays of the undisturbed world.")] = None,
+    view: Annotated[Path | None, typer.Option(help="Rerun file (.rrd): the first one's replays, undisturbed.")] = None,
     find_gain: Annotated[
         float | None, typer.Option(metavar="MM", help="Find the smallest gain that presses every skin so deep.")
     ] = None,
+    gain_from: Annotated[
+        Path | None, typer.Option(help="With --find-gain: find it on this recording, and try it on the others.")
+    ] = None,
 ) -> None:
-    """Replay a demonstrated grasp directly and compensated on a ball in MuJoCo, over many seeds."""
+    """Replay demonstrated grasps or wipes directly and compensated in MuJoCo, over many seeds."""
     from tacdata import documents
     from tacdata.demonstrations.compensation import read_gains
-    from tacdata.demonstrations.tracks_file import ENDING, path_of, read_tracks
+    from tacdata.demonstrations.tracks_file import read_tracks
     from tacdata.errors import UsageError
-    from tacdata.replay.scene import Scene
-    from tacdata.replay.trials import Trials
+    from tacdata.replay.scene import scene_of
+    from tacdata.replay.trials import Trials, result
     from training.wilson import interval
 
     for file in (out, view):
         if file is not None and file.exists():
             raise UsageError(f"{file} exists", "a new file", "choose another name")
-    made = read_tracks(path if path.name.endswith(ENDING) else path_of(path))
-    if not 1 <= radius <= 200 or not 0 < mass <= 10 or not 1 <= stiffness <= 1e5:
-        given = f"a ball of {radius:g} mm, {mass:g} kg; springs of {stiffness:g} N/m"
+    if gain_from is not None and find_gain is None:
+        raise UsageError("--gain-from without --find-gain", "a depth to find the gain for", "add --find-gain MM")
+    if not 1 <= radius <= 200 or not 0 < (mass or 0.1) <= 10 or not 1 <= stiffness <= 1e5:
+        given = f"a ball of {radius:g} mm, {mass or 0:g} kg; springs of {stiffness:g} N/m"
         raise UsageError(given, "1 to 200 mm, up to 10 kg, 1 to 100000 N/m", "correct them")
-    scene = Scene(radius=radius / 1000, mass=mass, stiffness=stiffness)
-    trials = Trials(made, read_gains(gains).of(task or made.task), scene)
+    made = [read_tracks(_tracks(path)) for path in paths]
+    source = read_tracks(_tracks(gain_from)) if gain_from is not None else made[0]
+    names = {task or one.task for one in (*made, source)}
+    if len(names) > 1:
+        raise UsageError(f"recordings of the tasks {', '.join(sorted(names))}", "one task", "replay each task alone")
+    if gain_from is not None and source.recording_hash in {one.recording_hash for one in made}:
+        raise UsageError(f"{gain_from} among those tried", "other recordings than that", "try others")
+    name = names.pop()
+    weight = {} if mass is None else {"mass": mass}
+    scene = scene_of(name, radius=radius / 1000, stiffness=stiffness, **weight)
+    published = read_gains(gains).of(name)
+    chosen, known = None, {"compensated": published}
     if find_gain is not None:
-        print(f"the smallest gain for {find_gain:g} mm is {trials.smallest_gain(find_gain):.4f} m/mm for every finger")
-        return
+        found = Trials(source, {}, scene).smallest_gain(find_gain)
+        print(f"the smallest gain for {find_gain:g} mm is {found:.4f} m/mm for every finger ({source.recording})")
+        if gain_from is None:
+            return
+        chosen = {"recording": source.recording, "hash": source.recording_hash, "depth": find_gain}
+        known["chosen"] = dict.fromkeys(published, found)
+    tried = [Trials(one, known, scene) for one in made]
     if view is not None:
-        from viewers.replay_view import save_replays
-
-        shown = {kind: trials.one(kind, scene) for kind in ("direct", "compensated")}
-        save_replays(view, shown, scene.radius)
-        for kind, outcome in shown.items():
-            forces = ", ".join(f"{name} {force:.2f} N" for name, force in outcome.force.items())
-            print(f"undisturbed, {kind}: {'held' if outcome.held else 'lost'} ({forces})")
-        print(f"saved {view}; look at it with: tacdata view {view}")
-    document = trials.run(seeds, interval)
-    for kind in ("direct", "compensated"):
-        found = document[kind]
-        low, high = found["wilson_95"]
-        print(f"{kind:<12} held {found['held']} of {found['of']} ({low:.0%} to {high:.0%}, Wilson 95 %)")
+        _save(view, tried[0], scene)
+    document = result(tried, seeds, interval, scene, chosen)
+    for kind in tried[0].paths:
+        rate = document[kind]
+        low, high = rate["wilson_95"]
+        print(f"{kind:<12} held {rate['held']} of {rate['of']} ({low:.0%} to {high:.0%}, Wilson 95 %)")
     if out is not None:
         documents.write(out, document, "replay_result")
         print(f"written to {out}")
+
+
+def _tracks(path: Path) -> Path:
+    from tacdata.demonstrations.tracks_file import ENDING, path_of
+
+    return path if path.name.endswith(ENDING) else path_of(path)
+
+
+def _save(view: Path, tried: Trials, scene: Scene) -> None:
+    from viewers.replay_view import save_replays
+
+    shown = {kind: tried.one(kind, scene) for kind in tried.paths}
+    save_replays(view, shown, scene.sizes)
+    for kind, outcome in shown.items():
+        forces = ", ".join(f"{name} {force:.2f} N" for name, force in outcome.force.items())
+        print(f"undisturbed, {kind}: {'held' if outcome.held else 'lost'} ({forces})")
+    print(f"saved {view}; look at it with: tacdata view {view}")

@@ -24,17 +24,21 @@ def run(
     sensor: Annotated[Path | None, typer.Option(help="sensor file; default: the paper's")] = None,
     rough: Annotated[bool, typer.Option("--rough", help="sensor put down by eye, to be registered first")] = False,
     demo: Annotated[
-        bool, typer.Option("--demo", help="a hand that grasps a ball, for record --demo: writes demo_rig.yaml")
+        bool, typer.Option("--demo", help="a hand at a task, for record --demo: writes demo_rig.yaml")
     ] = False,
     cameras: Annotated[int, typer.Option(help="with --demo: cameras on the hand, 1 or 2")] = 2,
+    task: Annotated[str, typer.Option(help="with --demo: grasp (a ball) or wipe (with an eraser)")] = "grasp",
     fault: Annotated[
         str | None, typer.Option(help="with --demo: no-tag, turned-tag, swapped-fingers or silent-finger")
     ] = None,
 ) -> None:
     """Emulate a rig (GRBL, taxel board, camera) that other verbs reach by its rig.yaml, until Ctrl-C."""
+    from tacdata.errors import UsageError
     from tacdata.sensor import read_sensor
     from tacdata.virtual_rig.rig import VirtualRig
 
+    if task != "grasp" and not demo:
+        raise UsageError(f"--task {task} without --demo", "--demo --task wipe", "add --demo")
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
@@ -42,7 +46,7 @@ def run(
     if demo:
         from tacdata.virtual_rig.demo import VirtualDemo
 
-        rig = VirtualDemo(directory, 0.5 if speed is None else speed, seed, cameras, fault, skin)
+        rig = VirtualDemo(directory, 0.5 if speed is None else speed, seed, cameras, fault, skin, task)
     else:
         rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skin, rough)
     try:

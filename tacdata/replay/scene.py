@@ -1,4 +1,4 @@
-"""A ball on a table and fingertips that follow targets like a robot's: springs pull them there, contact pushes back.
+"""An object on a table, and fingertips that follow targets like a robot's: springs pull them, contact pushes back.
 
 A fingertip is a soft sphere whose place is held by springs (the compliance of joints and controllers; an infinitely
 stiff robot would need no compensation). A direct replay brings the pads to where they were seen, so that the springs
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import UsageError
+from tacdata.replay.grasp import touching
 from tacdata.replay.scene_model import PAD, SceneModel
 from tacdata.replay.targets import Targets
 
@@ -22,7 +23,9 @@ HIGH = 0.9
 HELD = 0.5
 """The object is held if it never sinks below this share of the fingers' lift meanwhile [1]."""
 LEAST_LIFT = 0.01
-"""Targets that rise by less lift nothing [m]."""
+"""Targets that rise by less lift nothing, those that move by less wipe nothing [m]."""
+BEHIND = 0.015
+"""An eraser that falls behind the fingers by more is lost [m]."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,14 @@ class Scene:
     """Stiffness of the skin [N/m]."""
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """How far the ball lies from where it lay in the demonstration [m]."""
+    task: str = "grasp"
+    """"grasp": a ball is lifted; "wipe": an eraser is moved to and fro on a board."""
+    eraser: tuple[float, float, float] = (0.025, 0.055, 0.015)
+    """Half the sizes of the eraser [m]: between the fingers, along the strokes, in height."""
+    board_friction: float = 0.5
+    """Coulomb coefficient between the object and what it lies on [1]."""
+    pull: float = 0.0
+    """With which an object is drawn to what it lies on, beside its weight [N]."""
     bias: tuple[tuple[float, float, float], ...] = ()
     """How far each fingertip's targets are off in the robot's frame [m]: calibration, another hand's shape."""
 
@@ -48,7 +59,39 @@ class Scene:
     def document(self) -> dict[str, Any]:
         """The scene as plain data."""
         values = asdict(self)
-        return {**values, "place": list(self.place), "bias": [list(shift) for shift in self.bias]}
+        lists = {"place": list(self.place), "eraser": list(self.eraser), "bias": [list(shift) for shift in self.bias]}
+        return {**values, **lists}
+
+    @property
+    def geometry(self) -> str:
+        """What MuJoCo calls the object's shape."""
+        return "sphere" if self.task == "grasp" else "box"
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """Its sizes for MuJoCo [m]."""
+        return (self.radius,) if self.task == "grasp" else self.eraser
+
+    @property
+    def height(self) -> float:
+        """Of its middle over what it lies on [m]."""
+        return self.radius if self.task == "grasp" else self.eraser[2]
+
+    @property
+    def reach(self) -> float:
+        """From its middle to where fingers touch it [m]."""
+        return self.radius if self.task == "grasp" else self.eraser[0]
+
+
+def scene_of(task: str, **values: Any) -> Scene:
+    """Return the usual scene of a task; a wipe's eraser weighs 120 g and holds to its board by a magnet of 2 N.
+
+    Args:
+        task: A demonstration's task; all but "wipe" are grasps.
+        values: Fields that differ from the usual ones.
+    """
+    wiped: dict[str, Any] = {"mass": 0.12, "pull": 2.0} if task == "wipe" else {}
+    return Scene(task="wipe" if task == "wipe" else "grasp", **{**wiped, **values})
 
 
 def drawn(scene: Scene, fingers: int, seed: int) -> Scene:
@@ -80,6 +123,8 @@ class Outcome:
     """Centre of the ball [m], shape (n, 3)."""
     tips: np.ndarray
     """Centres of the fingertips' pads [m], shape (n, f, 3)."""
+    slip: float = 0.0
+    """How far an eraser fell behind the fingertips along the strokes [m]; 0 of a ball."""
 
 
 def ball_centre(targets: Targets, touch: int, radius: float) -> np.ndarray:
@@ -98,23 +143,55 @@ def normals(targets: Targets) -> np.ndarray:
 
 
 def replay_targets(targets: Targets, scene: Scene, centre: np.ndarray) -> Outcome:
-    """Return what becomes of a ball that lies with its centre at ``centre`` [m] when fingertips follow targets.
+    """Return what becomes of an object that lies with its centre at ``centre`` [m] when fingertips follow targets.
+
+    A ball is held if it stays high while the fingers are; an eraser, if it never falls behind the fingers' strokes.
 
     Raises:
-        UsageError: If the targets do not lift.
+        UsageError: If the targets do not lift, or wipe.
     """
     pads = targets.position - PAD * normals(targets)
-    height = pads[..., 2].mean(axis=1)
-    lift = float(np.ptp(height))
-    if lift < LEAST_LIFT:
-        raise UsageError(f"targets that rise by {1000 * lift:.0f} mm", "10 mm or more", "replay a demonstrated grasp")
+    high = _high(pads) if scene.task == "grasp" else _wiping(pads, targets)
     if scene.bias:
         pads = pads + np.array(scene.bias)
     ground = np.array(centre) + scene.place
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     path = SceneModel(scene, pads[0], ground).run(pads, seconds)
-    high = height > height.min() + HIGH * lift
     lowest = float((path.ball[high, 2] - ground[2]).min())
     force = {name: float(path.force[high, k].mean()) for k, name in enumerate(targets.fingers)}
     depth = {name: float(1000 * path.depth[high, k].mean()) for k, name in enumerate(targets.fingers)}
-    return Outcome(lowest > HELD * lift, lowest, force, depth, seconds, path.ball, path.tips)
+    slip = 0.0
+    if scene.task == "grasp":
+        held = lowest > HELD * _lift(pads)
+    else:
+        slip = _slip(path.tips[high].mean(axis=1), path.ball[high])
+        held = slip < BEHIND
+    return Outcome(bool(held), lowest, force, depth, seconds, path.ball, path.tips, slip)
+
+
+def _lift(pads: np.ndarray) -> float:
+    return float(np.ptp(pads[..., 2].mean(axis=1)))
+
+
+def _high(pads: np.ndarray) -> np.ndarray:
+    height, lift = pads[..., 2].mean(axis=1), _lift(pads)
+    if lift < LEAST_LIFT:
+        raise UsageError(f"targets that rise by {1000 * lift:.0f} mm", "10 mm or more", "replay a demonstrated grasp")
+    return height > height.min() + HIGH * lift
+
+
+def _wiping(pads: np.ndarray, targets: Targets) -> np.ndarray:
+    """Return the rows from the first stroke to the last: while all fingers feel something."""
+    rows = touching(targets)
+    rows[np.argmax(rows) : len(rows) - np.argmax(rows[::-1])] = rows.any()
+    stroke = np.ptp(pads[rows].mean(axis=1), axis=0).max() if rows.any() else 0.0
+    if stroke < LEAST_LIFT:
+        raise UsageError(f"targets that wipe {1000 * stroke:.0f} mm", "10 mm or more", "replay a demonstrated wipe")
+    return rows
+
+
+def _slip(fingers: np.ndarray, eraser: np.ndarray) -> float:
+    """Return how far the eraser fell behind along the direction in which the fingers move most [m]."""
+    moved = fingers - fingers[0]
+    along = np.linalg.svd(moved - moved.mean(axis=0), full_matrices=False)[2][0]
+    return float(np.abs((eraser - eraser[0] - moved) @ along).max())

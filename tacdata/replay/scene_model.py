@@ -1,4 +1,4 @@
-"""The scene in MuJoCo: a table, a ball, and soft pads on springs."""
+"""The scene in MuJoCo: a table, a ball or an eraser, and soft pads on springs."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ XML = """
 <mujoco>
  <option timestep="{step}" cone="elliptic" integrator="implicitfast" impratio="10"/>
  <worldbody>
-  <geom name="table" type="plane" size="1 1 0.1" pos="0 0 {table}" friction="0.5 0.005 0.0001"/>
+  <geom name="table" type="plane" size="1 1 0.1" pos="0 0 {table}" friction="{board} 0.005 0.0001" priority="2"/>
   <body name="ball" pos="{x} {y} {z}">
    <freejoint/>
-   <geom name="ball" type="sphere" size="{radius}" mass="{mass}" condim="4" friction="{friction} {torsion} 0.0001"/>
+   <geom name="ball" type="{kind}" size="{size}" mass="{mass}" condim="4" friction="{friction} {torsion} 0.0001"/>
   </body>
   {tips}
  </worldbody>
@@ -83,8 +83,9 @@ class SceneModel:
         springs = "".join(SPRING.format(joint=joint, kp=scene.stiffness, kv=critical) for joint in joints)
         x, y, z = centre
         text = XML.format(
-            step=STEP, table=z - scene.radius, x=x, y=y, z=z, radius=scene.radius, mass=scene.mass, friction=contact,
-            torsion=TORSION, tips=tips, springs=springs,
+            step=STEP, table=z - scene.height, x=x, y=y, z=z, kind=scene.geometry, mass=scene.mass, friction=contact,
+            size=" ".join(f"{v:.6g}" for v in scene.sizes), board=scene.board_friction, torsion=TORSION,
+            tips=tips, springs=springs,
         )  # fmt: skip
         self._begin, self._model = begin, engine.MjModel.from_xml_string(text)
         self._data = engine.MjData(self._model)
@@ -92,6 +93,7 @@ class SceneModel:
         self._tips = [self._model.body(f"tip{k}").id for k in range(count)]
         self._pads = {self._model.geom(f"tip{k}").id: k for k in range(count)}
         self._ball_geom = self._model.geom("ball").id
+        self._data.xfrc_applied[self._ball, 2] = -scene.pull
 
     def run(self, pads: np.ndarray, seconds: np.ndarray) -> Course:
         """Follow pads' centres [m], shape (n, f, 3), at times [s], shape (n,), ascending from 0."""

@@ -1,8 +1,8 @@
-"""Many trials of one grasp, direct and compensated, each seed a world of its own."""
+"""Many trials of one grasp or wipe, direct and compensated, each seed a world of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import schemas
@@ -13,32 +13,33 @@ from tacdata.replay.grasp import cut, first_grasp
 from tacdata.replay.scene import Outcome, Scene, ball_centre, drawn, replay_targets
 from tacdata.replay.targets import Targets, targets_of
 
-KINDS = ("direct", "compensated")
+DIRECT = "direct"
+Interval = Callable[[int, int], tuple[float, float]]
 
 
 class Trials:
-    """The first grasp of a demonstration, to be tried."""
+    """The first grasp or wipe of a demonstration, to be tried."""
 
-    def __init__(self, made: Demonstration, gains: dict[str, float], scene: Scene) -> None:
-        """Cut the grasp out and find where the ball lay.
+    def __init__(self, made: Demonstration, gains: dict[str, dict[str, float]], scene: Scene) -> None:
+        """Cut it out and find where the object lay.
 
         Args:
             made: A demonstration with predicted depth.
-            gains: Finger -> gain [m/mm].
+            gains: Kind of replay ("compensated", "chosen") -> finger -> gain [m/mm]; "direct" comes by itself.
             scene: The undisturbed world.
 
         Raises:
             UsageError: If it holds no grasp, or fingers lack predicted depth or gains.
         """
-        self._made, self._gains, self._scene = made, gains, scene
-        whole = targets_of(made, gains)
+        self.made, self._scene = made, scene
+        whole = targets_of(made, next(iter(gains.values())) if gains else dict.fromkeys(made.tracks, 0.0))
         self._span = first_grasp(whole)
-        self._centre = ball_centre(whole, self._span[1], scene.radius)
-        self._paths = {"direct": self._cut(None), "compensated": self._cut(gains)}
+        self._centre = ball_centre(whole, self._span[1], scene.reach)
+        self.paths = {DIRECT: self._cut(None), **{kind: self._cut(own) for kind, own in gains.items()}}
 
     def one(self, kind: str, scene: Scene) -> Outcome:
-        """Return the outcome of one trial, "direct" or "compensated", in a scene."""
-        return replay_targets(self._paths[kind], scene, self._centre)
+        """Return the outcome of one trial, of a kind of replay, in a scene."""
+        return replay_targets(self.paths[kind], scene, self._centre)
 
     def smallest_gain(self, wanted: float) -> float:
         """Return the smallest common gain [m/mm] with which every skin is pressed to a depth [mm] while holding.
@@ -48,38 +49,62 @@ class Trials:
         """
 
         def reached(gain: float) -> float:
-            path = self._cut(dict.fromkeys(self._paths["direct"].fingers, gain))
+            path = self._cut(dict.fromkeys(self.paths[DIRECT].fingers, gain))
             return min(replay_targets(path, self._scene, self._centre).depth.values())
 
         return smallest_gain(reached, wanted)
 
-    def run(self, seeds: int, interval: Callable[[int, int], tuple[float, float]]) -> dict[str, Any]:
-        """Return the result over seeds 0 ... (`schemas/replay_result.schema.json`).
-
-        Args:
-            seeds: Trials of each kind.
-            interval: Successes and trials -> an interval of the proportion.
-        """
-        trials = []
+    def trials(self, seeds: int) -> list[dict[str, Any]]:
+        """Return every trial of seeds 0 ..., as plain data."""
+        found = []
         for seed in range(seeds):
-            world = drawn(self._scene, len(self._paths["direct"].fingers), seed)
-            for kind in KINDS:
-                found = self.one(kind, world)
-                trials.append(
-                    {"seed": seed, "kind": kind, "held": bool(found.held), "lift": found.lift, "force": found.force,
-                     "depth": found.depth}
+            world = drawn(self._scene, len(self.paths[DIRECT].fingers), seed)
+            for kind in self.paths:
+                end = self.one(kind, world)
+                found.append(
+                    {"recording": self.made.recording, "seed": seed, "kind": kind, "held": bool(end.held),
+                     "lift": end.lift, "slip": end.slip, "force": end.force, "depth": end.depth}
                 )  # fmt: skip
-        rates = {}
-        for kind in KINDS:
-            held = sum(trial["held"] for trial in trials if trial["kind"] == kind)
-            rates[kind] = {"held": held, "of": seeds, "wilson_95": list(interval(held, seeds))}
-        parents = {"recording": self._made.recording_hash, "checkpoint": (self._made.network or {}).get("hash", "")}
-        return {
-            "version": schemas.version("replay_result"), "recording": self._made.recording, "task": self._made.task,
-            "gains": {name: self._gains[name] for name in self._paths["direct"].fingers},
-            "scene": {**self._scene.document, "spreads": " ".join((drawn.__doc__ or "").split())}, **rates,
-            "trials": trials, "provenance": provenance.stamp("tacdata replay", parents, {"seeds": seeds}),
-        }  # fmt: skip
+        return found
 
     def _cut(self, gains: dict[str, float] | None) -> Targets:
-        return cut(targets_of(self._made, gains), self._span[0], self._span[2])
+        return cut(targets_of(self.made, gains), self._span[0], self._span[2])
+
+
+def result(
+    tried: Sequence[Trials], seeds: int, interval: Interval, scene: Scene, chosen: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return the result over recordings and seeds (`schemas/replay_result.schema.json`).
+
+    Args:
+        tried: One or more demonstrations.
+        seeds: Trials of each kind and demonstration.
+        interval: Successes and trials -> an interval of the proportion.
+        scene: The undisturbed world.
+        chosen: On which recording, and for which depth, the gain of the kind "chosen" was found.
+    """
+    found = [trial for one in tried for trial in one.trials(seeds)]
+    kinds, first = list(tried[0].paths), tried[0]
+    parents = {"recording": first.made.recording_hash, "checkpoint": (first.made.network or {}).get("hash", "")}
+    gains = {kind: first.paths[kind].gains for kind in kinds if kind != DIRECT}
+    return {
+        "version": schemas.version("replay_result"), "recording": first.made.recording, "task": first.made.task,
+        "gains": gains["compensated"],
+        "scene": {**scene.document, "spreads": " ".join((drawn.__doc__ or "").split())},
+        **{kind: rate([t for t in found if t["kind"] == kind], interval) for kind in kinds},
+        "recordings": [
+            {"name": one.made.recording, "hash": one.made.recording_hash,
+             "rates": {
+                 kind: rate([t for t in trials if t["kind"] == kind], interval) for kind in kinds
+             }}
+            for k, one in enumerate(tried) for trials in (found[k * seeds * len(kinds) : (k + 1) * seeds * len(kinds)],)
+        ],
+        **({"gain_chosen": {**chosen, "gains": gains["chosen"]}} if chosen else {}),
+        "trials": found, "provenance": provenance.stamp("tacdata replay", parents, {"seeds": seeds}),
+    }  # fmt: skip
+
+
+def rate(trials: Sequence[dict[str, Any]], interval: Interval) -> dict[str, Any]:
+    """Return how many of some trials held, of how many, and the interval of the proportion."""
+    held = sum(trial["held"] for trial in trials)
+    return {"held": held, "of": len(trials), "wilson_95": list(interval(held, len(trials)))}

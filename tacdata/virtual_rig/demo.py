@@ -18,7 +18,7 @@ from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import Board, draw_timing
 from tacdata.virtual_rig.camera import Camera
-from tacdata.virtual_rig.hand import DIRECTIONS, PERIOD, RADIUS, draw_hand
+from tacdata.virtual_rig.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, draw_hand
 from tacdata.virtual_rig.rig import BAUDS, board_format
 from tacdata.virtual_rig.world import World, draw
 
@@ -54,7 +54,7 @@ class VirtualDemo:
 
     def __init__(
         self, directory: Path, speed: float = 1.0, seed: int = 0, cameras: int = 2, fault: str | None = None,
-        sensor: Sensor | None = None,
+        sensor: Sensor | None = None, task: str = "grasp",
     ) -> None:  # fmt: skip
         """Set up a hand whose clock runs ``speed`` times as fast as real time.
 
@@ -65,16 +65,19 @@ class VirtualDemo:
             cameras: One or two.
             fault: One of `FAULTS`, or none.
             sensor: The skin on every finger.
+            task: One of `TASKS`.
 
         Raises:
-            UsageError: If a number is out of range or there is no such fault.
+            UsageError: If a number is out of range or there is no such fault or task.
         """
         if not 0 < speed <= 8 or not 1 <= cameras <= len(EYES):
             raise UsageError(f"speed {speed:g}, {cameras} cameras", "above 0 to 8; 1 or 2 cameras", "choose others")
         if fault is not None and fault not in FAULTS:
             raise UsageError(f"fault {fault!r}", ", ".join(FAULTS), "name one of them")
+        if task not in TASKS:
+            raise UsageError(f"task {task!r}", ", ".join(TASKS), "name one of them")
         self.directory, self.path, self.fault, self.seed = directory, directory / "demo_rig.yaml", fault, seed
-        self.clock, self.hand, self.sensor = Clock.start(speed), draw_hand(seed), sensor or default_sensor()
+        self.clock, self.hand, self.sensor = Clock.start(speed), draw_hand(seed, task), sensor or default_sensor()
         self.start_ns = self.clock.now_ns()
         layout = board_format(self.sensor)
         baud = next((b for b in BAUDS if b >= layout.size * 10 * layout.rate / 0.8), BAUDS[-1])
@@ -127,7 +130,7 @@ class VirtualDemo:
         boards = [f"{name:<7} {board.port.path}  {self.layout.rate:g} Hz" for name, board in self.boards.items()]
         return [
             *boards, *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
-            f"a grasp every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} times real time",
+            f"{self.hand.task} every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} times real time",
             *([f"fault: {self.fault}"] if self.fault else []),
         ]  # fmt: skip
 

@@ -1,7 +1,7 @@
-"""An emulated hand that grasps a ball over and over: where its fingertips are, and how deep their skins are pressed.
+"""An emulated hand that grasps a ball, or wipes with an eraser, over and over: its fingertips, and how deep they press.
 
-World: z up, the ball lies on the table about the origin. Fingertip frame: origin on the pad, x along the finger,
-z out of the pad.
+World: z up, the ball or eraser lies on the table about the origin. Fingertip frame: origin on the pad, x along the
+finger, z out of the pad. Either object presses the skins as the ball does.
 """
 
 from __future__ import annotations
@@ -25,6 +25,13 @@ REACH = 45.0
 """How far the fingertips are from the ball before and after [mm]."""
 LIFT = 90.0
 """How high it is lifted [mm]."""
+TASKS = ("grasp", "wipe")
+ERASER = 25.0, 15.0
+"""Half the eraser's width between the fingers, and the height of its middle [mm]."""
+ASIDE = {"thumb": 0.0, "index": 14.0, "middle": -14.0}
+"""Where along the eraser each finger presses [mm]."""
+STROKE, STROKES = 40.0, 2
+"""How far to each side is wiped [mm], and how often back and forth."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,8 @@ class Hand:
     """Where on the pad each finger touches: x and y [mm]."""
     tremor: float
     """Amplitude of the hand's trembling at 8 Hz [mm]."""
+    task: str = "grasp"
+    """"grasp" or "wipe"."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -56,33 +65,48 @@ class Hand:
         """Return the fingertip's frame in the world, shape (4, 4) [m], at a time [s]."""
         t = seconds % PERIOD
         away = REACH * (1 - _blend(t, TIMES[0], TIMES[1]) + _blend(t, TIMES[6], TIMES[7]))
-        lift = LIFT * (_blend(t, TIMES[2], TIMES[3]) - _blend(t, TIMES[4], TIMES[5]))
-        out = np.array(DIRECTIONS[finger]) / np.linalg.norm(DIRECTIONS[finger])
+        out = self._out(finger)
         normal = -out
         along = np.array([0.0, 0.0, -1.0]) - (-normal[2]) * normal
         along /= np.linalg.norm(along)
         # The whole hand sways a little, so that no pose ever rests.
         phase = 2 * np.pi * (seconds + 0.37 * self.seed)
-        sway = 4.0 * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
+        free = 1.0 if self.task == "grasp" else 0.1  # an eraser lies flat on its board, and the hand with it
+        sway = 4.0 * free * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
         shake = self.tremor * np.array([np.sin(8 * phase), np.sin(8 * phase + 1), np.sin(8 * phase + 2)])
         matrix = np.eye(4)
         matrix[:3, :3] = np.stack([along, np.cross(normal, along), normal], axis=-1)
         x, y, depth = self.press(finger, seconds)
-        touch = np.array([0.0, 0.0, HEIGHT + lift]) + out * (RADIUS + away - depth)
+        half = RADIUS if self.task == "grasp" else ERASER[0]
+        touch = self._middle(finger, t) + out * (half + away - depth)
         # The pad's origin is the array's centre; what touches lies off it by the skew.
         place = touch - matrix[:3, 0] * x - matrix[:3, 1] * y
-        turn = _turn(0.06 * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)]))
+        turn = _turn(0.06 * free * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)]))
         matrix[:3, :3] = turn @ matrix[:3, :3]
         matrix[:3, 3] = (turn @ place + sway + shake) / 1000
         return matrix
 
+    def _out(self, finger: str) -> np.ndarray:
+        """Return the direction from the object to a finger [1]."""
+        if self.task == "wipe":
+            return np.array([-1.0 if finger == "thumb" else 1.0, 0.0, 0.0])
+        return np.array(DIRECTIONS[finger]) / np.linalg.norm(DIRECTIONS[finger])
 
-def draw_hand(seed: int) -> Hand:
-    """Draw a grasp from a seed."""
+    def _middle(self, finger: str, t: float) -> np.ndarray:
+        """Return the point of the object that a finger's normal goes through [mm]."""
+        if self.task == "wipe":
+            along = STROKE * np.sin(2 * np.pi * STROKES * _blend(t, TIMES[2], TIMES[5]))
+            return np.array([0.0, along + ASIDE[finger], ERASER[1]])
+        lift = LIFT * (_blend(t, TIMES[2], TIMES[3]) - _blend(t, TIMES[4], TIMES[5]))
+        return np.array([0.0, 0.0, HEIGHT + lift])
+
+
+def draw_hand(seed: int, task: str = "grasp") -> Hand:
+    """Draw a hand at a task from a seed."""
     rng = np.random.default_rng([seed, 11])
     depth = {name: float(rng.uniform(0.7, 1.2)) for name in DIRECTIONS}
     skew = {name: tuple(rng.uniform(-1.0, 1.0, 2).tolist()) for name in DIRECTIONS}
-    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)))  # type: ignore[arg-type]
+    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)), task)  # type: ignore[arg-type]
 
 
 def _blend(t: float, begin: float, end: float) -> float:

@@ -12,21 +12,20 @@ from tacdata.cli import main
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.demonstrations.tracks_file import write_tracks
 from tacdata.sensor import default_sensor
-from tacdata.virtual_rig.hand import DIRECTIONS
+from tacdata.virtual_rig.hand import DIRECTIONS, draw_hand
 from training.wilson import interval
 
 
-@pytest.fixture
-def tracked(tmp_path):
+def tracks(folder, hand, task, digest):
     """Tracks as a perfect tracker and network would give them."""
     from scipy.spatial.transform import Rotation
 
     times = np.arange(int(8.4 * RATE)) / RATE
-    tracks, count = {}, len(times)
+    found, count = {}, len(times)
     for name in DIRECTIONS:
-        poses = np.array([HAND.tip(name, t) for t in times])
-        depth = np.array([HAND.press(name, t)[2] for t in times], np.float32)
-        tracks[name] = FingerTrack(
+        poses = np.array([hand.tip(name, t) for t in times])
+        depth = np.array([hand.press(name, t)[2] for t in times], np.float32)
+        found[name] = FingerTrack(
             name, "right", name, poses[:, :3, 3], Rotation.from_matrix(poses[:, :3, :3]).as_quat(),
             np.tile(1e-8 * np.eye(6), (count, 1, 1)), np.zeros(count, bool), count, 0,
             np.zeros((count, 24), np.float32),
@@ -34,12 +33,18 @@ def tracked(tmp_path):
         )  # fmt: skip
     network = {"hash": "f" * 64, "network": "none", "epoch": 0, "lookahead": 0, "sensor": "0"}
     made = Demonstration(
-        "episode-000000.mcap", "e" * 64, "grasp", "table", RATE, np.rint(times * 1e9).astype(np.int64), tracks,
-        dict.fromkeys(tracks, default_sensor()), {}, network, (), {"made_by": "a test"},
+        "episode-000000.mcap", digest, task, "table", RATE, np.rint(times * 1e9).astype(np.int64), found,
+        dict.fromkeys(found, default_sensor()), {}, network, (), {"made_by": "a test"},
     )  # fmt: skip
-    path = tmp_path / "episode-000000.tracks.parquet"
+    path = folder / "episode-000000.tracks.parquet"
     write_tracks(path, made)
     return path
+
+
+@pytest.fixture
+def tracked(tmp_path):
+    """The tracks of a hand that grasps."""
+    return tracks(tmp_path, HAND, "grasp", "e" * 64)
 
 
 def run(arguments):
@@ -74,6 +79,38 @@ def test_bad_arguments_end_in_words(tracked, tmp_path, capsys):
         ([tracked, "--radius", "0"], "a ball of 0 mm"),
         ([tmp_path / "none.mcap"], "no file"),
         ([tracked, "--find-gain", "50"], "deepest reached"),
+    ):
+        assert run(["replay", *arguments]) == 2
+        assert words in capsys.readouterr().err
+
+
+def wiping(tmp_path, seed):
+    """The tracks of a hand that wipes."""
+    folder = tmp_path / f"wipe{seed}"
+    folder.mkdir()
+    return tracks(folder, draw_hand(seed, "wipe"), "wipe", f"{seed:x}" * 64)
+
+
+def test_an_eraser_is_lost_without_compensation_and_a_gain_chosen_elsewhere_holds_it(tmp_path, capsys):
+    training, first, second = (wiping(tmp_path, seed) for seed in (1, 2, 3))
+    out, view = tmp_path / "wipe.json", tmp_path / "wipe.rrd"
+    chosen = ["--find-gain", "0.3", "--gain-from", training]
+    assert run(["replay", first, second, "--seeds", "2", "--out", out, "--view", view, *chosen]) == 0
+    found = json.loads(out.read_text())
+    documents.check(found, "replay_result", "result")
+    assert found["task"] == "wipe" and found["gains"] == {"thumb": 0.004, "index": 0.01, "middle": 0.01}
+    assert found["direct"] == {"held": 0, "of": 4, "wilson_95": list(interval(0, 4))}
+    assert found["compensated"]["held"] >= 3 and found["chosen"]["of"] == 4
+    assert [one["rates"]["direct"]["of"] for one in found["recordings"]] == [2, 2]
+    assert found["gain_chosen"]["hash"] == "1" * 64 and 0 < found["gain_chosen"]["gains"]["thumb"] < 0.03
+    behind = [trial["slip"] for trial in found["trials"] if trial["kind"] == "direct"]
+    assert min(behind) > 0.03  # it stays where the first stroke began
+    assert view.stat().st_size > 10_000
+    capsys.readouterr()
+    for arguments, words in (
+        ([training, *chosen], "other recordings"),
+        ([first, "--gain-from", training], "--find-gain"),
+        ([first, "--task", "grasp"], "rise by"),
     ):
         assert run(["replay", *arguments]) == 2
         assert words in capsys.readouterr().err

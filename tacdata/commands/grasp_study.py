@@ -1,0 +1,109 @@
+"""Run the study of contact-position-aware grasping."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+if TYPE_CHECKING:
+    from tacdata.grasping.lessons import Lesson
+    from tacdata.sensor import Sensor
+    from training.frames import Frames
+
+ORDER = 124
+PANEL = TOOLS
+RESULT, PICTURE, NETWORK = "grasp_study.json", "grasp_study.png", "network"
+
+
+def run(
+    out: Annotated[Path, typer.Option(help="Folder for the result; made if it does not exist.")],
+    network: Annotated[
+        Path | None, typer.Option(help="A run trained for this fingertip; default: one is trained in OUT/network.")
+    ] = None,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes of that training.")] = 12,
+    repeats: Annotated[int, typer.Option(min=1, max=200, help="Trials at each place with each strategy.")] = 5,
+    seed: Annotated[int, typer.Option(min=0, help="Decides every draw: oranges, fingertips, noise, weights.")] = 0,
+    threads: Annotated[int | None, typer.Option(min=1, help="CPU threads of the training.")] = None,
+) -> None:
+    """Grasp an orange at eight places by three strategies, through the skin model and a trained network.
+
+    A network is trained on solved presses of other spheres and ellipsoids. Every trial goes through readings alone.
+    """
+    from tacdata import documents
+    from tacdata.errors import UsageError
+    from tacdata.grasping import picture, result
+    from tacdata.grasping.fingertip import fingertip_sensor
+    from tacdata.grasping.press_set import FOLDER, read_presses
+    from tacdata.grasping.study import Setup
+    from training import checkpoint
+    from training.sequence import identity, sequence_maps
+    from training.wilson import interval
+
+    for name in (RESULT, PICTURE):
+        if (out / name).exists():
+            raise UsageError(f"{out / name} exists", "a new folder", "choose another --out")
+    sensor = fingertip_sensor()
+    trained = checkpoint.load(network or _trained(sensor, out / NETWORK, epochs, seed, threads))
+    trained.check_sensor(sensor, "the study's fingertip")
+    found = result.result(
+        Setup(repeats=repeats, seed=seed), read_presses(FOLDER / "orange.npz", sensor), sensor,
+        lambda readings: sequence_maps(trained, readings), identity(trained), interval, _told,
+    )  # fmt: skip
+    documents.write(out / RESULT, found, "grasp_study")
+    picture.save(found, out / PICTURE)
+    print("\n".join(result.lines(found)))
+    print(f"written to {out / RESULT} and {out / PICTURE}")
+
+
+def _told(done: int, of: int) -> None:
+    if done % 20 == 0:
+        print(f"{done} of {of} trials", flush=True)
+
+
+def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | None) -> Path:
+    """Train the paper's network on the shipped presses, or go on where that was broken off; return its folder."""
+    from tacdata import provenance
+    from tacdata.grasping.lessons import lessons
+    from tacdata.grasping.press_set import FOLDER, read_presses
+    from tacdata.grasping.touch import Spread
+    from training.settings import Settings
+    from training.train import Progress, train
+
+    path = FOLDER / "training.npz"
+    origin = provenance.content_hash([provenance.file_hash(path), seed])
+    frames = _frames(lessons(read_presses(path, sensor), sensor, Spread(), seed), sensor, origin)
+
+    def told(progress: Progress) -> None:
+        if (line := progress.finished) is not None:
+            print(
+                f"epoch {progress.epoch} of {progress.epochs}: validation loss {line['validation_loss']:.5f}",
+                flush=True,
+            )
+
+    begun = (run / "last.safetensors").is_file()
+    train(frames, Settings(seed=seed, epochs=epochs), run, "auto", begun, threads, told)
+    return run
+
+
+def _frames(found: list[Lesson], sensor: Sensor, origin: str) -> Frames:
+    import numpy as np
+
+    from training.frames import EpisodeSpan, Frames
+
+    ends = np.cumsum([len(lesson.taxels) for lesson in found]).tolist()
+    spans = []
+    for number, (lesson, stop) in enumerate(zip(found, ends, strict=True)):
+        x, y, depth = lesson.tip[int(lesson.tip[:, 2].argmax())].tolist()
+        start = stop - len(lesson.taxels)
+        spans.append(EpisodeSpan(number, start, stop, lesson.indenter, lesson.shape, x=x, y=y, depth=depth))
+    taxels, maps, tip = (np.concatenate([getattr(v, n) for v in found]) for n in ("taxels", "depth", "tip"))
+    count = len(taxels)
+    times = (np.arange(count) * 1e9 / sensor.taxels.rate).astype(np.int64)
+    return Frames(
+        taxels, maps, tip, np.full(count, -1), times, np.ones(count, dtype=bool), tuple(spans), sensor, origin,
+        "presses that ship with tacdata.grasping", True,
+    )  # fmt: skip

@@ -1,0 +1,77 @@
+"""How far each way to find a contact's centre is off, by where it is: without noise, on a fingertip as described."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tacdata.grasping.centre import Maps, dense_centre, map_centre, raw_centre
+from tacdata.grasping.press_set import PressSet
+from tacdata.grasping.touch import OrangeTouch
+
+STEP = 0.25
+"""Distance of places [mm]."""
+FRAMES = 9
+"""Frames of each window, all alike: a network's longest, so that it sees a contact at rest [count]."""
+
+
+def bias(touch: OrangeTouch, presses: PressSet, maps: Maps, force: float, band: float) -> dict[str, Any]:
+    """Return true and believed lateral places of the orange, from the middle outwards.
+
+    Args:
+        touch: The skin's answer to the orange.
+        presses: The orange's presses, whose solved maps show what a perfect network would see.
+        maps: The trained network.
+        force: Normal force [N].
+        band: Within which a contact is accepted [mm].
+    """
+    sensor = touch.sensor
+    true = np.arange(0.0, touch.limit[0] + 1e-9, STEP)
+    windows = [np.repeat(touch.signals(x, 0.0, force)[None], FRAMES, axis=0) for x in true.tolist()]
+    believed = {
+        "raw_taxel": [_x(raw_centre(w, sensor)) for w in windows],
+        "dense_depth": [_x(dense_centre(w, sensor, maps)) for w in windows],
+        "solved_map": [_x(map_centre(_solved(touch, presses, x, force), sensor)) for x in true.tolist()],
+    }
+    return {
+        "true": true.tolist(), **believed,
+        "accepted_to": {name: _accepted(true, values, band) for name, values in believed.items()},
+        "toward_interior": {
+            name: {
+                f"{at:g}": None if (value := values[round(at / STEP)]) is None else at - value for at in (2.0, 4.0, 6.0)
+            }
+            for name, values in believed.items()
+        },
+    }  # fmt: skip
+
+
+def _x(centre: np.ndarray | None) -> float | None:
+    return None if centre is None else float(centre[0])
+
+
+def _accepted(true: np.ndarray, values: list[float | None], band: float) -> float:
+    """Return the farthest true place [mm] that is believed to lie in the band, between grid points linearly."""
+    believed = np.array([np.nan if v is None else v for v in values])
+    inside = np.flatnonzero(believed <= band)
+    last = int(inside[-1]) if len(inside) else 0
+    if last + 1 >= len(true) or not believed[last + 1] > believed[last]:
+        return float(true[last])
+    share = (band - believed[last]) / (believed[last + 1] - believed[last])
+    return float(true[last] + share * (true[last + 1] - true[last]))
+
+
+def _solved(touch: OrangeTouch, presses: PressSet, x: float, force: float) -> np.ndarray:
+    """Return the solved map at y = 0, between places and depths linearly [mm]."""
+    depth, places = touch.depth(x, 0.0, force), presses.place
+    own = np.flatnonzero(np.abs(places[:, 1]) < 1e-9)
+    at, levels = places[own, 0], presses.depths[own[0]]
+    maps = presses.surface[own].astype(float)
+    right = min(max(int(np.searchsorted(at, x)), 1), len(at) - 1)
+    above = min(max(int(np.searchsorted(levels, depth)), 1), len(levels) - 1)
+    a, b = (
+        (x - at[right - 1]) / (at[right] - at[right - 1]),
+        (depth - levels[above - 1]) / (levels[above] - levels[above - 1]),
+    )
+    low, high = ((1 - b) * maps[k, above - 1] + b * maps[k, above] for k in (right - 1, right))
+    return (1 - a) * low + a * high

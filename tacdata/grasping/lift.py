@@ -1,0 +1,161 @@
+"""The lift in MuJoCo: two fingertips take an orange off a table, rise and hold it.
+
+Nothing here knows of the band. The hand lifts in another configuration than it measures in (paper, Exp. 3): the
+fingertips are turned and farther apart, and touch with the rounded ridge at the middle of their pads instead of the
+flat skin. Beside its largest-diameter section an orange is thinner and its opposing faces lean outwards, so ridges that
+part to a given distance press it less and push it out. What comes of it is left to contact, friction and gravity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from tacdata.replay.engine import mujoco
+
+STEP = 0.001
+"""Time step [s]."""
+CLOSE, RISE, HOLD = 0.5, 1.0, 5.0
+"""Time to close, to rise, and for which the orange must stay [s]; the last is the paper's."""
+HEIGHT = 0.05
+"""How far the hand rises [m] (paper)."""
+STAYS = 0.8
+"""An object that stays above this share of the height throughout the hold is held [1]."""
+XML = """
+<mujoco>
+ <option timestep="{step}" cone="elliptic" integrator="implicitfast" impratio="10"/>
+ <worldbody>
+  <geom name="table" type="plane" size="1 1 0.1" pos="0 0 {table}" friction="0.5 0.005 0.0001"/>
+  <body name="orange"><freejoint/>
+   <geom name="orange" type="sphere" size="{radius}" mass="{mass}" condim="4" friction="{friction} {torsion} 0.0001"/>
+  </body>
+  <body name="hand" gravcomp="1"><joint name="rise" type="slide" axis="0 0 1" damping="20"/>
+   <geom type="sphere" size="0.001" mass="1" contype="0" conaffinity="0" pos="0 0 0.3"/>
+   {fingers}
+  </body>
+ </worldbody>
+ <actuator><position name="rise" joint="rise" kp="20000" kv="400"/>{springs}</actuator>
+</mujoco>"""
+FINGER = """<body name="{name}" pos="0 {y} 0" gravcomp="1"><joint name="{name}" type="slide" axis="0 {inwards} 0"/>
+  <geom name="{name}" type="capsule" size="{ridge} {half}" mass="{mass}" contype="2" conaffinity="1" condim="4"
+   priority="1" friction="{friction} {torsion} 0.0001" solref="-{skin} -{damping}" solimp="{d} {d} 0.001"/></body>"""
+TORSION, IMPEDANCE, FINGER_MASS = 0.003, 0.9, 0.05
+"""Friction against turning about the normal [m], the contact's impedance [1] (MuJoCo, solver parameters), mass [kg]."""
+FINEST = 2e-6
+"""How closely the lifting configuration is found [m]."""
+LOOSEST, GROWTH, TRIES = 5e-4, 1.25, 12
+"""Squeezes that are tried first [m], by what each is larger than the last [1], and how many."""
+SIDES = {"near": -1, "far": 1}
+
+
+@dataclass(frozen=True)
+class Grip:
+    """What lifts what."""
+
+    radius: float = 0.035
+    """Radius of the orange [m]."""
+    mass: float = 0.06
+    """Its mass [kg]: a hollow model."""
+    friction: float = 0.2
+    """Coulomb coefficient between skin and orange [1], the sensor file's."""
+    squeeze: float = 0.001
+    """How much farther than touching the middle of the orange each fingertip is sent [m]; the farther apart the
+    fingertips of the lifting configuration are, the less."""
+    stiffness: float = 3000.0
+    """Of a finger that holds its position [N/m]."""
+    skin: float = 3000.0
+    """Of the skin [N/m]."""
+    ridge: float = 0.008
+    """Radius of the ridge [m]: half the pad's width."""
+    half: float = 0.006
+    """Half the length of the ridge, which is vertical [m]."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The grip as plain data."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Lift:
+    """What became of it."""
+
+    held: bool
+    lowest: float
+    """Least rise of the orange during the hold [m]."""
+    time: np.ndarray
+    """Times [s], shape (n,)."""
+    orange: np.ndarray
+    """Its centre [m], shape (n, 3)."""
+    hand: np.ndarray
+    """Height of the hand [m], shape (n,)."""
+
+
+def lift(grip: Grip, lateral: float, vertical: float = 0.0) -> Lift:
+    """Return what becomes of an orange that lies beside the fingertips' middle.
+
+    Args:
+        grip: Hand and object.
+        lateral: How far it lies to +x [m].
+        vertical: How far its centre lies above the pads' middle [m].
+    """
+    model, data = _built(grip, vertical)
+    data.qpos[:3] = lateral, 0.0, vertical
+    orange, engine = model.body("orange").id, mujoco()
+    end = CLOSE + RISE + HOLD
+    moments = np.arange(0.0, end, STEP * 5)
+    path, hand = np.empty((len(moments), 3)), np.empty(len(moments))
+    for k, moment in enumerate(moments):
+        closing = min(moment / CLOSE, 1.0) * grip.squeeze
+        rise = float(np.clip((moment - CLOSE) / RISE, 0.0, 1.0))
+        hand[k] = HEIGHT * rise * rise * (3 - 2 * rise)
+        data.ctrl[:] = hand[k], closing, closing
+        engine.mj_step(model, data, 5)
+        path[k] = data.xpos[orange]
+    lowest = float((path[moments > end - HOLD, 2] - vertical).min())
+    return Lift(lowest > STAYS * HEIGHT, lowest, moments, path, hand)
+
+
+def lifting_grip(grip: Grip, lateral: float) -> Grip:
+    """Return the grip with the widest lifting configuration that still holds an orange so far off [m].
+
+    Raises:
+        UsageError: If none does.
+    """
+    tried = LOOSEST * GROWTH ** np.arange(TRIES)
+    high = next((s for s in tried.tolist() if lift(replace(grip, squeeze=s), lateral).held), None)
+    if high is None:
+        raise UsageError(
+            f"an orange of {grip.mass:g} kg, {1000 * lateral:g} mm off, friction {grip.friction:g}",
+            "one that the fingers can hold at all", "make it lighter, or the friction larger",
+        )  # fmt: skip
+    low = 0.0 if high == tried[0] else high / GROWTH
+    while high - low > FINEST:
+        middle = (low + high) / 2
+        low, high = (low, middle) if lift(replace(grip, squeeze=middle), lateral).held else (middle, high)
+    return replace(grip, squeeze=high)
+
+
+def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
+    reduced = FINGER_MASS * grip.mass / (FINGER_MASS + grip.mass)
+    rate = grip.skin * (1 - IMPEDANCE) / reduced
+    fingers = "".join(
+        FINGER.format(
+            name=name, y=side * (grip.radius + grip.ridge), inwards=-side, ridge=grip.ridge, half=grip.half,
+            mass=FINGER_MASS, friction=grip.friction, torsion=TORSION, skin=rate, damping=2 * np.sqrt(rate),
+            d=IMPEDANCE,
+        )
+        for name, side in SIDES.items()
+    )  # fmt: skip
+    critical = 2 * np.sqrt(grip.stiffness * FINGER_MASS)
+    springs = "".join(f'<position name="{n}" joint="{n}" kp="{grip.stiffness}" kv="{critical}"/>' for n in SIDES)
+    text = XML.format(
+        step=STEP, table=vertical - grip.radius, radius=grip.radius, mass=grip.mass, friction=grip.friction,
+        torsion=TORSION, fingers=fingers, springs=springs,
+    )  # fmt: skip
+    engine = mujoco()
+    model = engine.MjModel.from_xml_string(text)
+    return model, engine.MjData(model)

@@ -1,0 +1,117 @@
+"""The study from end to end, as a document (`schemas/grasp_study.schema.json`) and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata import provenance
+from tacdata.grasping.bias import bias
+from tacdata.grasping.centre import Maps
+from tacdata.grasping.lift import Grip, lift
+from tacdata.grasping.press_set import PressSet
+from tacdata.grasping.study import (
+    MARGIN,
+    OTHER_MARGINS,
+    PUBLISHED,
+    Interval,
+    Setup,
+    configured,
+    lifted,
+    rates,
+    trials,
+)  # fmt: skip
+from tacdata.grasping.touch import OrangeTouch
+from tacdata.grasping.trial import STRATEGIES
+from tacdata.sensor import Sensor
+
+FINENESS = 0.25
+"""How closely it is measured to where a lift holds [mm]."""
+
+
+def result(
+    setup: Setup, presses: PressSet, sensor: Sensor, maps: Maps, network: dict[str, Any], interval: Interval,
+    told: Callable[[int, int], None] = lambda done, of: None,
+) -> dict[str, Any]:  # fmt: skip
+    """Run a study.
+
+    Args:
+        setup: Hand, protocol and disorder; the lifting configuration is found here.
+        presses: The orange's presses.
+        sensor: The fingertip's sensor.
+        maps: The trained network.
+        network: Its identity.
+        interval: Successes and trials -> an interval of the proportion.
+        told: Is told how many trials are done, of how many.
+    """
+    touch, own = OrangeTouch(presses, sensor), configured(setup)
+    found = trials(own, touch, maps, told)
+    others = []
+    for margin in OTHER_MARGINS:
+        other = configured(setup, margin)
+        again = [replace(trial, held=lifted(trial, other.grip)) for trial in found]
+        others.append({"margin": margin, **_lifting(other.grip), "rates": rates(again, interval)})
+    parents = {"sensor": sensor.content_hash, "checkpoint": str(network["hash"]),
+               "presses": provenance.content_hash(presses.provenance["parents"])}  # fmt: skip
+    return {
+        "version": schemas.version("grasp_study"), "sensor": sensor.name, "network": network,
+        "setup": own.document, "lifting": {"margin": MARGIN, **_lifting(own.grip)}, "rates": rates(found, interval),
+        "published": PUBLISHED, "other_lifting": others,
+        "bias": bias(touch, presses, maps, setup.protocol.force, setup.protocol.band),
+        "trials": [trial.document for trial in found],
+        "provenance": provenance.stamp("tacdata grasp-study", parents, {"repeats": setup.repeats, "seed": setup.seed}),
+    }  # fmt: skip
+
+
+def _lifting(grip: Grip) -> dict[str, float]:
+    """Return the squeeze of a lifting configuration [mm], and to which offset it holds the undisturbed orange [mm]."""
+    held = 0.0
+    for offset in np.arange(0.0, 8.0, FINENESS).tolist():
+        if not lift(grip, offset / 1000).held:
+            break
+        held = offset
+    return {"squeeze": 1000 * grip.squeeze, "holds_to": held}
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """Return a study's result in words, the paper's figures beside it."""
+    said = [
+        f"{'':<13} {'held':>7}  {'Wilson 95 %':<14} {'paper':>6} | at the edge                   | moves where held"
+    ]
+    for name in STRATEGIES:
+        own, row = found["rates"][name], f"{name:<13}"
+        for part in ("overall", "edge"):
+            share, (held, of) = own[part], found["published"][part][name]
+            low, high = share["wilson_95"]
+            row += f" {share['held']:>3}/{share['of']:<3}  {f'{low:.0%} to {high:.0%}':<14} {held / of:>6.1%} |"
+        said.append(row + f" {_moves(own['adjustments'])}, edge {_moves(own['edge_adjustments'])}")
+    return [*said, *_bias_lines(found), *_lifting_lines(found)]
+
+
+def _moves(moves: dict[str, Any]) -> str:
+    return "none held" if moves["mean"] is None else f"{moves['mean']:.2f} +- {moves['sd']:.2f}"
+
+
+def _bias_lines(found: dict[str, Any]) -> list[str]:
+    own, band = found["bias"], found["setup"]["protocol"]["band"]
+    said = []
+    for name, words in (("raw_taxel", "taxels"), ("dense_depth", "network's map"), ("solved_map", "solved map")):
+        inside = own["toward_interior"][name].items()
+        off = ", ".join(f"{at} mm: {'none' if value is None else f'{value:+.2f}'}" for at, value in inside)
+        to = own["accepted_to"][name]
+        said.append(f"centre by {words}: too far inside at {off}; the {band:g} mm band accepts to {to:.2f} mm")
+    return said
+
+
+def _lifting_lines(found: dict[str, Any]) -> list[str]:
+    own = found["lifting"]
+    said = [f"the lift (fingertips {own['squeeze']:.2f} mm closer than touching) holds to {own['holds_to']:g} mm"]
+    for other in found["other_lifting"]:
+        shares = {name: other["rates"][name]["overall"] for name in STRATEGIES}
+        held = ", ".join(f"{name} {share['held']}/{share['of']}" for name, share in shares.items())
+        said.append(f"  one that holds to {other['holds_to']:g} mm: {held}")
+    return said

@@ -1,0 +1,168 @@
+"""Eight places, five repeats, three strategies (paper, Exp. 3): how often the orange is held, after how many moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from tacdata.grasping.centre import Maps
+from tacdata.grasping.lift import Grip, lift, lifting_grip
+from tacdata.grasping.touch import Fingertip, OrangeTouch, Spread
+from tacdata.grasping.trial import STRATEGIES, Approach, Protocol, approach, centre_of
+
+PLACES = (-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0)
+"""Where the orange is put beside the gripper's middle [mm]: evenly over the pad's 16 mm; Pos. 1 to 8."""
+EDGE = (1, 2, 7, 8)
+"""Positions that count as edge contact (paper)."""
+MARGIN = 0.5
+"""The lifting configuration is the widest that holds an orange this far beyond the band [mm]."""
+OTHER_MARGINS = (0.0, 1.0)
+"""Other lifting configurations for which the rates are given too [mm]."""
+PUBLISHED = {
+    "source": "paper, Exp. 3",
+    "overall": {"contact_only": [15, 40], "raw_taxel": [27, 40], "dense_depth": [35, 40]},
+    "edge": {"contact_only": [4, 20], "raw_taxel": [9, 20], "dense_depth": [17, 20]},
+    "adjustments": {"raw_taxel": [1.07, 1.36], "dense_depth": [2.14, 1.24]},
+    "edge_adjustments": {"raw_taxel": [2.56, 1.01], "dense_depth": [2.71, 1.21]},
+}
+"""What the paper reports: held and of how many; mean and standard deviation of adjustments where held."""
+
+Interval = Callable[[int, int], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Disorder:
+    """How one trial differs from the next."""
+
+    place: float = 0.5
+    """The orange lies up to so far from its place, sideways and in height [mm]."""
+    friction: float = 0.05
+    """Standard deviation of the friction [1]."""
+    mass: float = 0.02
+    """Standard deviation of the mass [1]."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything that decides a study but the network."""
+
+    protocol: Protocol = field(default_factory=Protocol)
+    grip: Grip = field(default_factory=Grip)
+    spread: Spread = field(default_factory=Spread)
+    disorder: Disorder = field(default_factory=Disorder)
+    repeats: int = 5
+    """Trials at each place."""
+    seed: int = 0
+    """Decides every draw."""
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The setup as plain data."""
+        return {
+            "places": list(PLACES), "edge": list(EDGE), **asdict(self), "grip": self.grip.document,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial, as it went."""
+
+    strategy: str
+    position: int
+    """1 to 8."""
+    repeat: int
+    friction: float
+    """Drawn [1]."""
+    mass: float
+    """Drawn [kg]."""
+    vertical: float
+    """Height of the orange's centre over the pads' middle [mm]."""
+    approach: Approach
+    held: bool
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The trial as plain data."""
+        way = self.approach
+        return {
+            "strategy": self.strategy, "position": self.position, "repeat": self.repeat, "held": self.held,
+            "adjustments": way.adjustments, "left_at": way.lateral, "stopped": way.stopped,
+            "estimates": list(way.estimates), "truths": list(way.truths),
+        }  # fmt: skip
+
+
+def trials(
+    setup: Setup, touch: OrangeTouch, maps: Maps, told: Callable[[int, int], None] = lambda done, of: None
+) -> list[Trial]:
+    """Run every trial; strategies meet the same oranges, fingertips and noise.
+
+    Args:
+        setup: The study; its grip is the lifting configuration.
+        touch: The skin's answer to the orange.
+        maps: The trained network.
+        told: Is told how many are done, of how many.
+    """
+    found: list[Trial] = []
+    total = len(STRATEGIES) * len(PLACES) * setup.repeats
+    for strategy in STRATEGIES:
+        centre = centre_of(strategy, touch.sensor, maps)
+        for position, place in enumerate(PLACES, 1):
+            for repeat in range(setup.repeats):
+                world = np.random.default_rng([setup.seed, position, repeat])
+                aside, up = world.uniform(-setup.disorder.place, setup.disorder.place, 2).tolist()
+                friction = setup.grip.friction * float(1 + setup.disorder.friction * world.standard_normal())
+                mass = setup.grip.mass * float(1 + setup.disorder.mass * world.standard_normal())
+                fingers = [
+                    Fingertip(touch, setup.spread, side, np.random.default_rng([setup.seed, position, repeat, k]))
+                    for k, side in enumerate((1, -1))
+                ]
+                way = approach(fingers, place + aside, up, centre, setup.protocol, touch.sensor.taxels.rate, world)
+                trial = Trial(strategy, position, repeat, friction, mass, up, way, False)
+                found.append(replace(trial, held=lifted(trial, setup.grip)))
+                told(len(found), total)
+    return found
+
+
+def lifted(trial: Trial, grip: Grip) -> bool:
+    """Return whether a lifting configuration holds what a trial took hold of."""
+    if trial.approach.stopped:
+        return False
+    own = replace(grip, friction=trial.friction, mass=trial.mass)
+    return lift(own, trial.approach.lateral / 1000, trial.vertical / 1000).held
+
+
+def configured(setup: Setup, margin: float = MARGIN) -> Setup:
+    """Return the setup with the lifting configuration that holds an orange ``margin`` [mm] beyond the band."""
+    return replace(setup, grip=lifting_grip(setup.grip, (setup.protocol.band + margin) / 1000))
+
+
+def rates(found: list[Trial], interval: Interval) -> dict[str, Any]:
+    """Return success and adjustments of every strategy: overall, at the edge and at each position."""
+    return {name: _rates([t for t in found if t.strategy == name], interval) for name in STRATEGIES}
+
+
+def _rates(found: list[Trial], interval: Interval) -> dict[str, Any]:
+    edge = [t for t in found if t.position in EDGE]
+    positions = sorted({t.position for t in found})
+    return {
+        "overall": _share(found, interval), "edge": _share(edge, interval),
+        "by_position": {str(p): _share([t for t in found if t.position == p], interval) for p in positions},
+        "adjustments": _moves(found), "edge_adjustments": _moves(edge),
+        "safety_stops": sum("safety" in t.approach.stopped for t in found),
+    }  # fmt: skip
+
+
+def _share(found: list[Trial], interval: Interval) -> dict[str, Any]:
+    held = sum(t.held for t in found)
+    return {"held": held, "of": len(found), "wilson_95": list(interval(held, len(found)))}
+
+
+def _moves(found: list[Trial]) -> dict[str, Any]:
+    """Return mean and standard deviation of adjustments where the orange was held, as the paper counts them."""
+    moves = [t.approach.adjustments for t in found if t.held]
+    if not moves:
+        return {"mean": None, "sd": None}
+    return {"mean": float(np.mean(moves)), "sd": float(np.std(moves, ddof=1)) if len(moves) > 1 else 0.0}
