@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import spline_filter
+from scipy.sparse import csr_matrix
 
 from tacdata.chain.response import Response
 from tacdata.errors import FormatError, UsageError
@@ -149,14 +150,12 @@ def _lagrange(t: np.ndarray) -> np.ndarray:
 def _cubic(table: np.ndarray, place: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Return what a padded array of coefficients or nodes says at places [nodes], shape (n, channels)."""
     node = np.floor(place).astype(np.int64)
-    weights = of(place - node)
+    weights = of(place - node).transpose(1, 0, 2)  # n, 4, axes
     _, b, c, channels = table.shape
-    flat = table.reshape(-1, channels)
-    result = np.zeros((len(place), channels))
-    for i in range(4):
-        for j in range(4):
-            plane = weights[i, :, 0] * weights[j, :, 1]
-            for k in range(4):
-                at = ((node[:, 0] + i) * b + node[:, 1] + j) * c + node[:, 2] + k
-                result += (plane * weights[k, :, 2])[:, None] * flat[at]
-    return result
+    x, y, z = (node[:, axis, None] + np.arange(4) for axis in range(3))
+    at = ((x[:, :, None, None] * b + y[:, None, :, None]) * c + z[:, None, None, :]).reshape(-1)
+    each = weights[:, :, None, None, 0] * weights[:, None, :, None, 1] * weights[:, None, None, :, 2]
+    rows = np.arange(len(place) + 1) * 64
+    return csr_matrix((each.reshape(-1), at, rows), shape=(len(place), table[..., 0].size)) @ table.reshape(
+        -1, channels
+    )
