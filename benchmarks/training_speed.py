@@ -1,12 +1,12 @@
 """How fast windows reach the trainer, a training step runs, and one frame is inferred.
 
     python benchmarks/training_speed.py [--dataset FOLDER] [--network paper] [--device cpu]
-                                        [--threads 1] [--json FILE]
+                                        [--threads 1] [--precision bfloat16] [--compile] [--batch 32] [--json FILE]
 
-Without a dataset the frames are random numbers of the paper's sensor. Windows are gathered in random order
-with their label maps, as in training; steps are those of `tacdata train`, timed from the tenth on; inference
-takes one frame at a time on one CPU thread. Each figure is the best of three runs. Nothing else should run on
-the machine.
+With a dataset, training from its memory maps is compared with training from copies in memory. Without one the frames
+are random numbers of the paper's sensor. Windows are gathered in random order with their label maps, as in training;
+steps are those of `tacdata train`, timed from the tenth on; inference takes one frame at a time on one CPU thread.
+Each figure is the best of three runs. Nothing else should run on the machine.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import platform
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -71,7 +72,13 @@ def windows_per_second(frames: Frames, device: torch.device, batch: int) -> floa
     return len(order) / best(once)
 
 
-def steps_per_second(frames: Frames, network: str, device: str, threads: int | None, folder: Path) -> float:
+def in_memory(frames: Frames) -> Frames:
+    """Return the same frames with every column copied into memory."""
+    columns = ("taxels", "depth", "tip", "phase", "time_ns", "valid")
+    return replace(frames, **{name: np.array(getattr(frames, name)) for name in columns})
+
+
+def steps_per_second(frames: Frames, given: argparse.Namespace, device: str, folder: Path) -> float:
     """Return training steps per second, the first ten not counted; leaves the last run in ``folder``."""
     number = 0
 
@@ -86,7 +93,8 @@ def steps_per_second(frames: Frames, network: str, device: str, threads: int | N
                     torch.cuda.synchronize()
                 times.append(time.perf_counter())
 
-        train(frames, Settings(network=network, epochs=1), folder / str(number), device, False, threads, note)
+        recipe = Settings(network=given.network, epochs=1, batch_size=given.batch, precision=given.precision)
+        train(frames, recipe, folder / str(number), device, False, given.threads, note, given.compile)
         return (times[-1] - times[9]) / (len(times) - 10)
 
     return 1.0 / best(once)
@@ -99,13 +107,14 @@ def best(measure: Callable[[], float]) -> float:
 
 def main() -> None:
     """Measure, print one JSON line a figure, and write them where asked."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dataset", type=Path)
     parser.add_argument("--network", default="paper")
     parser.add_argument("--device", default="auto")
     parser.add_argument("--threads", type=int)
+    parser.add_argument("--precision", default="float32")
+    parser.add_argument("--compile", action="store_true")
+    parser.add_argument("--batch", type=int, default=32)
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     device = choose_device(given.device)
@@ -117,13 +126,19 @@ def main() -> None:
         "code_version": provenance.code_version(),
         "frames": len(frames.taxels),
         "network": given.network,
+        "precision": given.precision,
+        "compiled": given.compile,
     }
     with tempfile.TemporaryDirectory() as folder, reproducible(given.threads):
         figures["threads"] = torch.get_num_threads()
         for batch in (32, 1024):
             figures[f"windows_per_s_batch_{batch}"] = round(windows_per_second(frames, device, batch))
-        speed = steps_per_second(frames, given.network, device.type, given.threads, Path(folder))
-        figures["train_steps_per_s_batch_32"] = round(speed, 2)
+        speed = steps_per_second(frames, given, device.type, Path(folder))
+        figures[f"train_steps_per_s_batch_{given.batch}"] = round(speed, 2)
+        if given.dataset:
+            held = steps_per_second(in_memory(frames), given, device.type, Path(folder) / "memory")
+            figures["train_steps_per_s_from_memory"] = round(held, 2)
+            figures["maps_over_memory"] = round(speed / held, 3)
         network = load(Path(folder) / "1").network
         windows = Windows(frames, network.offsets)
         pace = best(lambda: milliseconds_per_frame(network, windows))

@@ -29,9 +29,7 @@ def predictions(frames: Frames, split: Split, wanted: np.ndarray) -> dict[str, n
     linear = (frames.taxels[wanted] - offset) @ slope + mean
     shape = (len(wanted), *frames.sensor.map.shape)
     maps = {"mean": np.broadcast_to(mean, (len(wanted), len(mean))), "linear": linear}
-    return {
-        name: np.clip(values, 0.0, top).reshape(shape).astype(np.float32) for name, values in maps.items()
-    }
+    return {name: np.clip(values, 0.0, top).reshape(shape).astype(np.float32) for name, values in maps.items()}
 
 
 def _moments(frames: Frames, learned: np.ndarray, signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -39,11 +37,7 @@ def _moments(frames: Frames, learned: np.ndarray, signals: np.ndarray) -> tuple[
     pixels = int(np.prod(frames.sensor.map.shape))
     total, cross = np.zeros(pixels), np.zeros((signals.shape[1], pixels))
     for start in range(0, len(learned), 4096):
-        part = (
-            frames.depth[learned[start : start + 4096]]
-            .reshape(-1, pixels)
-            .clip(0.0, frames.sensor.map.depth_max)
-        )
+        part = frames.depth[learned[start : start + 4096]].reshape(-1, pixels).clip(0.0, frames.sensor.map.depth_max)
         total += part.sum(axis=0, dtype=np.float64)
         cross += signals[start : start + 4096].T @ part
     return total / len(learned), cross

@@ -73,9 +73,7 @@ class Checkpoint:
         )
 
 
-def save(
-    path: Path, network: Network, optimizer: torch.optim.Optimizer | None, document: dict[str, Any]
-) -> None:
+def save(path: Path, network: Network, optimizer: torch.optim.Optimizer | None, document: dict[str, Any]) -> None:
     """Write a checkpoint; a crash leaves the old file or the new one."""
     documents.check(document, "checkpoint", str(path))
     tensors = {f"network.{k}": v.detach().cpu().contiguous() for k, v in network.state_dict().items()}

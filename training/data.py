@@ -8,6 +8,7 @@ import numpy as np
 
 from tacdata.dataset import Dataset, read_dataset
 from tacdata.dataset import features as key
+from tacdata.dataset.flags import flagged_episodes
 from tacdata.dataset.reader import DatasetEpisode
 from training.frames import EpisodeSpan, Frames
 
@@ -38,7 +39,7 @@ def frames_of(dataset: Dataset) -> Frames:
         tip=dataset[key.TIP],
         phase=dataset[key.PHASE],
         time_ns=dataset[key.TIME],
-        valid=dataset[key.VALID],
+        valid=_valid(dataset),
         episodes=tuple(_span(episode, dataset[key.TIP]) for episode in dataset.episodes),
         sensor=dataset.sensor,
         dataset_hash=dataset.content_hash,
@@ -47,13 +48,25 @@ def frames_of(dataset: Dataset) -> Frames:
     )
 
 
+def _valid(dataset: Dataset) -> np.ndarray:
+    """Return which frames may be learned from and scored: none of an episode that a person has set aside."""
+    valid, flagged = dataset[key.VALID], flagged_episodes(dataset)
+    if flagged:
+        valid = np.array(valid)
+        for episode in dataset.episodes:
+            if episode.index in flagged:
+                valid[episode.start : episode.stop] = False
+    return valid
+
+
 def _span(episode: DatasetEpisode, tip: np.ndarray) -> EpisodeSpan:
-    press = episode.press
-    if press:
-        name, shape = press.indenter_name, press.indenter.shape
-        x, y, depth = press.x, press.y, press.depth
-    else:
+    press, record = episode.press, episode.record
+    specimen = (record.specimen or record.rig) if record else ""
+    if press is None:
         path = tip[episode.start : episode.stop]
-        name, shape = UNKNOWN, UNKNOWN
         x, y, depth = (float(v) for v in path[np.argmax(path[:, 2])])
-    return EpisodeSpan(episode.index, episode.start, episode.stop, name, shape, x, y, depth)
+        return EpisodeSpan(episode.index, episode.start, episode.stop, UNKNOWN, UNKNOWN, x, y, depth, None, specimen)
+    return EpisodeSpan(
+        episode.index, episode.start, episode.stop, press.indenter_name, press.indenter.shape,
+        press.x, press.y, press.depth, press.speed, specimen, press.purpose,
+    )  # fmt: skip

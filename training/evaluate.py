@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -10,16 +11,18 @@ import numpy as np
 
 import schemas
 from tacdata import provenance
-from tacdata.recording.episode import PHASES
-from training import baselines, metrics, physical, published, wilson
+from training import baselines, metrics, physical, published, spread, wilson
 from training.checkpoint import Checkpoint
 from training.compute import choose_device, reproducible
 from training.frames import EpisodeSpan, Frames
 from training.inference import milliseconds_per_frame, predict
 from training.metrics import FrameScores
 from training.physical import PressScore
+from training.trials import at_full_depth
 from training.windows import Windows
 
+DEPTHS = (0.2, 0.3, 0.5, 0.8)
+"""Borders of the largest labelled depth by which frames are told apart [mm]."""
 METRICS = {
     "pixel_rmse": ("Depth", "Pixel-wise RMSE", "mm"),
     "peak_error": ("Depth", "Peak Depth Error", "mm"),
@@ -108,6 +111,7 @@ def evaluate(
         **_agreement(episodes),
         "baselines": _baselines(trained, frames, episodes) if own else {},
         **_prescribed(episodes, frames),
+        **_uncertainty(trained, identity, episodes, frames),
         "inference_ms_per_frame": pace,
         "provenance": provenance.stamp(
             "training.evaluate",
@@ -121,19 +125,14 @@ def evaluate(
 def _result(frames: Frames, span: EpisodeSpan, depth: np.ndarray) -> EpisodeResult:
     here = slice(span.start, span.stop)
     label = np.clip(frames.depth[here], 0.0, frames.sensor.map.depth_max)
-    valid, tip = frames.valid[here], frames.tip[here, 2]
-    full = valid & (frames.phase[here] == PHASES.index("hold"))
-    if not full.any():
-        full = valid & (tip >= tip.max() - 0.01)
-    return EpisodeResult(span, depth, label, valid, metrics.score_frames(depth, label), full)
+    scores = metrics.score_frames(depth, label)
+    return EpisodeResult(span, depth, label, frames.valid[here], scores, at_full_depth(frames, span))
 
 
 def _identity(
     trained: Checkpoint, identity: str, frames: Frames, part: str, episodes: tuple[EpisodeResult, ...]
 ) -> dict[str, Any]:
-    rig = {True: "a virtual rig", False: "a real rig", None: "a rig that the dataset does not name"}[
-        frames.virtual
-    ]
+    rig = {True: "a virtual rig", False: "a real rig", None: "a rig that the dataset does not name"}[frames.virtual]
     first = {
         "test": "Scores on test episodes that the network never saw",
         "other dataset": "Scores on every episode of a dataset that the network was not trained on",
@@ -171,9 +170,7 @@ def _agreement(episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
     for name in names:
         mine = [e for e in episodes if e.span.indenter == name]
         part = _joined([e.scores.where(e.valid & e.scores.labelled) for e in mine])
-        by_indenter.append(
-            {"indenter": name, "episodes": len(mine), "frames": len(part.iou), "metrics": _table(part)}
-        )
+        by_indenter.append({"indenter": name, "episodes": len(mine), "frames": len(part.iou), "metrics": _table(part)})
     missed = int((~touching.predicted).sum())
     apart = ~scores.labelled
     return {
@@ -186,6 +183,7 @@ def _agreement(episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
         "contact_frames": _table(touching),
         "all_frames": _table(scores),
         "indenters": by_indenter,
+        "depths": _by_depth(episodes),
         "missed_contact": _proportion(
             "frames in contact whose predicted map has no pixel above the contact threshold",
             missed,
@@ -197,6 +195,20 @@ def _agreement(episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
             int(apart.sum()),
         ),
     }
+
+
+def _by_depth(episodes: tuple[EpisodeResult, ...]) -> list[dict[str, Any]]:
+    """Return the table by the largest labelled depth of a frame: where contact only begins, regions are few pixels."""
+    touching = [e.valid & e.scores.labelled for e in episodes]
+    scores = _joined([e.scores.where(chosen) for e, chosen in zip(episodes, touching, strict=True)])
+    deepest = np.concatenate([e.label[chosen].max(axis=(1, 2)) for e, chosen in zip(episodes, touching, strict=True)])
+    rows = []
+    for low, high in itertools.pairwise((metrics.CONTACT_THRESHOLD, *DEPTHS, np.inf)):
+        part = scores.where((deepest > low) & (deepest <= high))
+        if len(part.iou):
+            upper = None if high == np.inf else high
+            rows.append({"above_mm": low, "up_to_mm": upper, "frames": len(part.iou), "metrics": _table(part)})
+    return rows
 
 
 def _baselines(trained: Checkpoint, frames: Frames, episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
@@ -236,6 +248,18 @@ def _prescribed(episodes: tuple[EpisodeResult, ...], frames: Frames) -> dict[str
     }
 
 
+def _uncertainty(
+    trained: Checkpoint, identity: str, episodes: tuple[EpisodeResult, ...], frames: Frames
+) -> dict[str, Any]:
+    """Return what share of errors each interval holds; nothing if the run was not calibrated."""
+    known = spread.read(trained.path.parent, identity)
+    if known is None:
+        return {}
+    maps, labels = ([getattr(e, name)[e.valid] for e in episodes] for name in ("depth", "label"))
+    levels = spread.reliability(known, maps, labels, frames.sensor.map.pixel_pitch)
+    return {"uncertainty": {"definition": spread.DEFINITION, "levels": levels}}
+
+
 def _press_table(scores: list[PressScore]) -> dict[str, Any]:
     """Summarize presses; a truncated reference region counts in ``position_all`` alone, a lost one never."""
 
@@ -245,9 +269,7 @@ def _press_table(scores: list[PressScore]) -> dict[str, Any]:
     with_region = [s for s in scores if s.reference_region]
     return {
         "centre_depth": asdict(metrics.summarize(values([s.centre_depth_error for s in scores]))),
-        "position": asdict(
-            metrics.summarize(values([s.position_error for s in with_region if not s.truncated]))
-        ),
+        "position": asdict(metrics.summarize(values([s.position_error for s in with_region if not s.truncated]))),
         "position_all": asdict(metrics.summarize(values([s.position_error for s in with_region]))),
     }
 

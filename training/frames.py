@@ -30,6 +30,12 @@ class EpisodeSpan:
     """Nominal contact centre [mm, sensor frame]."""
     depth: float
     """Largest nominal depth of the indenter's lowest point [mm]."""
+    speed: float | None = None
+    """Loading speed [mm/s]; None if the dataset does not say."""
+    specimen: str = ""
+    """Which of several sensors of one design: the name in its sensor file, else the rig's; empty if not known."""
+    purpose: str = ""
+    """What the press is for, in the plan's words."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +72,8 @@ class Frames:
             FormatError: If shapes, the sensor and each other disagree, or a value is not finite.
         """
         n = len(self.taxels)
-        self._check_shape(
-            "taxel signals", self.taxels, (n, self.sensor.taxels.count), "a channel is missing or added"
-        )
-        self._check_shape(
-            "label maps", self.depth, (n, *self.sensor.map.shape), "the map is of another sensor"
-        )
+        self._check_shape("taxel signals", self.taxels, (n, self.sensor.taxels.count), "a channel is missing or added")
+        self._check_shape("label maps", self.depth, (n, *self.sensor.map.shape), "the map is of another sensor")
         self._check_shape("nominal tip", self.tip, (n, 3), "the tip column is damaged")
         self._check_shape("phases", self.phase, (n,), "the phase column is damaged")
         self._check_shape("times", self.time_ns, (n,), "the time column is damaged")
@@ -80,9 +82,7 @@ class Frames:
             0,
             *(e.stop for e in self.episodes[:-1]),
         ]:
-            raise FormatError(
-                f"{self.origin}: episodes do not follow each other", "gapless spans", "pack it again"
-            )
+            raise FormatError(f"{self.origin}: episodes do not follow each other", "gapless spans", "pack it again")
         if self.episodes[-1].stop != n or any(e.stop <= e.start for e in self.episodes):
             raise FormatError(
                 f"{self.origin}: {n} frames, episodes end at {self.episodes[-1].stop}",

@@ -62,9 +62,7 @@ class Summary:
     """Frames that do not."""
 
 
-def score_frames(
-    prediction: np.ndarray, label: np.ndarray, threshold: float = CONTACT_THRESHOLD
-) -> FrameScores:
+def score_frames(prediction: np.ndarray, label: np.ndarray, threshold: float = CONTACT_THRESHOLD) -> FrameScores:
     """Compare depth maps [mm], both of shape (n, pixels_x, pixels_y).
 
     Args:
@@ -117,6 +115,4 @@ def summarize(values: np.ndarray) -> Summary:
     if not len(kept):
         return Summary(None, None, None, None, 0, left_out)
     sd = float(kept.std(ddof=1)) if len(kept) > 1 else None
-    return Summary(
-        float(np.median(kept)), float(np.percentile(kept, 90)), float(kept.mean()), sd, len(kept), left_out
-    )
+    return Summary(float(np.median(kept)), float(np.percentile(kept, 90)), float(kept.mean()), sd, len(kept), left_out)

@@ -92,9 +92,7 @@ def read_prediction(path: Path) -> Prediction:
         FormatError: If it is damaged, no prediction file, or of another major format version.
     """
     if not path.is_file():
-        raise UsageError(
-            f"no prediction file {path}", "a file that `tacdata evaluate` wrote", "run `tacdata evaluate`"
-        )
+        raise UsageError(f"no prediction file {path}", "a file that `tacdata evaluate` wrote", "run `tacdata evaluate`")
     try:
         table = pq.read_table(path, page_checksum_verification=True)
         header = json.loads((table.schema.metadata or {})[HEADER])
@@ -111,7 +109,5 @@ def read_prediction(path: Path) -> Prediction:
         time_ns = table.column("time_ns").to_numpy().reshape(shape[0])
     except (KeyError, ValueError, AttributeError, pa.ArrowException) as error:
         raise FormatError(f"{path}: {error}", "columns as its header says", REMEDY) from None
-    named = {
-        k: header[k] for k in ("episode", "part", "checkpoint", "network", "dataset", "sensor", "provenance")
-    }
+    named = {k: header[k] for k in ("episode", "part", "checkpoint", "network", "dataset", "sensor", "provenance")}
     return Prediction(time_ns=time_ns, depth=depth, **named)

@@ -24,3 +24,26 @@ LABELS = {
     "position_all": {"mean": 0.279, "sd": 0.201, "count": 40},
 }
 """Labels against the prescribed contact, region above 0.4 mm [mm]."""
+
+LABEL_DEPTH = {"mean": 0.110, "sd": 0.016, "count": 78}
+"""Centre depth of the labels over the depth trials [mm]."""
+
+LABEL_POSITION = {
+    0.3: {"all": {"mean": 0.338, "sd": 0.227, "count": 40}},
+    0.4: {"all": {"mean": 0.279, "sd": 0.201, "count": 40}, "not_truncated": {"mean": 0.247, "sd": 0.159, "count": 37}},
+    0.5: {"all": {"mean": 0.265, "sd": 0.186, "count": 40}},
+}
+"""Position of the labels by threshold [mm]; medians and 95th percentiles are not printed."""
+
+WEARING = {"lowest": 0.827, "highest": 0.904, "mean": 0.861, "sd": 0.022, "participants": 12, "trials": 57}
+"""Centroid-aligned IoU of a triangular indenter: participants' means, and their mean and deviation [1]."""
+
+SUCCESS = {
+    "contact only": {"all": (15, 40), "edge": (4, 20), "adjustments": None},
+    "raw taxels": {"all": (27, 40), "edge": (9, 20), "adjustments": (1.07, 1.36), "adjustments_edge": (2.56, 1.01)},
+    "dense depth": {"all": (35, 40), "edge": (17, 20), "adjustments": (2.14, 1.24), "adjustments_edge": (2.71, 1.21)},
+}
+"""Exp. 3: successes of trials; adjustments of successful trials, mean and deviation."""
+
+REPLAY = {"apple": 0.95, "mango": 1.00, "peach": 0.80, "fruit, overall": 0.9167, "whiteboard": 0.90}
+"""Exp. 2 with compensation: success rates [1]; without it 0. The paper prints no counts."""

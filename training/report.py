@@ -44,9 +44,7 @@ class Places:
 def places(run: Path, out: Path | None) -> Places:
     """Return where a run's evaluation goes: RUN/scores and RUN/predictions, or OUT and OUT/predictions."""
     folder = run if run.is_dir() else run.parent
-    return (
-        Places(folder / "scores", folder / "predictions") if out is None else Places(out, out / "predictions")
-    )
+    return Places(folder / "scores", folder / "predictions") if out is None else Places(out, out / "predictions")
 
 
 def write(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,6 +26,16 @@ def draw(path: Path, evaluation: Evaluation, frames: Frames) -> None:
         _draw_cases(figure.add_subfigure(halves[1]), cases, frames)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
+
+
+def draw_cases(path: Path | BinaryIO, evaluation: Evaluation, frames: Frames) -> bool:
+    """Write best, median and worst press alone as PNG; False, and nothing written, if no press touches."""
+    cases = _cases(evaluation.episodes)
+    if cases:
+        figure = Figure(figsize=(12.5, 2.6 * len(cases)), dpi=90, layout="constrained")
+        _draw_cases(figure, cases, frames)
+        figure.savefig(path, format="png")
+    return bool(cases)
 
 
 def _cases(episodes: tuple[EpisodeResult, ...]) -> list[tuple[str, EpisodeResult, int, float]]:

@@ -47,12 +47,17 @@ def markdown(document: dict[str, Any]) -> str:
         "",
         *_indenters(document["indenters"]),
         "",
+        "## By the largest labelled depth, frames in contact (mean)",
+        "",
+        *_depths(document.get("depths", [])),
+        "",
         "## Against the prescribed contact, one value a press at full depth (mean ± SD)",
         "",
         *_prescribed(document["prescribed"]),
         "",
         *_proportion("Success", document["success"]),
         "",
+        *_reliability(document),
         f"Checkpoint `{document['checkpoint']['hash'][:12]}`, dataset `{document['dataset']['hash'][:12]}`, "
         f"sensor {document['sensor']['name']} `{document['sensor']['hash'][:12]}`, "
         f"code {document['provenance']['code_version']}.",
@@ -79,7 +84,7 @@ def title(metric: str) -> str:
 def _agreement(table: dict[str, Any], with_paper: bool) -> list[str]:
     columns = ["Category", "Metric", "Median", "P90", "Mean ± SD", "Left out"]
     paper = ["Paper: median", "P90", "Mean ± SD"] if with_paper else []
-    lines = [_row(columns + paper), _rule(len(columns + paper), 2)]
+    lines = [row(columns + paper), rule(len(columns + paper), 2)]
     for metric, (category, _, _) in METRICS.items():
         ours, theirs = table[metric], TABLE_1[metric]
         cells = [
@@ -91,7 +96,7 @@ def _agreement(table: dict[str, Any], with_paper: bool) -> list[str]:
             f"{ours['left_out']} of {ours['left_out'] + ours['count']}",
         ]
         published = [number(theirs["median"]), number(theirs["p90"]), spread(theirs)] if with_paper else []
-        lines.append(_row(cells + published))
+        lines.append(row(cells + published))
     return lines
 
 
@@ -101,10 +106,10 @@ def _baselines(document: dict[str, Any]) -> list[str]:
     lines = [
         "## Beside predictors without a network, frames in contact (median)",
         "",
-        _row(heads),
-        _rule(len(heads), 1),
+        row(heads),
+        rule(len(heads), 1),
     ]
-    lines += [_row([name, *(number(table[m]["median"]) for m in METRICS)]) for name, table in rows.items()]
+    lines += [row([name, *(number(table[m]["median"]) for m in METRICS)]) for name, table in rows.items()]
     return [
         *lines,
         "",
@@ -113,14 +118,39 @@ def _baselines(document: dict[str, Any]) -> list[str]:
     ]
 
 
-def _indenters(rows: list[dict[str, Any]]) -> list[str]:
+def _reliability(document: dict[str, Any]) -> list[str]:
+    known = document.get("uncertainty")
+    if known is None:
+        return []
     lines = [
-        _row(["Indenter", "Episodes", "Frames", *(title(m) for m in METRICS)]),
-        _rule(3 + len(METRICS), 1),
+        "## Reliability of the pixels' intervals",
+        "",
+        row(["Should lie inside (%)", "Does (%)", "Mean width (mm)"]),
     ]
-    for row in rows:
-        values = [number(row["metrics"][m]["median"]) for m in METRICS]
-        lines.append(_row([row["indenter"], str(row["episodes"]), str(row["frames"]), *values]))
+    lines.append(rule(3, 0))
+    for entry in known["levels"]:
+        lines.append(
+            row([f"{100 * entry['level']:.0f}", f"{100 * entry['inside']:.1f}", number(entry["mean_width_mm"])])
+        )
+    return [*lines, "", f"Counted is the {known['definition']}.", ""]
+
+
+def _indenters(rows: list[dict[str, Any]]) -> list[str]:
+    heads = ["Indenter", "Episodes", "Frames", *(title(m) for m in METRICS)]
+    lines = [row(heads), rule(len(heads), 1)]
+    for entry in rows:
+        values = [number(entry["metrics"][m]["median"]) for m in METRICS]
+        lines.append(row([entry["indenter"], str(entry["episodes"]), str(entry["frames"]), *values]))
+    return lines
+
+
+def _depths(rows: list[dict[str, Any]]) -> list[str]:
+    heads = ["Deepest pixel (mm)", "Frames", *(title(m) for m in METRICS)]
+    lines = [row(heads), rule(len(heads), 1)]
+    for entry in rows:
+        upper = f" to {entry['up_to_mm']:g}" if entry["up_to_mm"] is not None else " and deeper"
+        values = [number(entry["metrics"][m]["mean"]) for m in METRICS]
+        lines.append(row([f"{entry['above_mm']:g}{upper}", str(entry["frames"]), *values]))
     return lines
 
 
@@ -131,13 +161,13 @@ def _prescribed(table: dict[str, Any]) -> list[str]:
         "position_all": "Position of the region's centroid, all presses (mm)",
     }
     heads = ["", "Prediction", "n", "Paper", "n", "Label", "n", "Paper", "n"]
-    lines = [_row(heads), _rule(len(heads), 1)]
+    lines = [row(heads), rule(len(heads), 1)]
     for key, name in titles.items():
         cells = [name]
         for source in ("prediction", "label"):
             ours, paper = table[source][key], table[source]["paper"][key]
             cells += [spread(ours), _defined(ours), spread(paper), str(paper["count"])]
-        lines.append(_row(cells))
+        lines.append(row(cells))
     return lines
 
 
@@ -156,9 +186,11 @@ def _proportion(name: str, entry: dict[str, Any]) -> list[str]:
     ]
 
 
-def _row(cells: list[str]) -> str:
+def row(cells: list[str]) -> str:
+    """Return a line of a Markdown table."""
     return "| " + " | ".join(cells) + " |"
 
 
-def _rule(columns: int, left: int) -> str:
+def rule(columns: int, left: int) -> str:
+    """Return the line below a table's head; the first ``left`` columns are aligned left, the others right."""
     return "|" + "|".join([" --- "] * left + [" ---: "] * (columns - left)) + "|"

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
+from math import cos, pi
 from typing import Any
 
 from tacdata.errors import UsageError
 from training.loss import WeightedLoss
+
+SCHEDULES = ("constant", "cosine")
+PRECISIONS = ("float32", "bfloat16")
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,16 @@ class Settings:
     """AdamW's decoupled weight decay [1]."""
     loss: WeightedLoss = field(default_factory=WeightedLoss)
     """Weights of the training loss."""
+    schedule: str = "constant"
+    """Course of the learning rate over the epochs: "constant", or "cosine" down to a fiftieth."""
+    mirror: bool = False
+    """Mirror half of the frames about x and half about y, signals and labels alike: taxels and map are symmetric."""
+    gain_jitter: float = 0.0
+    """Standard deviation of a factor drawn for each channel of each frame [1]: other specimens' gains."""
+    idle_share: float = 1.0
+    """Share of the frames without contact in their label that an epoch takes, drawn anew [1]; the others all count."""
+    precision: str = "float32"
+    """Arithmetic of the forward pass while training: "float32" or "bfloat16"; weights are float32 in both."""
 
     def __post_init__(self) -> None:
         """Refuse settings that cannot train.
@@ -46,11 +60,47 @@ class Settings:
             value = getattr(self, name)
             if not (0 < value < 1 or (value == 0 and not positive)):
                 raise UsageError(f"{name} = {value}", "a number between 0 and 1", f"change {name}")
+        for name, allowed in (("schedule", SCHEDULES), ("precision", PRECISIONS)):
+            if getattr(self, name) not in allowed:
+                raise UsageError(f"{name} = {getattr(self, name)!r}", ", ".join(allowed), f"change --{name}")
+        if not 0.0 <= self.idle_share <= 1.0:
+            raise UsageError(f"idle_share = {self.idle_share}", "0 to 1", "change --idle-share")
+        if not 0.0 <= self.gain_jitter < 1.0:
+            raise UsageError(f"gain_jitter = {self.gain_jitter}", "0 or more, less than 1", "change --gain-jitter")
+
+    def rate_at(self, epoch: int) -> float:
+        """Return the learning rate of an epoch, counted from 1."""
+        if self.schedule == "constant":
+            return self.learning_rate
+        done = (epoch - 1) / max(1, self.epochs - 1)
+        return self.learning_rate * (0.02 + 0.98 * 0.5 * (1.0 + cos(pi * done)))
 
     @property
     def document(self) -> dict[str, Any]:
         """The settings as plain data (JSON types)."""
         return asdict(self)
+
+    @property
+    def title(self) -> str:
+        """The network, and what the recipe changes of the paper's, in words."""
+        paper = Settings()
+        changed = [f"{k} {v}" for k, v in self.arguments.items()]
+        names = (
+            "batch_size",
+            "learning_rate",
+            "weight_decay",
+            "schedule",
+            "mirror",
+            "gain_jitter",
+            "idle_share",
+            "epochs",
+            "loss",
+        )
+        for name in names:
+            value = getattr(self, name)
+            if value != getattr(paper, name):
+                changed.append(name if value is True else f"{name.replace('_', ' ')} {value}")
+        return self.network + (f" ({', '.join(changed)})" if changed else "")
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Settings:

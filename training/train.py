@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import torch
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import TacdataError, UsageError
-from training import checkpoint, metrics
+from training import checkpoint, metrics, spread
 from training.compute import choose_device, reproducible
 from training.frames import Frames
 from training.inference import predict
@@ -24,6 +25,7 @@ from training.loss import normalized
 from training.networks.network import Network, create
 from training.settings import Settings
 from training.splits.split import Split, divide
+from training.variation import Variation
 from training.windows import Windows
 
 METRICS = "metrics.jsonl"
@@ -55,6 +57,12 @@ class _Run:
     """The checkpoint's document as far as it is known; epoch, best and history grow."""
     epoch: int = 0
     """Epochs done."""
+    forward: Callable[[torch.Tensor], torch.Tensor] = field(init=False)
+    """The network, or what the compiler made of it."""
+
+    def __post_init__(self) -> None:
+        """Take the network as it is."""
+        self.forward = self.network
 
 
 def train(
@@ -65,6 +73,7 @@ def train(
     resume: bool = False,
     threads: int | None = None,
     listener: Callable[[Progress], None] = lambda progress: None,
+    compiled: bool = False,
 ) -> checkpoint.Checkpoint:
     """Train a network and write ``out``: best.safetensors, last.safetensors, metrics.jsonl.
 
@@ -78,6 +87,7 @@ def train(
         resume: Go on from ``out``'s last epoch; settings must be the same except for the number of epochs.
         threads: CPU threads; by default one a core, at most `compute.THREADS`; others may change last bits.
         listener: Called after every step and every epoch.
+        compiled: Let torch compile the network first; pays off on cards, and changes last bits.
 
     Returns:
         The checkpoint of the epoch with the lowest validation loss.
@@ -95,15 +105,17 @@ def train(
         )
     with reproducible(threads):
         run = _resumed(frames, settings, out, place) if resume else _started(frames, settings, place)
+        if compiled:
+            run.forward = torch.compile(run.network)
         split = Split.from_document(run.document["split"])
         windows = Windows(frames, run.network.offsets, place)
         depth = _labels(frames.depth, place)
+        learned = torch.as_tensor(frames.indices(split.train))
+        taken = torch.from_numpy(_always(frames, learned.numpy(), settings))
         while run.epoch < settings.epochs:
             began = time.monotonic()
             run.epoch += 1
-            train_loss = _epoch(
-                run, windows, depth, torch.as_tensor(frames.indices(split.train)), frames, settings, listener
-            )
+            train_loss = _epoch(run, windows, depth, learned, taken, frames, settings, listener)
             line = {
                 "epoch": run.epoch,
                 "train_loss": train_loss,
@@ -112,7 +124,20 @@ def train(
             }
             _keep(run, line, out)
             listener(Progress(run.epoch, settings.epochs, 0, 0, line))
+        best = checkpoint.load(out, place)
+        if len(split.validation) > 1:
+            spread.write(out, _calibrated(best, windows, frames, split))
     return checkpoint.load(out)
+
+
+def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, split: Split) -> spread.Spread:
+    """Return how far off the best epoch's pixels are on the validation episodes."""
+    grid, maps, labels = frames.sensor.map, [], []
+    for number in split.validation:
+        chosen = frames.indices((number,))
+        maps.append(predict(best.network, windows, chosen, grid.depth_max))
+        labels.append(np.clip(frames.depth[chosen], 0.0, grid.depth_max))
+    return spread.calibrate(maps, labels, grid.pixel_pitch, best.content_hash)
 
 
 def normalization(taxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -169,6 +194,12 @@ def _resumed(frames: Frames, settings: Settings, out: Path, place: torch.device)
             "resume with it, or start a new run",
         )
     before = last.settings.document
+    if settings.schedule != "constant" and settings.epochs != before["epochs"]:
+        raise UsageError(
+            f"resuming {out} with {settings.epochs} epochs instead of {before['epochs']}",
+            f"the same number: the {settings.schedule} schedule is laid out over them",
+            "resume with that number, or start a new run",
+        )
     changed = [k for k, v in settings.document.items() if k != "epochs" and v != before[k]]
     if changed:
         words = "; ".join(f"{k} {settings.document[k]} instead of {before[k]}" for k in changed)
@@ -184,7 +215,11 @@ def _resumed(frames: Frames, settings: Settings, out: Path, place: torch.device)
 
 
 def _optimizer(network: Network, settings: Settings) -> torch.optim.Optimizer:
-    return torch.optim.AdamW(network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
+    # Fused, a step on a card launches few kernels instead of hundreds.
+    on_card = network.get_buffer("mean").is_cuda
+    return torch.optim.AdamW(
+        network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay, fused=on_card or None
+    )
 
 
 def _circumstances(place: torch.device) -> dict[str, Any]:
@@ -198,21 +233,33 @@ def _epoch(
     windows: Windows,
     depth: torch.Tensor,
     chosen: torch.Tensor,
+    taken: torch.Tensor,
     frames: Frames,
     settings: Settings,
     listener: Callable[[Progress], None],
 ) -> float:
-    """Run one pass over the training frames ``chosen`` (m,) and return the mean loss over them."""
+    """Run one pass over the training frames ``chosen`` (m,) and return the mean loss over them.
+
+    Those of which ``taken`` (m,) says no take part by chance.
+    """
     run.network.train()
+    for group in run.optimizer.param_groups:
+        group["lr"] = settings.rate_at(run.epoch)
+    varied = Variation(run.network, frames.sensor, settings)
     # Seeded by epoch, so that a resumed run draws the same order without any stored generator.
     torch.manual_seed(1_000_003 * settings.seed + run.epoch)
     place = windows.taxels.device
+    if settings.idle_share < 1.0:
+        chosen = chosen[taken | (torch.rand(len(chosen)) < settings.idle_share)]
     order = chosen[torch.randperm(len(chosen))].to(place)
     batches = order.split(settings.batch_size)
     total = torch.zeros((), device=place)
     for step, batch in enumerate(batches, start=1):
         label = normalized(depth[batch.to(depth.device)].to(place), frames.sensor.map.depth_max)
-        loss = settings.loss(run.network(windows.batch(batch)), label)
+        signals, label = varied(windows.batch(batch), label)
+        with torch.autocast(place.type, torch.bfloat16, enabled=settings.precision == "bfloat16"):
+            prediction = run.forward(signals)
+        loss = settings.loss(prediction.float(), label)
         run.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         run.optimizer.step()
@@ -228,8 +275,22 @@ def _epoch(
     return mean
 
 
+def _always(frames: Frames, learned: np.ndarray, settings: Settings) -> np.ndarray:
+    """Return which of the frames ``learned`` (m,) every epoch takes [bool], shape (m,): all, or those in contact."""
+    if settings.idle_share == 1.0:
+        return np.ones(len(learned), bool)
+    touching = np.zeros(len(frames.depth), bool)
+    for span in frames.episodes:
+        here = slice(span.start, span.stop)
+        touching[here] = frames.depth[here].max(axis=(1, 2)) > metrics.CONTACT_THRESHOLD
+    return touching[learned]
+
+
 def _labels(depth: np.ndarray, place: torch.device) -> torch.Tensor:
-    """Return the labels [mm], (n, pixels_x, pixels_y): on the device if they fit, else where they lie."""
+    """Return the labels [mm], (n, pixels_x, pixels_y): on the card or in memory if they fit, else where they lie."""
+    if place.type == "cpu" and depth.nbytes < _free_memory() // 4:
+        # Read through once in order, instead of page by page in the order of the first epoch.
+        depth = np.array(depth)
     with warnings.catch_warnings():
         # A read-only memory map must not be copied into memory; nothing here writes to it.
         warnings.filterwarnings("ignore", message="The given NumPy array is not writable")
@@ -237,6 +298,14 @@ def _labels(depth: np.ndarray, place: torch.device) -> torch.Tensor:
     if place.type == "cuda" and depth.nbytes < torch.cuda.mem_get_info(place)[0] // 2:
         return labels.to(place)
     return labels
+
+
+def _free_memory() -> int:
+    """Return the memory that is free [bytes]; 0 where the system does not say."""
+    try:
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return 0
 
 
 def _validate(
@@ -249,9 +318,7 @@ def _validate(
     loss = settings.loss(torch.from_numpy(prediction) / top, normalized(torch.from_numpy(label), top))
     return {
         "validation_loss": float(loss),
-        "validation_contact_rmse_mm": metrics.summarize(
-            metrics.score_frames(prediction, label).contact_rmse
-        ).median,
+        "validation_contact_rmse_mm": metrics.summarize(metrics.score_frames(prediction, label).contact_rmse).median,
     }
 
 

@@ -27,8 +27,21 @@ def run(
     network: Annotated[str, typer.Option(help="A file name in training/networks.")] = "paper",
     split: Annotated[str, typer.Option(help="A file name in training/splits.")] = "episode",
     seed: Annotated[int, typer.Option(help="Seed of the split, the weights and the order of frames.")] = 0,
+    idle_share: Annotated[float, typer.Option(help="Share of the frames out of contact an epoch takes.")] = 1.0,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
+    batch_size: Annotated[int, typer.Option(min=1, help="Frames a step.")] = 32,
+    learning_rate: Annotated[float, typer.Option(help="AdamW's step size.")] = 1e-3,
+    schedule: Annotated[str, typer.Option(help="Course of the learning rate: constant or cosine.")] = "constant",
+    mirror: Annotated[
+        bool, typer.Option("--mirror", help="Mirror frames at random, as the sensor is symmetric.")
+    ] = False,
+    gain_jitter: Annotated[
+        float, typer.Option(help="Vary each channel's gain at random by this share, for other specimens.")
+    ] = 0.0,
+    precision: Annotated[str, typer.Option(help="float32 or bfloat16, for cards.")] = "float32",
+    compiled: Annotated[bool, typer.Option("--compile", help="Let torch compile the network; for cards.")] = False,
+    tensorboard: Annotated[bool, typer.Option("--tensorboard", help="Metrics for TensorBoard too, in RUN.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the run's last epoch.")] = False,
 ) -> None:
     """Train a network that maps taxel signals to depth maps; keeps the best and the last epoch.
@@ -41,13 +54,24 @@ def run(
 
     from training.data import read_frames
     from training.settings import Settings
+    from training.tensorboard import event_log
     from training.train import METRICS, train
 
-    settings = Settings(network=network, split=split, seed=seed, epochs=epochs)
+    settings = Settings(
+        network=network, split=split, seed=seed, epochs=epochs, batch_size=batch_size, learning_rate=learning_rate,
+        schedule=schedule, mirror=mirror, gain_jitter=gain_jitter, idle_share=idle_share, precision=precision,
+    )  # fmt: skip
     frames = read_frames(dataset)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    log = event_log(out) if tensorboard else lambda progress: None
     with Bar(*columns) as bar:
-        best = train(frames, settings, out, device, resume, threads, _listener(bar))
+        show = _listener(bar)
+
+        def listen(progress: Progress) -> None:
+            show(progress)
+            log(progress)
+
+        best = train(frames, settings, out, device, resume, threads, listen, compiled)
     document = best.document
     parts = ", ".join(f"{len(document['split'][part])} {part}" for part in ("train", "validation", "test"))
     print(f"episodes: {parts} (split {document['split']['name']!r})")

@@ -44,8 +44,7 @@ def data_files(root: Path, rows: list[folder.EpisodeRow]) -> list[Path]:
     missing = [path for path in paths if not path.is_file()]
     if missing:
         raise FormatError(
-            f"{missing[0]} is missing"
-            + (f" and {len(missing) - 1} more data files" if len(missing) > 1 else ""),
+            f"{missing[0]} is missing" + (f" and {len(missing) - 1} more data files" if len(missing) > 1 else ""),
             f"all {len(paths)} data files that meta/episodes names",
             "copy the dataset again, or pack the session again",
         )
@@ -127,9 +126,7 @@ def _shape(feature: dict[str, Any]) -> tuple[int, ...]:
 
 def _fill(root: Path, info: dict[str, Any], paths: list[Path], target: Path) -> None:
     total, at = info["total_frames"], 0
-    described = {
-        key: f for key, f in info["features"].items() if f["dtype"] not in ("string", "video", "language")
-    }
+    described = {key: f for key, f in info["features"].items() if f["dtype"] not in ("string", "video", "language")}
     maps = {
         key: open_memmap(
             target / f"{key}.npy",
@@ -179,9 +176,7 @@ def column_values(column: pa.ChunkedArray, feature: dict[str, Any]) -> np.ndarra
     if feature["dtype"] == "image":
         parts = [tiff.decode(chunk, (shape[0], shape[1])) for chunk in column.chunks]
         metres = np.concatenate(parts) if parts else np.empty((0, *shape), np.float32)
-        scale = {"m": tiff.MM_PER_METRE, "mm": np.float32(1.0)}[
-            (feature.get("info") or {}).get("depth_unit", "m")
-        ]
+        scale = {"m": tiff.MM_PER_METRE, "mm": np.float32(1.0)}[(feature.get("info") or {}).get("depth_unit", "m")]
         return metres * scale
     if column.null_count:
         raise ValueError(f"{column.null_count} values are missing")

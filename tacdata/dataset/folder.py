@@ -97,9 +97,7 @@ def read_info(root: Path) -> dict[str, Any]:
         ) from None
     if not complete or str(version).split(".")[0] != CODEBASE_VERSION.split(".")[0]:
         raise FormatError(
-            f"{root / INFO}: LeRobot format {version}"
-            if complete
-            else f"{root / INFO} lacks counts or features",
+            f"{root / INFO}: LeRobot format {version}" if complete else f"{root / INFO} lacks counts or features",
             f"LeRobot format {CODEBASE_VERSION}",
             "convert it with lerobot's own converter, or pack the session again",
         )
@@ -122,18 +120,12 @@ def write_row(root: Path, row: EpisodeRow, stats: dict[str, Statistics], own: di
         "data/file_index": row.data_file % FILES_PER_CHUNK,
         "dataset_from_index": row.start,
         "dataset_to_index": row.stop,
-        **{
-            f"stats/{key}/{name}": value.tolist()
-            for key, values in stats.items()
-            for name, value in values.items()
-        },
+        **{f"stats/{key}/{name}": value.tolist() for key, values in stats.items() for name, value in values.items()},
         "meta/episodes/chunk_index": row.row_file // FILES_PER_CHUNK,
         "meta/episodes/file_index": row.row_file % FILES_PER_CHUNK,
         **own,
     }
-    write_parquet(
-        root / row_path(row.row_file), pa.Table.from_pydict({key: [value] for key, value in columns.items()})
-    )
+    write_parquet(root / row_path(row.row_file), pa.Table.from_pydict({key: [value] for key, value in columns.items()}))
 
 
 def row_columns(root: Path) -> set[str]:
@@ -196,9 +188,7 @@ def read_parquet(path: Path, columns: list[str] | None = None) -> pa.Table:
         table = pq.ParquetFile(path, page_checksum_verification=True).read(columns)
     except (pa.ArrowException, OSError) as error:
         reason = str(error).splitlines()[0]
-        raise FormatError(
-            f"{path} is damaged or was never finished: {reason}", "a Parquet file", remedy
-        ) from None
+        raise FormatError(f"{path} is damaged or was never finished: {reason}", "a Parquet file", remedy) from None
     missing = sorted(set(columns or ()) - set(table.column_names))
     if missing:
         raise FormatError(f"{path} lacks {', '.join(missing)}", "the columns that tacdata writes", remedy)
@@ -212,9 +202,7 @@ def write_tasks(root: Path, tasks: list[str]) -> None:
         for name, kind, numpy in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
     ]
     described = {"index_columns": ["task"], "column_indexes": [], "columns": columns}
-    table = pa.table(
-        {"task_index": pa.array(range(len(tasks)), pa.int64()), "task": pa.array(tasks, pa.string())}
-    )
+    table = pa.table({"task_index": pa.array(range(len(tasks)), pa.int64()), "task": pa.array(tasks, pa.string())})
     write_parquet(root / TASKS, table.replace_schema_metadata({"pandas": json.dumps(described)}))
 
 

@@ -139,4 +139,5 @@ def episode_record(episode: Episode, label: Label, recording: str, sensor: Senso
         quality=float(valid(episode).mean()),
         complete=episode.complete,
         notes=episode.notes,
+        specimen=episode.sensor.name,
     )

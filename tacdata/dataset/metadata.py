@@ -55,6 +55,8 @@ class EpisodeRecord:
     """False if the recording was interrupted or salvaged."""
     notes: tuple[str, ...] = ()
     """What a person should know of it."""
+    specimen: str = ""
+    """Name of the sensor: of sensors of one design, whose descriptions are the same, each has its own."""
 
     @cached_property
     def document(self) -> dict[str, Any]:

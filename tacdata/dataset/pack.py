@@ -71,9 +71,7 @@ def pack(
         else:
             recording, skin = frames.recording_hash(episode), sensor or episode.sensor
             model = model or label.provenance["parents"].get("model")
-            frames.check_pair(
-                episode, label, {"recording": recording, "sensor": skin.content_hash, "model": model}
-            )
+            frames.check_pair(episode, label, {"recording": recording, "sensor": skin.content_hash, "model": model})
             if writer is None or writer.sensor != skin:
                 again = out.exists() and (append or writer is not None)
                 writer = (DatasetWriter.open if again else DatasetWriter.create)(out, skin, extra)
@@ -150,9 +148,7 @@ class LabelFiles:
         path = self.folder / f"{recording.stem}.failure.json"
         return documents.read(path, "label_failure")["reason"] if path.is_file() else ""
 
-    def check(
-        self, recordings: Iterable[Path], sensor: Sensor | None = None, model: str | None = None
-    ) -> None:
+    def check(self, recordings: Iterable[Path], sensor: Sensor | None = None, model: str | None = None) -> None:
         """Refuse mixed labels before anything is written, from the files' headers alone.
 
         Raises:
@@ -170,8 +166,7 @@ class LabelFiles:
                 if digest and parents.get(name) != digest:
                     raise FormatError(
                         f"{path} is made for {name} {parents.get(name, 'unknown')[:12]}",
-                        f"{name} {digest[:12]}"
-                        + ("" if name == "recording" else ", as asked for or as the others"),
+                        f"{name} {digest[:12]}" + ("" if name == "recording" else ", as asked for or as the others"),
                         "run `tacdata label` for this session again",
                     )
             wanted = {name: digest or parents.get(name) for name, digest in wanted.items()}

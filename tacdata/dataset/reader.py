@@ -74,9 +74,7 @@ class Dataset:
             FormatError: If there is none of that name.
         """
         if key not in self.columns:
-            raise FormatError(
-                f"{self.root} has no column {key!r}", ", ".join(self.columns), "name one of them"
-            )
+            raise FormatError(f"{self.root} has no column {key!r}", ", ".join(self.columns), "name one of them")
         return self.columns[key]
 
     @property
@@ -141,9 +139,7 @@ def read_dataset(root: Path, cache_folder: Path | None = None) -> Dataset:
                 "(tacdata.dataset.restore), or delete the episode",
             )
         record = records.get(_single(root, columns[features.RECORD], row, "records"))
-        episodes.append(
-            DatasetEpisode(row.index, row.start, row.stop, " / ".join(row.tasks), by_key[key], record)
-        )
+        episodes.append(DatasetEpisode(row.index, row.start, row.stop, " / ".join(row.tasks), by_key[key], record))
     nameless = [episode.index for episode in episodes if episode.record is None]
     if nameless:
         _warn(
@@ -169,9 +165,7 @@ def _check_columns(root: Path, info: dict[str, Any]) -> None:
         stored = "m" if key == features.DEPTH else features.unit(key)
         said = (info["features"][key].get("info") or {}).get("unit", stored)
         if said != stored:
-            raise FormatError(
-                f"{root}: {key} is in {said}", stored, "convert the column, or pack the session again"
-            )
+            raise FormatError(f"{root}: {key} is in {said}", stored, "convert the column, or pack the session again")
 
 
 def _provenance(root: Path, paths: list[Path]) -> tuple[dict[str, Sensor], dict[int, EpisodeRecord]]:
@@ -189,9 +183,7 @@ def _provenance(root: Path, paths: list[Path]) -> tuple[dict[str, Sensor], dict[
         raise metadata.lost(root)
     sensors = {digest: Sensor.from_document(document, str(root)) for digest, document in documents.items()}
     if any(sensor.content_hash != digest for digest, sensor in sensors.items()):
-        raise FormatError(
-            f"{root}: a sensor description was changed", "it as recorded", "put the original back"
-        )
+        raise FormatError(f"{root}: a sensor description was changed", "it as recorded", "put the original back")
     return sensors, records
 
 
@@ -203,7 +195,5 @@ def _shard_stamps(paths: list[Path]) -> list[dict[str, Any]]:
 def _single(root: Path, column: np.ndarray, row: folder.EpisodeRow, what: str) -> int:
     values = np.unique(column[row.start : row.stop])
     if len(values) != 1:
-        raise FormatError(
-            f"{root}: episode {row.index} mixes {len(values)} {what}", "one", "pack the session again"
-        )
+        raise FormatError(f"{root}: episode {row.index} mixes {len(values)} {what}", "one", "pack the session again")
     return int(values[0])

@@ -28,12 +28,8 @@ def _header(height: int, width: int) -> bytes:
     ]
     # Padded to 16 bytes so that the strip of every frame starts aligned.
     start = -(-(8 + 2 + 12 * len(fields) + 4) // 16) * 16
-    entries = b"".join(
-        struct.pack("<HHII", tag, kind, 1, start if tag == 273 else v) for tag, kind, v in fields
-    )
-    head = (
-        struct.pack("<2sHI", b"II", 42, 8) + struct.pack("<H", len(fields)) + entries + struct.pack("<I", 0)
-    )
+    entries = b"".join(struct.pack("<HHII", tag, kind, 1, start if tag == 273 else v) for tag, kind, v in fields)
+    head = struct.pack("<2sHI", b"II", 42, 8) + struct.pack("<H", len(fields)) + entries + struct.pack("<I", 0)
     return head.ljust(start, b"\0")
 
 
@@ -83,9 +79,7 @@ def decode(column: pa.Array, shape: tuple[int, int]) -> np.ndarray:
         end = start + shape[0] * shape[1] * 4
         same = (images[:, :start] == images[0, :start]).all() and (images[:, end:] == images[0, end:]).all()
         if same:
-            return (
-                np.ascontiguousarray(images[:, start:end]).view("<f4").reshape(-1, *shape).astype(np.float32)
-            )
+            return np.ascontiguousarray(images[:, start:end]).view("<f4").reshape(-1, *shape).astype(np.float32)
     return np.stack([_decode_one(blob, shape) for blob in blobs])
 
 
@@ -96,9 +90,7 @@ def _strip_start(blob: bytes, shape: tuple[int, int]) -> int | None:
     try:
         with Image.open(io.BytesIO(blob)) as image:
             tags = getattr(image, "tag_v2", {})
-            plain = (
-                image.mode == "F" and image.size == shape[::-1] and tags.get(259) == 1 and blob[:2] == b"II"
-            )
+            plain = image.mode == "F" and image.size == shape[::-1] and tags.get(259) == 1 and blob[:2] == b"II"
             starts = tags.get(273, ())
     except OSError as error:
         raise ValueError(f"a depth image is unreadable: {error}") from None

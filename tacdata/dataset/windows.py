@@ -21,9 +21,7 @@ def centred(length: int = 9) -> tuple[int, ...]:
         UsageError: If the length is even or not positive.
     """
     if length < 1 or length % 2 == 0:
-        raise UsageError(
-            f"a window of {length} frames", "an odd number of frames, 1 or more", "choose 9, for example"
-        )
+        raise UsageError(f"a window of {length} frames", "an odd number of frames, 1 or more", "choose 9, for example")
     return tuple(range(-(length // 2), length // 2 + 1))
 
 

@@ -119,9 +119,7 @@ class DatasetWriter:
             FormatError: If columns are missing, of the wrong shape, or not finite.
         """
         if record.recording in self.recordings:
-            raise UsageError(
-                f"{self.root} holds {record.recording_file} already", "each episode once", "leave it out"
-            )
+            raise UsageError(f"{self.root} holds {record.recording_file} already", "each episode once", "leave it out")
         if record.sensor != self.sensor.content_hash:
             raise FormatError(
                 f"{record.recording_file} is of sensor {record.sensor[:8]}",
@@ -148,8 +146,7 @@ class DatasetWriter:
         stats = {key: statistics.column_statistics(whole[key]) for key in self.info["features"]}
         self._write_files(whole, stats, record, tasks, task)
         self.stats = {
-            key: statistics.merge([self.stats[key], new]) if key in self.stats else new
-            for key, new in stats.items()
+            key: statistics.merge([self.stats[key], new]) if key in self.stats else new for key, new in stats.items()
         }
         folder.write_stats(self.root, self.stats)
         self.info |= {

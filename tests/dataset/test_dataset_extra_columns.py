@@ -18,7 +18,8 @@ def knowing(episode):
     label = example.label(episode)
     random = np.random.default_rng(episode.number)
     return replace(
-        label, uncertainty=(0.1 * random.random(label.signed.shape)).astype(np.float16),
+        label,
+        uncertainty=(0.1 * random.random(label.signed.shape)).astype(np.float16),
         taxel_counts=random.random(label.taxel_force.shape).astype(np.float32),
         interpolation_error=random.random(len(label.time_ns)).astype(np.float32),
     )
@@ -52,7 +53,8 @@ def test_an_episode_whose_label_does_not_know_it_is_left_out_by_name(tmp_path):
     packed = pack(
         [example.episode(0), example.episode(1)],
         lambda episode: knowing(episode) if episode.number else example.label(episode),
-        tmp_path / "d", extra=features.asked_for(["uncertainty"]),
+        tmp_path / "d",
+        extra=features.asked_for(["uncertainty"]),
     )
     assert packed.episodes == 1
     assert packed.left_out == (("episode-000000.mcap", "its label has no uncertainty"),)

@@ -134,9 +134,7 @@ CRASHES = {
 
 @pytest.mark.parametrize("stage", [*CRASHES, "info"])
 @pytest.mark.parametrize("earlier", [0, 2])
-def test_a_crash_costs_only_the_episode_being_written(
-    tmp_path: Path, monkeypatch, stage: str, earlier: int
-) -> None:
+def test_a_crash_costs_only_the_episode_being_written(tmp_path: Path, monkeypatch, stage: str, earlier: int) -> None:
     root = tmp_path / "d"
     if earlier:
         packed(root, range(earlier))

@@ -40,9 +40,9 @@ def build_frames(episodes: int = 12, length: int = 24, seed: int = 0) -> Frames:
         tip.append(np.stack([np.full(length, cx), np.full(length, cy), course], axis=1))
         phase.append(marks)
         shape = SHAPES[number % 3]
-        spans.append(
-            EpisodeSpan(number, number * length, (number + 1) * length, f"{shape}_2", shape, cx, cy, deepest)
-        )
+        place = number, number * length, (number + 1) * length
+        speed, specimen = 0.5 + 0.1 * (number % 7), f"specimen {number % 4}"
+        spans.append(EpisodeSpan(*place, f"{shape}_2", shape, cx, cy, deepest, speed, specimen))
     n = episodes * length
     return Frames(
         taxels=np.concatenate(taxels).astype(np.float32),

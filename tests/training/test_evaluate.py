@@ -86,6 +86,19 @@ def test_only_the_test_episodes_of_the_own_dataset_count(frames, trained):
     assert other.document["baselines"] == {}
 
 
+def test_frames_are_told_apart_by_their_depth(frames, trained):
+    """Predicted 0.06 mm too deep everywhere: the shallower the contact, the more the region grows."""
+    known = told(frames)
+    document = evaluate(replace(trained, network=Oracle(known, shift=0.02)), known).document
+    rows = document["depths"]
+    assert sum(entry["frames"] for entry in rows) == document["frames"]["in_contact"]
+    assert [entry["above_mm"] for entry in rows] == sorted(entry["above_mm"] for entry in rows)
+    assert rows[-1]["up_to_mm"] is None
+    overlap = [entry["metrics"]["iou"]["mean"] for entry in rows]
+    assert overlap[0] < overlap[-1] < 1.0
+    documents.check(document, "scores", "scores")
+
+
 def test_invalid_frames_are_not_scored(frames, trained):
     valid = np.ones(len(frames.taxels), dtype=bool)
     first = frames.spans(trained.split.test)[0]
@@ -108,9 +121,7 @@ def test_presses_without_any_contact_have_no_scores_and_no_error(frames, trained
 
 
 def test_data_of_another_sensor_is_refused(other_sensor_frames, trained):
-    with pytest.raises(
-        FormatError, match=r"trained for sensor tacprint \(skin/thickness 3\.3 against 3\.0\)"
-    ):
+    with pytest.raises(FormatError, match=r"trained for sensor tacprint \(skin/thickness 3\.3 against 3\.0\)"):
         evaluate(trained, other_sensor_frames)
 
 

@@ -23,9 +23,7 @@ def test_the_threshold_holds_on_the_normalized_label():
     label = normalized(torch.tensor([[[0.8, 1.0]]]), 3.0)
     only_left, only_right = torch.tensor([[[0.1, 0.0]]]), torch.tensor([[[0.0, 0.1]]])
     loss = WeightedLoss()
-    assert float(loss(label + only_right, label)) == pytest.approx(
-        2 * float(loss(label + only_left, label)), rel=1e-5
-    )
+    assert float(loss(label + only_right, label)) == pytest.approx(2 * float(loss(label + only_left, label)), rel=1e-5)
 
 
 def test_frames_are_averaged_not_summed():
@@ -36,6 +34,4 @@ def test_frames_are_averaged_not_summed():
 
 
 def test_labels_are_clipped_to_the_valid_range():
-    assert normalized(torch.tensor([-0.5, 0.0, 1.5, 3.0, 4.0]), 3.0).tolist() == pytest.approx(
-        [0, 0, 0.5, 1, 1]
-    )
+    assert normalized(torch.tensor([-0.5, 0.0, 1.5, 3.0, 4.0]), 3.0).tolist() == pytest.approx([0, 0, 0.5, 1, 1])

@@ -18,9 +18,7 @@ def test_bilinear_is_exact_on_a_bilinear_field_and_at_the_corners():
     x, y = np.meshgrid(GRID.x, GRID.y, indexing="ij")
     field = 0.3 + 0.1 * x - 0.2 * y + 0.05 * x * y
     for px, py in [(0.0, 0.0), (1.234, -2.345), (GRID.x[0], GRID.y[0]), (GRID.x[-1], GRID.y[-1])]:
-        assert bilinear(field, px, py, GRID) == pytest.approx(
-            0.3 + 0.1 * px - 0.2 * py + 0.05 * px * py, abs=1e-12
-        )
+        assert bilinear(field, px, py, GRID) == pytest.approx(0.3 + 0.1 * px - 0.2 * py + 0.05 * px * py, abs=1e-12)
     assert bilinear(field, GRID.x[-1] + 0.01, 0.0, GRID) is None
 
 

@@ -32,12 +32,15 @@ def test_shapes_sites_and_depths_are_held_apart(make_frames):
     frames = make_frames(episodes=24, length=12)
     for seed in range(3):
         split = divide(frames, "indenter", seed)
-        shapes = [
-            {e.shape for e in frames.spans(part)} for part in (split.train + split.validation, split.test)
-        ]
+        shapes = [{e.shape for e in frames.spans(part)} for part in (split.train + split.validation, split.test)]
         assert not shapes[0] & shapes[1]
     split = divide(frames, "depth", 0)
     assert min(e.depth for e in frames.spans(split.test)) > max(e.depth for e in frames.spans(split.train))
+    split = divide(frames, "rate", 0)
+    assert min(e.speed for e in frames.spans(split.test)) > max(e.speed for e in frames.spans(split.train))
+    split = divide(frames, "specimen", 0)
+    specimens = [{e.specimen for e in frames.spans(part)} for part in (split.train + split.validation, split.test)]
+    assert not specimens[0] & specimens[1]
     split = divide(frames, "site", 0)
     # TacPrint: the outermost taxels stand at 4.75 and 3.75 mm, the next at 2.85 and 1.25 mm; the
     # middle between them is 3.8 and 2.5 mm.
@@ -75,3 +78,9 @@ def test_invalid_frames_are_never_learned_from(frames):
     assert 5 not in marked.indices((0, 2))
     with pytest.raises(FormatError, match="is valid"):
         marked.indices((2,))
+
+
+def test_speeds_that_nobody_knows_are_not_divided(frames):
+    unknown = tuple(replace(e, speed=None) if e.number == 3 else e for e in frames.episodes)
+    with pytest.raises(FormatError, match="speed of 1 episodes is not known"):
+        divide(replace(frames, episodes=unknown), "rate", 0)

@@ -67,10 +67,7 @@ def test_a_resumed_run_is_the_run(frames, tmp_path):
     for name in (checkpoint.LAST, checkpoint.BEST):
         assert same(weights(tmp_path / "whole" / name), weights(tmp_path / "parts" / name))
     losses = [
-        [
-            json.loads(line)["train_loss"]
-            for line in (tmp_path / name / "metrics.jsonl").read_text().splitlines()
-        ]
+        [json.loads(line)["train_loss"] for line in (tmp_path / name / "metrics.jsonl").read_text().splitlines()]
         for name in ("whole", "parts")
     ]
     assert losses[0] == losses[1]
@@ -87,9 +84,7 @@ def test_the_checkpoint_says_what_it_is(frames, tmp_path):
     learned = frames.taxels[frames.indices(trained.split.train)]
     np.testing.assert_allclose(document["normalization"]["mean"], learned.mean(axis=0), rtol=1e-5)
     np.testing.assert_allclose(document["normalization"]["sd"], learned.std(axis=0), rtol=1e-4)
-    torch.testing.assert_close(
-        trained.network.get_buffer("mean"), torch.tensor(document["normalization"]["mean"])
-    )
+    torch.testing.assert_close(trained.network.get_buffer("mean"), torch.tensor(document["normalization"]["mean"]))
 
 
 def test_a_dead_channel_stays_silent():
@@ -145,3 +140,73 @@ def test_damaged_checkpoints_are_refused(frames, tmp_path):
 def test_an_unknown_device_is_refused(frames, tmp_path):
     with pytest.raises(UsageError, match="--device tpu"):
         train(frames, SMALL, tmp_path / "run", device="tpu")
+
+
+def test_the_rate_falls_along_the_cosine_and_the_paper_keeps_it():
+    assert {Settings(epochs=5).rate_at(e) for e in range(1, 6)} == {1e-3}
+    rates = [Settings(epochs=5, schedule="cosine").rate_at(e) for e in range(1, 6)]
+    assert rates == sorted(rates, reverse=True)
+    assert rates[0] == pytest.approx(1e-3)
+    assert rates[-1] == pytest.approx(2e-5)
+
+
+def test_a_resumed_run_with_every_variation_is_the_run(frames, tmp_path):
+    """Mirrors, gains, idle frames and the schedule are drawn again alike; only the schedule's length is fixed."""
+    varied = replace(SMALL, epochs=2, schedule="cosine", mirror=True, gain_jitter=0.1, idle_share=0.3)
+    run(frames, varied, tmp_path / "whole")
+
+    def interrupted(progress):
+        if progress.finished:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(frames, varied, tmp_path / "cut", listener=interrupted)
+    run(frames, varied, tmp_path / "cut", resume=True)
+    assert same(weights(tmp_path / "whole" / checkpoint.LAST), weights(tmp_path / "cut" / checkpoint.LAST))
+    with pytest.raises(UsageError, match="cosine schedule"):
+        run(frames, replace(varied, epochs=3), tmp_path / "cut", resume=True)
+
+
+def test_idle_frames_are_left_out_and_contact_never(make_frames, tmp_path):
+    frames = make_frames(episodes=8, length=24)
+    steps = {}
+    for share in (1.0, 0.0):
+        count = []
+        settings = replace(SMALL, epochs=1, batch_size=1, idle_share=share)
+        out = tmp_path / str(share)
+        run(frames, settings, out, listener=lambda progress, count=count: count.append(progress.steps))
+        steps[share] = count[0]
+        learned = frames.indices(checkpoint.load(out).split.train)
+    touching = (frames.depth[learned].max(axis=(1, 2)) > 0.1).sum()
+    assert steps == {1.0: len(learned), 0.0: touching}
+
+
+def test_bfloat16_learns_alike(frames, tmp_path):
+    losses = {}
+    for precision in ("float32", "bfloat16"):
+        trained = run(frames, replace(SMALL, epochs=2, precision=precision), tmp_path / precision)
+        losses[precision] = trained.document["history"][-1]["train_loss"]
+    assert losses["bfloat16"] == pytest.approx(losses["float32"], rel=0.1)
+    last = [weights(tmp_path / precision / checkpoint.LAST) for precision in losses]
+    assert not same(*last)
+
+
+@pytest.mark.parametrize("changed", [{"schedule": "linear"}, {"precision": "float8"}, {"gain_jitter": -0.1},
+                                     {"idle_share": 1.5}])  # fmt: skip
+def test_variations_that_make_no_sense_are_refused(changed):
+    with pytest.raises(UsageError, match=next(iter(changed))):
+        Settings(**changed)
+
+
+def test_tensorboard_shows_what_the_metrics_file_holds(frames, tmp_path):
+    pytest.importorskip("tensorboard")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    from training.tensorboard import FOLDER, event_log
+
+    run(frames, replace(SMALL, epochs=2), tmp_path / "run", listener=event_log(tmp_path / "run"))
+    events = EventAccumulator(str(tmp_path / "run" / FOLDER))
+    events.Reload()
+    history = [json.loads(line) for line in (tmp_path / "run/metrics.jsonl").read_text().splitlines()]
+    for name in ("train_loss", "validation_loss"):
+        assert [e.value for e in events.Scalars(name)] == pytest.approx([h[name] for h in history])

@@ -8,7 +8,7 @@ and implements `estimate`. Every size must follow from the sensor's, so that ano
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,8 +24,8 @@ ROOM, BASE = "training.networks", "network"
 class Network(nn.Module, ABC):
     """A map from a window of taxel signals to the depth map of its target frame."""
 
-    offsets: ClassVar[tuple[int, ...]]
-    """Frames of the window relative to the target frame; the largest is the look-ahead."""
+    offsets: tuple[int, ...]
+    """Frames of the window relative to the target frame, ascending; the largest is the look-ahead."""
 
     def __init__(self, taxels: int, map_shape: tuple[int, int], arguments: dict[str, Any]) -> None:
         """Keep the sizes and the arguments, from which `create` can build the same network again."""

@@ -23,9 +23,7 @@ class Paper(Network):
 
     offsets = (-4, -3, -2, -1, 0, 1, 2, 3, 4)
 
-    def __init__(
-        self, taxels: int, map_shape: tuple[int, int], hidden: int = 256, channels: int = 32
-    ) -> None:
+    def __init__(self, taxels: int, map_shape: tuple[int, int], hidden: int = 256, channels: int = 32) -> None:
         """Build the layers.
 
         Args:
@@ -51,10 +49,14 @@ class Paper(Network):
             nn.Conv2d(channels // 2, 1, kernel_size=3, padding=1),
         )
 
-    def estimate(self, signals: torch.Tensor) -> torch.Tensor:
-        """Return maps over D_max from standardized windows; (b, 9, taxels) -> (b, pixels_x, pixels_y)."""
+    def encode(self, signals: torch.Tensor) -> torch.Tensor:
+        """Return features of standardized windows; (b, T, taxels) -> (b, hidden)."""
         _, (hidden, _) = self.encoder(signals)
-        features = self.decoder(self.projection(hidden[-1]).reshape(-1, *self.coarse))
+        return hidden[-1]
+
+    def estimate(self, signals: torch.Tensor) -> torch.Tensor:
+        """Return maps over D_max from standardized windows; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
+        features = self.decoder(self.projection(self.encode(signals)).reshape(-1, *self.coarse))
         return self.refinement(_crop(features, self.map_shape))[:, 0]
 
 

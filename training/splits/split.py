@@ -45,9 +45,16 @@ class Split:
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Split:
         """Rebuild a split from `document`."""
-        return cls(
-            document["name"], document["seed"], *(tuple(document[k]) for k in ("train", "validation", "test"))
-        )
+        return cls(document["name"], document["seed"], *(tuple(document[k]) for k in ("train", "validation", "test")))
+
+
+def describe(name: str) -> str:
+    """Return what a split asks of a network: the first line of its file.
+
+    Raises:
+        UsageError: If no such split exists.
+    """
+    return (registry.load_module(ROOM, BASE, name).__doc__ or "").splitlines()[0]
 
 
 def divide(frames: Frames, name: str, seed: int) -> Split:
@@ -67,8 +74,7 @@ def divide(frames: Frames, name: str, seed: int) -> Split:
     for part in ("train", "validation", "test"):
         if not getattr(split, part):
             raise UsageError(
-                f"split {name!r} of the {len(frames.episodes)} episodes in {frames.origin} leaves no {part} "
-                "episode",
+                f"split {name!r} of the {len(frames.episodes)} episodes in {frames.origin} leaves no {part} episode",
                 "at least one episode each for train, validation and test",
                 "record more episodes, or choose another --split",
             )

@@ -1,0 +1,42 @@
+"""Write a trained network as an ONNX file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+ORDER = 163
+PANEL = TOOLS
+
+
+def run(
+    network: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a training run, or a checkpoint file.")],
+    out: Annotated[Path, typer.Option(help="ONNX file to write; must not exist.")],
+    dataset: Annotated[
+        Path | None, typer.Option(help="Compare on this dataset's readings instead of random ones.")
+    ] = None,
+) -> None:
+    """Write a network as ONNX, with normalization and clipping inside; kept only if it answers like torch."""
+    import numpy as np
+    import torch
+
+    from training import checkpoint
+    from training.data import read_frames
+    from training.onnx_export import export
+    from training.windows import Windows
+
+    trained = checkpoint.load(network)
+    readings = None
+    if dataset:
+        frames = read_frames(dataset)
+        trained.check_sensor(frames.sensor, frames.origin)
+        windows = Windows(frames, trained.network.offsets)
+        chosen = np.linspace(0, len(windows) - 1, min(len(windows), 256)).astype(np.int64)
+        readings = windows.batch(torch.from_numpy(chosen)).numpy()
+    made = export(trained, out, readings)
+    print(f"{made.path}: differs from torch by at most {made.difference:.1e} mm on {made.windows} windows")
+    print(f"input windows (frames, {len(trained.network.offsets)}, {trained.sensor.taxels.count}) of tared counts")

@@ -1,0 +1,45 @@
+"""Recreate the paper's configuration-referenced evaluations on a dataset of trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import PIPELINE
+
+ORDER = 62
+PANEL = PIPELINE
+JSON, SHEET = "protocols.json", "protocols.md"
+
+
+def run(
+    dataset: Annotated[Path, typer.Argument(help="Dataset of the trials, recorded apart from training.")],
+    network: Annotated[
+        Path | None, typer.Option(help="Training run or checkpoint; without it only the labels are evaluated.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="New folder for protocols.json and protocols.md.")] = None,
+) -> None:
+    """Evaluate labels and predictions against the prescribed contact, with the paper's rows beside.
+
+    The plan that `tacdata plan evaluation` writes holds 78 depth and 40 position trials; presses whose purpose is
+    "wearing trial" are scored by participant. Where no press of the dataset has a purpose, each counts as both.
+    """
+    from tacdata import documents
+    from tacdata.errors import UsageError
+    from training import checkpoint
+    from training.data import read_frames
+    from training.protocol_sheet import markdown
+    from training.protocols import protocols
+
+    if out and out.exists():
+        raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
+    trained = checkpoint.load(network) if network else None
+    document = protocols(read_frames(dataset), trained)
+    documents.check(document, "protocols", str(dataset))
+    print(markdown(document))
+    if out:
+        documents.write_text(out / SHEET, markdown(document))
+        documents.write(out / JSON, document, "protocols")
+        print(f"written: {out / JSON}, {SHEET}")

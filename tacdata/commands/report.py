@@ -1,0 +1,70 @@
+"""Put the scores of training runs on one HTML page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import PIPELINE
+
+ORDER = 66
+PANEL = PIPELINE
+
+
+def run(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of training runs, or folders of such.")],
+    out: Annotated[Path, typer.Option(help="HTML file to write; must not exist.")],
+    dataset: Annotated[
+        Path | None, typer.Option(help="Dataset folder; default: the one that each network was trained on.")
+    ] = None,
+    trials: Annotated[
+        Path | None,
+        typer.Option(help="Dataset of the paper's trials; they are evaluated with the first run's network."),
+    ] = None,
+    device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
+    threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
+) -> None:
+    """Write one self-contained HTML page: tables, best, median and worst cases, splits, reliability.
+
+    Runs of one network and recipe that differ in their seed are put together, mean ± SD.
+    """
+    from tacdata import documents
+    from tacdata.errors import UsageError
+    from training import checkpoint
+    from training.data import read_frames
+    from training.evaluate import evaluate
+    from training.frames import Frames
+    from training.protocol_sheet import markdown
+    from training.protocols import protocols
+    from training.report_page import Scored, page
+
+    if out.exists():
+        raise UsageError(f"{out} exists", "a new file; nothing is overwritten", "choose another --out")
+    trained = [checkpoint.load(folder) for folder in _folders(runs)]
+    known: dict[Path, Frames] = {}
+    scored = []
+    for network in trained:
+        place = dataset or Path(network.document["dataset"]["path"])
+        if dataset is None and not place.is_dir():
+            raise UsageError(
+                f"the dataset {place} of {network.path} is not there", "a dataset folder", "give --dataset"
+            )
+        frames = known.setdefault(place, read_frames(place)) if place not in known else known[place]
+        scored.append(Scored(network.settings.title, evaluate(network, frames, device, threads), frames))
+        print(f"scored {network.path.parent}", flush=True)
+    sheet = markdown(protocols(read_frames(trials), trained[0])) if trials else ""
+    documents.write_text(out, page(scored, sheet))
+    print(f"report: {out}")
+
+
+def _folders(given: list[Path]) -> list[Path]:
+    """Return the runs: those named, and those in folders that hold runs."""
+    from training.checkpoint import BEST
+
+    found = []
+    for path in given:
+        inside = sorted(best.parent for best in path.glob(f"*/{BEST}")) if path.is_dir() else []
+        found += inside if inside and not (path / BEST).is_file() else [path]
+    return found

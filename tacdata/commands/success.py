@@ -1,0 +1,50 @@
+"""Success rates of trials with their 95 % Wilson intervals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import TOOLS
+
+ORDER = 165
+PANEL = TOOLS
+
+
+def run(
+    trials: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[FILE.csv|NAME=K/N]...", help="Trials one a line, or counts such as dense=35/40."),
+    ] = None,
+    group: Annotated[
+        list[str] | None, typer.Option(help="Positions that belong together: edge=1,2,7,8; give it repeatedly.")
+    ] = None,
+    paper: Annotated[bool, typer.Option("--paper", help="The paper's own counts beside.")] = False,
+) -> None:
+    """Print success rates with 95 % Wilson intervals, by condition, group and position.
+
+    A CSV file has the columns condition and success, and may have position and adjustments.
+    """
+    from tacdata.errors import UsageError
+    from training import success
+
+    if not trials and not paper:
+        raise UsageError("no trials", "a CSV file, counts such as dense=35/40, or --paper", "name some")
+    groups = {}
+    for text in group or []:
+        name, _, members = text.partition("=")
+        if not (name and members):
+            raise UsageError(f"--group {text}", "NAME=POSITION,POSITION,...", "for example edge=1,2,7,8")
+        groups[name] = {m.strip() for m in members.split(",")}
+    found = []
+    for text in trials or []:
+        if "=" in text and not Path(text).exists():
+            found.append(success.counted(text))
+        else:
+            found += success.rates(success.read_attempts(Path(text)), groups)
+    if found:
+        print(success.markdown(found))
+    if paper:
+        print("\nThe paper's (Exp. 3, on a real robot):\n\n" + success.markdown(success.published_rates()))

@@ -1,0 +1,167 @@
+"""The data card: what is inside a dataset, where it comes from, and what it lacks, as Markdown."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.dataset import features, label_states
+from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.dataset.reader import Dataset
+from tacdata.plans import Press
+
+COLUMNS, ROWS = 3, 3
+"""Parts of the taxel array's box in which presses are counted, along x and y."""
+DEPTH_BORDERS = (0.3, 0.6, 0.9, 1.2)
+"""Borders of the depths by which presses are counted [mm]."""
+PICTURE = "coverage.png"
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Presses by place and depth."""
+
+    counts: np.ndarray
+    """Presses [1], shape (COLUMNS, ROWS, len(DEPTH_BORDERS) + 1); places beyond the box count in its nearest part."""
+
+    @property
+    def empty(self) -> int:
+        """Number of cells without a press."""
+        return int((self.counts == 0).sum())
+
+
+def coverage(presses: list[Press], dataset: Dataset) -> Coverage:
+    """Count presses that touch, by part of the taxel array and by depth."""
+    taxels = dataset.sensor.taxels
+    half = np.array([taxels.pitch_x * taxels.columns, taxels.pitch_y * taxels.rows]) / 2
+    counts = np.zeros((COLUMNS, ROWS, len(DEPTH_BORDERS) + 1), int)
+    for press in presses:
+        if press.depth > 0:
+            place = (np.array([press.x, press.y]) / half + 1) / 2 * (COLUMNS, ROWS)
+            i, j = np.clip(place.astype(int), 0, (COLUMNS - 1, ROWS - 1))
+            counts[i, j, int(np.digitize(press.depth, DEPTH_BORDERS))] += 1
+    return Coverage(counts)
+
+
+def card(dataset: Dataset) -> str:
+    """Return the data card of a dataset of one sensor.
+
+    Raises:
+        FormatError: If it is of several sensors.
+    """
+    records = [e.record for e in dataset.episodes if e.record]
+    presses = [record.configuration for record in records]
+    seconds = len(dataset) / dataset.sensor.taxels.rate
+    lines = [
+        f"# Data card: {dataset.root.name}",
+        "",
+        f"{len(dataset.episodes)} episodes, {len(dataset)} frames, {seconds / 60:.1f} min at "
+        f"{dataset.sensor.taxels.rate:g} Hz; LeRobot v3.0; content `{dataset.content_hash[:12]}`.",
+        "",
+        *_sensor(dataset, records),
+        *_presses(presses),
+        *_coverage(presses, dataset),
+        *_labels(records),
+        *_gaps(dataset, records),
+        *_columns(dataset),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _sensor(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
+    sensor = dataset.sensor
+    kinds = {r.virtual for r in records}
+    rig = "virtual rigs" if kinds == {True} else "real rigs" if kinds == {False} else "real and virtual rigs"
+    specimens = Counter(r.specimen or "not named" for r in records)
+    return [
+        "## Sensor and rig",
+        "",
+        f"- {sensor.name} `{sensor.content_hash[:12]}`: {sensor.taxels.columns} x {sensor.taxels.rows} taxels, skin "
+        f"{sensor.skin.size_x:g} x {sensor.skin.size_y:g} x {sensor.skin.thickness:g} mm, map "
+        f"{sensor.map.pixels_x} x {sensor.map.pixels_y} pixels of {sensor.map.pixel_pitch:g} mm",
+        f"- specimens: {_counted(specimens)}",
+        f"- recorded on {rig if kinds else 'rigs that nobody named'}: {_counted(Counter(r.rig for r in records))}",
+        "",
+    ]
+
+
+def _presses(presses: list[Press]) -> list[str]:
+    heads = "| Indenter | Shape and sizes (mm, deg) | Presses | Depths (mm) | Speeds (mm/s) |"
+    lines = ["## Indenters", "", heads, "| --- | --- | ---: | ---: | ---: |"]
+    for name in sorted({p.indenter_name for p in presses}):
+        mine = [p for p in presses if p.indenter_name == name]
+        sizes = {k: v for k, v in mine[0].indenter.document.items() if k != "shape" and isinstance(v, int | float)}
+        words = ", ".join([mine[0].indenter.shape, *(f"{k} {v:g}" for k, v in sizes.items())])
+        depths, speeds = _range([p.depth for p in mine]), _range([p.speed for p in mine])
+        lines.append(f"| {name} | {words} | {len(mine)} | {depths} | {speeds} |")
+    purposes = Counter(p.purpose for p in presses if p.purpose)
+    return [*lines, "", *([f"Purposes: {_counted(purposes)}.", ""] if purposes else [])]
+
+
+def _coverage(presses: list[Press], dataset: Dataset) -> list[str]:
+    if not presses:
+        return []
+    found = coverage(presses, dataset)
+    borders = ["0", *(f"{b:g}" for b in DEPTH_BORDERS)]
+    bands = [f"{a} to {b} mm" for a, b in itertools.pairwise(borders)] + [f"deeper than {borders[-1]} mm"]
+    lines = ["## Coverage of positions x depths", "", "| Part of the array | " + " | ".join(bands) + " |"]
+    lines.append("| --- |" + " ---: |" * len(bands))
+    names_x, names_y = ("-x", "middle", "+x"), ("-y", "middle", "+y")
+    for i in range(COLUMNS):
+        for j in range(ROWS):
+            cells = " | ".join(map(str, found.counts[i, j].tolist()))
+            lines.append(f"| {names_x[i]}, {names_y[j]} | {cells} |")
+    return [*lines, "", f"{found.empty} of {found.counts.size} cells have no press. Picture: {PICTURE}.", ""]
+
+
+def _labels(records: list[EpisodeRecord]) -> list[str]:
+    if not records:
+        return []
+    made = [r.label_provenance for r in records]
+    models = Counter(str(m.get("parents", {}).get("model", ""))[:12] or "not named" for m in made)
+    codes = Counter(str(m.get("code_version", "")) or "not named" for m in made)
+    makers = Counter(str(m.get("made_by", "")) or "not named" for m in made)
+    return [
+        "## Labels",
+        "",
+        f"- made by {_counted(makers)}, code {_counted(codes)}",
+        f"- skin model (content hash): {_counted(models)}",
+        "- simulated by finite elements from the prescribed contact; nobody measured the skin's shape",
+        "",
+    ]
+
+
+def _gaps(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
+    invalid = int((~np.asarray(dataset[features.VALID])).sum())
+    lines = [f"- {invalid} of {len(dataset)} frames are invalid (frames lost before them, or off the commanded path)"]
+    broken = [r.recording_file for r in records if not r.complete]
+    if broken:
+        lines.append(f"- {len(broken)} recordings were broken off, the first is {broken[0]}")
+    lost = len(dataset.episodes) - len(records)
+    if lost:
+        lines.append(f"- {lost} episodes lost their record in an edit: indenter, press and label's origin are unknown")
+    states = Counter(s.state for s in label_states.states(dataset.root) if s.state != "complete")
+    if states:
+        lines.append(f"- labels of sessions that flow in here: {_counted(states)}")
+    notes = Counter(note for r in records for note in r.notes)
+    lines += [f"- {count} episodes: {note}" for note, count in notes.most_common(10)]
+    return ["## Known gaps", "", *lines, ""]
+
+
+def _columns(dataset: Dataset) -> list[str]:
+    lines = ["## Columns", "", "| Column | Shape | Unit |", "| --- | --- | --- |"]
+    for key, values in dataset.columns.items():
+        shape = " x ".join(map(str, values.shape[1:])) or "1"
+        lines.append(f"| {key} | {shape} | {dataset.units[key]} |")
+    return lines
+
+
+def _range(values: list[float]) -> str:
+    return f"{min(values):g}" if min(values) == max(values) else f"{min(values):g} to {max(values):g}"
+
+
+def _counted(counts: Counter[str]) -> str:
+    return ", ".join(f"{name} ({count})" for name, count in sorted(counts.items())) or "none"

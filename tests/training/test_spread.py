@@ -1,0 +1,69 @@
+"""Uncertainty by pixel: calibrated where the errors are alike, told apart where they are not."""
+
+import numpy as np
+import pytest
+
+from tacdata.errors import FormatError, UsageError
+from training import spread
+from training.spread import LEVELS, calibrate, reliability
+
+PITCH = 0.4
+
+
+def episodes(count, seed, scale=1.0):
+    """Blobs whose prediction errs by 5 % of the depth plus 5 um, times ``scale``."""
+    generator = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.arange(35), np.arange(26), indexing="ij")
+    maps, labels = [], []
+    for _ in range(count):
+        blob = np.exp(-((x - generator.uniform(8, 26)) ** 2 + (y - generator.uniform(6, 20)) ** 2) / 30)
+        depth = np.linspace(0, 1.5, 12)[:, None, None] * blob
+        error = scale * (0.005 + 0.05 * depth) * generator.normal(size=depth.shape)
+        maps.append(depth.astype(np.float32))
+        labels.append((depth + error).clip(0).astype(np.float32))
+    return maps, labels
+
+
+def test_intervals_hold_the_share_that_they_should():
+    known = calibrate(*episodes(20, 0), PITCH, "a" * 64)
+    for entry in reliability(known, *episodes(20, 1), PITCH):
+        assert entry["inside"] == pytest.approx(entry["level"], abs=0.02)
+        assert entry["pixels"] > 1000
+
+
+def test_larger_errors_than_calibrated_are_told():
+    known = calibrate(*episodes(20, 0), PITCH, "a" * 64)
+    inside = {e["level"]: e["inside"] for e in reliability(known, *episodes(20, 1, scale=3.0), PITCH)}
+    assert inside[0.9] < 0.6
+
+
+def test_deep_pixels_are_less_certain_as_their_errors_are():
+    known = calibrate(*episodes(20, 0), PITCH, "a" * 64)
+    flat = np.full((1, 35, 26), 0.15, np.float32), np.full((1, 35, 26), 1.2, np.float32)
+    shallow, deep = (float(known.sigma(depth, PITCH)[0, 17, 13]) for depth in flat)
+    assert shallow == pytest.approx(0.005 + 0.05 * 0.15, rel=0.3)
+    assert deep == pytest.approx(0.005 + 0.05 * 1.2, rel=0.3)
+    widths = [float(known.half_width(flat[1], PITCH, level)[0, 17, 13]) for level in LEVELS]
+    assert widths == sorted(widths)
+    with pytest.raises(UsageError, match="level"):
+        known.half_width(flat[1], PITCH, 0.42)
+
+
+def test_what_is_written_is_read_for_its_checkpoint_alone(tmp_path):
+    known = calibrate(*episodes(6, 0), PITCH, "a" * 64)
+    assert spread.read(tmp_path, "a" * 64) is None
+    spread.write(tmp_path, known)
+    again = spread.read(tmp_path, "a" * 64)
+    np.testing.assert_array_equal(again.deviation, known.deviation)
+    assert again.factors == known.factors
+    assert spread.read(tmp_path, "b" * 64) is None
+    (tmp_path / spread.FILE).write_text("{")
+    with pytest.raises(FormatError):
+        spread.read(tmp_path, "a" * 64)
+
+
+def test_too_little_to_calibrate_on():
+    with pytest.raises(UsageError, match="two or more"):
+        calibrate(*episodes(1, 0), PITCH, "a" * 64)
+    nothing = [np.zeros((4, 35, 26), np.float32)] * 2
+    assert calibrate(nothing, nothing, PITCH, "a" * 64).factors[0] == spread.NOT_KNOWN

@@ -1,0 +1,44 @@
+"""The metrics of a run as an event file that TensorBoard shows, beside metrics.jsonl."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from tacdata.errors import UsageError
+from training.train import Progress
+
+FOLDER = "tensorboard"
+
+
+def event_log(run: Path) -> Callable[[Progress], None]:
+    """Return a listener that writes every finished epoch's metrics to RUN/tensorboard.
+
+    The file is made with the first epoch, so that a run which is refused leaves nothing.
+
+    Raises:
+        UsageError: If tensorboard is not installed.
+    """
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ModuleNotFoundError:
+        raise UsageError(
+            "--tensorboard without tensorboard",
+            "an installation with it",
+            "pip install tensorboard, or leave the option out: metrics.jsonl holds the same figures",
+        ) from None
+    writers: list[Any] = []
+
+    def write(progress: Progress) -> None:
+        line = progress.finished
+        if line is None:
+            return
+        if not writers:
+            writers.append(SummaryWriter(str(run / FOLDER)))
+        for name, value in line.items():
+            if name != "epoch" and value is not None:
+                writers[0].add_scalar(name, value, line["epoch"])
+        writers[0].flush()
+
+    return write
