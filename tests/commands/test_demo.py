@@ -78,7 +78,7 @@ def test_the_whole_job(tmp_path):
     assert len(list((out / "session").glob("episode-*.mcap"))) == 8
     assert len(list((out / "session" / "labels").glob("episode-*.parquet"))) == 8
     scores = json.loads((out / "network" / "scores" / "scores.json").read_text())
-    assert scores["version"] == "1.0"
+    assert scores["version"] == "1.1"
     for picture in (out / "episode.png", out / "network" / "scores" / "scores.png"):
         assert picture.read_bytes()[:4] == b"\x89PNG"
     assert (out / "episode.rrd").stat().st_size > 10_000
