@@ -14,20 +14,20 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from label_farm import environment, solution_file
+from label_farm.engine import Engine, EngineMaker, StoreFull
 from label_farm.failure import Failure
 from label_farm.job import Job
-from label_farm.ledger import Change, Lease, Ledger, owner_name
-from label_farm.pool import POLL_SECONDS, Engine, StoreFull
+from label_farm.ledger import Lease, Ledger, owner_name
 from label_farm.roster import Roster
 from label_farm.store import Store
 from label_farm.worker import is_disk
-from tacdata.errors import DeviceError, SolveError, UsageError
+from tacdata.errors import DeviceError, SolveError, TacdataError, UsageError
 from tacdata.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -41,7 +41,6 @@ ALONE_SECONDS = 30.0
 """After how long without any worker that is said."""
 LOOK_SECONDS = 1.0
 """How often at most the scheduler is asked who is there."""
-ON_A_CARD = 256
 _models: dict[str, Any] = {}
 
 
@@ -49,11 +48,14 @@ def solve_there(factory: str, version: str, sensor: dict[str, Any], documents: l
     """Solve jobs; this runs on a Dask worker. Returns each result as the store's own bytes, or why there is none."""
     from dataclasses import replace
 
-    from label_farm.model import build, solve_each
+    from label_farm.model import batch_size, build, solve_each
     from tacdata import provenance
 
     if version not in _models:
-        model = build(factory, Sensor.from_document(sensor, "sensor"))
+        try:
+            model = build(factory, Sensor.from_document(sensor, "sensor"))
+        except TacdataError as error:  # no fault of the press
+            return {"worker": owner_name(), "refused": f"it cannot build the model: {error}"}
         if model.content_hash != version:
             refused = f"its model is {model.content_hash[:12]}… ({provenance.code_version()}), not {version[:12]}…"
             return {"worker": owner_name(), "refused": refused}
@@ -67,7 +69,8 @@ def solve_there(factory: str, version: str, sensor: dict[str, Any], documents: l
         made = {"seconds": seconds, "code_version": provenance.code_version(), "worker": owner_name()}
         outcome = replace(outcome, provenance={**made, **outcome.provenance})
         settled.append((job.key, solution_file.encode(job, outcome), "", seconds))
-    return {"worker": owner_name(), "device": os.environ.get(environment.DEVICE, "cpu"), "settled": settled}
+    device, likes = os.environ.get(environment.DEVICE, "cpu"), batch_size(_models[version])
+    return {"worker": owner_name(), "device": device, "batch": likes, "settled": settled}
 
 
 @dataclass
@@ -77,8 +80,8 @@ class _Task:
     leases: list[Lease]
 
 
-class DaskPool:
-    """Has the calls of `pool.Pool`."""
+class DaskPool(Engine):
+    """The workers of a Dask cluster on one store of this machine."""
 
     def __init__(
         self,
@@ -94,18 +97,18 @@ class DaskPool:
 
         The cluster is reached when the first job waits.
         """
-        self.store, self.workers, self._address, self._factory = store, workers, address, factory
-        self._ledger = Ledger(store.ledger_path, lease_seconds)
-        if sensors is not None:
-            self._ledger.register({version: sensor.document for version, sensor in sensors.items()})
-        self._versions = None if sensors is None else set(sensors)
-        self._batch = ON_A_CARD if any(device.startswith("cuda") for device in devices) else 1
+        super().__init__(store, sensors, lease_seconds)
+        self.workers, self._address, self._factory = workers, address, factory
         self._roster, self._numbers = Roster(self._ledger), itertools.count()
         self._given: dict[str, list[_Task]] = {}
         """Address of a worker -> its task. One at a time: a dying worker takes along what it has not handed over yet,
         and a press that does no harm would count as the deadly one."""
         self._refused: dict[str, str] = {}
         """Address of a worker -> why it gets no tasks."""
+        self._likes: dict[str, int] = {}
+        """Address of a worker -> how many jobs its model likes at a time; one until it has said so."""
+        self._names: dict[str, str] = {}
+        """Address of a worker that is there -> its name on the roster."""
         self._seen: set[str] = set()
         self._client: Client | None = None
         self._cluster: Any = None
@@ -114,25 +117,8 @@ class DaskPool:
         self._beating = threading.Thread(target=self._beat, args=(lease_seconds,), daemon=True)
         self._beating.start()
 
-    def run(self, keys: set[str], since: int, on_change: Callable[[Change], None]) -> int:
-        """Work until every key is settled; as `pool.Pool.run`."""
-        pending = set(keys)
-        self._ledger.release_dead()
-        try:
-            while pending:
-                self.tend(len(pending))
-                time.sleep(POLL_SECONDS)
-                for change in self._ledger.changes(since):
-                    since = change.number
-                    if change.key in pending:
-                        pending.remove(change.key)
-                        on_change(change)
-        finally:
-            self.stop()
-        return since
-
     def tend(self, wanted: int, settled: bool = False) -> None:
-        """Take in what is finished and give out more; as `pool.Pool.tend`."""
+        """Take in what is finished and give out more; as `Engine.tend`."""
         if not wanted and not any(self._given.values()):
             return
         client = self._connected()
@@ -167,7 +153,7 @@ class DaskPool:
         self.stop()
         for owner in self._seen:
             self._roster.leave(owner)
-        self._ledger.close()
+        super().close()
 
     def _connected(self) -> Client:
         if self._client is not None and self._client.status == "running":
@@ -198,6 +184,7 @@ class DaskPool:
         found = client.scheduler_info(n_workers=-1)["workers"]
         there = {address for address, worker in found.items() if worker.get("resources", {}).get(RESOURCE)}
         self._refused = {address: why for address, why in self._refused.items() if address in there}
+        self._names = {address: name for address, name in self._names.items() if address in there}
         there -= self._refused.keys()
         for address in self._given.keys() - there:
             for task in self._given.pop(address):
@@ -211,26 +198,28 @@ class DaskPool:
             self._alone_since = self._looked
             print(f"no worker has joined {self._address}: `tacdata farm worker {self._address}` does", file=sys.stderr)
         if self._refused and not self._given and self._versions is not None:
+            why = next(iter(self._refused.values()))
             raise UsageError(
-                f"all {len(self._refused)} Dask workers run other code: {next(iter(self._refused.values()))}",
-                "workers of the version that asks", "install one version everywhere, then run again",
-            )  # fmt: skip
+                f"none of the {len(self._refused)} Dask workers has the model asked for: {why}",
+                "workers of the version that asks, with all that it needs",
+                "install one version everywhere, then run again",
+            )
 
     def _give_out(self, client: Client) -> None:
         for address, tasks in self._given.items():
             while not tasks:
                 owner = f"{owner_name()}#{next(self._numbers)}"
-                leases = self._claimed(owner)
+                leases = self._claimed(owner, self._likes.get(address, 1))
                 if not leases:
                     return
                 todo = [lease for lease in leases if not self._found(lease, owner)]
                 if todo:
                     tasks.append(_Task(self._submit(client, address, todo), owner, todo))
 
-    def _claimed(self, owner: str) -> list[Lease]:
+    def _claimed(self, owner: str, count: int) -> list[Lease]:
         for version in self._ledger.offered():
             if (self._versions is None or version in self._versions) and (
-                leases := self._ledger.claim(owner, version, self._batch)
+                leases := self._ledger.claim(owner, version, count)
             ):
                 return leases
         return []
@@ -260,7 +249,7 @@ class DaskPool:
             self._ledger.fail(lease.job.key, task.owner, reason)
 
     def _take_in(self, answer: dict[str, Any], task: _Task, address: str) -> None:
-        worker = f"dask:{answer['worker']}"
+        worker = self._names[address] = f"dask:{answer['worker']}"
         if "refused" in answer:
             self._ledger.release(task.owner, blame=False)
             self._refused[address] = answer["refused"]
@@ -268,6 +257,7 @@ class DaskPool:
             self._roster.note(worker, f"refused: {answer['refused']}")
             self._looked = 0.0
             return
+        self._likes[address] = answer["batch"]
         jobs = {lease.job.key: lease for lease in task.leases}
         done = failed = 0
         busy = 0.0
@@ -310,9 +300,11 @@ class DaskPool:
                 with suppress(Exception):  # a full disk or a lock held for long: the next beat may succeed
                     for task in list(itertools.chain(*list(self._given.values()))):
                         ledger.heartbeat(task.owner)
+                    for name in list(self._names.values()):
+                        ledger.heartbeat(name)
 
 
-def dask_engine(address: str) -> Engine:
+def dask_engine(address: str) -> EngineMaker:
     """Return an engine for a scheduler's address, or "here" for a cluster of this machine's processes.
 
     Raises:
@@ -333,11 +325,12 @@ def dask_engine(address: str) -> Engine:
     ) -> DaskPool:  # fmt: skip
         return DaskPool(store, factory, sensors, workers, lease_seconds, devices, address)
 
-    return engine  # pyright: ignore[reportReturnType]
+    return engine
 
 
 def join(address: str, processes: int | None, devices: tuple[str, ...]) -> None:
     """Join a scheduler with worker processes of this computer, one a card or core, until interrupted."""
+    environment.end_on_terminate()
     chosen = environment.devices(devices)
     count = processes or (environment.cores() if chosen == ("cpu",) else len(chosen))
     started = []

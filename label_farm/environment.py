@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -48,29 +50,60 @@ def devices(asked: Sequence[str]) -> tuple[str, ...]:
     """Return what workers solve on: what was asked for, "cuda" standing for all cards of this machine; else "cpu".
 
     Raises:
-        UsageError: If a name is neither, or "cuda" was asked for and the driver lists no card.
+        UsageError: If a name is neither, or a card is not there.
     """
     found: list[str] = []
     for name in asked or ("cpu",):
-        there = _cards() if name == "cuda" else [name]
-        if not there or not re.fullmatch(r"cpu|cuda:[0-9]+", there[0]):
+        cards = [] if name == "cpu" else _cards()
+        there = cards if name == "cuda" else [name]
+        if not there or not re.fullmatch(r"cpu|cuda:[0-9]+", there[0]) or (name != "cpu" and there[0] not in cards):
+            known = f"this machine has {', '.join(cards) or 'no CUDA card'}"
             raise UsageError(
-                f"the device {name!r}" + (", but nvidia-smi lists no card" if name == "cuda" else ""),
+                f"the device {name!r}; {known}",
                 "cpu, cuda for all cards, or cards such as cuda:0",
-                "name another with --device",
+                "name another with --device" if cards else "leave --device out, or see that nvidia-smi -L lists a card",
             )
         found += there
     return tuple(found)
 
 
+def idle_cards(asked: Sequence[str]) -> str:
+    """Return in words that this machine has cards and no device was chosen; "" otherwise."""
+    count = 0 if asked else len(_cards())
+    named = "1 CUDA card lies" if count == 1 else f"{count} CUDA cards lie"
+    return f"{named} idle here: --device cuda solves on all of them" if count else ""
+
+
 def _cards() -> list[str]:
+    found = _listed() or _counted()
+    visible = os.environ.get("CUDA_VISIBLE_DEVICES")
+    if visible is not None:
+        found = min(found, len(list(filter(None, visible.split(",")))))
+    return [f"cuda:{k}" for k in range(found)]
+
+
+def _listed() -> int:
     try:
         listed = subprocess.run(["nvidia-smi", "-L"], capture_output=True, text=True, timeout=20).stdout
     except (OSError, subprocess.SubprocessError):
-        return []
-    found = len([line for line in listed.splitlines() if line.startswith("GPU ")])
-    visible = os.environ.get("CUDA_VISIBLE_DEVICES")
-    return [f"cuda:{k}" for k in range(found if visible is None else len(list(filter(None, visible.split(",")))))]
+        return 0
+    return len([line for line in listed.splitlines() if line.startswith("GPU ")])
+
+
+def _counted() -> int:
+    """Return how many cards the driver's library counts: some containers lack nvidia-smi."""
+    count = ctypes.c_int(0)
+    try:
+        driver = ctypes.CDLL("libcuda.so.1")
+        working = driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0
+    except (OSError, AttributeError):
+        return 0
+    return count.value if working else 0
+
+
+def end_on_terminate() -> None:
+    """Let a request to end (SIGTERM: a batch system, a service manager) run what is to be run at the end."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
 
 
 def cores() -> int:

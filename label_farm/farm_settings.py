@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from label_farm import environment, model
+from label_farm.engine import EngineMaker
 from label_farm.ladder import Ladder
 from label_farm.ledger import LEASE_SECONDS
-from label_farm.pool import Engine, Pool
+from label_farm.pool import Pool
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class FarmSettings:
     """How long a silent worker keeps its job [s]."""
     priority: int = 0
     """Larger comes first among the runs that share a store."""
-    engine: Engine = Pool
-    """What runs the jobs: `pool.Pool`, or another of its shape."""
+    engine: EngineMaker = Pool
+    """What runs the jobs: `pool.Pool`, or what makes another engine."""
     devices: Sequence[str] = ("cpu",)
     """What the workers solve on, one after the other."""

@@ -17,13 +17,15 @@ from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 
 if TYPE_CHECKING:
+    from tacdata.skin.companion import CoarsePress
     from tacdata.skin.press import PressRequest
 
-_ROUNDS = 3
-"""How often a path is solved at most until its states are near enough to each other."""
+_ROUNDS = 2
+"""How often a path is solved at most until its states are near enough to each other; the coarser mesh said before where
+they are needed."""
 
-_ON_A_CARD = 256
-"""How many presses a card is given at a time (benchmarks/skin_throughput.py); a CPU solves one after the other."""
+_AT_A_TIME = {"cpu": 4, "cuda": 256}
+"""How many presses a device solves at a time [1] (benchmarks/skin_throughput.py): a CPU reads its factor once for 4."""
 
 _SOURCES = ("fem.py", "interpolate.py", "tolerance.py")
 """Files of the farm that decide which states a path gets."""
@@ -46,7 +48,7 @@ class FemModel:
         check_spreads(sensor, Sphere(1.0))
         device = os.environ.get(environment.DEVICE, "cpu")
         self._model = SkinModel(sensor, device=device)
-        self.batch = 1 if device == "cpu" else _ON_A_CARD
+        self.batch = _AT_A_TIME[device.split(":")[0]]
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -66,19 +68,26 @@ class FemModel:
         Raises:
             SolveError: If the press is impossible or an equilibrium is not found.
         """
-        from tacdata.skin.path_uncertainty import with_uncertainty
-
-        request, solution = self._resolved(_request(job), job)
-        return with_uncertainty(self._model, request, solution)
+        [(_, outcome)] = self.solve_many([job])
+        if isinstance(outcome, SolveError):
+            raise outcome
+        return outcome
 
     def solve_many(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
-        """Solve paths together; each is yielded as soon as its states are near enough to each other."""
+        """Solve paths together; each is yielded as soon as its states are near enough to each other.
+
+        The coarser mesh, which is asked for the error in any case, says first where states are needed: a path that is
+        solved again is solved whole, since friction remembers it.
+        """
         requests = [_request(job) for job in jobs]
+        coarse = self._model.solve_coarsely(requests, self._together(requests))
+        requests = [_foreseen(*each) for each in zip(jobs, requests, coarse, strict=True)]
         open_ones = list(range(len(jobs)))
         for round_ in range(_ROUNDS):
             again = []
             asked = [requests[k] for k in open_ones]
-            for index, solution in self._model.solve_many(asked, capacity=min(len(asked), _ON_A_CARD)):
+            known = [coarse[k] for k in open_ones]
+            for index, solution in self._model.solve_many(asked, self._together(asked), known):
                 number = open_ones[index]
                 job, request = jobs[number], requests[number]
                 if isinstance(solution, SolveError):
@@ -94,27 +103,26 @@ class FemModel:
             if not again:
                 return
 
+    def _together(self, requests: Sequence[PressRequest]) -> int:
+        return max(1, min(len(requests), self.batch))
+
     def _finished(self, job: Job, request: PressRequest, solution: PathSolution) -> PathSolution | SolveError:
         from tacdata.skin.path_uncertainty import with_uncertainty
 
         try:
-            return with_uncertainty(self._model, request, _with_ladder(job, request, solution))
+            # Spreads are smooth in depth: the states that were asked for are enough.
+            return with_uncertainty(self._model, _request(job), _with_ladder(job, request, solution))
         except SolveError as error:
             return error
 
-    def _resolved(self, request: PressRequest, job: Job) -> tuple[PressRequest, PathSolution]:
-        """Solve a path and, as long as states are missing, solve it again with them: friction remembers the path."""
-        tolerance = job.tolerance
-        solution = self._model.solve(request)
-        if tolerance is None:
-            return request, solution
-        for _ in range(_ROUNDS - 1):
-            depths = tolerance.refined(solution.depth, solution.surface)
-            if depths == request.depths:
-                break
-            request = replace(request, depths=depths)
-            solution = self._model.solve(request)
-        return request, _with_ladder(job, request, solution)
+
+def _foreseen(job: Job, request: PressRequest, coarse: CoarsePress | None) -> PressRequest:
+    """Return a request with the states that the coarser mesh asks for."""
+    if job.tolerance is None or coarse is None:
+        return request
+    return replace(
+        request, depths=job.tolerance.foretold(request.depths, coarse.figures.depth, coarse.figures.surface)
+    )
 
 
 def _request(job: Job) -> PressRequest:

@@ -12,6 +12,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from label_farm import label, model
+from label_farm.engine import StoreFull
 from label_farm.failure import Failure
 from label_farm.farm_settings import FarmSettings
 from label_farm.job import Job
@@ -19,7 +20,6 @@ from label_farm.label_index import Known, stamp
 from label_farm.ledger import Change, Ledger, owner_name
 from label_farm.margin import Margin
 from label_farm.plan import LabelRequest, Planned, request
-from label_farm.pool import StoreFull
 from label_farm.recall import FLUSH, Recall, skin_key
 from label_farm.session_labels import SessionLabels
 from label_farm.store import Store

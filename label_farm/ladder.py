@@ -12,6 +12,9 @@ import numpy as np
 from label_farm.tolerance import Tolerance
 from tacdata.errors import UsageError
 
+FINEST = 0.001
+"""Least step that may be asked for [mm]: far below what any mesh resolves, and a path has few enough states."""
+
 
 @dataclass(frozen=True)
 class Ladder:
@@ -32,13 +35,13 @@ class Ladder:
         """Refuse settings that make no ladder.
 
         Raises:
-            UsageError: If a step is not positive or the steps would shrink.
+            UsageError: If a step is below `FINEST` or the steps would shrink.
         """
         steps = (self.first_step, self.load_step, self.unload_step)
-        if not (min(steps) > 0 and np.isfinite(steps).all() and 1 <= self.growth < np.inf):
+        if not (min(steps) >= FINEST and np.isfinite(steps).all() and 1 <= self.growth < np.inf):
             raise UsageError(
                 f"depth steps {steps} mm growing by {self.growth}",
-                "positive steps [mm] and a growth of at least 1",
+                f"steps of {FINEST:g} mm or more and a growth of at least 1",
                 "correct the steps",
             )
 

@@ -19,7 +19,9 @@ from label_farm.ledger_tables import (
     FIRST_WAITING,
     GIVE_BACK,
     LAYOUT,
+    LIVING,
     NEXT,
+    OPEN,
     TABLES,
     TAKE,
     WAITING_LIKE_IT,
@@ -205,7 +207,8 @@ class Ledger:
     def claim(self, owner: str, model: str, count: int = 1) -> list[Lease]:
         """Take up to ``count`` jobs of one model version that share their indenter: by priority, else an expired one.
 
-        A job in whose company a worker died is taken alone, so that it can be told which of them is to blame.
+        No more than a worker's share, so that none stands idle beside a full one. A job in whose company a worker died
+        is taken alone, so that it can be told which of them is to blame.
         """
         now = time.monotonic()
         with self._transaction():
@@ -215,10 +218,18 @@ class Ledger:
             elif first[2] or count == 1:
                 keys = [first[0]]
             else:
-                keys = [row[0] for row in self._db.execute(WAITING_LIKE_IT, (model, first[1], count))]
+                share = self._share(model, count, now)
+                keys = [row[0] for row in self._db.execute(WAITING_LIKE_IT, (model, first[1], share))]
             grant = (owner, self._boot, now + self.lease_seconds)
             rows = [self._db.execute(TAKE, (*grant, key)).fetchone() for key in keys]
         return [_lease(document, tries) for document, tries in rows]
+
+    def _share(self, model: str, count: int, now: float) -> int:
+        """Return how many of a model's open jobs fall to one of the living workers, at most ``count``."""
+        living = (self._boot, now - 2 * self.lease_seconds)
+        workers = max(1, self._db.execute(LIVING, living).fetchone()[0])
+        unsettled = self._db.execute(OPEN, 2 * (model, count * workers)).fetchone()[0]
+        return min(count, -(-unsettled // workers))
 
     def has_work(self, model: str) -> bool:
         """Return whether `claim` would find a job of a model version."""

@@ -35,6 +35,12 @@ WAITING_LIKE_IT = (
     "SELECT key FROM job WHERE state = 0 AND alone = 0 AND model = ? AND batch = ? ORDER BY rank, changed LIMIT ?"
 )
 FIRST_EXPIRED = "SELECT key FROM job WHERE state = 1 AND model = ? AND lease < ? LIMIT 1"
+# Named, as the planner would take the index of all states and pass over other models' jobs one by one.
+OPEN = (
+    "SELECT (SELECT count(*) FROM (SELECT 1 FROM job INDEXED BY waiting WHERE state = 0 AND model = ? LIMIT ?))"
+    " + (SELECT count(*) FROM (SELECT 1 FROM job INDEXED BY leased WHERE state = 1 AND model = ? LIMIT ?))"
+)
+LIVING = "SELECT count(*) FROM worker WHERE boot = ? AND seen > ? AND note IS NULL"
 TAKE = (
     "UPDATE job SET state = 1, owner = ?, boot = ?, lease = ?, tries = tries + 1"
     " WHERE key = ? RETURNING document, tries"

@@ -6,21 +6,21 @@ import os
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO
 
 from label_farm import environment
+from label_farm.engine import Engine, StoreFull
 from label_farm.failure import Failure
-from label_farm.ledger import LEASE_SECONDS, MAX_TRIES, Change, Ledger
+from label_farm.ledger import LEASE_SECONDS, MAX_TRIES
 from label_farm.roster import Roster
 from label_farm.store import Store
 from label_farm.worker import NO_ROOM, OTHER_CODE, Assignment
 from tacdata.errors import SolveError, UsageError
 from tacdata.sensor import Sensor
 
-POLL_SECONDS = 0.1
 STOP_SECONDS = 5.0
 
 
@@ -35,28 +35,8 @@ class _Slot:
         return f"{socket.gethostname()}/{self.process.pid}"
 
 
-class StoreFull(UsageError):
-    """The store's disk is full or refuses; what is finished is kept, and the jobs are back in the queue."""
-
-
-class Engine(Protocol):
-    """What runs jobs: something made of the same arguments as `Pool`, with these two calls."""
-
-    def __call__(
-        self,
-        store: Store,
-        factory: str,
-        sensors: dict[str, Sensor] | None,
-        workers: int,
-        lease_seconds: float,
-        devices: Sequence[str],
-    ) -> Pool:
-        """Prepare; see `Pool`."""
-        ...
-
-
-class Pool:
-    """Local workers on one store. Another engine needs the same calls: `run`, `tend` and `stop`."""
+class Pool(Engine):
+    """Local workers on one store."""
 
     def __init__(
         self,
@@ -78,12 +58,9 @@ class Pool:
             lease_seconds: How long a silent worker keeps its job [s].
             devices: What the workers solve on, one after the other: "cpu" or cards such as "cuda:0".
         """
-        self.store, self.workers = store, workers
-        self._ledger = Ledger(store.ledger_path, lease_seconds)
-        if sensors is not None:
-            self._ledger.register({version: sensor.document for version, sensor in sensors.items()})
-        versions = None if sensors is None else list(sensors)
-        self._assignment = Assignment(str(store.folder.resolve()), factory, versions, lease_seconds)
+        super().__init__(store, sensors, lease_seconds)
+        self.workers = workers
+        self._assignment = Assignment(str(store.folder.resolve()), factory, self._versions, lease_seconds)
         self._devices, self._roster = devices, Roster(self._ledger)
         self._slots: list[_Slot] = []
         self._deaths = 0
@@ -93,48 +70,8 @@ class Pool:
         """Process numbers of the workers that were started and not replaced."""
         return [slot.process.pid for slot in self._slots]
 
-    def run(self, keys: set[str], since: int, on_change: Callable[[Change], None]) -> int:
-        """Work until every key is settled, by these workers or by those of another run on the same store.
-
-        Args:
-            keys: Keys of the jobs, already in the ledger.
-            since: The ledger's last change before the store was asked for results.
-            on_change: Called for each of the keys as it is finished or failed.
-
-        Returns:
-            Number of the last change that was told.
-
-        Raises:
-            UsageError: If the workers' code is of another version.
-            SolveError: If workers cannot start or keep dying.
-        """
-        pending = set(keys)
-        self._ledger.release_dead()
-        try:
-            while pending:
-                self.tend(len(pending))
-                time.sleep(POLL_SECONDS)
-                for change in self._ledger.changes(since):
-                    since, self._deaths = change.number, 0
-                    if change.key in pending:
-                        pending.remove(change.key)
-                        on_change(change)
-        finally:
-            self.stop()
-        return since
-
     def tend(self, wanted: int, settled: bool = False) -> None:
-        """Start workers as far as they are wanted, and replace those that died.
-
-        Args:
-            wanted: How many jobs wait.
-            settled: Whether a job was settled since the last call.
-
-        Raises:
-            UsageError: If the workers' code is of another version (only where the models were named).
-            StoreFull: If the store's disk refuses.
-            SolveError: If workers cannot start or keep dying.
-        """
+        """Start workers as far as they are wanted, and replace those that died; as `Engine.tend`."""
         if settled:
             self._deaths = 0
         self._replace_dead()
@@ -160,11 +97,6 @@ class Pool:
             self._ledger.release(slot.owner, blame=False)
             self._roster.leave(slot.owner)
             slot.log.unlink(missing_ok=True)
-
-    def close(self) -> None:
-        """Stop and let go of the ledger."""
-        self.stop()
-        self._ledger.close()
 
     def _start(self, number: int) -> _Slot:
         logs = self.store.folder / "logs"

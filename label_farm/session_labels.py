@@ -40,6 +40,12 @@ class SessionLabels:
         """Return where the reason lies if an episode has no label."""
         return self.folder / f"episode-{episode:06d}.failure.json"
 
+    def numbers(self, ending: str) -> list[int]:
+        """Return the episodes that have a file of an ending, ``.parquet`` or ``.failure.json``."""
+        return sorted(
+            int(path.name[8:14]) for path in self.folder.glob(f"episode-[0-9][0-9][0-9][0-9][0-9][0-9]{ending}")
+        )
+
     def failures(self, most: int) -> dict[str, str]:
         """Return the reasons of up to ``most`` episodes that have no label, by episode number."""
         found = {}

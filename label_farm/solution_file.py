@@ -67,12 +67,11 @@ def encode(job: Job, solution: PathSolution) -> bytes:
     }
     documents.check(header, "path_solution", f"result {job.key[:12]}")
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+    with zipfile.ZipFile(stream, "w") as archive:
         text = json.dumps(header, indent=1, allow_nan=False).encode()
         for name, content in {HEADER: text, **members}.items():
-            entry = zipfile.ZipInfo(name, EPOCH)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, content)
+            # Not compressed: the digits of maps hardly shrink, and trying cost more than all else that is done here.
+            archive.writestr(zipfile.ZipInfo(name, EPOCH), content)
     return stream.getvalue()
 
 

@@ -141,13 +141,14 @@ class Store:
 
     def _write(self, path: Path, data: bytes) -> None:
         beside = self.folder / WRITING
+        # Not settled: what a loss of power takes is solved again, and waiting for it was a third of a job's overhead.
         try:
-            with replacement(path, beside) as stream:
+            with replacement(path, beside, settled=False) as stream:
                 stream.write(data)
         except FileNotFoundError:
             # Another's sweep took it for old: a clock that jumps ages a file by hours.
             beside.mkdir(exist_ok=True)
-            with replacement(path, beside) as stream:
+            with replacement(path, beside, settled=False) as stream:
                 stream.write(data)
 
     def _sweep(self) -> None:

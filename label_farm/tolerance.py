@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -65,6 +66,26 @@ class Tolerance:
         load = self._split(depth[: peak + 1], surface[: peak + 1])
         unload = self._split(depth[peak:][::-1], surface[peak:][::-1])
         return (*load, *unload[-2::-1])
+
+    def foretold(self, path: tuple[float, ...], depth: np.ndarray, surface: np.ndarray) -> tuple[float, ...]:
+        """Return a path with states added, down and up, where a rougher model's loading asks for them.
+
+        Args:
+            path: Depths of the states [mm]: rising from 0 to the deepest, then falling.
+            depth: Depths that the rougher model reached while loading [mm], shape (k,), some of those of ``path``.
+            surface: Its maps [mm], shape (k, pixels_x, pixels_y).
+        """
+        some = depth > 0
+        if not some.any():
+            return path
+        depth = np.concatenate([[0.0], depth[some]])
+        surface = np.concatenate([np.zeros_like(surface[:1]), surface[some]])
+        split = set(self._split(depth, surface)) - set(depth.tolist())
+        result = list(path[:1])
+        for before, after in pairwise(path):
+            low, high = min(before, after) + _LEAST_STEP, max(before, after) - _LEAST_STEP
+            result += [*sorted((d for d in split if low <= d <= high), reverse=after < before), after]
+        return tuple(result)
 
     def exceeded(self, depth: np.ndarray, surface: np.ndarray) -> float:
         """Return by which factor the worst state of a path misses the tolerance [1]; at most 1 where all keep it."""

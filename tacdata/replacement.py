@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 
 @contextmanager
-def replacement(path: Path, beside: Path | None = None) -> Iterator[BinaryIO]:
+def replacement(path: Path, beside: Path | None = None, settled: bool = True) -> Iterator[BinaryIO]:
     """Give a stream whose bytes become the file ``path`` when the block ends; until then the old file stays.
 
     A crash or a full disk leaves the old file or the new one, never a half. If the block raises, nothing is left.
@@ -19,6 +19,8 @@ def replacement(path: Path, beside: Path | None = None) -> Iterator[BinaryIO]:
     Args:
         path: The file; its folder is made if it is missing.
         beside: Folder of the unfinished file, on the same file system; by default the file's own, under a hidden name.
+        settled: Whether the new name too is on the disk when the block ends. Without it, a loss of power within the
+            next seconds may leave the old file, still never a half.
 
     Raises:
         OSError: If the disk refuses it.
@@ -35,7 +37,8 @@ def replacement(path: Path, beside: Path | None = None) -> Iterator[BinaryIO]:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
-    _settle(path.parent)
+    if settled:
+        _settle(path.parent)
 
 
 def _settle(folder: Path) -> None:

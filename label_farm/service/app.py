@@ -6,20 +6,23 @@ from dataclasses import asdict
 from importlib.resources import files
 from typing import Any
 
-from fastapi import FastAPI, Request, Response
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from label_farm.ledger import Ledger
 from label_farm.service.foreman import Foreman
 from label_farm.service.guard import Guard
-from label_farm.service.run import LABELS
+from label_farm.service.receiving import add_receiving
+from label_farm.service.results import add_results
 from label_farm.service.submission import Submission
 from label_farm.service.work import add_work
-from label_farm.session_labels import SessionLabels
-from tacdata import documents, provenance
+from tacdata import provenance
 from tacdata.errors import FormatError, SolveError, TacdataError, UsageError
 
+SHOWN = 20
+"""Of how many submissions, the newest, labels and failures are shown."""
 STATUS = {UsageError: 400, FormatError: 422, SolveError: 422}
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; img-src blob:"
 
@@ -61,12 +64,26 @@ def application(foreman: Foreman, token: str = "") -> Guard:
         content = {"given": error.given, "allowed": error.allowed, "next": error.remedy}
         return JSONResponse(content, next((code for kind, code in STATUS.items() if isinstance(error, kind)), 500))
 
+    @api.exception_handler(RequestValidationError)
+    async def _unfit(_: Request, error: RequestValidationError) -> JSONResponse:
+        # Without what was sent: it may be no JSON of ours (NaN, half of a surrogate pair), which cannot be answered.
+        first = error.errors()[0]
+        where = "/".join(str(part) for part in first["loc"][1:]) or "the request"
+        content = {
+            "given": f"{where}: {first['msg']}",
+            "allowed": "what /openapi.json says of it",
+            "next": "correct it",
+        }
+        return JSONResponse(content, 422)
+
     @api.get("/", response_class=HTMLResponse, include_in_schema=False)
     def page() -> HTMLResponse:
         text = (files("label_farm.service") / "page.html").read_text()
         return HTMLResponse(text, headers={"Content-Security-Policy": POLICY, "X-Frame-Options": "DENY"})
 
     _add_submissions(api, foreman)
+    add_receiving(api, foreman)
+    add_results(api, foreman)
     add_work(api, foreman)
     return Guard(api, token)
 
@@ -87,8 +104,7 @@ def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
         """One submission as it stands."""
         foreman.submissions.get(number)
         entry = next(entry for entry in _listing(foreman) if entry["id"] == number)
-        if "failures" not in entry and entry["failed"]:
-            entry["failures"] = SessionLabels(foreman.session(number) / LABELS).failures(100)
+        entry["recent"], entry["failures"] = foreman.finished(number)
         return entry
 
     @api.post("/api/submissions/{number}/cancel")
@@ -101,21 +117,6 @@ def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
         """Change a submission's priority."""
         return foreman.prioritize(number, asked.priority).document
 
-    @api.get("/api/submissions/{number}/failures/{episode}")
-    def failure(number: str, episode: int) -> dict[str, Any]:
-        """Why an episode has no label, with the worker's log (`schemas/label_failure.schema.json`)."""
-        path = SessionLabels(foreman.session(number) / LABELS).failure_path(episode)
-        return documents.read(path, "label_failure")
-
-    @api.get("/api/submissions/{number}/labels/{episode}.png")
-    def preview(number: str, episode: int) -> Response:
-        """The deepest frame of a finished label as a picture; its depth [mm] stands in the header X-Depth."""
-        from label_farm.service.preview import picture
-
-        session = foreman.session(number)
-        content, depth = picture(session / LABELS / f"episode-{episode:06d}.parquet")
-        return Response(content, media_type="image/png", headers={"X-Depth": f"{depth:.4f}"})
-
 
 def _listing(foreman: Foreman) -> list[dict[str, Any]]:
     listed = []
@@ -125,11 +126,11 @@ def _listing(foreman: Foreman) -> list[dict[str, Any]]:
             stage, done, total = run.stage
             entry |= {
                 "stage": {"name": stage, "done": done, "total": total},
-                "recent": list(run.recent)[::-1],
-                "failures": {str(k): reason for k, reason in sorted(run.failures.items())[:100]},
                 "presses_left": run.labelling.pending if run.labelling else 0,
             }
         listed.append(entry)
+    for entry in listed[-SHOWN:]:
+        entry["recent"], entry["failures"] = foreman.finished(entry["id"])
     return listed
 
 

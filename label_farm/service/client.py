@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import http.client
 import json
+import re
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -15,6 +17,10 @@ URL = "TACDATA_FARM_URL"
 SECONDS = 60.0
 
 
+class _Unchanged(Exception):
+    """What was asked for is what the asker has."""
+
+
 class Client:
     """One service."""
 
@@ -22,23 +28,57 @@ class Client:
         """Name the service.
 
         Raises:
-            UsageError: If the address is none of HTTP.
+            UsageError: If the address is none of HTTP, or the token cannot be one.
         """
-        parts = urllib.parse.urlsplit(url)
-        if parts.scheme not in ("http", "https") or not parts.netloc:
+        if not _is_address(url):
             raise UsageError(
                 f"the address {url!r}", "http://HOST:PORT, as `tacdata farm up` says it", "give it with --url"
             )
+        if not re.fullmatch("[!-~]*", token):
+            raise UsageError(
+                "a token with blanks or letters beyond plain ones", "the token that `tacdata farm up` was started with",
+                "give it with --token or TACDATA_FARM_TOKEN",
+            )  # fmt: skip
         self.url, self._token = url.rstrip("/"), token
+
+    @staticmethod
+    def submission(number: str) -> str:
+        """Return the path of a submission.
+
+        Raises:
+            UsageError: If that is no number.
+        """
+        if not re.fullmatch("[0-9]{1,6}", number):
+            raise UsageError(f"submission {number!r}", "its number, such as 000001", "see `tacdata farm status`")
+        return f"/api/submissions/{int(number):06d}"
 
     def get(self, path: str) -> Any:
         """Return the document at a path."""
-        return json.loads(self.send("GET", path))
+        return self._document(self.send("GET", path))
 
     def post(self, path: str, document: Any = None) -> Any:
         """Send a document; return the answer."""
         body = json.dumps({} if document is None else document).encode()
-        return json.loads(self.send("POST", path, body, {"Content-Type": "application/json"}))
+        return self._document(self.send("POST", path, body, {"Content-Type": "application/json"}))
+
+    def _document(self, answer: bytes) -> Any:
+        try:
+            return json.loads(answer)
+        except ValueError:
+            raise self._stranger() from None
+
+    def _stranger(self) -> UsageError:
+        return UsageError(
+            f"what answers at {self.url} is no label farm of this version", "the address that `tacdata farm up` says",
+            "check --url",
+        )  # fmt: skip
+
+    def content(self, path: str, known: str = "") -> bytes | None:
+        """Return the bytes at a path; None if they are still those of a hash that is known (SHA-256, hex)."""
+        try:
+            return self.send("GET", path, headers={"If-None-Match": f'"{known}"'} if known else {})
+        except _Unchanged:
+            return None
 
     def send(self, method: str, path: str, body: bytes | None = None, headers: dict[str, str] | None = None) -> bytes:
         """Send a request; return the answer's bytes.
@@ -57,22 +97,31 @@ class Client:
                 return answer.read()
         except urllib.error.HTTPError as error:
             with error:
+                if error.code == 304:
+                    raise _Unchanged from None
+                if error.code in (404, 405, 501):
+                    raise self._stranger() from None
                 raise _in_words(error.code, error.read()) from None
-        except (urllib.error.URLError, OSError) as error:
-            reason = getattr(error, "reason", error)
+        except (urllib.error.URLError, http.client.HTTPException, OSError) as error:
+            reason = getattr(error, "reason", "") or error or type(error).__name__
             raise DeviceError(
                 f"no answer from {self.url}: {reason}", "a service that runs there", "start it: `tacdata farm up`"
             ) from None
+
+
+def _is_address(url: str) -> bool:
+    try:
+        parts = urllib.parse.urlsplit(url)
+        fits = parts.scheme in ("http", "https") and bool(parts.hostname) and (parts.port or 0) >= 0
+    except ValueError:
+        return False
+    return fits and bool(re.fullmatch("[!-~]+", url)) and not parts.query and not parts.fragment
 
 
 def _in_words(status: int, body: bytes) -> TacdataError:
     kind = FormatError if status == 422 else UsageError
     try:
         document = json.loads(body)
-        if "given" in document:
-            return kind(document["given"], document["allowed"], document["next"])
-        first = document["detail"][0] if isinstance(document.get("detail"), list) else document
-        field = "/".join(str(part) for part in first.get("loc", ())[1:])
-        return kind(f"{field}: {first.get('msg', document)}", "what /openapi.json says of it", "correct it")
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError):
+        return kind(str(document["given"]), str(document["allowed"]), str(document["next"]))
+    except (ValueError, KeyError, TypeError):
         return kind(f"the service answered {status}", "an answer of tacdata's label farm", "check the address")

@@ -6,6 +6,9 @@ from pathlib import Path, PurePosixPath
 
 from tacdata.errors import UsageError
 
+LONGEST = 255
+"""Bytes that a file system takes for a name."""
+
 
 def confined(root: Path, asked: str, what: str) -> Path:
     """Return the path under ``root`` that was asked for, links followed.
@@ -18,6 +21,8 @@ def confined(root: Path, asked: str, what: str) -> Path:
         f"{what} {asked[:200]!r}", "a path inside the folder that the service serves", f"name it from {root.name}/ on"
     )
     if not asked or "\0" in asked or "\\" in asked or parts.is_absolute() or ".." in parts.parts:
+        raise refused
+    if any(len(part.encode(errors="replace")) > LONGEST for part in parts.parts):
         raise refused
     try:
         path = (root / parts).resolve()

@@ -41,6 +41,7 @@ class Crew:
         Raises:
             SolveError: If they keep dying.
         """
+        environment.end_on_terminate()
         crew = [self._start(k) for k in range(self._count)]
         print(f"{self._count} workers for {self._client.url}; Ctrl-C stops them", flush=True)
         deaths = 0

@@ -8,22 +8,25 @@ import sqlite3
 import threading
 import time
 import traceback
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
+from label_farm.engine import Engine, StoreFull
 from label_farm.farm_settings import FarmSettings
 from label_farm.ledger import Ledger
 from label_farm.model import Version
-from label_farm.pool import Pool, StoreFull
 from label_farm.roster import Roster, WorkerRow
-from label_farm.service.run import Run
+from label_farm.service.run import LABELS, RECENT, Run
 from label_farm.service.submission import OPEN, Submission, Submissions
+from label_farm.session_labels import SessionLabels
 from label_farm.store import Store
 from tacdata.errors import TacdataError, UsageError
 
 ROUND_SECONDS = 0.1
 PAUSE_SECONDS = 5.0
+MOST_SHOWN = 100
+"""Most failures that are shown of a submission."""
 KEPT_RUNS = 200
 """How many finished submissions keep their list of failures in memory."""
 
@@ -49,6 +52,7 @@ class Foreman:
         self._versions: dict[str, Version] = {}
         self._guard = threading.RLock()
         self._runs: dict[str, Run] = {}
+        self._finished: dict[str, tuple[list[int], dict[str, str]]] = {}
         self._stop = threading.Event()
         for submission in self.submissions.listing():
             if submission.state in OPEN:
@@ -136,6 +140,57 @@ class Foreman:
         """
         return self._run(self.submissions.get(number)).session
 
+    def results(self, number: str) -> tuple[list[int], list[int]]:
+        """Return the episodes of a submission that have their label, and those of which it is known why not.
+
+        Raises:
+            UsageError: If there is none of that number, or it left the session's labels as they were.
+        """
+        run = self._with_results(number)
+        if run is not None:
+            return run.labelled, sorted(run.failures)
+        labels = SessionLabels(self.session(number) / LABELS)
+        return labels.numbers(".parquet"), labels.numbers(".failure.json")
+
+    def finished(self, number: str) -> tuple[list[int], dict[str, str]]:
+        """Return what came of a submission, to be shown: some labelled episodes, the last first, and some failures.
+
+        Of one that was done before a restart the files are looked at once, and the highest numbers taken for the last.
+        """
+        with self._guard:
+            run = self._runs.get(number)
+        if run is not None:
+            failures = sorted(run.failures.items())[:MOST_SHOWN]
+            return list(run.recent)[::-1], {str(episode): reason for episode, reason in failures}
+        if number not in self._finished:
+            submission, found = self.submissions.get(number), ([], {})
+            with suppress(UsageError):  # its folder may be gone by now
+                labels = SessionLabels(self.session(number) / LABELS)
+                if submission.state == "done":
+                    found = labels.numbers(".parquet")[-RECENT:][::-1], labels.failures(MOST_SHOWN)
+            self._finished[number] = found
+        return self._finished[number]
+
+    def is_labelled(self, number: str, episode: int) -> bool:
+        """Return whether a submission's label of an episode lies there; raises as `results`."""
+        run = self._with_results(number)
+        if run is not None:
+            return run.is_labelled(episode)
+        return SessionLabels(self.session(number) / LABELS).path(episode).exists()
+
+    def _with_results(self, number: str) -> Run | None:
+        """Return the run of a submission that has results; None if it is done and its run is not kept any more."""
+        submission = self.submissions.get(number)
+        with self._guard:
+            run = self._runs.get(number)
+        if submission.state != "refused" and (run is not None or submission.state == "done"):
+            return run
+        raise UsageError(
+            f"submission {number} is {submission.state}" + (f": {submission.reason}" if submission.reason else ""),
+            "one that is worked on or done",
+            "submit the session again: what is finished is found at once",
+        )
+
     def workers(self) -> list[WorkerRow]:
         """Return who works."""
         with Ledger(self.store.ledger_path) as ledger:
@@ -151,7 +206,7 @@ class Foreman:
     def _run(self, submission: Submission) -> Run:
         return Run(submission, self.root, self.store, self._settings, self._versions)
 
-    def _hire(self) -> Pool:
+    def _hire(self) -> Engine:
         chosen = self._settings
         return chosen.engine(
             self.store, chosen.factory, None, chosen.workers, chosen.lease_seconds, chosen.devices
@@ -203,7 +258,7 @@ class Foreman:
         self._pauses[what] = why
         self._stop.wait(PAUSE_SECONDS)
 
-    def _round(self, ledger: Ledger, pool: Pool) -> None:
+    def _round(self, ledger: Ledger, pool: Engine) -> None:
         settled = 0
         with self._guard:
             running = [(number, run) for number, run in self._runs.items() if run.planned.is_set()]

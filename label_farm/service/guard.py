@@ -14,7 +14,8 @@ Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Message, Receive, Send], Awaitable[None]]
 
 SMALL, LARGE = 64 * 1024, 64 * 1024 * 1024
-"""Most bytes of a request's body; the large one for results of workers."""
+"""Most bytes of a request's body; the large one for results of workers and pieces of recordings."""
+ROOMY = ("/api/work/results/", "/api/recordings")
 OPEN_PATHS = ("/", "/openapi.json", "/favicon.ico")
 """What may be had without a token: nothing of it comes from the store."""
 LOOPBACK = re.compile(r"(localhost|127\.\d+\.\d+\.\d+|\[::1\])(:\d+)?", re.IGNORECASE)
@@ -37,7 +38,7 @@ class Guard:
         if answer := self._refusal(scope, headers):
             await _answer(send, *answer)
             return
-        limit = LARGE if scope["path"].startswith("/api/work/results/") else SMALL
+        limit = LARGE if scope["path"].startswith(ROOMY) else SMALL
         length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > limit:
             await _answer(send, 413, f"a request of {length} bytes", f"at most {limit} bytes", "send less")

@@ -21,6 +21,8 @@ from label_farm.tolerance import Tolerance
 from tacdata.errors import TacdataError, UsageError
 
 LABELS = "labels"
+RECENT = 24
+"""How many of the episodes labelled last are remembered."""
 MOST_ATTEMPTS = 20
 """How often a submission is planned again after the process that builds its model was killed."""
 
@@ -34,7 +36,7 @@ class Run:
         """Prepare; nothing is read yet. Versions of models are shared among the runs."""
         self._versions = versions
         self.submission, self._root, self._store, self._settings = submission, root, store, settings
-        self.recent: deque[int] = deque(maxlen=24)
+        self.recent: deque[int] = deque(maxlen=RECENT)
         """Episodes labelled last."""
         self.failures: dict[int, str] = {}
         """Episode -> reason why it has no label."""
@@ -53,6 +55,15 @@ class Run:
     def session(self) -> Path:
         """Folder of the recordings."""
         return confined(self._root, self.submission.session, "session")
+
+    @property
+    def labelled(self) -> list[int]:
+        """Episodes whose label lies there."""
+        return sorted(self._labelled)
+
+    def is_labelled(self, episode: int) -> bool:
+        """Return whether the label of an episode lies there."""
+        return episode in self._labelled
 
     def check_paths(self) -> None:
         """Refuse a sensor file or dataset outside the root, or a sensor file that is not there.

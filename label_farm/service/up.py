@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from label_farm import environment
+from label_farm.engine import EngineMaker
 from label_farm.farm_settings import FarmSettings
 from label_farm.model import FACTORY
-from label_farm.pool import Engine, Pool
+from label_farm.pool import Pool
 from label_farm.store import Store
 from tacdata.errors import UsageError
 
@@ -70,6 +71,8 @@ def up(asked: UpSettings) -> None:
         foreman.announce(address)
         foreman.start()
         print(f"label farm of {root} at {address}", flush=True)
+        if hint := "" if asked.dask else environment.idle_cards(asked.devices):
+            print(hint, flush=True)
         print("open it in a browser, or: tacdata farm submit SESSION --url " + address, flush=True)
         config = uvicorn.Config(
             application(foreman, asked.token),
@@ -93,7 +96,7 @@ def _settings(asked: UpSettings) -> FarmSettings:
     return FarmSettings(factory=asked.factory or FACTORY, workers=workers, devices=devices, engine=_engine(asked.dask))
 
 
-def _engine(dask: str) -> Engine:
+def _engine(dask: str) -> EngineMaker:
     if not dask:
         return Pool
     from label_farm.dask_pool import dask_engine

@@ -56,7 +56,7 @@ def run(
 
     from label_farm.dask_pool import dask_engine
     from label_farm.dataset_flow import DatasetFlow
-    from label_farm.environment import cores, devices
+    from label_farm.environment import cores, devices, idle_cards
     from label_farm.farm_settings import FarmSettings
     from label_farm.labelling import Labelling
     from label_farm.ladder import Ladder
@@ -82,6 +82,8 @@ def run(
         redo=redo,
         engine=dask_engine(dask) if dask else Pool,
     )
+    if hint := "" if dask else idle_cards(device or ()):
+        print(hint)
     skin = read_sensor(sensor) if sensor else None
     labels = session / "labels"
     paths = {int(path.stem[-6:]): path for path in recorded.episodes}

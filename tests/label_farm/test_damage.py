@@ -97,7 +97,7 @@ def test_a_full_disk_ends_in_words_and_the_next_run_goes_on(tmp_path, small_disk
     begun = len(solves())
     # Labels are large beside this disk: only the store stays on it.
     summary = label_episodes(small_disk / "labels", presses[:4])
-    assert sorted(summary.written) == [0, 1, 2, 3] and not summary.failed
+    assert sorted([*summary.current, *summary.written]) == [0, 1, 2, 3] and summary.written and not summary.failed
     assert len(solves()) - begun <= 4 and results <= 12
 
 
@@ -147,10 +147,10 @@ def test_a_writer_whose_file_was_swept_after_a_clock_jump_writes_again(tmp_path,
     job = request(press_episode(tmp_path), SENSOR, "b" * 64, Ladder()).job
     true, swept = module.replacement, []
 
-    def sweeping(path, beside):
+    def sweeping(path, beside, **how):
         if not swept:
             swept.append(path)
-            entered = true(path, beside)
+            entered = true(path, beside, **how)
 
             class Around:
                 def __enter__(self):
@@ -164,7 +164,7 @@ def test_a_writer_whose_file_was_swept_after_a_clock_jump_writes_again(tmp_path,
                     return entered.__exit__(*error)
 
             return Around()
-        return true(path, beside)
+        return true(path, beside, **how)
 
     monkeypatch.setattr(module, "replacement", sweeping)
     from label_farm.failure import Failure

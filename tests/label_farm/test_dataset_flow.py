@@ -7,7 +7,7 @@ import sys
 import pytest
 from chaos import ROOT, Service, all_finished
 from farm_examples import HERE
-from session_examples import session
+from session_examples import examples, session
 
 from tacdata.dataset import label_states
 from tacdata.dataset.reader import read_dataset
@@ -45,6 +45,14 @@ def test_episodes_flow_in_and_the_dataset_says_what_is_failed_or_stale(tmp_path)
     assert "0 complete, 5 stale" in shown.stdout and "made by model" in shown.stdout
     shown = label(tmp_path, "label", "s", "--into", "s", "--workers", "1")
     assert shown.returncode == 2 and "no dataset" in shown.stderr
+
+
+def test_labels_without_spreads_are_not_stale(tmp_path):
+    """They are of the same model without what the sensor file says of its spreads."""
+    assert session(tmp_path / "s", 2) and examples.SENSOR.uncertainty, "else this test says nothing"
+    shown = label(tmp_path, "label", "s", "--into", "data", "--workers", "1", "--no-uncertainty")
+    assert shown.returncode == 0, shown.stderr
+    assert "2 complete, 0 stale" in label(tmp_path, "farm", "dataset", "data").stdout
 
 
 def test_the_dataset_grows_while_others_are_computed_and_survives_kills(tmp_path):

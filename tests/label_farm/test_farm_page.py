@@ -91,7 +91,9 @@ def test_what_is_refused_is_said_on_the_page(page, service):
     page.fill("[name=session]", "../elsewhere")
     page.fill("[name=by]", "eve")
     page.click("#submit button")
-    page.wait_for_selector("#problem:has-text('a path inside the folder')")
+    page.wait_for_selector("#refusal:has-text('a path inside the folder')")
+    page.wait_for_timeout(1500)
+    assert "a path inside the folder" in page.inner_text("#refusal"), "it stays while the page goes on asking"
     service.client(TOKEN).post("/api/submissions", {"session": "empty", "by": "eve"})
     page.wait_for_selector("#submissions .refused")
     assert "session.json" in page.inner_text("#submissions tr:has-text('empty')")

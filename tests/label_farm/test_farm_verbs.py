@@ -1,6 +1,8 @@
 """`tacdata farm`: what is wrong is said in words, with the exit code of its kind."""
 
+import socket
 import sys
+import threading
 
 import pytest
 
@@ -14,7 +16,14 @@ CASES = [
     ("status", "--wait", "--wait without a submission", 2),
     ("submit", f"session --url {NOWHERE}", "start it: `tacdata farm up`", 4),
     ("submit", "session --url ftp://host", "http://HOST:PORT", 2),
+    ("submit", "session --url http://host:port", "http://HOST:PORT", 2),
+    ("submit", "session --url http://[::1", "http://HOST:PORT", 2),
+    ("status", "é", "its number, such as 000001", 2),
+    ("status", "../x", "its number, such as 000001", 2),
+    ("status", f"1 --url {NOWHERE} --token ä€", "a token with", 2),
+    ("cancel", "1234567", "its number, such as 000001", 2),
     ("cancel", f"000001 --url {NOWHERE}", "no answer from", 4),
+    ("fetch", f"000001 nothing --url {NOWHERE}", "no answer from", 4),
     ("priority", f"000001 5 --url {NOWHERE}", "no answer from", 4),
     ("worker", NOWHERE, "no answer from", 4),
     ("worker", "nonsense", "http://HOST:PORT", 2),
@@ -55,15 +64,36 @@ def test_every_file_of_the_folder_is_a_verb_with_help(tmp_path, monkeypatch, cap
 
 
 def test_devices_are_those_that_are_there(monkeypatch):
+    monkeypatch.setattr(environment, "_cards", lambda: ["cuda:0", "cuda:1"])
     assert environment.devices(()) == ("cpu",)
     assert environment.devices(("cuda:1", "cpu")) == ("cuda:1", "cpu")
-    monkeypatch.setattr(environment, "_cards", lambda: ["cuda:0", "cuda:1"])
     assert environment.devices(("cuda",)) == ("cuda:0", "cuda:1")
+    with pytest.raises(UsageError, match="has cuda:0, cuda:1"):
+        environment.devices(("cuda:2",))
     monkeypatch.setattr(environment, "_cards", lambda: [])
-    with pytest.raises(UsageError, match="lists no card"):
-        environment.devices(("cuda",))
-    with pytest.raises(UsageError, match="cuda for all cards"):
+    for name in ("cuda", "cuda:0"):
+        with pytest.raises(UsageError, match="no CUDA card"):
+            environment.devices((name,))
+    with pytest.raises(UsageError, match="'gpu0'") as error:
         environment.devices(("gpu0",))
+    assert "cuda for all cards" in error.value.allowed
+
+
+def test_cards_are_counted_by_the_driver_where_nvidia_smi_is_missing(monkeypatch):
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    monkeypatch.setattr(environment, "_listed", lambda: 0)
+    monkeypatch.setattr(environment, "_counted", lambda: 3)
+    assert environment._cards() == ["cuda:0", "cuda:1", "cuda:2"]
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,6")
+    assert environment._cards() == ["cuda:0", "cuda:1"]
+
+
+def test_cards_that_lie_idle_are_named_unless_a_device_was_chosen(monkeypatch):
+    monkeypatch.setattr(environment, "_cards", lambda: ["cuda:0", "cuda:1"])
+    assert "2 CUDA cards" in environment.idle_cards(()) and "--device cuda" in environment.idle_cards(())
+    assert environment.idle_cards(("cpu",)) == ""
+    monkeypatch.setattr(environment, "_cards", lambda: [])
+    assert environment.idle_cards(()) == ""
 
 
 def test_a_worker_sees_its_own_card_alone(monkeypatch):
@@ -73,3 +103,30 @@ def test_a_worker_sees_its_own_card_alone(monkeypatch):
     assert (given["CUDA_VISIBLE_DEVICES"], given[environment.DEVICE]) == ("1", "cuda:0")
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,6")
     assert environment.variables("cuda:1")["CUDA_VISIBLE_DEVICES"] == "6"
+
+
+@pytest.mark.parametrize(
+    ("answer", "code", "word"),
+    [
+        (b"SSH-2.0-OpenSSH_9.2\r\n", 4, "no answer from"),
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 900\r\n\r\n{", 4, "no answer from"),
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 6\r\n\r\n<html>", 2, "is no label farm"),
+        (b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n", 2, "is no label farm"),
+    ],
+)
+def test_what_is_no_farm_is_named(tmp_path, monkeypatch, capfd, answer, code, word):
+    """Whatever listens at the address: another protocol, an answer that breaks off, another web server."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def serve():
+            line, _ = listener.accept()
+            with line:
+                line.recv(65536)
+                line.sendall(answer)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        url = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        found, shown = run(tmp_path, monkeypatch, capfd, ["farm", "status", "--url", url])
+        thread.join()
+    assert found == code and word in shown.err and "next:" in shown.err and "Traceback" not in shown.err

@@ -9,6 +9,7 @@ from farm_examples import HERE
 
 from label_farm.job import Job
 from label_farm.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING, Ledger, owner_name
+from label_farm.roster import Roster
 from tacdata.errors import FormatError
 
 MODEL = "a" * 64
@@ -125,6 +126,8 @@ def test_claims_use_the_indices(ledger):
     for statement, values in statements.items():
         plan = [row[3] for row in ledger.rows("EXPLAIN QUERY PLAN " + statement, values)]
         assert not [step for step in plan if step.startswith("SCAN") or "TEMP B-TREE" in step], plan
+    plan = [row[3] for row in ledger.rows("EXPLAIN QUERY PLAN " + tables.OPEN, 2 * (MODEL, 5))]
+    assert sum("(model=?)" in step for step in plan) == 2 and "SCAN job" not in " ".join(plan), plan
 
 
 def test_only_jobs_of_one_indenter_are_taken_together(ledger):
@@ -133,6 +136,23 @@ def test_only_jobs_of_one_indenter_are_taken_together(ledger):
     ledger.enqueue(other, priority=1)
     assert [lease.job.x for lease in ledger.claim("a", MODEL, 5)] == [4, 5]
     assert [lease.job.x for lease in ledger.claim("a", MODEL, 3)] == [0, 1, 2]
+
+
+def test_a_batch_is_no_more_than_a_workers_share(ledger):
+    roster = Roster(ledger)
+    for name in ("remote:a/1", "remote:b/1", "remote:c/1"):
+        roster.enter(name, "cuda:0")
+    roster.note("remote:c/1", "refuses the model")
+    ledger.enqueue(jobs(9))
+    first = ledger.claim("remote:a/1", MODEL, 256)
+    assert len(first) == 5, "nine jobs, two workers that work"
+    assert len(ledger.claim("remote:b/1", MODEL, 256)) == 4, "what another holds counts as well"
+    for lease in first:
+        ledger.finish(lease.job.key, "remote:a/1", 0.0)
+    ledger.enqueue([replace(job, x=job.x + 100.0) for job in jobs(300)])
+    assert len(ledger.claim("remote:a/1", MODEL, 100)) == 100, "never more than a model likes"
+    roster.leave("remote:b/1")
+    assert len(ledger.claim("remote:a/1", MODEL, 256)) == 200, "one that is gone has no share"
 
 
 def test_a_batch_whose_worker_died_is_tried_one_by_one(ledger):

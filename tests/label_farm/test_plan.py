@@ -31,7 +31,7 @@ def test_a_ladder_meets_its_deepest_point_with_small_first_steps(deepest):
 
 
 def test_a_ladder_refuses_steps_that_lead_nowhere():
-    for settings in ({"load_step": 0.0}, {"growth": 0.5}, {"first_step": float("nan")}):
+    for settings in ({"load_step": 0.0}, {"unload_step": 1e-9}, {"growth": 0.5}, {"first_step": float("nan")}):
         with pytest.raises(UsageError, match="depth steps"):
             Ladder(**settings)
 

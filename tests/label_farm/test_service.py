@@ -107,6 +107,11 @@ def test_what_does_not_fit_is_refused_in_words(busy):
         ask(busy, "/api/submissions", "POST", b'{"session": "a", "by": "b", "factory": "os:system"}', **kind)[0] == 422
     )
     assert ask(busy, "/api/submissions", "POST", b"\x80\x04nonsense", **kind)[0] in (400, 422)
+    for wish in (b'{"session": "\\ud800", "by": "eve"}', b'{"session": "a", "by": "eve", "tolerance": NaN}', b"[" * 9):
+        status, _, content = ask(busy, "/api/submissions", "POST", wish, **kind)
+        assert status == 422 and json.loads(content)["next"] == "correct it", content
+    long = json.dumps({"session": "a" * 300, "by": "eve"}).encode()
+    assert ask(busy, "/api/submissions", "POST", long, **kind)[0] == 400
     status, _, content = ask(busy, "/api/state", Host="farm.example.org")
     assert status == 403 and "localhost" in json.loads(content)["allowed"]
     assert ask(busy, "/api/submissions", "POST", b"{}", Origin="https://example.org", **kind)[0] == 403
@@ -166,7 +171,7 @@ def test_failures_keep_their_reason_and_a_broken_session_is_refused(tmp_path):
 
 def test_a_killed_service_goes_on_where_it_stood(tmp_path):
     record(tmp_path, 1, 8)
-    service = Service(tmp_path, workers=2, seconds=0.4).start()
+    service = Service(tmp_path, workers=2, seconds=0.4, FAST_MODEL_FAILS="-5.8").start()
     service.client().post("/api/submissions", {"session": "session-0", "by": "ann"})
     service.wait(lambda state: state["submissions"][0]["labelled"] >= 2)
     workers = service.children
@@ -178,8 +183,14 @@ def test_a_killed_service_goes_on_where_it_stood(tmp_path):
     before = len(list((tmp_path / "farm").glob("??/*.npz")))
     with service:
         service.wait(all_finished)
+    with service:
+        [entry] = service.client().get("/api/state")["submissions"]
+        labelled = [k for k in range(8) if k != 4]
+        assert entry["recent"] == labelled[::-1], "what was done before a restart is still shown"
+        assert "no equilibrium" in entry["failures"]["4"]
+        assert service.client().get("/api/submissions/000001/results") == {"labels": labelled, "failures": [4]}
     solves = (tmp_path / "solves.log").read_text().splitlines()
-    assert len(list((tmp_path / "session-0" / "labels").glob("*.parquet"))) == 8
+    assert len(list((tmp_path / "session-0" / "labels").glob("*.parquet"))) == 7
     assert len(solves) <= 8 + len(workers) and before >= 2
 
 
@@ -193,13 +204,14 @@ def test_a_worker_of_elsewhere_needs_the_token_and_the_same_code(tmp_path):
         assert ask(service, "/api/state", Authorization="Bearer wrong")[0] == 401
         shown = verb("farm", "worker", service.url, "--token", "wrong")
         assert shown.returncode == 2 and "a wrong token" in shown.stderr
-        with crew(service, *arguments, FAST_MODEL_VERSION="2") as other:
+        with crew(service, *arguments, how=signal.SIGTERM, FAST_MODEL_VERSION="2") as other:
             deadline = time.monotonic() + 60
             while not (noted := [w["note"] for w in client.get("/api/state")["workers"] if w["note"]]):
                 assert time.monotonic() < deadline
                 time.sleep(0.2)
             assert "refuses model" in noted[0] and other.poll() is None
-        assert client.get("/api/state")["presses"]["solved"] == 0
+        state = client.get("/api/state")
+        assert state["presses"]["solved"] == 0 and not state["workers"], "a worker that is asked to end takes its leave"
         with crew(service, *arguments):
             while not all_finished(state := client.get("/api/state")):
                 assert time.monotonic() < deadline + 60
@@ -211,7 +223,8 @@ def test_a_worker_of_elsewhere_needs_the_token_and_the_same_code(tmp_path):
 class crew:
     """`tacdata farm worker` as a process."""
 
-    def __init__(self, service, *arguments, **variables):
+    def __init__(self, service, *arguments, how=signal.SIGINT, **variables):
+        self.how = how
         path = os.pathsep.join([str(HERE), str(ROOT)])
         command = [sys.executable, "-m", "tacdata.cli", "farm", "worker", service.url, *arguments]
         environment = {**os.environ, "PYTHONPATH": path, "TACDATA_FARM_TOKEN": TOKEN, **variables}
@@ -223,8 +236,8 @@ class crew:
         return self.process
 
     def __exit__(self, *_):
-        self.process.send_signal(signal.SIGINT)
-        assert self.process.wait(30) == 130
+        self.process.send_signal(self.how)
+        assert self.process.wait(30) == 128 + self.how
 
 
 @pytest.mark.parametrize(

@@ -19,5 +19,6 @@ def run(
     """Take a submission back; labels that are finished stay."""
     from label_farm.service.client import Client
 
-    entry = Client(url, token).post(f"/api/submissions/{number}/cancel")
+    client = Client(url, token)
+    entry = client.post(f"{client.submission(number)}/cancel")
     print(f"submission {number} is cancelled: {entry['labelled']} of {entry['episodes']} labels lie there")

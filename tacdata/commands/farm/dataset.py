@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -25,9 +26,14 @@ def run(
 
     folder.read_info(dataset)
     sensors = (metadata.read_main(dataset) or {"sensors": {}})["sensors"]
-    models = {}
+    models, held = {}, label_states.models_in(dataset)
     for key, document in sensors.items() if build else ():
-        models[key] = version(factory or FACTORY, Sensor.from_document(document, str(dataset))).content_hash
+        skin = Sensor.from_document(document, str(dataset))
+        models[key] = version(factory or FACTORY, skin).content_hash
+        if held.get(key) != models[key]:
+            # Labels made with --no-uncertainty are of the same model without the sensor file's spreads.
+            plain = version(factory or FACTORY, replace(skin, uncertainty={})).content_hash
+            models[key] = plain if held.get(key) == plain else models[key]
     states = label_states.states(dataset, models)
     for entry in states:
         if entry.state != "complete":

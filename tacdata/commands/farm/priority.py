@@ -20,5 +20,6 @@ def run(
     """Change a submission's priority; its waiting presses move at once."""
     from label_farm.service.client import Client
 
-    Client(url, token).post(f"/api/submissions/{number}/priority", {"priority": priority})
+    client = Client(url, token)
+    client.post(f"{client.submission(number)}/priority", {"priority": priority})
     print(f"submission {number} has priority {priority}")

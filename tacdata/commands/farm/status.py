@@ -29,10 +29,10 @@ def run(
     if not number:
         _all(client.get("/api/state"))
         return
-    entry = client.get(f"/api/submissions/{number}")
+    entry = client.get(client.submission(number))
     while wait and entry["state"] in ("waiting", "planning", "running"):
         sleep(1.0)
-        entry = client.get(f"/api/submissions/{number}")
+        entry = client.get(client.submission(number))
     _line(entry)
     for episode, reason in entry.get("failures", {}).items():
         print(f"  episode {episode}: no label: {reason.splitlines()[0]}")
@@ -44,6 +44,9 @@ def run(
             f"submission {number} " + ("is refused" if refused else f"left {entry['failed']} episodes without a label"),
             "a label for every episode", "mend what is said above and submit again",
         )  # fmt: skip
+    if entry["state"] == "done":
+        print(f"labels lie in {entry['session']}/labels under the service's root; on another computer:")
+        print(f"next: tacdata farm fetch {number} SESSION")
 
 
 def _line(entry: dict[str, Any]) -> None:

@@ -1,0 +1,56 @@
+"""The part of the interface that hands out what came of a submission: labels, pictures of them, failures."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+from fastapi import FastAPI, Request, Response
+
+from label_farm.service.foreman import Foreman
+from label_farm.service.run import LABELS
+from label_farm.session_labels import SessionLabels
+from tacdata import documents
+from tacdata.errors import UsageError
+
+
+def add_results(api: FastAPI, foreman: Foreman) -> None:
+    """Add the routes for results."""
+
+    @api.get("/api/submissions/{number}/results")
+    def results(number: str) -> dict[str, list[int]]:
+        """Episodes whose label can be fetched, and those of which it is known why they have none."""
+        labels, failures = foreman.results(number)
+        return {"labels": labels, "failures": failures}
+
+    @api.get("/api/submissions/{number}/labels/{episode}.parquet")
+    def label(number: str, episode: int, request: Request) -> Response:
+        """A finished label as a file; with its SHA-256 in If-None-Match, only whether it is still that one."""
+        path = _labels(foreman, number).path(episode)
+        if not foreman.is_labelled(number, episode) or not path.exists():
+            raise UsageError(
+                f"no finished label of episode {episode} in submission {number}", "one that results lists",
+                "see `tacdata farm status`",
+            )  # fmt: skip
+        content = path.read_bytes()
+        mark = f'"{hashlib.sha256(content).hexdigest()}"'
+        if request.headers.get("if-none-match") == mark:
+            return Response(status_code=304, headers={"ETag": mark})
+        return Response(content, media_type="application/vnd.apache.parquet", headers={"ETag": mark})
+
+    @api.get("/api/submissions/{number}/labels/{episode}.png")
+    def preview(number: str, episode: int) -> Response:
+        """The deepest frame of a finished label as a picture; its depth [mm] stands in the header X-Depth."""
+        from label_farm.service.preview import picture
+
+        content, depth = picture(_labels(foreman, number).path(episode))
+        return Response(content, media_type="image/png", headers={"X-Depth": f"{depth:.4f}"})
+
+    @api.get("/api/submissions/{number}/failures/{episode}")
+    def failure(number: str, episode: int) -> dict[str, Any]:
+        """Why an episode has no label, with the worker's log (`schemas/label_failure.schema.json`)."""
+        return documents.read(_labels(foreman, number).failure_path(episode), "label_failure")
+
+
+def _labels(foreman: Foreman, number: str) -> SessionLabels:
+    return SessionLabels(foreman.session(number) / LABELS)

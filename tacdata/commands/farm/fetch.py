@@ -1,0 +1,54 @@
+"""Bring finished labels from a label service to this computer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.farm import command as service
+
+ORDER = 35
+
+
+def run(
+    number: Annotated[str, typer.Argument(help="Number of the submission.")],
+    session: Annotated[Path, typer.Argument(help="The same recordings on this computer; labels go into it.")],
+    url: service.Url = service.DEFAULT,
+    token: service.Token = "",
+    wait: Annotated[bool, typer.Option("--wait", help="Go on until the submission is finished.")] = False,
+    redo: Annotated[bool, typer.Option("--redo", help="Replace labels that were made from something else.")] = False,
+) -> None:
+    """Bring the labels that are finished into SESSION/labels; run again, it brings what is new."""
+    from time import sleep
+
+    from label_farm.service.client import Client
+    from label_farm.service.fetch import Fetch
+    from tacdata.errors import SolveError
+
+    client = Client(url, token)
+    entry = client.get(client.submission(number))
+    fetch = Fetch(client, number, session, redo)
+    fetch.bring()
+    while wait and entry["state"] in ("waiting", "planning", "running"):
+        sleep(1.0)
+        # Its state is asked for first: what is finished by then is brought below.
+        entry = client.get(client.submission(number))
+        fetch.bring()
+    found = fetch.fetched
+    print(f"labels fetched: {len(found.written)}, already here: {len(found.current)}, failed: {len(found.failed)}")
+    for episode, reason in sorted(found.failed.items()):
+        print(f"  episode {episode}: no label: {reason.splitlines()[0]}")
+    left = entry["episodes"] - len(found.written) - len(found.current) - len(found.failed)
+    if entry["state"] in ("waiting", "planning", "running"):
+        print(f"{left} episodes are still to come: the submission is {entry['state']}")
+        print(f"next: tacdata farm fetch {number} {session} --wait")
+    elif found.failed:
+        raise SolveError(
+            f"{len(found.failed)} of {entry['episodes']} episodes have no label",
+            "a label for every episode",
+            f"read {session}/labels/episode-*.failure.json; `tacdata farm submit --redo` tries again",
+        )
+    else:
+        print(f"next: tacdata pack {session} --out DATASET")

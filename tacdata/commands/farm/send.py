@@ -1,0 +1,30 @@
+"""Bring a session of this computer to a label service that cannot see its folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.farm import command as service
+
+ORDER = 15
+
+
+def run(
+    session: Annotated[Path, typer.Argument(help="Folder of recordings on this computer.")],
+    url: service.Url = service.DEFAULT,
+    token: service.Token = "",
+    to: Annotated[
+        str, typer.Option(help="Where it is to lie, from the service's root on; else the folder's name.")
+    ] = "",
+) -> None:
+    """Send a session's recordings to the service; run again, it goes on. Not needed where it sees the same disk."""
+    from label_farm.service.client import Client
+    from label_farm.service.send import send
+
+    name = to or session.resolve().name
+    sent = send(Client(url, token), session, name)
+    print(f"files sent: {sent.files} ({sent.size / 1e6:.1f} MB), already there: {sent.there}")
+    print(f"next: tacdata farm submit {name}, then tacdata farm fetch NUMBER {session} --wait")
