@@ -245,27 +245,43 @@ class SkinModel:
             raise solution
         return solution
 
+    def solve_coarsely(self, requests: list[PressRequest], capacity: int = 1) -> list[CoarsePress | None]:
+        """Solve the loading of presses on the companion: for `solve_many`, and to see which states a path needs.
+
+        Args:
+            requests: What to press.
+            capacity: How many presses are in work at a time.
+
+        Returns:
+            One for each request; None where no error is estimated or there is no companion.
+        """
+        found: list[CoarsePress | None] = [None] * len(requests)
+        if not (self.settings.error_estimate and self.companion):
+            return found
+        for numbers in _by_shape(requests):
+            coarse = press_coarsely(self.companion, [requests[number] for number in numbers], capacity)
+            for number, press in zip(numbers, coarse, strict=True):
+                found[number] = press
+        return found
+
     def solve_many(
-        self, requests: list[PressRequest], capacity: int = 1
+        self, requests: list[PressRequest], capacity: int = 1, coarse: Sequence[CoarsePress | None] | None = None
     ) -> Iterator[tuple[int, PathSolution | SolveError]]:
         """Solve presses, many at a time; those of one shape of indenter share a batch.
 
         Args:
             requests: What to press.
             capacity: How many presses are in work at a time.
+            coarse: What `solve_coarsely` said of them, perhaps at a part of the depths; solved here if not given.
 
         Yields:
             The press's index and its solution, as they are finished; or why it was given up.
         """
-        order = sorted(range(len(requests)), key=lambda k: requests[k].indenter.shape)
-        for _, group in groupby(order, key=lambda k: requests[k].indenter.shape):
-            numbers = list(group)
+        for numbers in _by_shape(requests):
             chosen = [requests[number] for number in numbers]
             rows: dict[int, list[State]] = {number: [] for number in numbers}
             began = time.perf_counter()
-            coarse: list[CoarsePress | None] = [None] * len(chosen)
-            if self.settings.error_estimate and self.companion:
-                coarse = [*press_coarsely(self.companion, chosen, capacity)]
+            beside = [coarse[k] for k in numbers] if coarse else self.solve_coarsely(chosen, capacity)
             for index, _, state in self.walk(chosen, capacity):
                 number = numbers[index]
                 if isinstance(state, SolveError):
@@ -275,7 +291,7 @@ class SkinModel:
                 rows[number].append(state)
                 if len(rows[number]) == len(requests[number].depths):
                     seconds, began = time.perf_counter() - began, time.perf_counter()
-                    yield number, self._answer(requests[number], rows.pop(number), coarse[index], seconds)
+                    yield number, self._answer(requests[number], rows.pop(number), beside[index], seconds)
 
     def figures(self, depths: Sequence[float], states: list[State]) -> Figures:
         """Return what states (with displacements) at depths [mm] say."""
@@ -347,3 +363,9 @@ class SkinModel:
             penetration=np.array([state.penetration for state in states]),
             provenance=provenance.stamp("tacdata.skin", self.identity, parameters),
         )
+
+
+def _by_shape(requests: Sequence[PressRequest]) -> list[list[int]]:
+    """Return the numbers of requests, those of one shape of indenter together."""
+    order = sorted(range(len(requests)), key=lambda k: requests[k].indenter.shape)
+    return [list(group) for _, group in groupby(order, key=lambda k: requests[k].indenter.shape)]

@@ -18,7 +18,7 @@ from tacdata.skin.parameter import check, directions, known
 from tacdata.skin.pose import Pose
 from tacdata.skin.press import PressRequest
 from tacdata.skin.state import State
-from tacdata.skin.tangents import Tangents
+from tacdata.skin.tangents import TOLERANCE, Tangents
 from tacdata.skin.trail import Trail
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Sensitivity:
 
 
 def sensitivities(
-    model: SkinModel, request: PressRequest, parameters: Sequence[str]
+    model: SkinModel, request: PressRequest, parameters: Sequence[str], tolerance: float = TOLERANCE
 ) -> Iterator[tuple[float, State, Sensitivity]]:
     """Yield the requested states of a press with their derivatives, in the order of its depths.
 
@@ -64,6 +64,7 @@ def sensitivities(
         model: The skin.
         request: The press.
         parameters: Names of parameters (`tacdata.skin.parameter.known`).
+        tolerance: Residual of the linear solves over their right-hand sides [1].
 
     Raises:
         UsageError: If a parameter is not one of this press.
@@ -80,7 +81,7 @@ def sensitivities(
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
     distances = [request.indenter.distance_function(), board_distance][: len(contacts)]
     free = torch.as_tensor(~model._fixed, device=model.device).to(torch.float64)[:, None, None]
-    tangents = Tangents(model._batch(request, len(names))[0]._newton, distances, free, label)  # pyright: ignore
+    tangents = Tangents(model._batch(request, len(names))[0]._newton, distances, free, label, tolerance)  # pyright: ignore
 
     def collect(members: Members) -> list[State]:
         return model._gauge.states(members, contacts, True)

@@ -71,7 +71,9 @@ class _Point:
 class Tangents:
     """The derivatives on their way along the load path, one column a parameter."""
 
-    def __init__(self, newton: Newton, distances: list[wp.Function], free: torch.Tensor, label: str) -> None:
+    def __init__(
+        self, newton: Newton, distances: list[wp.Function], free: torch.Tensor, label: str, tolerance: float = TOLERANCE
+    ) -> None:
         """Start.
 
         Args:
@@ -79,7 +81,9 @@ class Tangents:
             distances: Of the contacts' shapes.
             free: 1 for nodes that are not held, else 0, shape (n, 1, 1).
             label: The press in words, for errors.
+            tolerance: Residual of the linear solves over their right-hand sides [1].
         """
+        self._tolerance = tolerance
         self._newton, self._contacts, self._distances = newton, newton.contacts, distances
         self._free, self._label = free, label
         self.du = torch.empty(0)
@@ -147,14 +151,14 @@ class Tangents:
         for _ in range(_AUGMENTATIONS if augmented else 1):
             still = point.changes(torch.zeros_like(point.u), self._history)
             rhs = (torch.stack([change.force for change in still]).sum(dim=0) - internal) * free
-            found = gmres.solve(product, self._newton.preconditioner.apply, rhs, self.du, TOLERANCE)
+            found = gmres.solve(product, self._newton.preconditioner.apply, rhs, self.du, self._tolerance)
             self.du, self.products = found.x, self.products + found.iterations
             self.residual = max(self.residual, float(found.residual.max()))
-            if not self.residual <= TOLERANCE:
+            if not self.residual <= self._tolerance:
                 raise SolveError(
                     f"{self._label}: derivatives with a residual of {self.residual:.1e} after {found.iterations} "
                     "products",
-                    f"at most {TOLERANCE:g}", "press less deep, or refine the mesh",
+                    f"at most {self._tolerance:g}", "press less deep, or refine the mesh",
                 )
             if augmented and self._follow(point.changes(self.du, self._history)):
                 break
