@@ -17,7 +17,7 @@ import torch
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import TacdataError, UsageError
-from training import checkpoint, metrics, spread
+from training import checkpoint, metrics, seen, spread
 from training.compute import choose_device, reproducible
 from training.frames import Frames
 from training.inference import predict
@@ -127,6 +127,10 @@ def train(
         best = checkpoint.load(out, place)
         if len(split.validation) > 1:
             spread.write(out, _calibrated(best, windows, frames, split))
+        validated = frames.indices(split.validation)
+        known = seen.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
+        if known is not None:
+            seen.write(out, known)
     return checkpoint.load(out)
 
 

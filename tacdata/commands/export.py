@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tacdata.commands.command import TOOLS
+
+if TYPE_CHECKING:
+    from tacdata.replay.targets import Targets
 
 ORDER = 121
 PANEL = TOOLS
@@ -46,11 +49,22 @@ def run(
         moved = 1000 * abs(targets.position - targets.seen).max()
         kind = f"compensated by up to {moved:.1f} mm" if targets.kind == "compensated" else "direct"
         print(f"{targets.recording}: {len(targets.time_ns)} targets for {', '.join(targets.fingers)}, {kind}")
+    for targets in episodes:
+        for words in _notes(targets):
+            print(f"note: {targets.recording}: {words}")
     for words in limits:
         print(f"note: {words}")
     print(f"written to {out} ({form}), poses in frame {episodes[0].frame!r}")
     if limits and writer.needs_robot:
         raise typer.Exit(1)
+
+
+def _notes(targets: Targets) -> list[str]:
+    """Return what a person should know of compensated targets: what was not felt, and what was not known."""
+    made = targets.source
+    if made is None or targets.kind == "direct":
+        return []
+    return [words for words in targets.remarks if words not in made.remarks] + made.guesses(targets.fingers)
 
 
 def _tracks(path: Path) -> Path:

@@ -38,17 +38,20 @@ def run(
     from tacdata.live.depth_stream import DepthStream
     from tacdata.live.live_loop import LiveLoop
     from tacdata.live.message_server import MessageServer
-    from tacdata.live.source import stream_clock, touched_board
+    from tacdata.live.source import touched_board
+    from tacdata.recording.device_streams import stream_clock
+    from training import seen
     from training.checkpoint import load
     from training.sequence import window_map
 
     trained = load(network)
     source = touched_board(rig, finger, trained.sensor)
     trained.check_sensor(source.sensor, str(rig))
-    offsets = trained.network.offsets
+    offsets, known = trained.network.offsets, seen.read(trained.path.parent, trained.content_hash)
     stream = DepthStream(
-        window_map(trained), offsets, source.sensor.map, stream_clock(source.board), round(tare * source.rate), causal
-    )
+        window_map(trained), offsets, source.sensor.map, stream_clock(source.board), round(tare * source.rate), causal,
+        known.novelty if known else None,
+    )  # fmt: skip
     print(_mode(trained.network.name, max(offsets), causal, source.rate), flush=True)
     with ExitStack() as stack:
         watch = server = None

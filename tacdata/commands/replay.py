@@ -27,6 +27,7 @@ def run(
     stiffness: Annotated[float, typer.Option(help="Of the springs that hold the robot's fingertips [N/m].")] = 300.0,
     out: Annotated[Path | None, typer.Option(help="File for the result (JSON).")] = None,
     view: Annotated[Path | None, typer.Option(help="Rerun file (.rrd): the first one's replays, undisturbed.")] = None,
+    video: Annotated[Path | None, typer.Option(help="The same as a film (.mp4 or .gif).")] = None,
     find_gain: Annotated[
         float | None, typer.Option(metavar="MM", help="Find the smallest gain that presses every skin so deep.")
     ] = None,
@@ -43,7 +44,7 @@ def run(
     from tacdata.replay.trials import Trials, result
     from training.wilson import interval
 
-    for file in (out, view):
+    for file in (out, view, video):
         if file is not None and file.exists():
             raise UsageError(f"{file} exists", "a new file", "choose another name")
     if gain_from is not None and find_gain is None:
@@ -71,8 +72,11 @@ def run(
         chosen = {"recording": source.recording, "hash": source.recording_hash, "depth": find_gain}
         known["chosen"] = dict.fromkeys(published, found)
     tried = [Trials(one, known, scene) for one in made]
-    if view is not None:
-        _save(view, tried[0], scene)
+    for one in made:
+        for words in one.guesses():
+            print(f"note: {one.recording}: {words}")
+    if view is not None or video is not None:
+        _save(view, video, tried[0], scene)
     document = result(tried, seeds, interval, scene, chosen)
     for kind in tried[0].paths:
         rate = document[kind]
@@ -89,12 +93,20 @@ def _tracks(path: Path) -> Path:
     return path if path.name.endswith(ENDING) else path_of(path)
 
 
-def _save(view: Path, tried: Trials, scene: Scene) -> None:
+def _save(view: Path | None, video: Path | None, tried: Trials, scene: Scene) -> None:
+    """Write the undisturbed replays of one recording, and say how they ended."""
+    from viewers.replay_film import film_replays
     from viewers.replay_view import save_replays
 
     shown = {kind: tried.one(kind, scene) for kind in tried.paths}
-    save_replays(view, shown, scene.sizes)
+    if view is not None:
+        save_replays(view, shown, scene.sizes)
+    if video is not None:
+        film_replays(video, shown, scene.sizes)
     for kind, outcome in shown.items():
         forces = ", ".join(f"{name} {force:.2f} N" for name, force in outcome.force.items())
         print(f"undisturbed, {kind}: {'held' if outcome.held else 'lost'} ({forces})")
-    print(f"saved {view}; look at it with: tacdata view {view}")
+    if view is not None:
+        print(f"saved {view}; look at it with: tacdata view {view}")
+    if video is not None:
+        print(f"saved {video}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,14 +23,19 @@ def run(
     network: Annotated[
         Path | None, typer.Option(help="A training run or checkpoint: its predicted depth is added, marked as such.")
     ] = None,
+    every_image: Annotated[
+        bool,
+        typer.Option("--every-image", help="Search all stored images for tags, not those that record had time for."),
+    ] = False,
     rate: Annotated[float, typer.Option(help="Rate of the grid [Hz].")] = 30.0,
 ) -> None:
     """Smooth the fingertip paths of demonstrations, mark gaps, name faults, and add a network's predicted depth."""
     from tacdata.demonstrations.compensation import contact_depth
     from tacdata.demonstrations.demo_reader import read_demo
     from tacdata.demonstrations.demo_session import read_demo_session
+    from tacdata.demonstrations.second_look import look_again
     from tacdata.demonstrations.tracking import track
-    from tacdata.demonstrations.tracks_file import path_of, write_tracks
+    from tacdata.demonstrations.tracks_file import path_of, read_tracks, write_tracks
     from tacdata.errors import UsageError
 
     recordings = read_demo_session(path).episodes if path.is_dir() else (path,)
@@ -37,8 +43,12 @@ def run(
         raise UsageError(f"no finished demonstration in {path}", "one or more", "record with tacdata record --demo")
     estimator = _estimator(network) if network else None
     for recording in recordings:
-        made = track(read_demo(recording), rate, estimator)
-        write_tracks(path_of(recording), made)
+        read = read_demo(recording)
+        made = track(look_again(read, _told) if every_image else read, rate, estimator)
+        before = path_of(recording)
+        if estimator is None and before.is_file() and (lost := read_tracks(before).network):
+            print(f"note: {before.name} held depth predicted by {lost['hash'][:12]}; without --network it goes")
+        write_tracks(before, made)
         _draw(made, recording)
         length = f"{made.seconds[-1]:.1f} s in frame {made.frame!r}"
         print(f"{recording.name}: {length}, written to {path_of(recording).name}")
@@ -55,6 +65,11 @@ def run(
             print(f"  note: {remark}")
     hint = "" if network else "  (with --network the targets can be compensated)"
     print(f"next: tacdata export {path} --out EXPORT{hint}")
+
+
+def _told(done: int) -> None:
+    if done % 100 == 0:
+        print(f"{done} images searched for tags", flush=True)
 
 
 def _draw(made: Demonstration, recording: Path) -> None:
@@ -76,8 +91,11 @@ def _draw(made: Demonstration, recording: Path) -> None:
 
 def _estimator(network: Path) -> Estimator:
     from tacdata.demonstrations.tracking import Estimator
+    from training import seen
     from training.checkpoint import load
     from training.sequence import identity, sequence_maps
 
     trained = load(network)
-    return Estimator(identity(trained), trained.sensor, lambda taxels: sequence_maps(trained, taxels))
+    known = seen.read(trained.path.parent, trained.content_hash)
+    maps = partial(sequence_maps, trained)
+    return Estimator(identity(trained), trained.sensor, maps, known.novelty if known else None)

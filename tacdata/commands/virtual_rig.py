@@ -28,6 +28,10 @@ def run(
     ] = False,
     cameras: Annotated[int, typer.Option(help="with --demo: cameras on the hand, 1 or 2")] = 2,
     task: Annotated[str, typer.Option(help="with --demo: grasp (a ball) or wipe (with an eraser)")] = "grasp",
+    nub: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="with --demo: fingers press round nubs of this radius on ball or eraser"),
+    ] = None,
     fault: Annotated[
         str | None, typer.Option(help="with --demo: no-tag, turned-tag, swapped-fingers or silent-finger")
     ] = None,
@@ -39,14 +43,19 @@ def run(
 
     if task != "grasp" and not demo:
         raise UsageError(f"--task {task} without --demo", "--demo --task wipe", "add --demo")
+    if nub is not None and not demo:
+        raise UsageError(f"--nub {nub:g} without --demo", f"--demo --nub {nub:g}", "add --demo")
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
     skin = read_sensor(sensor) if sensor else None
     if demo:
         from tacdata.virtual_rig.demo import VirtualDemo
+        from tacdata.virtual_rig.hand import RADIUS
 
-        rig = VirtualDemo(directory, 0.5 if speed is None else speed, seed, cameras, fault, skin, task)
+        rig = VirtualDemo(
+            directory, 0.5 if speed is None else speed, seed, cameras, fault, skin, task, RADIUS if nub is None else nub
+        )
     else:
         rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skin, rough)
     try:

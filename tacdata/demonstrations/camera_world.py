@@ -38,10 +38,10 @@ class CameraWorld:
         made: dict[str, Any] = {
             "version": schemas.version("camera_world"), "camera": self.camera, "frame": self.frame,
             **_flat(self.matrix), "method": self.method, "poses": self.poses,
-            "residual": {"position": self.residual[0], "rotation": self.residual[1]},
+            "residual": _errors(self.residual),
         }  # fmt: skip
         if self.spread is not None:
-            made["spread"] = {"position": self.spread[0], "rotation": self.spread[1]}
+            made["spread"] = _errors(self.spread)
         if self.cube is not None:
             made["cube"] = _flat(self.cube)
         return {**made, "remarks": list(self.remarks), "date": date, "code_version": provenance.code_version()}
@@ -79,6 +79,10 @@ def pose_matrix(entry: dict[str, Any], origin: str) -> np.ndarray:
     matrix[:3, :3] = Rotation.from_quat(turn).as_matrix()
     matrix[:3, 3] = entry["position"]
     return matrix
+
+
+def _errors(values: tuple[float, float]) -> dict[str, float]:
+    return {"position": float(values[0]), "rotation": float(values[1])}
 
 
 def _flat(matrix: np.ndarray) -> dict[str, list[float]]:

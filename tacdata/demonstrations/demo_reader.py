@@ -42,6 +42,8 @@ class DemoRecording:
     """What was noted while recording, and what could not be read, in words."""
     timing: dict[str, float] = field(default_factory=dict)
     """Camera -> standard uncertainty of when each of its images was taken [s]."""
+    searched: str = "images that the recorder had time for"
+    """Which images were searched for tags, in words."""
 
     @property
     def span_ns(self) -> tuple[int, int]:

@@ -118,8 +118,10 @@ class DemoRecorder:
                 time.sleep(WATCH)
             reason = ""
         finally:
+            self._streams.catch_up()
+            counts = self._streams.counts
             self._streams.record_into(None)
-            path = writer.close(not reason, reason, dict(self._streams.clock_models), self._streams.counts)
+            path = writer.close(not reason, reason, self._streams.clock_models, counts)
             self.session = refresh(self.session)
         return path
 

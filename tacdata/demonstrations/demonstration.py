@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from tacdata.demonstrations import touch
 from tacdata.sensor import Sensor
 
 
@@ -36,6 +38,9 @@ class FingerTrack:
     depth: np.ndarray | None = None
     """PREDICTED depth [mm], shape (n, pixels_x, pixels_y), float32: a network's estimate, never a measurement; NaN
     where it had no reading. None without a network."""
+    novelty: np.ndarray | None = None
+    """How far the readings are from all that the network learnt from [1], shape (n,), float32; above 1 farther than
+    nearly all on which it was validated, so that its depth is a guess. None where the network's run does not say."""
 
     @property
     def normal(self) -> np.ndarray:
@@ -69,6 +74,17 @@ class Demonstration:
     remarks: tuple[str, ...] = ()
     """What a person should know of it, in words."""
     provenance: dict[str, Any] = field(default_factory=dict)
+
+    def guesses(self, fingers: Iterable[str] = ()) -> list[str]:
+        """Return where the predicted depth of some fingers (all if none is named) is a guess, in words.
+
+        It is one where the network never learnt from readings alike.
+        """
+        words, chosen = [], tuple(fingers) or tuple(self.tracks)
+        for name, track in self.tracks.items():
+            if name in chosen and track.signals is not None and track.novelty is not None:
+                words += touch.unknown(name, track.signals, track.novelty)
+        return words
 
     @property
     def seconds(self) -> np.ndarray:

@@ -12,6 +12,12 @@ REST = 0.5
 """Length of the quietest stretch, which is taken as untouched [s]."""
 SILENT = 0.5
 """A board that says nothing for longer has been silent [s]."""
+FELT = 0.1
+"""A finger touches while its strongest reading is above this share of its largest [1]."""
+ODD = 0.05
+"""A share of unknown readings that is said; a tenth of a percent to a few are to be expected [1]."""
+ALIEN = 1.5
+"""So many times farther from what was learnt than validation presses, an estimate is called a guess [1]."""
 TOUCH = 8.0
 """A reading that rises by so many times the noise has been touched [1]."""
 
@@ -71,6 +77,30 @@ def faults(name: str, stream: TaxelStream, begin_ns: int, end_ns: int) -> list[s
     if len(stuck) < len(spread) and (spread < TOUCH * noise).all():
         remarks.append(f"{name}: its board speaks, but nothing ever touched the finger")
     return remarks
+
+
+def unknown(name: str, signals: np.ndarray, novelty: np.ndarray) -> list[str]:
+    """Say for which share of a finger's touches the network has never learnt from anything alike.
+
+    Args:
+        name: The finger.
+        signals: Tared readings [counts], shape (n, taxels).
+        novelty: How far they are from all that it learnt from, over what is far [1], shape (n,).
+    """
+    known = np.isfinite(novelty) & np.isfinite(signals).all(axis=1)
+    strongest = np.max(signals[known], axis=1, initial=0.0)
+    touching = novelty[known][strongest > FELT * np.max(strongest, initial=0.0)]
+    strange = touching > 1.0
+    if len(touching) == 0 or strange.mean() <= ODD:
+        return []
+    most = float(touching.max())
+    how, what = "just outside of", "may be off there"
+    if most > ALIEN:
+        how, what = "unlike all of", "is a guess there"
+    return [
+        f"{name}: {strange.mean():.0%} of its touch is {how} what the network learnt from (up to {most:.2f} times as "
+        f"far from it as its validation presses): the predicted depth {what}; train on contacts as wide and as deep"
+    ]
 
 
 def _period(stream: TaxelStream) -> float:

@@ -20,6 +20,8 @@ from tacdata.sensor import Sensor
 
 RATE = 30.0
 """Default rate of the grid [Hz]."""
+UNSEARCHED = "no image was searched for tags"
+"""How a remark on a stretch without images begins."""
 FEWEST = 5
 """Sightings below which a finger has no path."""
 
@@ -33,6 +35,8 @@ class Estimator:
     sensor: Sensor
     maps: Callable[[np.ndarray], np.ndarray]
     """Tared readings of successive frames [counts], shape (m, taxels) -> depth [mm], shape (m, pixels_x, pixels_y)."""
+    novelty: Callable[[np.ndarray], np.ndarray] | None = None
+    """Tared readings -> how far they are from all that was learnt from [1], shape (m,); None if that is not known."""
 
 
 def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | None = None) -> Demonstration:
@@ -62,9 +66,12 @@ def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | N
             "check light, focus, tag numbers and intrinsics with one image first",
         )  # fmt: skip
     paths, settings = {}, {}
+    looked = np.unique(np.concatenate([view.sample_ns for view in recording.views]))
     for name, found in seen.items():
-        seen[name], paths[name], settings[name], words = _path(found, times)
+        seen[name], paths[name], settings[name], words = _path(found, times, looked)
         remarks += words
+    if not recording.searched.startswith("all") and any(words.startswith(UNSEARCHED) for words in remarks):
+        remarks.append("all images are stored: tacdata track --every-image searches those that were passed over")
     remarks += path_faults.exchanges(seen, paths, times, begin)
     remarks += path_faults.other_hand(paths, recording.rig.fingers, rate)
     for name, stream in recording.taxels.items():
@@ -76,16 +83,27 @@ def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | N
     parents = {"recording": provenance.file_hash(recording.path)}
     if estimator:
         parents["checkpoint"] = estimator.identity["hash"]
+        if estimator.novelty is None:
+            remarks.append(
+                "whether these readings are like those that the network learnt from is not known: its run holds no "
+                "seen.json of this checkpoint (tacdata train --resume on it writes one)"
+            )
     return Demonstration(
         recording.path.name, parents["recording"], recording.task, recording.rig.frame, rate, times, tracks,
-        recording.rig.sensors, {"gate": GATE, "floor": list(FLOOR), "fingers": settings},
+        recording.rig.sensors,
+        {"gate": GATE, "floor": list(FLOOR), "fingers": settings, "searched": recording.searched},
         estimator.identity if estimator else None, tuple(dict.fromkeys(remarks)),
         provenance.stamp("tacdata track", parents, {"rate": rate}),
     )  # fmt: skip
 
 
-def _path(seen: Sightings, times: np.ndarray) -> tuple[Sightings, Smoothed, dict[str, Any], list[str]]:
-    """Smooth one finger; a tag that contradicts the others whenever it is alone is left out and named."""
+def _path(
+    seen: Sightings, times: np.ndarray, looked: np.ndarray
+) -> tuple[Sightings, Smoothed, dict[str, Any], list[str]]:
+    """Smooth one finger, with the times of all images searched [ns], shape (p,).
+
+    A tag that contradicts the others whenever it is alone is left out and named.
+    """
     words: list[str] = []
     wander = choose(seen)
     path = smooth(seen, times, wander)
@@ -106,7 +124,11 @@ def _path(seen: Sightings, times: np.ndarray) -> tuple[Sightings, Smoothed, dict
     begin = int(times[0])
     for a, b in path_faults.gaps(seen.time_ns[path.accepted], begin, int(times[-1])):
         first, last = (a - begin) * 1e-9, (b - begin) * 1e-9
-        words.append(f"{seen.finger}: no tag that fits from {first:.1f} to {last:.1f} s ({last - first:.1f} s)")
+        when = f"from {first:.1f} to {last:.1f} s ({last - first:.1f} s)"
+        if ((looked > a) & (looked < b)).any():
+            words.append(f"{seen.finger}: no tag that fits {when}")
+        else:  # whoever records must not look for a hidden tag
+            words.append(f"{UNSEARCHED} {when}: a camera or the host did not keep up")
     chosen = {"velocity_density": wander.velocity, "turning_density": wander.turning}
     return seen, path, {**chosen, "left_out_tags": list(wrong)}, words
 
@@ -123,7 +145,7 @@ def _track(
     gap = np.logical_not(inside)
     for a, b in path_faults.gaps(seen.time_ns[path.accepted], int(times[0]), int(times[-1])):
         gap = gap | np.asarray((times > a) & (times < b))
-    signals, depth, words = None, None, []
+    signals, depth, novelty, words = None, None, None, []
     stream = recording.taxels.get(name)
     if stream is not None and len(stream.counts) > 1:
         tared = stream.counts - touch.baseline(stream)
@@ -131,12 +153,15 @@ def _track(
         if estimator is not None:
             _same_sensor(name, recording.rig.sensors[name], estimator)
             depth = touch.on_grid(stream, estimator.maps(tared), times)
+            if estimator.novelty is not None:
+                novelty = touch.on_grid(stream, estimator.novelty(tared), times)
+                words += touch.unknown(name, signals, novelty)
             unfelt = int(np.isnan(signals[:, 0]).sum())
             if unfelt:
                 words.append(f"{name}: no reading, so no predicted depth, at {unfelt} of {len(times)} times")
     made = FingerTrack(
         name, finger.hand, finger.kind, path.position, quaternion, path.covariance, gap, len(path.accepted),
-        int((~path.accepted).sum()), signals, depth,
+        int((~path.accepted).sum()), signals, depth, novelty,
     )  # fmt: skip
     return made, words
 

@@ -22,7 +22,7 @@ HEADER = b"tacdata.finger_tracks"
 ENDING = ".tracks.parquet"
 UNITS = {
     "position": "m", "quaternion": "1", "covariance": "rad^2, rad m, m^2", "gap": "1",
-    "signals": "counts", "predicted_depth": "mm",
+    "signals": "counts", "predicted_depth": "mm", "novelty": "1",
 }  # fmt: skip
 """Column of a finger -> unit; the columns are called FINGER.COLUMN, and time_ns [ns]."""
 REMEDY = "run `tacdata track` again: the recording holds everything"
@@ -101,6 +101,8 @@ def _columns(track: FingerTrack) -> dict[str, np.ndarray]:
         named["signals"] = track.signals
     if track.depth is not None:
         named["predicted_depth"] = track.depth
+    if track.novelty is not None:
+        named["novelty"] = track.novelty
     return {**named, "gap": track.gap}
 
 
@@ -116,7 +118,7 @@ def _track(name: str, entry: dict[str, Any], table: pa.Table, sensor: Sensor | N
         if f"{name}.{which}" not in table.column_names:
             return None
         values = table.column(f"{name}.{which}").combine_chunks()
-        return values.flatten().to_numpy().reshape(rows, *shape)
+        return (values.flatten() if shape else values).to_numpy(zero_copy_only=False).reshape(rows, *shape)
 
     maps = sensor.map.shape if sensor else ()
     found = column("position", 3), column("quaternion", 4), column("covariance", 6, 6)
@@ -124,5 +126,5 @@ def _track(name: str, entry: dict[str, Any], table: pa.Table, sensor: Sensor | N
     return FingerTrack(
         name, entry["hand"], entry["kind"], position, quaternion, covariance,
         table.column(f"{name}.gap").to_numpy(), entry["sightings"], entry["outliers"], column("signals", -1),
-        column("predicted_depth", *maps) if sensor else None,
+        column("predicted_depth", *maps) if sensor else None, column("novelty"),
     )  # fmt: skip

@@ -41,7 +41,7 @@ class Joints(Exporter):
         new_folder(out)
         for targets, path in zip(episodes, solved, strict=True):
             stem = Path(targets.recording).stem
-            said += [f"{stem}: {words}" for words in in_words(path, targets)]
+            said += [f"{stem}: {words}" for words in in_words(path, targets, robot.tolerance[1] is not None)]
             columns = to_columns(targets)
             header = _header(targets, path, robot, columns)
             documents.check(header, "joint_trajectory", stem)
@@ -70,15 +70,16 @@ def read_joints(out: Path) -> list[tuple[Targets, dict[str, np.ndarray], dict[st
     return [_read(path) for path in found]
 
 
-def in_words(path: JointPath, targets: Targets) -> list[str]:
-    """Return what the robot cannot do, in words with times."""
+def in_words(path: JointPath, targets: Targets, turned: bool = True) -> list[str]:
+    """Return what the robot cannot do, in words with times; with its turns, where those are asked for."""
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     said = []
     for name, rows in path.unreached.items():
         chosen = list(rows), targets.fingers.index(name)
         worst = 1000 * path.position_error[chosen].max(), np.degrees(path.rotation_error[chosen].max())
         share = f"{len(rows)} of {len(seconds)} targets ({_when(rows, seconds)})"
-        said.append(f"{name} does not reach {share}, off by up to {worst[0]:.1f} mm, {worst[1]:.0f} deg")
+        off = f"{worst[0]:.1f} mm" + (f", {worst[1]:.0f} deg" if turned else "")
+        said.append(f"{name} does not reach {share}, off by up to {off}")
     for name, rows in path.outside_workspace.items():
         said.append(f"{name}: {len(rows)} targets lie outside the workspace ({_when(rows, seconds)})")
     for name, rows in path.too_fast.items():

@@ -30,7 +30,8 @@ class Lerobot(Exporter):
 
     ``action``: fingertip targets, ``observation.state``: fingertips as seen, both x y z [m] and qx qy qz qw a finger;
     ``observation.tactile.FINGER`` [counts]; ``observation.predicted_depth.FINGER``: a network's estimate as a float32
-    depth image (metres in the file, millimetres in lerobot), with the checkpoint's hash in the feature's ``info``.
+    depth image (metres in the file, millimetres in lerobot), with the checkpoint's hash in the feature's ``info``;
+    ``tacdata.predicted_novelty.FINGER``: above 1 the estimate is from readings unlike all that the network learnt from.
     """
 
     def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
@@ -110,6 +111,8 @@ def _columns(targets: Targets) -> dict[str, np.ndarray]:
         if track.depth is not None:
             maps = np.nan_to_num(track.depth[targets.rows]).astype(np.float32)
             columns[f"observation.predicted_depth.{name}"] = maps / tiff.MM_PER_METRE
+        if track.novelty is not None:
+            columns[f"tacdata.predicted_novelty.{name}"] = np.nan_to_num(track.novelty[targets.rows]).astype(np.float32)
     return columns
 
 
@@ -127,7 +130,7 @@ def _features(targets: Targets, columns: dict[str, np.ndarray]) -> dict[str, dic
             dtype, shape, names = "image", [*shape, 1], ["height", "width", "channels"]
             info = {"is_depth_map": True, "depth_unit": "m", "unit": "m"}
         elif key != TIME:
-            info = {"unit": "counts"}
+            info = {"unit": "1" if "novelty" in key else "counts"}
         if "predicted" in key:
             info |= {"prediction": True, "checkpoint": (targets.network or {}).get("hash", "")}
         made[key] = {"dtype": dtype, "shape": shape, "names": names, "info": info}

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.grasping.centre import Maps, dense_centre, map_centre, raw_centre
+from tacdata.grasping.centre import Maps, map_centre
 from tacdata.grasping.press_set import PressSet
+from tacdata.grasping.strategies import strategy as strategies
 from tacdata.grasping.touch import OrangeTouch
 
 STEP = 0.25
@@ -29,9 +30,9 @@ def bias(touch: OrangeTouch, presses: PressSet, maps: Maps, force: float, band: 
     sensor = touch.sensor
     true = np.arange(0.0, touch.limit[0] + 1e-9, STEP)
     windows = [np.repeat(touch.signals(x, 0.0, force)[None], FRAMES, axis=0) for x in true.tolist()]
+    ways = {name: strategies.create(name, sensor, maps) for name in strategies.names()}
     believed = {
-        "raw_taxel": [_x(raw_centre(w, sensor)) for w in windows],
-        "dense_depth": [_x(dense_centre(w, sensor, maps)) for w in windows],
+        **{name: [_x(way.centre(w)) for w in windows] for name, way in ways.items() if way.adjusts},
         "solved_map": [_x(map_centre(_solved(touch, presses, x, force), sensor)) for x in true.tolist()],
     }
     return {

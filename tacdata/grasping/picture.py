@@ -5,11 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from tacdata.grasping.trial import STRATEGIES
-
 COLORS = {"contact_only": "0.55", "raw_taxel": "tab:orange", "dense_depth": "tab:blue", "solved_map": "black"}
-NAMES = {name: name.replace("_", " ") for name in COLORS}
-WIDTH = 0.26
+OTHERS = "tab:purple", "tab:brown", "tab:pink", "tab:cyan", "tab:olive"
+"""Colours of strategies that the paper does not have."""
+BREADTH = 0.78
+"""Share of an axis' unit that the bars of one place take [1]."""
+
+
+def _colors(found: dict[str, Any]) -> dict[str, str]:
+    own = [name for name in found["rates"] if name not in COLORS]
+    return COLORS | {name: OTHERS[k % len(OTHERS)] for k, name in enumerate(own)}
+
+
+def _spread(found: dict[str, Any]) -> list[tuple[str, float, float]]:
+    """Return name, offset and width of each strategy's bar about its place on an axis."""
+    width = BREADTH / len(found["rates"])
+    return [(name, width * (k - (len(found["rates"]) - 1) / 2), width) for k, name in enumerate(found["rates"])]
 
 
 def save(found: dict[str, Any], path: Path) -> None:
@@ -27,25 +38,29 @@ def save(found: dict[str, Any], path: Path) -> None:
 
 
 def _success(ax: Any, found: dict[str, Any]) -> None:
-    for k, name in enumerate(STRATEGIES):
+    colors, named = _colors(found), False
+    for name, shift, width in _spread(found):
         for at, part in enumerate(("overall", "edge")):
-            share, (held, of) = found["rates"][name][part], found["published"][part][name]
-            rate, x = share["held"] / share["of"], at + WIDTH * (k - 1)
+            share, published = found["rates"][name][part], found["published"][part].get(name)
+            rate, x = share["held"] / share["of"], at + shift
             low, high = share["wilson_95"]
-            ax.bar(x, rate, 0.9 * WIDTH, color=COLORS[name], label=NAMES[name] if at == 0 else None)
+            ax.bar(x, rate, 0.9 * width, color=colors[name], label=name.replace("_", " ") if at == 0 else None)
             ax.errorbar(x, rate, [[max(rate - low, 0)], [max(high - rate, 0)]], color="black", capsize=3)
-            ax.plot(x, held / of, "D", color="white", mec="black", label="paper" if at == k == 0 else None)
+            if published:
+                held, of = published
+                ax.plot(x, held / of, "D", color="white", mec="black", label=None if named else "paper")
+                named = True
     ax.set(xticks=(0, 1), xticklabels=("all positions", "edge"), ylabel="held [1]", ylim=(0, 1.25))
     ax.set_title("held for 5 s, with 95 % Wilson intervals")
     ax.legend(fontsize=8, ncols=4, loc="upper center")
 
 
 def _positions(ax: Any, found: dict[str, Any]) -> None:
-    places = found["setup"]["places"]
-    for k, name in enumerate(STRATEGIES):
+    places, colors = found["setup"]["places"], _colors(found)
+    for name, shift, width in _spread(found):
         own = found["rates"][name]["by_position"]
         rates = [own[str(p)]["held"] / own[str(p)]["of"] for p in range(1, len(places) + 1)]
-        ax.bar([p + WIDTH * (k - 1) for p in range(1, len(places) + 1)], rates, 0.9 * WIDTH, color=COLORS[name])
+        ax.bar([p + shift for p in range(1, len(places) + 1)], rates, 0.9 * width, color=colors[name])
     for p in found["setup"]["edge"]:
         ax.axvspan(p - 0.5, p + 0.5, color="0.92", zorder=0)
     ticks = range(1, len(places) + 1)
@@ -55,10 +70,10 @@ def _positions(ax: Any, found: dict[str, Any]) -> None:
 
 def _bias(ax: Any, found: dict[str, Any]) -> None:
     own, band = found["bias"], found["setup"]["protocol"]["band"]
-    for name in ("raw_taxel", "dense_depth", "solved_map"):
+    for name in own["accepted_to"]:
         points = [(x, y) for x, y in zip(own["true"], own[name], strict=True) if y is not None]
         line = "--" if name == "solved_map" else "-"
-        ax.plot(*zip(*points, strict=True), color=COLORS[name], ls=line, label=NAMES[name])
+        ax.plot(*zip(*points, strict=True), color=_colors(found)[name], ls=line, label=name.replace("_", " "))
     ax.plot(own["true"], own["true"], color="0.7", lw=0.8)
     ax.axhspan(0, band, color="tab:green", alpha=0.12, label="band")
     ax.axvline(found["lifting"]["holds_to"], color="tab:red", lw=0.8, label="the lift holds to")
@@ -67,13 +82,16 @@ def _bias(ax: Any, found: dict[str, Any]) -> None:
 
 
 def _ways(ax: Any, found: dict[str, Any]) -> None:
+    ways = [name for name in found["rates"] if name in found["bias"]["accepted_to"]]
+    colors = _colors(found)
     for trial in found["trials"]:
-        if trial["strategy"] == "contact_only":
+        name = trial["strategy"]
+        if name not in ways:
             continue
-        shift = -0.12 if trial["strategy"] == "raw_taxel" else 0.12
+        shift = 0.24 * (ways.index(name) / max(len(ways) - 1, 1) - 0.5)
         moves = [k + shift for k in range(len(trial["truths"]))]
-        ax.plot(moves, trial["truths"], color=COLORS[trial["strategy"]], lw=0.6, alpha=0.5)
-        ax.plot(moves[-1], trial["truths"][-1], "o" if trial["held"] else "x", color=COLORS[trial["strategy"]], ms=4)
+        ax.plot(moves, trial["truths"], color=colors[name], lw=0.6, alpha=0.5)
+        ax.plot(moves[-1], trial["truths"][-1], "o" if trial["held"] else "x", color=colors[name], ms=4)
     band = found["setup"]["protocol"]["band"]
     ax.axhspan(-band, band, color="tab:green", alpha=0.12)
     ax.set(xlabel="adjustments", ylabel="true lateral place [mm]", title="every trial: held (o), lost (x)")

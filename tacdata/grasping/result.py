@@ -26,7 +26,6 @@ from tacdata.grasping.study import (
     trials,
 )  # fmt: skip
 from tacdata.grasping.touch import OrangeTouch
-from tacdata.grasping.trial import STRATEGIES
 from tacdata.sensor import Sensor
 
 FINENESS = 0.25
@@ -82,12 +81,13 @@ def lines(found: dict[str, Any]) -> list[str]:
     said = [
         f"{'':<13} {'held':>7}  {'Wilson 95 %':<14} {'paper':>6} | at the edge                   | moves where held"
     ]
-    for name in STRATEGIES:
-        own, row = found["rates"][name], f"{name:<13}"
+    for name, own in found["rates"].items():
+        row = f"{name:<13}"
         for part in ("overall", "edge"):
-            share, (held, of) = own[part], found["published"][part][name]
-            low, high = share["wilson_95"]
-            row += f" {share['held']:>3}/{share['of']:<3}  {f'{low:.0%} to {high:.0%}':<14} {held / of:>6.1%} |"
+            share, (low, high) = own[part], own[part]["wilson_95"]
+            held, of = found["published"][part].get(name, (0, 0))
+            paper = f"{held / of:.1%}" if of else "-"
+            row += f" {share['held']:>3}/{share['of']:<3}  {f'{low:.0%} to {high:.0%}':<14} {paper:>6} |"
         said.append(row + f" {_moves(own['adjustments'])}, edge {_moves(own['edge_adjustments'])}")
     return [*said, *_bias_lines(found), *_lifting_lines(found)]
 
@@ -99,9 +99,10 @@ def _moves(moves: dict[str, Any]) -> str:
 def _bias_lines(found: dict[str, Any]) -> list[str]:
     own, band = found["bias"], found["setup"]["protocol"]["band"]
     said = []
-    for name, words in (("raw_taxel", "taxels"), ("dense_depth", "network's map"), ("solved_map", "solved map")):
-        inside = own["toward_interior"][name].items()
-        off = ", ".join(f"{at} mm: {'none' if value is None else f'{value:+.2f}'}" for at, value in inside)
+    known = {"raw_taxel": "taxels", "dense_depth": "network's map", "solved_map": "solved map"}
+    for name, inside in own["toward_interior"].items():
+        words = known.get(name, name)
+        off = ", ".join(f"{at} mm: {'none' if value is None else f'{value:+.2f}'}" for at, value in inside.items())
         to = own["accepted_to"][name]
         said.append(f"centre by {words}: too far inside at {off}; the {band:g} mm band accepts to {to:.2f} mm")
     return said
@@ -111,7 +112,7 @@ def _lifting_lines(found: dict[str, Any]) -> list[str]:
     own = found["lifting"]
     said = [f"the lift (fingertips {own['squeeze']:.2f} mm closer than touching) holds to {own['holds_to']:g} mm"]
     for other in found["other_lifting"]:
-        shares = {name: other["rates"][name]["overall"] for name in STRATEGIES}
+        shares = {name: own["overall"] for name, own in other["rates"].items()}
         held = ", ".join(f"{name} {share['held']}/{share['of']}" for name, share in shares.items())
         said.append(f"  one that holds to {other['holds_to']:g} mm: {held}")
     return said

@@ -10,8 +10,9 @@ import numpy as np
 
 from tacdata.grasping.centre import Maps
 from tacdata.grasping.lift import Grip, lift, lifting_grip
+from tacdata.grasping.strategies import strategy as strategies
 from tacdata.grasping.touch import Fingertip, OrangeTouch, Spread
-from tacdata.grasping.trial import STRATEGIES, Approach, Protocol, approach, centre_of
+from tacdata.grasping.trial import Approach, Protocol, approach
 
 PLACES = (-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0)
 """Where the orange is put beside the gripper's middle [mm]: evenly over the pad's 16 mm; Pos. 1 to 8."""
@@ -29,6 +30,13 @@ PUBLISHED = {
     "edge_adjustments": {"raw_taxel": [2.56, 1.01], "dense_depth": [2.71, 1.21]},
 }
 """What the paper reports: held and of how many; mean and standard deviation of adjustments where held."""
+
+
+def strategy_names() -> list[str]:
+    """Return all strategies, those of the paper first and in its order."""
+    known, published = strategies.names(), list(PUBLISHED["overall"])
+    return [*(name for name in published if name in known), *(name for name in known if name not in published)]
+
 
 Interval = Callable[[int, int], tuple[float, float]]
 
@@ -106,9 +114,10 @@ def trials(
         told: Is told how many are done, of how many.
     """
     found: list[Trial] = []
-    total = len(STRATEGIES) * len(PLACES) * setup.repeats
-    for strategy in STRATEGIES:
-        centre = centre_of(strategy, touch.sensor, maps)
+    names = strategy_names()
+    total = len(names) * len(PLACES) * setup.repeats
+    for name in names:
+        strategy = strategies.create(name, touch.sensor, maps)
         for position, place in enumerate(PLACES, 1):
             for repeat in range(setup.repeats):
                 world = np.random.default_rng([setup.seed, position, repeat])
@@ -119,8 +128,8 @@ def trials(
                     Fingertip(touch, setup.spread, side, np.random.default_rng([setup.seed, position, repeat, k]))
                     for k, side in enumerate((1, -1))
                 ]
-                way = approach(fingers, place + aside, up, centre, setup.protocol, touch.sensor.taxels.rate, world)
-                trial = Trial(strategy, position, repeat, friction, mass, up, way, False)
+                way = approach(fingers, place + aside, up, strategy, setup.protocol, touch.sensor.taxels.rate, world)
+                trial = Trial(name, position, repeat, friction, mass, up, way, False)
                 found.append(replace(trial, held=lifted(trial, setup.grip)))
                 told(len(found), total)
     return found
@@ -141,7 +150,7 @@ def configured(setup: Setup, margin: float = MARGIN) -> Setup:
 
 def rates(found: list[Trial], interval: Interval) -> dict[str, Any]:
     """Return success and adjustments of every strategy: overall, at the edge and at each position."""
-    return {name: _rates([t for t in found if t.strategy == name], interval) for name in STRATEGIES}
+    return {name: _rates([t for t in found if t.strategy == name], interval) for name in strategy_names()}
 
 
 def _rates(found: list[Trial], interval: Interval) -> dict[str, Any]:

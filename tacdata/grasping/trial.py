@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.grasping.centre import Maps, dense_centre, raw_centre, touched
+from tacdata.grasping.strategies.strategy import Strategy
 from tacdata.grasping.touch import Fingertip
-from tacdata.sensor import Sensor
-
-STRATEGIES = ("contact_only", "raw_taxel", "dense_depth")
 
 
 @dataclass(frozen=True)
@@ -50,18 +47,6 @@ class Approach:
     """Why nothing is lifted, in words; empty if it is."""
 
 
-Centre = Callable[[np.ndarray], np.ndarray | None]
-
-
-def centre_of(strategy: str, sensor: Sensor, maps: Maps) -> Centre | None:
-    """Return what a strategy makes of a window of frames; None for one that only asks whether there is contact."""
-    if strategy == "raw_taxel":
-        return lambda frames: raw_centre(frames, sensor)
-    if strategy == "dense_depth":
-        return lambda frames: dense_centre(frames, sensor, maps)
-    return None
-
-
 def fused(fingers: Sequence[Fingertip], centres: Sequence[np.ndarray | None]) -> float | None:
     """Return the lateral offset in the gripper's frame [mm], averaged over the fingertips that know one."""
     known = [finger.side * float(c[0]) for finger, c in zip(fingers, centres, strict=True) if c is not None]
@@ -69,7 +54,7 @@ def fused(fingers: Sequence[Fingertip], centres: Sequence[np.ndarray | None]) ->
 
 
 def approach(
-    fingers: Sequence[Fingertip], lateral: float, vertical: float, centre: Centre | None, protocol: Protocol,
+    fingers: Sequence[Fingertip], lateral: float, vertical: float, strategy: Strategy, protocol: Protocol,
     rate: float, rng: np.random.Generator,
 ) -> Approach:  # fmt: skip
     """Close, measure and move until the contact is believed to lie in the band.
@@ -78,7 +63,7 @@ def approach(
         fingers: The two fingertips.
         lateral: Where the orange lies at first [mm].
         vertical: The same upwards [mm].
-        centre: A window of frames to a contact's centre; None accepts any contact.
+        strategy: Where each fingertip believes the contact to be.
         protocol: How the hand proceeds.
         rate: Frames a second [Hz].
         rng: Decides where the arm comes to a halt.
@@ -93,9 +78,7 @@ def approach(
     while True:
         windows = [finger.frames(lateral, vertical, protocol.force, count) for finger in fingers]
         true.append(lateral)
-        if centre is None:
-            return ended("" if any(touched(window) for window in windows) else "no contact")
-        offset = fused(fingers, [centre(window) for window in windows])
+        offset = fused(fingers, [strategy.centre(window) for window in windows])
         if offset is None:
             return ended("no contact")
         believed.append(offset)

@@ -36,6 +36,8 @@ class Estimate:
     """Mean of the ten largest depths [mm]."""
     centre: tuple[float, float] | None
     """Centroid of the pixels deeper than `REGION` in the sensor's frame [mm]; None without contact."""
+    novelty: float | None = None
+    """How far the reading is from all that the network learnt from, over what is far [1]; None if that is not known."""
 
 
 class DepthStream:
@@ -50,6 +52,7 @@ class DepthStream:
     def __init__(
         self, estimate: Callable[[np.ndarray], np.ndarray], offsets: Sequence[int], grid: DepthMap,
         clock: StreamClock, tare_frames: int, causal: bool = False,
+        novelty: Callable[[np.ndarray], np.ndarray] | None = None,
     ) -> None:  # fmt: skip
         """Begin without frames.
 
@@ -60,6 +63,7 @@ class DepthStream:
             clock: The board's clock, which says when frames were sampled.
             tare_frames: Frames at the beginning over which the untouched reading is averaged.
             causal: Whether to estimate the newest frame.
+            novelty: Tared readings (m, taxels) -> how far they are from all that was learnt from [1], shape (m,).
 
         Raises:
             UsageError: If there is no frame for taring.
@@ -68,6 +72,7 @@ class DepthStream:
             raise UsageError(f"taring over {tare_frames} frames", "one or more", "give --tare more time")
         self._estimate, self._offsets, self._grid, self._clock = estimate, tuple(offsets), grid, clock
         self.causal, self.lookahead = causal, 0 if causal else max(max(offsets), 0)
+        self._novelty = novelty
         self._wanted, self._tare = tare_frames, []
         self._frames: deque[tuple[np.ndarray, int]] = deque(maxlen=1 + max(offsets) - min(*offsets, 0))
         self._sequence = 0
@@ -102,11 +107,11 @@ class DepthStream:
         # Frames before the first and behind the newest are replaced by those, as in training.
         rows = np.clip(target + np.array(self._offsets), 0, newest)
         depth = self._estimate(np.array([self._frames[row][0] for row in rows]))
-        made = Estimate(
+        novelty = float(self._novelty(self._frames[target][0][None])[0]) if self._novelty else None
+        return Estimate(
             self._sequence - 1, self._frames[target][1], frame.arrival_ns, depth, float(contact_depth(depth[None])[0]),
-            contact_centre(depth, self._grid),
+            contact_centre(depth, self._grid), novelty,
         )  # fmt: skip
-        return made
 
 
 def contact_centre(depth: np.ndarray, grid: DepthMap, threshold: float = REGION) -> tuple[float, float] | None:

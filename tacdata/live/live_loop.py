@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from tacdata.demonstrations.touch import ALIEN
 from tacdata.live.depth_stream import DepthStream, Estimate
 from tacdata.live.latency_meter import LatencyMeter
 from tacdata.live.message_server import MessageServer, message
@@ -81,5 +82,8 @@ class LiveLoop:
     def _words(self, made: Estimate) -> str:
         figures = self.meter.figures
         where = "no contact" if made.centre is None else f"centre {made.centre[0]:+.2f}, {made.centre[1]:+.2f} mm"
+        if made.novelty is not None and made.novelty > 1:
+            word = "a guess" if made.novelty > ALIEN else "may be off"
+            where += f" ({word}: {made.novelty:.1f} times as far from what was learnt as validation presses)"
         pace = f"; {figures.rate:.1f} Hz, age {figures.age[0]:.0f} ms (95 %: {figures.age[1]:.0f})" if figures else ""
         return f"{self._source.name}: depth {made.largest:.2f} mm, {where}{pace}"

@@ -33,6 +33,8 @@ def message(made: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = T
         "depth": round(made.largest, 4), "contact": made.centre is not None,
         "centre": None if made.centre is None else [round(value, 4) for value in made.centre],
     }  # fmt: skip
+    if made.novelty is not None:
+        values["novelty"] = round(made.novelty, 3)
     if maps:
         values["map"] = [[round(float(value), 4) for value in row] for row in made.depth]
     return values

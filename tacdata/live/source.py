@@ -11,7 +11,6 @@ from tacdata.clock import Clock
 from tacdata.demonstrations.demo_rig import read_demo_rig
 from tacdata.devices.device import TaxelBoard, create
 from tacdata.errors import UsageError
-from tacdata.recording.stream_clock import StreamClock, nominal_period_ns
 from tacdata.rig import read_rig
 from tacdata.sensor import Sensor
 
@@ -63,10 +62,3 @@ def touched_board(path: Path, finger: str | None, assumed: Sensor) -> Source:
         name, entry, clock, sensor = assumed.name, rig.board, rig.clock, assumed
     board = create(entry, TaxelBoard, clock)
     return Source(name, board, clock, sensor, board.describe()["rate"]["nominal"] or sensor.taxels.rate)
-
-
-def stream_clock(board: TaxelBoard) -> StreamClock:
-    """Return a clock that says when a board's frames were sampled."""
-    described = board.describe()
-    axis = "device_ns" if described.get("clock") == "device_ns" else "counter"
-    return StreamClock(axis, board.clock.rate, nominal_period_ns(described))

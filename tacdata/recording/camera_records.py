@@ -24,7 +24,7 @@ class ImageTimes:
     sample_ns: np.ndarray
     """Estimated times of exposure [ns], shape (n,), int64."""
     digest: np.ndarray
-    """CRC32 of each compressed picture, shape (n,), int64."""
+    """CRC32 of each compressed picture, shape (n,), int64; 0 where none was asked for."""
     sequence: np.ndarray
     """Number of each image since the camera was opened, shape (n,), int64; gaps are images not fetched in time."""
     device_ns: np.ndarray
@@ -33,22 +33,21 @@ class ImageTimes:
 
 def image_stamps(records: Records, camera: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return arrival times [ns], numbers and device times [ns] (-1: none) of a camera's images, shape (n,), int64."""
-    messages = records.of_topic(channels.image(camera))
+    images = records.columns_of(channels.image(camera))
     device = device_times(records, camera)
-    sequence = _array([m.sequence for m in messages])
-    return _array([m.log_time for m in messages]), sequence, _array([device.get(int(k), -1) for k in sequence])
+    return images.log_ns, images.sequence, _array([device.get(k, -1) for k in images.sequence.tolist()])
 
 
 def device_times(records: Records, camera: str) -> dict[int, int]:
     """Return the camera's own time [ns] of each image, by the image's number modulo 2^32."""
-    times = (pb.ImageTime.FromString(m.data) for m in records.of_topic(channels.image_time(camera)))
+    times = map(pb.ImageTime.FromString, records.columns_of(channels.image_time(camera)).data)
     return {time.sequence & 0xFFFFFFFF: time.device_ns for time in times}
 
 
 def image_times(records: Records, camera: str, clock: ClockModel | None) -> ImageTimes:
     """Return when a camera's images were taken by its clock."""
     arrival, sequence, device = image_stamps(records, camera)
-    digest = _array([int.from_bytes(m.data, "little") for m in records.of_topic(channels.image(camera))])
+    digest = _array([int.from_bytes(own, "little") for own in records.columns_of(channels.image(camera)).data])
     return ImageTimes(arrival, _sample(clock, arrival, sequence, device), digest, sequence, device)
 
 
@@ -65,8 +64,8 @@ def finger_streams(records: Records, camera: str, clock: ClockModel | None) -> t
 
 
 def _stream(records: Records, camera: str, clock: ClockModel | None, topics: tuple[str, str], finger: str) -> TagStream:
-    views = [pb.CubeView.FromString(message.data) for message in records.of_topic(topics[0])]
-    poses = {m.sequence: PoseInFrame.FromString(m.data).pose for m in records.of_topic(topics[1])}
+    views, given = list(map(pb.CubeView.FromString, records.columns_of(topics[0]).data)), records.columns_of(topics[1])
+    poses = {k: PoseInFrame.FromString(own).pose for k, own in zip(given.sequence.tolist(), given.data, strict=True)}
     position, quaternion = np.full((len(views), 3), np.nan), np.full((len(views), 4), np.nan)
     covariance = np.full((len(views), 6, 6), np.nan)
     for row, view in enumerate(views):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from tacdata.recording.mcap_records import Records, read_records
 from tacdata.recording.measured import marked_phases, measured_streams
 from tacdata.recording.motion_profile import AxisLimits
 from tacdata.recording.stream_clock import nominal_period_ns
+from tacdata.recording.taxel_records import TaxelFrames, taxel_frames
 from tacdata.rig import registration_for
 from tacdata.sensor import Sensor
 
@@ -64,14 +66,30 @@ def read_episode(path: Path) -> Episode:
     return read_recording(path).episode
 
 
-def read_recording(path: Path) -> Recording:
-    """Read one recording with everything in it. Raises as `read_episode`."""
-    records = read_records(Path(path), images=False)
+def read_recording(
+    path: Path, digests: bool = True, seen: Callable[[str, memoryview], None] | None = None
+) -> Recording:
+    """Read one recording with everything in it.
+
+    Args:
+        path: The file.
+        digests: Whether pictures are told apart (`ImageTimes.digest`); without it reading is faster.
+        seen: Takes the topic and message of each picture as it is read (`mcap_records.read_records`).
+
+    Raises:
+        UsageError: As `read_episode`.
+        FormatError: As `read_episode`.
+    """
+    return recording_of(read_records(Path(path), images=False, digests=digests, seen=seen))
+
+
+def recording_of(records: Records) -> Recording:
+    """Return what the records of a file say, also of one that is still being written. Raises as `read_episode`."""
     try:
         return _recording(records)
     except (KeyError, ValueError, TypeError) as error:
         raise FormatError(
-            f"{path}: a recording with unexpected content ({type(error).__name__}: {error})",
+            f"{records.path}: a recording with unexpected content ({type(error).__name__}: {error})",
             "a file recorded by this release of tacdata",
             "use the release that wrote it",
         ) from error
@@ -92,13 +110,14 @@ def _recording(records: Records) -> Recording:
     registration = registration_for(rig, press.indenter_name)
     log = tuple(entry.message for entry in map(_log, records.of_topic(channels.LOG)) if entry.level > Log.Level.INFO)
     cameras = [t.split("/")[2] for t in (c.topic for c in records.channels.values()) if t.endswith("/image")]
-    clocks = _clocks(records, cameras, float(rig.get("clock", {}).get("rate", 1.0)))
+    frames = taxel_frames(records.columns_of(channels.TAXELS).data)
+    clocks = _clocks(records, frames, cameras, float(rig.get("clock", {}).get("rate", 1.0)))
     episode = Episode(
         path=records.path,
         press=press,
         sensor=sensor,
         rig=rig,
-        taxels=_taxels(records, sensor.taxels.count, clocks.get("taxels")),
+        taxels=_taxels(records.path, frames, sensor.taxels.count, clocks.get("taxels")),
         cnc=statuses.stream,
         tags=tuple(
             cube_stream(records, camera, clocks.get(f"camera {camera}"))
@@ -118,7 +137,7 @@ def _recording(records: Records) -> Recording:
         for name, values in records.metadata.items()
         if name.startswith("stream_counts/")
     }
-    images = {camera: len(records.of_topic(channels.image(camera))) for camera in cameras}
+    images = {camera: len(records.columns_of(channels.image(camera)).data) for camera in cameras}
     return Recording(
         episode,
         tuple(moves),
@@ -170,26 +189,24 @@ def _array(values: list[int]) -> np.ndarray:
     return np.array(values, dtype=np.int64)
 
 
-def _clocks(records: Records, cameras: list[str], rate: float) -> dict[str, ClockModel]:
+def _clocks(records: Records, frames: TaxelFrames, cameras: list[str], rate: float) -> dict[str, ClockModel]:
     """Return each stream's clock: the session's from the file, or one fitted to what a crash left."""
     clocks = {}
     for name in ("taxels", *(f"camera {camera}" for camera in cameras)):
         stored = records.metadata.get(f"clock_model/{name}")
-        model = ClockModel.from_document(stored) if stored else _fitted(records, name, rate)
+        model = ClockModel.from_document(stored) if stored else _fitted(records, frames, name, rate)
         if model is not None:
             clocks[name] = model
     return clocks
 
 
-def _fitted(records: Records, stream: str, rate: float) -> ClockModel | None:
+def _fitted(records: Records, frames: TaxelFrames, stream: str, rate: float) -> ClockModel | None:
     attached = records.attachments.get("latencies.json")
     latency = json.loads(attached.data).get(stream) if attached else None
     if stream == "taxels":
-        frames = [pb.Taxels.FromString(message.data) for message in records.of_topic(channels.TAXELS)]
         board = _attachment(records, "board.json")
         axis = "device_ns" if board.get("clock") == "device_ns" else "counter"
-        arrival = _array([f.arrival_ns for f in frames])
-        model = fit(arrival, _array([getattr(f, axis) for f in frames]), axis, rate, nominal_period_ns(board))
+        model = fit(frames.arrival_ns, getattr(frames, axis), axis, rate, nominal_period_ns(board))
     else:
         arrival, sequence, device = image_stamps(records, stream.removeprefix("camera "))
         on_device = len(device) > 0 and bool((device >= 0).all())
@@ -197,21 +214,17 @@ def _fitted(records: Records, stream: str, rate: float) -> ClockModel | None:
     return model.with_latency(Latency.from_document(latency)) if model and latency else model
 
 
-def _taxels(records: Records, count: int, clock: ClockModel | None) -> TaxelStream:
-    frames = [pb.Taxels.FromString(message.data) for message in records.of_topic(channels.TAXELS)]
-    arrival, counter = _array([f.arrival_ns for f in frames]), _array([f.counter for f in frames])
-    device = _array([f.device_ns for f in frames])
+def _taxels(path: Path, frames: TaxelFrames, count: int, clock: ClockModel | None) -> TaxelStream:
+    arrival, counter, device = frames.arrival_ns, frames.counter, frames.device_ns
     on_device = clock is not None and clock.axis == "device_ns"
     sample = arrival if clock is None else clock.sample_times(arrival, device if on_device else counter)
-    widths = {len(f.counts) for f in frames}
-    if widths - {count}:
+    if set(frames.widths) - {count}:
         raise FormatError(
-            f"{records.path}: frames of {', '.join(map(str, sorted(widths)))} channels",
+            f"{path}: frames of {', '.join(map(str, frames.widths))} channels",
             f"{count} channels, as its sensor description says",
             "record with the sensor file that belongs to the board",
         )
-    counts = np.array([list(f.counts) for f in frames], dtype=float).reshape(-1, count)
-    return TaxelStream(arrival, sample, counter, counts, device)
+    return TaxelStream(arrival, sample, counter, frames.counts.reshape(-1, count), device)
 
 
 def _statuses(records: Records) -> StatusTimes:

@@ -37,7 +37,7 @@ class _Sink:
         self.begun_ns = 0
         self.frames: list[tuple[int, np.ndarray]] = []
 
-    def taxels(self, frame: TaxelFrame, sample_ns: int) -> None:
+    def taxels(self, frame: TaxelFrame, sample_ns: int, board: str = "") -> None:
         """Keep a frame with its sample time [ns]."""
         self.frames.append((sample_ns, frame.counts))
 

@@ -1,7 +1,8 @@
 """Joint values that bring a robot's fingertips to their targets, by mink on MuJoCo's kinematics (decision 0011).
 
-Each time is solved from the one before, by damped steps within the joints' limits until the fingertips rest; then it is
-measured where they are. What does not reach its target is said, and its joint values are NaN.
+Each time is solved from the one before; then it is measured where the fingertips are. Where they are not at their
+targets, other beginnings are tried: the last that reached, the home, some at random. What does not reach its target is
+said, and its joint values are NaN.
 """
 
 from __future__ import annotations
@@ -13,18 +14,14 @@ import numpy as np
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.replay.engine import mujoco
+from tacdata.replay.kinematic_search import OTHERS, STEPS, KinematicSearch
 from tacdata.replay.robot import Robot
 from tacdata.replay.targets import Targets
 
-STEPS = 60
-"""Largest number of steps at one time [count]; the first time gets ten times as many."""
-REST = 1e-7
-"""A step that moves no joint by more has come to rest [rad or m]."""
-DAMPING = 1e-6
-"""Levenberg and Marquardt's damping [1]."""
 COUPLED = 1e-4
 """How far a mimic joint may be off the joint that it follows [rad or m]; beyond, no target of that time is reached."""
-SOLVER = "daqp"
+AGAIN = 15
+"""While a target stays out of reach, other beginnings are tried at every so many times [count]."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +90,10 @@ class Kinematics:
             reason = str(error).strip().splitlines()[0]
             raise FormatError(f"the URDF of {robot.name}: {reason}", "a URDF that MuJoCo reads", "correct it") from None
         self.joints = tuple(self._joint(k) for k in range(self.model.njnt))
+        for joint, value in zip(self.joints, self.home, strict=True):
+            if (joint.lower is not None and value < joint.lower) or (joint.upper is not None and value > joint.upper):
+                given = f"home of joint {joint.name} of {robot.name}: {value:g} {joint.unit}"
+                raise FormatError(given, f"{joint.lower:g} to {joint.upper:g} {joint.unit}", "correct the robot file")
 
     def _add_site(self, spec: Any, name: str) -> None:
         from scipy.spatial.transform import Rotation
@@ -111,6 +112,17 @@ class Kinematics:
         unit = "rad" if kind == engine.mjtJoint.mjJNT_HINGE else "m"
         ends = (None if low is None else float(low), None if high is None else float(high))
         return Joint(name, unit, *ends, self.robot.velocity.get(name))
+
+    @property
+    def moving(self) -> list[int]:
+        """Joints between the root and a fingertip: all that moves one, but for mimic joints elsewhere."""
+        bodies = set()
+        for name in self.fingers:
+            body = int(self.model.site(f"tip {name}").bodyid[0])
+            while body:
+                bodies.add(body)
+                body = int(self.model.body_parentid[body])
+        return [k for k in range(self.model.njnt) if int(self.model.jnt_bodyid[k]) in bodies]
 
     @property
     def home(self) -> np.ndarray:
@@ -160,33 +172,30 @@ def follow(robot: Robot, targets: Targets) -> tuple[JointPath, Kinematics]:
 
 def _search(model: Kinematics, places: np.ndarray, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return joint values, shape (n, joints), and what is left of each target: [m] and [rad], shape (n, f)."""
-    import mink
-
-    weight = model.robot.orientation_weight
-    tasks = [
-        mink.FrameTask(f"tip {name}", "site", position_cost=1.0, orientation_cost=weight, lm_damping=DAMPING)
-        for name in model.fingers
-    ]
-    coupled = mink.EqualityConstraintTask(model.model, cost=10.0) if model.model.neq else None  # mimic joints
-    wanted = [*tasks, *([coupled] if coupled else [])]
-    state, limits = mink.Configuration(model.model, q=model.home), [mink.ConfigurationLimit(model.model)]
-    values = np.empty((len(places), len(model.joints)))
-    errors, angles = np.empty(places.shape[:2]), np.empty(places.shape[:2])
+    search, count = KinematicSearch(model), len(places)
+    values, errors = np.empty((count, len(model.joints))), np.empty(places.shape[:2])
+    angles = np.empty_like(errors)
+    start, good, missed = model.home, model.home, 0
     for row, (place, turn) in enumerate(zip(places, turns, strict=True)):
-        for task, p, r in zip(tasks, place, turn, strict=True):
-            task.set_target(mink.SE3.from_rotation_and_translation(mink.SO3.from_matrix(r), p))
-        for _ in range(STEPS if row else 10 * STEPS):
-            step = mink.solve_ik(state, wanted, 1.0, SOLVER, limits=limits)
-            state.integrate_inplace(step, 1.0)
-            if np.abs(step).max() < REST:
-                break
-        values[row] = state.q
-        for k, task in enumerate(tasks):
-            left = task.compute_error(state)
-            errors[row, k], angles[row, k] = np.linalg.norm(left[:3]), np.linalg.norm(left[3:])
-        if coupled is not None and np.abs(coupled.compute_error(state)).max() > COUPLED:
+        search.aim(place, turn)
+        start, cost = search.settle(start, STEPS if row else 10 * STEPS)
+        if not _reached(search, start) and missed % AGAIN == 0:
+            rng = np.random.default_rng(row)
+            for begin in (good, model.home, *(search.drawn(rng) for _ in range(OTHERS))):
+                other, left = search.settle(begin)
+                start, cost = (other, left) if left < cost else (start, cost)
+        values[row] = start
+        errors[row], angles[row], off = search.errors(start)
+        if off > COUPLED:
             errors[row] = np.inf
+        good, missed = (start, 0) if _reached(search, start) else (good, missed + 1)
     return values, errors, angles
+
+
+def _reached(search: KinematicSearch, values: np.ndarray) -> bool:
+    place, angle = search.model.robot.tolerance
+    far, turned, off = search.errors(values)
+    return bool((far <= place).all() and off <= COUPLED and (angle is None or (turned <= angle).all()))
 
 
 def _rows(found: np.ndarray, fingers: tuple[str, ...]) -> dict[str, tuple[int, ...]]:

@@ -1,4 +1,4 @@
-"""A robot that is to follow fingertips (`schemas/robot.schema.json`), and its URDF without shapes."""
+"""A robot that is to follow fingertips (`schemas/robot.schema.json`), and its URDF without shapes and masses."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ POSITION_TOLERANCE = 0.0005
 """A fingertip that comes so near has reached its target [m]."""
 ORIENTATION_WEIGHT = 0.02
 """How much a turn of one radian counts against a metre [m/rad]: 1 deg as 0.35 mm."""
-SHAPES = ("visual", "collision", "transmission", "gazebo")
-"""Elements of a URDF that kinematics does not need; meshes are often missing where a trajectory is computed."""
+HAIR = 1e-6
+"""How far a joint whose limits are equal may move to either side [rad or m]."""
+SHAPES = ("visual", "collision", "inertial", "transmission", "gazebo")
+"""Elements of a URDF that kinematics does not need: meshes are often missing where a trajectory is computed, and many
+files hold inertias that cannot be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +79,10 @@ def read_robot(path: Path) -> Robot:
                 f"{path}: {what} {', '.join(unknown)}, not in {urdf.name}", ", ".join(sorted(map(str, known))),
                 f"name a {what} of the URDF",
             )  # fmt: skip
+    try:
+        _locked(root)
+    except ValueError as error:
+        raise FormatError(f"{urdf}: {error}", "numbers as limits", "correct the URDF") from None
     found = {name: joint.find("limit") for name, joint in joints.items()}
     limits = {name: float(limit.get("velocity", "nan")) for name, limit in found.items() if limit is not None}
     velocity = {n: v for n, v in limits.items() if np.isfinite(v) and v > 0} | document.get("velocity", {})
@@ -94,6 +101,18 @@ def read_robot(path: Path) -> Robot:
 
 
 HERE = {"position": [0.0, 0.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+
+
+def _locked(root: ET.Element) -> None:
+    """Give joints whose limits are equal a hair's breadth: MuJoCo would take them for joints without limits."""
+    for joint in root.iter("joint"):
+        limit = joint.find("limit")
+        if limit is None or joint.get("type") not in ("revolute", "prismatic"):
+            continue
+        low, high = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+        if low == high:
+            limit.set("lower", repr(low - HAIR))
+            limit.set("upper", repr(high + HAIR))
 
 
 def _without_shapes(root: ET.Element) -> str:

@@ -81,7 +81,8 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
         missing = [name for name in names if name not in known]
         if missing:
             given = f"no {what} for {', '.join(missing)}"
-            raise UsageError(given, ", ".join(known), "name other fingers with --finger")
+            remedy = "name other fingers with --finger" + (", or give them a gain" if what == "gain" else "")
+            raise UsageError(given, ", ".join(known), remedy)
     tracks = [made.tracks[name] for name in names]
     known = np.all([np.isfinite(track.position).all(axis=1) for track in tracks], axis=0)
     if not known.any():

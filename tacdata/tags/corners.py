@@ -65,6 +65,24 @@ def candidates(tags: list[Tag], cube: Cube, camera: Camera) -> list[Candidate]:
     return kept
 
 
+def contradicting(
+    tags: list[Tag], rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: Camera
+) -> list[Tag]:
+    """Return the tags that lie elsewhere than a pose has them; what is merely read badly, as at a slant, is not meant.
+
+    Args:
+        tags: Tags of the cube with straightened corners, not among those that gave the pose.
+        rotation: From the cube frame to the camera frame [1], shape (3, 3).
+        translation: Cube centre in the camera frame [m], shape (3,).
+        cube: The cube.
+        camera: The camera.
+    """
+    import cv2
+
+    near = _fitting(cv2.Rodrigues(rotation)[0], translation.reshape(3, 1), tags, cube, camera, LOOSE)
+    return [tag for tag in tags if not any(tag is other for other in near)]
+
+
 def angle_between(a: np.ndarray, b: np.ndarray) -> float:
     """Return the angle [rad] between two rotations, shape (3, 3)."""
     return float(np.arccos(np.clip(((a * b).sum() - 1) / 2, -1.0, 1.0)))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.tags.camera import Camera
+from tacdata.tags.corners import contradicting
 from tacdata.tags.cube import Cube
 from tacdata.tags.detector import detect_tags, to_grey
 from tacdata.tags.rivals import Before, Rival, best_rival
@@ -99,8 +100,10 @@ def solve_cube(
     if found is None:
         return None
     best, other = found
-    used = {id(tag) for tag in best.tags}
-    strays = tuple(sorted({tag.id for tag in own if id(tag) not in used}))
+    used, aligned = {id(tag) for tag in best.tags}, best.alignment
+    others = [tag for tag in own if id(tag) not in used]
+    away = contradicting(others, aligned.rotation, aligned.translation, cube, camera)
+    strays = tuple(sorted({tag.id for tag in away}))
     return _pose(best, strays, None if other is None else _pose(other, strays, None))
 
 

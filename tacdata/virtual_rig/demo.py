@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,8 @@ DELAY = 0.05
 FAULTS = ("no-tag", "turned-tag", "swapped-fingers", "silent-finger")
 """What can go wrong on demand: the index finger's tags covered for a second; its upper tag turned half way round;
 the cubes of index and middle finger exchanged; the middle finger's board silent after three seconds."""
+NUBS = 1.0, 200.0
+"""Radii of what may press a skin, from and to [mm]."""
 FACE_UP = "-x"
 
 
@@ -54,7 +56,7 @@ class VirtualDemo:
 
     def __init__(
         self, directory: Path, speed: float = 1.0, seed: int = 0, cameras: int = 2, fault: str | None = None,
-        sensor: Sensor | None = None, task: str = "grasp",
+        sensor: Sensor | None = None, task: str = "grasp", nub: float = RADIUS,
     ) -> None:  # fmt: skip
         """Set up a hand whose clock runs ``speed`` times as fast as real time.
 
@@ -66,6 +68,7 @@ class VirtualDemo:
             fault: One of `FAULTS`, or none.
             sensor: The skin on every finger.
             task: One of `TASKS`.
+            nub: Radius of what presses each skin [mm].
 
         Raises:
             UsageError: If a number is out of range or there is no such fault or task.
@@ -76,8 +79,11 @@ class VirtualDemo:
             raise UsageError(f"fault {fault!r}", ", ".join(FAULTS), "name one of them")
         if task not in TASKS:
             raise UsageError(f"task {task!r}", ", ".join(TASKS), "name one of them")
+        if not NUBS[0] <= nub <= NUBS[1]:
+            raise UsageError(f"nubs of {nub:g} mm", f"{NUBS[0]:g} to {NUBS[1]:g} mm", "choose another radius")
         self.directory, self.path, self.fault, self.seed = directory, directory / "demo_rig.yaml", fault, seed
-        self.clock, self.hand, self.sensor = Clock.start(speed), draw_hand(seed, task), sensor or default_sensor()
+        self.hand = replace(draw_hand(seed, task), nub=nub)
+        self.clock, self.sensor = Clock.start(speed), sensor or default_sensor()
         self.start_ns = self.clock.now_ns()
         layout = board_format(self.sensor)
         baud = next((b for b in BAUDS if b >= layout.size * 10 * layout.rate / 0.8), BAUDS[-1])
@@ -165,7 +171,7 @@ class VirtualDemo:
     def _reader(self, finger: str, number: int) -> Callable[[int], np.ndarray]:
         flat = Registration((0.0, 0.0, 0.0), 0.0)
         world = World(draw(100 * self.seed + number, self.sensor, flat), self.sensor)
-        ball = Sphere(RADIUS)
+        ball = Sphere(self.hand.nub)
 
         def read(sampled_ns: int) -> np.ndarray:
             seconds = self.seconds(sampled_ns)

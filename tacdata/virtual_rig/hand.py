@@ -1,7 +1,7 @@
 """An emulated hand that grasps a ball, or wipes with an eraser, over and over: its fingertips, and how deep they press.
 
 World: z up, the ball or eraser lies on the table about the origin. Fingertip frame: origin on the pad, x along the
-finger, z out of the pad. Either object presses the skins as the ball does.
+finger, z out of the pad. Either object presses the skins as the ball does, or by round nubs of a smaller radius.
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ class Hand:
     """Amplitude of the hand's trembling at 8 Hz [mm]."""
     task: str = "grasp"
     """"grasp" or "wipe"."""
+    nub: float = RADIUS
+    """Radius of what presses each skin [mm]: the ball's own, or that of nubs on the object where the fingers touch."""
 
     @property
     def document(self) -> dict[str, Any]:

@@ -1,16 +1,21 @@
 """Where a camera stands: by a robot with a cube, and by a board."""
 
+import sys
+
+import cv2
 import numpy as np
 import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from tacdata.cli import main
 from tacdata.demonstrations.board_pose import board_poses
 from tacdata.demonstrations.camera_world import CameraWorld
 from tacdata.demonstrations.hand_eye import board_world, hand_eye
 from tacdata.demonstrations.hand_eye_pairs import solve_pairs
 from tacdata.errors import FormatError, UsageError
 from tacdata.tags.board import Board, draw_squares
+from tacdata.virtual_rig.render import render_cube
 from tacdata.virtual_rig.sheet import render_sheet
 
 
@@ -104,3 +109,63 @@ def test_a_board_on_the_table_gives_the_camera():
     assert 1e-5 < spread < 0.003 and rms < 0.0003
     with pytest.raises(UsageError, match="no image shows the board"):
         board_poses([("empty", np.full((480, 640), 90, np.uint8))], board, intrinsics)
+
+
+def run(arguments):
+    """Type the verb; return its exit code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["tacdata", "calibrate-world", *map(str, arguments)])
+        try:
+            main()
+        except SystemExit as end:
+            return end.code or 0
+    return 0
+
+
+def test_images_of_a_robot_that_carries_a_cube_give_a_file_that_a_demo_rig_takes(tmp_path, capsys):
+    cube = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}
+    intrinsics = {"width": 640, "height": 480, "fx": 700.0, "fy": 700.0, "cx": 319.5, "cy": 239.5}
+    eye, rng, entries = pose([0.0, 0.0, 0.3], [0.3, -0.1, 0.1]), np.random.default_rng(1), []
+    for k in range(10):
+        seen = pose(np.array([2.4, 1.0, 0.2]) + rng.normal(0, 0.35, 3), [*rng.uniform(-0.05, 0.05, 2), 0.3])
+        cv2.imwrite(str(tmp_path / f"{k}.png"), render_cube(seen, intrinsics, cube, rng))
+        entries.append({"gripper": flat(eye @ seen @ np.linalg.inv(HELD)), "image": f"{k}.png"})
+    document = {"version": "1.0", "camera": "eye", "frame": "base", "intrinsics": intrinsics, "tag_cube": cube}
+    (tmp_path / "pairs.yaml").write_text(yaml.safe_dump({**document, "pairs": entries}))
+    out = tmp_path / "world.yaml"
+    assert run(["--pairs", tmp_path / "pairs.yaml", "--out", out]) == 0
+    assert "camera eye stands at 0.30" in capsys.readouterr().out
+    found = CameraWorld.from_document(yaml.safe_load(out.read_text()), "world.yaml")
+    place, turn = off(found.matrix, eye)
+    assert place < 0.001 and turn < 0.004 and found.poses >= 8
+    assert run(["--pairs", tmp_path / "pairs.yaml", "--out", out]) == 2
+    assert "calibrations are not overwritten" in capsys.readouterr().err
+    assert run(["--out", tmp_path / "new.yaml"]) == 2
+    assert run(["--pairs", tmp_path / "none.yaml", "--out", tmp_path / "new.yaml"]) == 2
+    assert not (tmp_path / "new.yaml").exists()
+
+
+def test_images_of_a_board_give_it_too(tmp_path, capsys):
+    board, truth = Board(9, 6, 25.0, 18.0, "4X4_50"), pose([0.5, 0.3, 0.1], [-0.1, -0.08, 0.45])
+    intrinsics = {"width": 640, "height": 480, "fx": 605.0, "fy": 602.0, "cx": 320.0, "cy": 240.0, "distortion": []}
+    sheet = np.pad(draw_squares(board, 40), 40, constant_values=255)
+    corner = truth @ pose([0, 0, 0], [-0.025, -0.025, 0])
+    (tmp_path / "views").mkdir()
+    for k in range(3):
+        drawn = render_sheet(sheet, 0.275, corner, intrinsics, np.random.default_rng(k))
+        cv2.imwrite(str(tmp_path / "views" / f"{k}.png"), drawn)
+    (tmp_path / "board.yaml").write_text(yaml.safe_dump({"version": "1.0", **board.document}))
+    found = {
+        "version": "1.0", "date": "2026-01-01", "code_version": "0", "source": "a test", "model": "k1k2p1p2",
+        "intrinsics": intrinsics, "uncertainty": dict.fromkeys(("fx", "fy", "cx", "cy"), 1.0), "rms": 0.1,
+        "held_out_rms": 0.1, "coverage": 1.0, "tilt": 40.0, "board": {}, "views": [],
+    }  # fmt: skip
+    (tmp_path / "camera.yaml").write_text(yaml.safe_dump(found))
+    files = {"board": "board.yaml", "calibration": "camera.yaml", "out": "eye.yaml"}
+    given = [word for option, file in files.items() for word in (f"--{option}", tmp_path / file)]
+    assert run([*given, "--images", tmp_path / "none"]) == 2
+    assert run([*given, "--images", tmp_path / "views", "--camera", "eye"]) == 0
+    assert "put  world: eye.yaml  into the camera's entry" in capsys.readouterr().out
+    world = CameraWorld.from_document(yaml.safe_load((tmp_path / "eye.yaml").read_text()), "eye")
+    place, turn = off(world.matrix, np.linalg.inv(truth))
+    assert world.camera == "eye" and place < 0.002 and turn < 0.004

@@ -175,5 +175,7 @@ def test_arguments_that_do_not_fit_are_refused(tmp_path, capsys):
 def test_a_virtual_demonstration_is_refused_what_it_cannot_do(tmp_path):
     with pytest.raises(UsageError, match="fault 'fire'"):
         VirtualDemo(tmp_path, fault="fire")
+    with pytest.raises(UsageError, match="nubs of 0 mm"):
+        VirtualDemo(tmp_path, nub=0.0)
     with pytest.raises(UsageError, match="3 cameras"):
         VirtualDemo(tmp_path, cameras=3)

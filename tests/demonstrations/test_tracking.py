@@ -1,6 +1,7 @@
 """Fingertip paths: how near to the truth, how honest about it, and every planted fault named."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -172,6 +173,36 @@ def test_predicted_depth_is_a_prediction_with_the_checkpoints_identity(tmp_path)
     assert again.remarks == made.remarks and again.frame == "table" and np.array_equal(again.time_ns, made.time_ns)
 
 
+def test_depth_from_readings_that_the_network_never_learnt_from_is_called_a_guess(tmp_path):
+    sensor = default_sensor()
+
+    def maps(tared):
+        return np.ones((len(tared), 35, 26), np.float32)
+
+    def novelty(tared):  # as if nothing above 700 counts had been learnt from
+        return tared.max(axis=1) / 700
+
+    made = track(recording(tmp_path), estimator=Estimator({"hash": "a" * 64}, sensor, maps, novelty))
+    for name in NAMES:
+        (words,) = note(made, f"{name}: ", "unlike all of what the network learnt from")
+        assert "guess" in words
+        found = made.tracks[name]
+        assert np.nanmax(found.novelty[found.signals.max(axis=1) < 100]) < 0.2
+    path = tmp_path / "x.tracks.parquet"
+    write_tracks(path, made)
+    assert np.array_equal(read_tracks(path).tracks["index"].novelty, made.tracks["index"].novelty, equal_nan=True)
+
+    near = track(recording(tmp_path), estimator=Estimator({"hash": "a" * 64}, sensor, maps, lambda t: 0 * t[:, 0]))
+    between = track(
+        recording(tmp_path), estimator=Estimator({"hash": "a" * 64}, sensor, maps, lambda t: 1.2 + 0 * t[:, 0])
+    )
+    assert len(note(between, "just outside of", "1.20 times", "may be off")) == len(NAMES)
+    assert not note(near, "unlike") and not note(near, "not known")
+    silent = track(recording(tmp_path), estimator=Estimator({"hash": "a" * 64}, sensor, maps))
+    assert len(note(silent, "is not known", "seen.json")) == 1
+    assert silent.tracks["index"].novelty is None
+
+
 def truth_depth(name):
     from demo_examples import HAND
 
@@ -208,3 +239,17 @@ def test_rotations_and_their_vectors_are_inverse():
         vector = angle * axis / np.linalg.norm(axis)
         assert np.allclose(exponential(vector), Rotation.from_rotvec(vector).as_matrix(), atol=1e-12)
         assert np.allclose(exponential(logarithm(exponential(vector))), exponential(vector), atol=1e-7)
+
+
+def test_a_stretch_without_images_is_no_hidden_tag(tmp_path):
+    def without(stream):
+        seconds = (stream.sample_ns - START) * 1e-9
+        kept = (seconds < 4.0) | (seconds > 4.6)
+        arrays = {k: getattr(stream, k)[kept] for k in ("sample_ns", "position", "quaternion", "reprojection", "faces")}
+        arrays |= {k: getattr(stream, k)[kept] for k in ("covariance", "ambiguous")}
+        return replace(stream, **arrays, ids=tuple(i for i, k in zip(stream.ids, kept, strict=True) if k))
+
+    made = track(recording(tmp_path, tuple(without(view(name)) for name in NAMES)))
+    (words,) = note(made, "no image was searched for tags from 4.0 to 4.6 s")
+    assert note(made, "tacdata track --every-image")
+    assert "keep up" in words and not note(made, "no tag that fits")

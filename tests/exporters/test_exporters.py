@@ -1,6 +1,7 @@
 """Every format gives back what was written; LeRobot's own reader opens its folder; a robot's limits are respected."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,11 +37,16 @@ def demonstration(rows=40, network=NETWORK, number=0):
         tracks[name] = FingerTrack(
             name, "right", name, place, turns, np.tile(np.eye(6) * 1e-8, (rows, 1, 1)), gap, rows, 0,
             rng.normal(0, 100, (rows, 24)).astype(np.float32), depth.astype(np.float32) if network else None,
+            np.linspace(0, 2, rows, dtype=np.float32) if network else None,
         )  # fmt: skip
     time_ns = 1_700_000_000_000_000_000 + np.rint(seconds * 1e9).astype(np.int64)
     name = f"episode-{number:06d}.mcap"
     sensors = dict.fromkeys(tracks, default_sensor())
     return Demonstration(name, "e" * 64, "grasp", "table", 30.0, time_ns, tracks, sensors, network=network)
+
+
+# As some published URDFs hold them.
+IMPOSSIBLE = '<inertial><mass value="1"/><inertia ixx="-1" iyy="1" izz="9" ixy="0" ixz="0" iyz="0"/></inertial>'
 
 
 def fingers_urdf(velocity=5.0, reach=0.5, mimic=""):
@@ -53,7 +59,7 @@ def fingers_urdf(velocity=5.0, reach=0.5, mimic=""):
             kind, end = ("prismatic", reach) if len(name) == 1 else ("revolute", 3.0)
             extra = mimic if (finger, name) == ("index", "x") else ""
             parts.append(
-                f'<link name="{finger}_{name}_link"><visual><geometry><mesh filename="package://no/where.stl"/>'
+                f'<link name="{finger}_{name}_link">{IMPOSSIBLE}<visual><geometry><mesh filename="package://no/where.stl"/>'
                 f'</geometry></visual></link><joint name="{finger}_{name}" type="{kind}"><parent link="{parent}"/>'
                 f'<child link="{finger}_{name}_link"/><axis xyz="{axis}"/>{extra}'
                 f'<limit lower="{-end}" upper="{end}" effort="1" velocity="{velocity}"/></joint>'
@@ -145,6 +151,8 @@ def test_lerobots_info_calls_predictions_predictions(tmp_path):
     features = json.loads((out / "meta/info.json").read_text())["features"]
     maps = features["observation.predicted_depth.index"]
     assert maps["info"]["prediction"] is True and maps["info"]["checkpoint"] == NETWORK["hash"]
+    novelty = features["tacdata.predicted_novelty.index"]["info"]
+    assert novelty["checkpoint"] == NETWORK["hash"] and novelty["unit"] == "1"
     parts = ("x", "y", "z", "qx", "qy", "qz", "qw")
     assert features["action"]["names"] == [f"{finger}.{part}" for finger in ("thumb", "index") for part in parts]
 
@@ -162,7 +170,9 @@ def test_stock_lerobot_opens_the_folder(tmp_path, monkeypatch):
     item = opened[40]
     wanted = np.concatenate([episodes[1].position[2], episodes[1].quaternion[2]], axis=-1).ravel()
     assert np.allclose(item["action"].numpy(), wanted, atol=1e-6)
-    maps = episodes[1].source.tracks["index"].depth[4]
+    track = episodes[1].source.tracks["index"]
+    assert float(item["tacdata.predicted_novelty.index"]) == pytest.approx(float(track.novelty[4]))
+    maps = track.depth[4]
     assert np.allclose(item["observation.predicted_depth.index"].numpy()[0], maps, atol=1e-6)  # mm
 
 
@@ -190,6 +200,66 @@ def test_targets_out_of_reach_are_named_and_never_clipped(tmp_path):
     reached = np.setdiff1d(np.arange(38), [k for rows in header["unreached"].values() for k in rows])
     assert np.isfinite(values["thumb_x"][reached]).all()
     assert max(np.abs(values["index_x"][reached]), default=0) <= 0.1 + 1e-9
+
+
+def hinge(name, parent, child, x=0.0, axis="0 0 1", velocity=10):
+    return (
+        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin xyz="{x} 0 0"/>'
+        f'<axis xyz="{axis}"/><limit lower="-2.5" upper="2.5" effort="1" velocity="{velocity}"/></joint>'
+    )
+
+
+ARM = (
+    '<robot name="arm">' + "".join(f'<link name="{name}"/>' for name in ("base", "upper", "lower", "tip", "leg"))
+    + hinge("shoulder", "base", "upper") + hinge("elbow", "upper", "lower", 0.2)
+    + hinge("knee", "base", "leg", axis="0 1 0", velocity=1)
+    + '<joint name="wrist" type="fixed"><parent link="lower"/><child link="tip"/><origin xyz="0.2 0 0"/></joint>'
+    + "</robot>"
+)  # fmt: skip
+
+
+def arm(tmp_path, **more):
+    fingers = {"index": {"link": "tip"}}
+    return read_robot(robot(tmp_path, ARM, base={**HOME}, fingers=fingers, orientation_weight=0, **more))
+
+
+HOME = {"position": [0.0, 0.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+
+
+def test_what_lies_out_of_reach_is_off_by_its_distance_and_what_follows_is_reached(tmp_path):
+    # A straight arm of 0.4 m; the path leaves its disc by 0.1 m and comes back.
+    seconds = np.arange(60) / 30
+    away = 0.3 + 0.2 * np.sin(np.pi * seconds / 2) ** 2
+    places = np.stack([away * np.cos(0.4 * seconds), away * np.sin(0.4 * seconds), 0 * seconds], axis=1)
+    made = demonstration(rows=60)
+    track = replace(made.tracks["index"], position=places, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (60, 1)))
+    targets = targets_of(replace(made, tracks={"index": track}), None)
+    path, _ = follow(arm(tmp_path, home={"elbow": 0.5}, tolerance={"position": 1e-4}), targets)
+    far, knee = away > 0.4 + 1e-4, [joint.name for joint in path.joints].index("knee")
+    assert 10 < far.sum() < 50 and path.unreached == {"index": tuple(np.flatnonzero(far))}
+    beyond = path.position_error[far, 0] - (away[far] - 0.4)
+    assert beyond.min() > -1e-6 and beyond.max() < 0.001  # at a straight arm the last millimetre takes many steps
+    assert not path.too_fast.get("knee") and np.ptp(path.values[~far, knee]) == 0
+    assert np.isfinite(path.values[~far]).all() and path.values.shape == (60, 3)
+    with pytest.raises(FormatError, match="home of joint elbow"):
+        follow(arm(tmp_path, home={"elbow": 3.0}), targets)
+
+
+def test_a_joint_whose_limits_are_equal_does_not_move(tmp_path):
+    stiff = ARM.replace('lower="-2.5" upper="2.5" effort="1" velocity="10"/></joint><joint name="elbow"', LOCKED, 1)
+    made = demonstration(rows=3)
+    places = np.array([[0.4, 0.0, 0.0], [0.3, 0.1, 0.0], [0.0, 0.4, 0.0]])
+    track = replace(made.tracks["index"], position=places, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)))
+    (tmp_path / "locked").mkdir()
+    fingers = {"index": {"link": "tip"}}
+    described = read_robot(robot(tmp_path / "locked", stiff, base={**HOME}, fingers=fingers, orientation_weight=0))
+    path, _ = follow(described, targets_of(replace(made, tracks={"index": track}), None))
+    shoulder = [joint.name for joint in path.joints].index("shoulder")
+    assert 2 in path.unreached["index"] and 0 not in path.unreached["index"]
+    assert abs(path.values[0, shoulder]) < 1e-5
+
+
+LOCKED = 'lower="0" upper="0" effort="1" velocity="10"/></joint><joint name="elbow"'
 
 
 def test_workspace_and_velocity_limits_are_checked(tmp_path):

@@ -1,6 +1,7 @@
 """Fingertips that find where an orange lies: the skin decides what they read, friction and gravity what they hold."""
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +17,11 @@ from tacdata.grasping.lessons import REST, lessons
 from tacdata.grasping.lift import Grip, lift, lifting_grip
 from tacdata.grasping.press_set import FOLDER, read_presses
 from tacdata.grasping.presses import LEFT_OUT, RADIUS
-from tacdata.grasping.study import Setup
+from tacdata.grasping.strategies import strategy as strategies
+from tacdata.grasping.strategies.strategy import Strategy
+from tacdata.grasping.study import Setup, strategy_names
 from tacdata.grasping.touch import Fingertip, OrangeTouch, Spread, mirrored
-from tacdata.grasping.trial import Protocol, approach, centre_of, fused
+from tacdata.grasping.trial import Protocol, approach, fused
 from tacdata.sensor import default_sensor
 from training.wilson import interval
 
@@ -112,23 +115,29 @@ def test_offsets_are_averaged_in_the_grippers_frame(touch):
 
 
 def test_an_orange_at_the_edge_is_brought_into_the_band(touch, presses, sensor):
-    centre = centre_of("dense_depth", sensor, nearest_maps(presses, sensor))
+    strategy = strategies.create("dense_depth", sensor, nearest_maps(presses, sensor))
     fingers = [Fingertip(touch, PERFECT, side, np.random.default_rng(side + 1)) for side in (1, -1)]
-    way = approach(fingers, 5.0, 0.0, centre, Protocol(window=0.1), 30.0, np.random.default_rng(0))
+    way = approach(fingers, 5.0, 0.0, strategy, Protocol(window=0.1), 30.0, np.random.default_rng(0))
     assert not way.stopped and abs(way.lateral) < 2.6
     assert way.adjustments == len(way.truths) - 1 >= 2
 
 
 def test_a_strategy_that_never_arrives_is_stopped(touch):
     fingers = [Fingertip(touch, PERFECT, side, np.random.default_rng(0)) for side in (1, -1)]
-    protocol, always = Protocol(window=0.1), np.array([3.0, 0.0])
-    stuck = approach(fingers[:1], 0.0, 0.0, lambda frames: always, protocol, 30.0, np.random.default_rng(0))
+    protocol = Protocol(window=0.1)
+
+    class Always(Strategy):
+        def centre(self, frames):
+            return np.array([3.0, 0.0])
+
+    always = Always(touch.sensor, lambda frames: frames)
+    stuck = approach(fingers[:1], 0.0, 0.0, always, protocol, 30.0, np.random.default_rng(0))
     assert "safety stop" in stuck.stopped
     far = approach(
         fingers,
         60.0,
         0.0,
-        centre_of("raw_taxel", touch.sensor, lambda f: f),
+        strategies.create("raw_taxel", touch.sensor, lambda f: f),
         Protocol(),
         30.0,
         np.random.default_rng(0),
@@ -146,12 +155,17 @@ def test_the_lift_is_decided_by_where_the_orange_lies_and_by_friction():
         lifting_grip(Grip(friction=0.01), 0.0)
 
 
-def test_a_small_study_is_a_valid_document_and_the_same_again(presses, sensor, tmp_path, monkeypatch):
+def small(monkeypatch):
+    """Make a study one of two places with a lift that need not be found."""
     monkeypatch.setattr("tacdata.grasping.study.PLACES", (-5.0, 1.0))
     monkeypatch.setattr("tacdata.grasping.study.EDGE", (1,))
     monkeypatch.setattr("tacdata.grasping.result.OTHER_MARGINS", ())
     monkeypatch.setattr("tacdata.grasping.result._lifting", lambda grip: {"squeeze": 1.0, "holds_to": 2.5})
     monkeypatch.setattr("tacdata.grasping.study.lifting_grip", lambda grip, lateral: replace(grip, squeeze=1.07e-3))
+
+
+def test_a_small_study_is_a_valid_document_and_the_same_again(presses, sensor, tmp_path, monkeypatch):
+    small(monkeypatch)
     setup = Setup(repeats=1, protocol=Protocol(window=0.2))
     maps = nearest_maps(presses, sensor)
     found, again = (result.result(setup, presses, sensor, maps, {"hash": "none"}, interval) for _ in range(2))
@@ -164,6 +178,41 @@ def test_a_small_study_is_a_valid_document_and_the_same_again(presses, sensor, t
     assert any("paper" in line for line in result.lines(found))
     picture.save(found, tmp_path / "study.png")
     assert (tmp_path / "study.png").stat().st_size > 20_000
+
+
+OWN = '''
+"""The strongest taxel alone."""
+
+from tacdata.grasping.strategies.strategy import Strategy
+
+
+class StrongestTaxel(Strategy):
+    """Goes by one taxel."""
+
+    def centre(self, frames):
+        mean = frames.mean(axis=0)
+        return self.sensor.taxels.centers[mean.argmax()] if mean.max() > 100 else None
+'''
+
+
+def test_a_strategy_of_ones_own_is_one_file(presses, sensor, tmp_path, monkeypatch):
+    import tacdata.grasping.strategies as room
+
+    assert strategy_names() == ["contact_only", "raw_taxel", "dense_depth"]
+    (tmp_path / "strongest_taxel.py").write_text(OWN)
+    monkeypatch.setattr(room, "__path__", [*room.__path__, str(tmp_path)])
+    small(monkeypatch)
+    try:
+        setup = Setup(repeats=1, protocol=Protocol(window=0.2))
+        found = result.result(setup, presses, sensor, nearest_maps(presses, sensor), {"hash": "none"}, interval)
+    finally:
+        sys.modules.pop("tacdata.grasping.strategies.strongest_taxel", None)
+    documents.check(json.loads(json.dumps(found)), "grasp_study", "here")
+    assert list(found["rates"])[-1] == "strongest_taxel" and found["rates"]["strongest_taxel"]["overall"]["of"] == 2
+    curve = found["bias"]["strongest_taxel"]
+    assert set(curve) <= {*sensor.taxels.centers[:, 0].tolist(), None} and len(set(curve)) > 2
+    assert any(line.startswith("strongest_taxel") for line in result.lines(found))
+    picture.save(found, tmp_path / "study.png")
 
 
 def test_presses_of_another_sensor_and_damaged_ones_are_refused(sensor, tmp_path):

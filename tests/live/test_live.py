@@ -167,6 +167,27 @@ def test_messages_reach_a_reader_as_the_schema_says():
         server.close()
 
 
+def test_an_estimate_from_readings_never_learnt_from_says_so():
+    clock, said, shown = Frozen(10**12), [], []
+    known = DepthStream(newest_of, (0,), SENSOR.map, StreamClock(), 3, novelty=lambda taxels: taxels[:, 0] / 10)
+    parts = [[frame(k, 0 if k < 3 else k)] for k in range(20)]
+    made = LiveLoop(
+        Source("index", Board(clock, parts), clock, SENSOR, 30.0), known, "f" * 64,
+        watch=lambda stream, ns, value: None,
+    )  # fmt: skip
+    words, about = made._words, {"finger": "index", "network": "f" * 64, "causal": False, "lookahead": 0}
+    for part in parts:
+        estimate = known.push(part[0])
+        if estimate is not None:
+            shown.append(message(estimate, about, 1))
+            said.append("a guess" in words(estimate))
+    assert [m["novelty"] for m in shown] == pytest.approx([k / 10 for k in range(3, 20)])
+    assert said == [k > 15 for k in range(3, 20)]
+    documents.check(shown[-1], "live_message", "message")
+    silent = run(stream())[-1]
+    assert silent.novelty is None and "novelty" not in message(silent, {}, 1)
+
+
 def test_a_reader_that_stalls_loses_messages_and_holds_up_nobody():
     server = MessageServer(0)
     try:

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 from test_scene import HAND, RATE
 
 from tacdata import documents
@@ -58,8 +59,8 @@ def run(arguments):
 
 
 def test_rates_come_with_wilson_intervals(tracked, tmp_path, capsys):
-    out, view = tmp_path / "result.json", tmp_path / "replay.rrd"
-    assert run(["replay", tracked, "--seeds", "4", "--out", out, "--view", view]) == 0
+    out, view, film = tmp_path / "result.json", tmp_path / "replay.rrd", tmp_path / "replay.gif"
+    assert run(["replay", tracked, "--seeds", "4", "--out", out, "--view", view, "--video", film]) == 0
     said = capsys.readouterr().out
     assert "undisturbed, direct: lost" in said and "undisturbed, compensated: held" in said
     found = json.loads(out.read_text())
@@ -69,6 +70,9 @@ def test_rates_come_with_wilson_intervals(tracked, tmp_path, capsys):
         assert found[kind]["of"] == 4 == sum(trial["kind"] == kind for trial in found["trials"])
         assert found[kind]["wilson_95"] == pytest.approx(interval(found[kind]["held"], 4))
     assert view.stat().st_size > 10_000
+    with Image.open(film) as shown:
+        assert getattr(shown, "n_frames", 1) > 20 and shown.size[0] > 500
+    assert run(["replay", tracked, "--video", tmp_path / "replay.avi"]) == 2
     assert run(["replay", tracked, "--out", out]) == 2
     assert "exists" in capsys.readouterr().err
 

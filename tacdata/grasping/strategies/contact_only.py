@@ -1,0 +1,18 @@
+"""Contact only: any valid contact is taken for central, and the object is lifted at once (paper, Exp. 3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.grasping.centre import touched
+from tacdata.grasping.strategies.strategy import Strategy
+
+
+class ContactOnly(Strategy):
+    """Knows whether, not where."""
+
+    adjusts = False
+
+    def centre(self, frames: np.ndarray) -> np.ndarray | None:
+        """Return the pad's middle for any contact."""
+        return np.zeros(2) if touched(frames) else None

@@ -1,0 +1,119 @@
+"""Taxel frames of a recording as arrays: the bytes of many messages at once, as long as they are laid out alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas import tacdata_pb2 as pb
+
+VARINT, PACKED = 0, 2
+"""Wire types of numbers and of packed doubles (protobuf encoding)."""
+FIELDS = {1: "arrival_ns", 3: "counter", 4: "counts", 5: "device_ns"}
+"""Numbers of the fields that are read, as `schemas/tacdata.proto` gives them."""
+
+
+@dataclass(frozen=True)
+class TaxelFrames:
+    """What a board's frames say, in the order of writing."""
+
+    arrival_ns: np.ndarray
+    """Host times of receipt [ns], shape (n,), int64."""
+    counter: np.ndarray
+    """The device's frame counters [frames], shape (n,), int64; -1 without one."""
+    device_ns: np.ndarray
+    """The device's own times [ns], shape (n,), int64; -1 without one."""
+    counts: np.ndarray
+    """Raw readings [counts], shape (n, channels); without frames (0, 0)."""
+    widths: tuple[int, ...]
+    """Channels that frames have, ascending; more than one only if frames contradict each other, and then ``counts``
+    is empty."""
+
+
+def taxel_frames(data: list[bytes]) -> TaxelFrames:
+    """Return the frames of messages `Taxels`.
+
+    Raises:
+        google.protobuf.message.DecodeError: If one is no such message.
+    """
+    found: dict[str, np.ndarray] = {}
+    lengths = np.fromiter(map(len, data), np.int64, len(data))
+    left = np.ones(len(data), dtype=bool)
+    for length in np.unique(lengths).tolist():
+        rows = np.flatnonzero(lengths == length)
+        flat = np.frombuffer(b"".join([data[k] for k in rows.tolist()]), np.uint8).reshape(len(rows), -1)
+        alike, columns = _columns(flat)
+        for name, values in columns.items():
+            if name not in found:
+                found[name] = np.zeros((len(data), *values.shape[1:]), values.dtype)
+            if found[name].shape[1:] == values.shape[1:]:
+                found[name][rows[alike]] = values[alike]
+            else:
+                alike &= False
+        left[rows[alike]] = False
+    return _with_rest(data, found, np.flatnonzero(left))
+
+
+def _columns(flat: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Read messages of one length, shape (n, bytes), as the first of them is laid out.
+
+    Returns:
+        Which messages are laid out like it, shape (n,), bool; field name -> values, shape (n,) or (n, channels).
+    """
+    alike, columns = np.ones(len(flat), dtype=bool), {}
+    first, place = flat[0], 0
+    while place < len(first):
+        number, wire = int(first[place]) >> 3, int(first[place]) & 7
+        alike &= flat[:, place] == first[place]
+        width = _varint_bytes(first, place + 1)
+        values = _varints(flat[:, place + 1 : place + 1 + width], alike)
+        place += 1 + width
+        if wire == PACKED and number == 4 and values[0] % 8 == 0 and 0 < values[0] <= len(first) - place:
+            alike &= values == values[0]
+            values = np.ascontiguousarray(flat[:, place : place + int(values[0])]).view("<f8")
+            place += values.shape[1] * 8
+        elif wire != VARINT or width == 0:
+            return np.zeros(len(flat), dtype=bool), {}
+        if FIELDS.get(number) in columns:  # said twice
+            return np.zeros(len(flat), dtype=bool), {}
+        if number in FIELDS:
+            columns[FIELDS[number]] = values
+    if set(columns) != set(FIELDS.values()):  # protobuf leaves out a 0
+        return np.zeros(len(flat), dtype=bool), {}
+    return alike, columns
+
+
+def _varint_bytes(message: np.ndarray, place: int) -> int:
+    """Return how many bytes a number takes; 0 if it does not end within ten."""
+    ends = np.flatnonzero(message[place : place + 10] < 0x80)
+    return int(ends[0]) + 1 if len(ends) else 0
+
+
+def _varints(octets: np.ndarray, alike: np.ndarray) -> np.ndarray:
+    """Return numbers of as many bytes, shape (n, bytes), as int64; where one has another length, ``alike`` is lost."""
+    more = octets >= 0x80
+    alike &= (more[:, :-1].all(axis=1)) & ~more[:, -1] if octets.shape[1] else False
+    values = np.zeros(len(octets), np.uint64)
+    for k in range(octets.shape[1]):
+        values |= (octets[:, k] & np.uint8(0x7F)).astype(np.uint64) << np.uint64(7 * k)
+    return values.view(np.int64)
+
+
+def _with_rest(data: list[bytes], found: dict[str, np.ndarray], rest: np.ndarray) -> TaxelFrames:
+    """Return the frames, those that were laid out otherwise read one by one."""
+    frames = [pb.Taxels.FromString(data[k]) for k in rest.tolist()]
+    widths = {len(frame.counts) for frame in frames}
+    if len(rest) < len(data):
+        widths.add(found["counts"].shape[1])
+    names = ("arrival_ns", "counter", "device_ns")
+    numbers = {name: found.get(name, np.zeros(len(data), np.int64)) for name in names}
+    for name, values in numbers.items():
+        values[rest] = [getattr(frame, name) for frame in frames]
+    width = next(iter(widths)) if len(widths) == 1 else 0
+    counts = found.get("counts", np.zeros((len(data), 0)))
+    if counts.shape[1] != width:
+        counts = np.zeros((len(data), width))
+    if frames and width:
+        counts[rest] = [list(frame.counts) for frame in frames]
+    return TaxelFrames(numbers["arrival_ns"], numbers["counter"], numbers["device_ns"], counts, tuple(sorted(widths)))

@@ -1,0 +1,61 @@
+"""Images that a busy recorder passed over are searched afterwards."""
+
+import cv2
+import numpy as np
+import pytest
+from demo_examples import HAND, START, rig
+
+from tacdata.clock import Clock
+from tacdata.demonstrations.demo_reader import read_demo
+from tacdata.demonstrations.demo_recorder import DemoHeader
+from tacdata.demonstrations.second_look import look_again
+from tacdata.recording.writer import EpisodeWriter
+from tacdata.tags import look
+from tacdata.virtual_rig.demo import FINGERS, INTRINSICS, _look_at, _tip_on_cube
+from tacdata.virtual_rig.render import render_scene
+
+EYE = _look_at((0.10, -0.36, 0.36))
+TIMES = 0.2 + 0.05 * np.arange(8)
+
+
+def image(seconds, rng):
+    """What the camera sees of the hand."""
+    cubes = [
+        (np.linalg.inv(EYE) @ HAND.tip(name, seconds) @ np.linalg.inv(_tip_on_cube()), entry["cube"])
+        for name, entry in FINGERS["fingers"].items()
+    ]
+    return render_scene(cubes, INTRINSICS, rng)
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """Eight images, of which the recorder had time to search one; one of them is damaged on disk."""
+    bench, rng = rig(), np.random.default_rng(0)
+    path = tmp_path / "episode-000000.mcap"
+    writer = EpisodeWriter(
+        path, DemoHeader(bench.document, {name: {} for name in bench.boards}, "grasp"), Clock(START, START, 1.0),
+        ("eye",), tuple(bench.fingers), tuple(bench.boards),
+    )  # fmt: skip
+    for number, seconds in enumerate(TIMES.tolist()):
+        stamp = START + round(seconds * 1e9)
+        jpeg = cv2.imencode(".jpg", image(seconds, rng))[1].tobytes()
+        writer.image("eye", stamp, stamp, number, jpeg[:200] if number == 5 else jpeg, -1)
+    found = look(image(TIMES[0], rng), INTRINSICS, bench.document["fingers"], None)
+    assert set(found.tips) == set(FINGERS["fingers"])
+    return writer.close(True, "", {}, {})
+
+
+def test_every_stored_image_is_searched_and_a_damaged_one_costs_no_other(recorded):
+    before = read_demo(recorded)
+    assert not before.views and "time for" in before.searched
+    told = []
+    after = look_again(before, told.append)
+    assert told[-1] == 8 and after.searched == "all 8 images"
+    assert {view.finger for view in after.views} == set(FINGERS["fingers"])
+    for view in after.views:
+        np.testing.assert_array_equal(view.sample_ns, START + np.rint(TIMES * 1e9).astype(np.int64))
+        assert (view.faces > 0).tolist() == [k != 5 for k in range(8)]
+        truth = np.array([(np.linalg.inv(EYE) @ HAND.tip(view.finger, t))[:3, 3] for t in TIMES])
+        off = 1000 * np.linalg.norm(view.position - truth, axis=1)[view.faces > 0]
+        assert np.median(off) < 1.0 and off.max() < 3.0
+    assert not [note for note in after.notes if "away from" in note]
