@@ -16,10 +16,10 @@ from threading import Lock, Thread
 from typing import Any
 from urllib.parse import quote, urlsplit
 
+from tacdata.dataset.flags import read_flags
 from tacdata.errors import TacdataError
-from viewers.episode_list import UNITS, EpisodeList
+from viewers.episode_list import UNITS, EpisodeList, with_flags
 from viewers.flagging import flag_episode, unflag_episode
-from viewers.list_sources import episodes_at
 from viewers.rerun_window import GRPC_PORT, LOOPBACK, WEB_PORT, free_port, quiet_environment, running
 
 PORT = 9095
@@ -84,8 +84,7 @@ class Pages:
 
     def entries(self) -> bytes:
         """Return the list as JSON, with the flags as they are now."""
-        fresh = {e.number: e.flag for e in episodes_at(self.listed.root, self._labels).entries}
-        rows = [asdict(e) | {"flag": fresh.get(e.number, e.flag)} for e in self.listed.entries]
+        rows = [asdict(entry) for entry in with_flags(self.listed.entries, read_flags(self.listed.root))]
         document = {
             "root": str(self.listed.root), "units": UNITS, "episodes": rows, "remarks": self.listed.remarks,
             "viewer": self.viewer + "/?hide_welcome_screen&url=" + quote(self.address + "/episode/", safe=""),

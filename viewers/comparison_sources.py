@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.labels import read_label
 from tacdata.sensor import Sensor
 from viewers import signals
 from viewers.comparison_scene import Side, maps_comparison
 from viewers.dataset_scene import phase_spans
-from viewers.kinds.session import episode_of
-from viewers.prediction_files import find_prediction
+from viewers.kinds.session import episode_of, spans
+from viewers.prediction_files import find_prediction, first_predicted
 from viewers.scene import Scene, Span
+from viewers.shown_label import shown_label
 
 
 def labels_at(path: Path, folders: Sequence[Path], episode: int | None) -> Scene:
@@ -37,7 +37,7 @@ def labels_at(path: Path, folders: Sequence[Path], episode: int | None) -> Scene
         file = folder / f"{recording.stem}.parquet"
         if not file.is_file():
             raise UsageError(f"no label {file}", f"a label of {recording.stem} in each folder", "run `tacdata label`")
-        label = read_label(file)
+        label = shown_label(file)
         sides.append(Side(name, label.time_ns, np.maximum(label.signed, 0.0)))
     _same_grid(sides, recorded.sensor)
     title = f"{recording.resolve().parent.name}/{recording.stem}: two labels"
@@ -87,12 +87,14 @@ def _labelled(
         return f"{path.resolve().name}/episode {number}", dataset.sensors[entry.sensor], time, label, phases
     from tacdata.recording.reader import read_episode
 
+    if episode is None and path.is_dir():
+        episode = first_predicted(folders[0], spans(path))
     recording = path if path.is_file() else episode_of(path, episode)
     recorded = read_episode(recording)
     file = recording.parent / "labels" / f"{recording.stem}.parquet"
     label = None
     if file.is_file():
-        own = read_label(file)
+        own = shown_label(file)
         label = Side("label", own.time_ns, np.maximum(own.signed, 0.0))
     title = f"{recording.resolve().parent.name}/{recording.stem}"
     return title, recorded.sensor, recorded.taxels.sample_ns, label, signals.spans(recorded.phases)

@@ -70,7 +70,7 @@ def dataset_scene(
     )
     press, drawn = entry.press, maps.thinned(shown)
     surfaces = skin_surface.surfaces(sensor, int(time[0]), drawn, None)
-    remarks += thinned_remark(shown, drawn)
+    remarks += thinned_remark(len(shown[0].time_ns) if shown else 0, drawn)
     return Scene(
         title=f"{dataset.root.resolve().name}/episode {number}",
         summary=summary.of_dataset_episode(dataset, entry, prediction, shown, remarks, count),

@@ -13,11 +13,12 @@ from tacdata.recording.episode import PHASES, Episode, TaxelStream
 from training.prediction import Prediction
 from viewers import camera_view, maps, signals, skin_surface, summary
 from viewers.scene import DepthMaps, Scene
+from viewers.shown_label import ShownLabel
 
 
 def episode_scene(
     episode: Episode,
-    label: Label | None = None,
+    label: Label | ShownLabel | None = None,
     prediction: Prediction | None = None,
     images: Iterable[tuple[str, int, bytes]] = (),
     remarks: tuple[str, ...] = (),
@@ -41,7 +42,8 @@ def episode_scene(
     if not len(episode.taxels.sample_ns):
         episode, remarks = _without_taxels(episode), (*remarks, "not one taxel frame: what else there is, is shown")
     time, sensor = episode.taxels.sample_ns, episode.sensor
-    label_pair = (label.time_ns, np.maximum(label.signed, 0.0)) if label else None
+    label = ShownLabel.of(label) if isinstance(label, Label) else label
+    label_pair = (label.map_ns, np.maximum(label.signed, 0.0)) if label else None
     prediction_pair = (prediction.time_ns, prediction.depth) if prediction else None
     for name, pair in (("label", label_pair), ("prediction", prediction_pair)):
         if pair is not None and pair[1].shape[1:] != sensor.map.shape:
@@ -59,8 +61,8 @@ def episode_scene(
     curves += tuple(signals.delays(f"camera {name}", *pair) for name, pair in (image_times or {}).items())
     curves += maps.error_curves(shown)
     drawn = maps.thinned(shown)
-    surfaces = skin_surface.surfaces(sensor, int(time[0]), drawn, (label.time_ns, label.signed) if label else None)
-    remarks += thinned_remark(shown, drawn)
+    surfaces = skin_surface.surfaces(sensor, int(time[0]), drawn, (label.map_ns, label.signed) if label else None)
+    remarks += thinned_remark(len(label.time_ns) if label else len(shown[0].time_ns) if shown else 0, drawn)
     return Scene(
         title=f"{episode.path.resolve().parent.name}/{episode.path.stem}",
         summary=summary.of_episode(episode, label, prediction, shown, cameras, remarks),
@@ -98,11 +100,11 @@ def _without_taxels(episode: Episode) -> Episode:
     return replace(episode, taxels=TaxelStream(time, time, np.full(len(time), -1), counts))
 
 
-def thinned_remark(maps: tuple[DepthMaps, ...], drawn: tuple[DepthMaps, ...]) -> tuple[str, ...]:
-    """Return in words how many maps are drawn, where it is not all."""
-    if not maps or len(maps[0].time_ns) == len(drawn[0].time_ns):
+def thinned_remark(count: int, drawn: tuple[DepthMaps, ...]) -> tuple[str, ...]:
+    """Return in words how many of ``count`` maps are drawn, where it is not all."""
+    if not drawn or count == len(drawn[0].time_ns):
         return ()
-    return (f"{len(drawn[0].time_ns)} of {len(maps[0].time_ns)} maps are drawn, the deepest of each stretch",)
+    return (f"{len(drawn[0].time_ns)} of {count} maps are drawn, the deepest of each stretch",)
 
 
 def _device_times(episode: Episode) -> np.ndarray:

@@ -50,9 +50,8 @@ class FilmBackend(Backend):
             raise UsageError(given, "an episode of a recording, session or dataset", "use --picture or --save")
         kind = self._path.suffix
         times = film_times(scene, RATE[kind], MOST[kind])
-        with rc_context(STYLE), written_beside(self._path) as temporary:
-            write = _write_gif if kind == ".gif" else _write_mp4
-            write(temporary, self._frames(scene, times), RATE[kind])
+        with rc_context(STYLE):
+            write_film(self._path, self._frames(scene, times))
 
     def _frames(self, scene: Scene, times: np.ndarray) -> Iterator[np.ndarray]:
         for time in times.tolist():
@@ -117,6 +116,17 @@ def _signals(axes: Any, scene: Scene, time_ns: int) -> None:
     axes.set_xlabel("time [s]", fontsize=8)
     axes.set_ylabel(change.unit, fontsize=8)
     axes.tick_params(labelsize=7)
+
+
+def write_film(path: Path, frames: Iterator[np.ndarray]) -> None:
+    """Write frames, uint8, shape (height, width, 3) each, at the rate of the file's kind; whole or not at all.
+
+    Raises:
+        UsageError: If the package that writes such films is missing.
+    """
+    with written_beside(path) as temporary:
+        write = _write_gif if path.suffix == ".gif" else _write_mp4
+        write(temporary, frames, RATE[path.suffix])
 
 
 def _write_gif(path: Path, frames: Iterator[np.ndarray], rate: float) -> None:

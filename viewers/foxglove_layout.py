@@ -48,6 +48,12 @@ def foxglove_layout(topics: set[str]) -> dict[str, Any]:
         panels["Plot!guide"] = _plot("Guide, machine position [mm]", axes)
     for topic in sorted(t for t in topics if t.endswith("/image")):
         panels[f"Image!{_name(topic)}"] = {"imageMode": {"imageTopic": topic}}
+    for topic in sorted(t for t in topics if t.endswith("/image")):
+        camera = topic.split("/")[2]
+        poses = {t: {"visible": True, "type": "axis"} for t in sorted(topics) if t.startswith(f"/camera/{camera}/")}
+        poses = {t: own for t, own in poses.items() if t.endswith("/pose")}
+        if poses:  # where the camera sees the cube, in the camera's own frame
+            panels[f"3D!{_name(topic)}"] = {"followTf": camera, "followMode": "follow-none", "topics": poses}
     for topic in sorted(t for t in topics if t.endswith("/cube") or t.endswith("/view")):
         panels[f"Plot!{_name(topic)}"] = _plot(f"{topic}: reprojection [px]", [f"{topic}.reprojection"])
     if channels.PHASE in topics:

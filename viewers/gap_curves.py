@@ -35,5 +35,7 @@ def read_gap_curves(path: Path) -> tuple[Curves, ...]:
     for name, own in sorted(found.items()):
         if set(own) == set(COLORS):
             time = own["measured"][0]
-            curves.append(Curves(name, "counts", tuple(COLORS), time, np.column_stack([own[key][1] for key in COLORS])))
+            curves.append(
+                Curves(name, "as recorded", tuple(COLORS), time, np.column_stack([own[key][1] for key in COLORS]))
+            )
     return tuple(curves)

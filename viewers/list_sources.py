@@ -13,12 +13,12 @@ from tacdata import documents
 from tacdata.dataset import features, folder, label_states, metadata
 from tacdata.dataset.flags import read_flags
 from tacdata.errors import FormatError, TacdataError, UsageError
-from tacdata.labels import read_label
 from tacdata.recording import file_names
 from tacdata.recording.session import read_session
 from training.prediction import Prediction, read_prediction
 from viewers.episode_list import Entry, EpisodeList, errors_of, of_press, with_flags
 from viewers.prediction_files import prediction_paths
+from viewers.shown_label import shown_label
 
 
 def episodes_at(path: Path, labels: Path | None = None, predictions: Path | None = None) -> EpisodeList:
@@ -84,7 +84,7 @@ def _with_session_errors(entries: tuple[Entry, ...], labels: Path, predictions: 
     result = []
     for entry in entries:
         path = labels / f"{Path(entry.file).stem}.parquet"
-        label = read_label(path) if entry.label == "complete" else None
+        label = shown_label(path) if entry.label == "complete" else None
         own = next((p for t, p in known.items() if label is not None and t in label.time_ns), None)
         error = None
         if label is not None and own is not None:
@@ -121,7 +121,7 @@ def _record_keys(root: Path, rows: list[folder.EpisodeRow]) -> dict[int, int]:
     for number in sorted({row.data_file for row in rows}):
         own = [row for row in rows if row.data_file == number]
         try:
-            table = pq.read_table(root / folder.data_path(number), columns=[features.RECORD], use_threads=False)
+            table = pq.ParquetFile(root / folder.data_path(number)).read([features.RECORD], use_threads=False)
         except (pa.ArrowException, OSError, KeyError) as error:
             reason = str(error).splitlines()[0]
             raise FormatError(f"{folder.data_path(number)} cannot be read: {reason}", "a data file",

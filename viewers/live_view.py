@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import get_context
@@ -17,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import UsageError
-from viewers.rerun_window import GRPC_PORT, LOOPBACK, WEB_PORT, free_port, quiet_environment, require_display, running
+from viewers.fed_viewer import START, fed_viewer
+from viewers.rerun_window import require_display
 
 WAITING = 16
 """Values that wait for the viewer; more are dropped [count]."""
-START = 30.0
-"""Longest wait for the viewer [s of real time]; the recording does not begin before."""
 PATIENCE = 15.0
 """How long the viewer may take to end [s of real time]."""
 NICENESS = 10
@@ -126,28 +123,9 @@ def _open(where: str, stack: ExitStack) -> tuple[Any, str]:
     if where not in ("window", "web"):
         recording.save(where)
         return recording, where
-    environment = stack.enter_context(quiet_environment())
-    port = free_port(GRPC_PORT)
-    command = ["--bind", LOOPBACK, "--port", str(port), "--memory-limit", "500MB"]
-    web = free_port(WEB_PORT)
-    if where == "web":
-        command += ["--serve-web", "--web-viewer-port", str(web), "--server-memory-limit", "200MB"]
-    stack.enter_context(running(command, environment))
-    _wait_for(port)
-    recording.connect_grpc(f"rerun+http://{LOOPBACK}:{port}/proxy")
-    address = f"http://{LOOPBACK}:{web}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{port}%2Fproxy"
-    return recording, address if where == "web" else ""
-
-
-def _wait_for(port: int) -> None:
-    """Return once the viewer listens; what is sent before is lost."""
-    end = time.monotonic() + START / 2
-    while time.monotonic() < end:
-        with socket.socket() as probe:
-            if probe.connect_ex((LOOPBACK, port)) == 0:
-                return
-        time.sleep(0.05)
-    raise TimeoutError(f"the viewer does not listen on port {port}")
+    viewer = stack.enter_context(fed_viewer(where == "web"))
+    viewer.connect(recording)
+    return recording, viewer.address
 
 
 class _Drawing:

@@ -59,7 +59,8 @@ def thinned(maps: tuple[DepthMaps, ...], most: int = thinning.MAPS) -> tuple[Dep
     if not maps or max(len(m.time_ns) for m in maps) <= most:
         return maps
     first = max(maps, key=lambda m: len(m.time_ns))
-    strength = np.abs(first.values).reshape(len(first.values), -1).max(axis=1)
+    flat = first.values.reshape(len(first.values), -1)
+    strength = np.maximum(flat.max(axis=1), -flat.min(axis=1))
     times = first.time_ns[thinning.strongest(strength, most)]
     result = []
     for m in maps:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -54,9 +55,22 @@ def other_page(scene: Scene) -> Figure:
         grid = parts["curves"].subplots(rows, 2 if len(curves) > 1 else 1, squeeze=False).ravel()
         for axes, own in zip(grid, curves, strict=False):
             course(axes, own, scene)
+        if scene.kind == "comparison":
+            one_scale(grid, curves)
         for axes in grid[len(curves) :]:
             axes.set_visible(False)
     return figure
+
+
+def one_scale(grid: Iterable[Axes], curves: list[Curves]) -> None:
+    """Give curves of one group, such as what two models leave, the same axis, so that their heights compare."""
+    groups: dict[str, list[Axes]] = {}
+    for axes, own in zip(grid, curves, strict=False):
+        groups.setdefault(own.name.split("/")[0], []).append(axes)
+    for members in groups.values():
+        low, high = zip(*(axes.get_ylim() for axes in members), strict=True)
+        for axes in members:
+            axes.set_ylim(min(low), max(high))
 
 
 def space(figure: SubFigure, scene: Scene) -> None:
@@ -113,7 +127,8 @@ def course(axes: Axes, curves: Curves, scene: Scene) -> None:
     seconds = panels.seconds(scene, curves.time_ns)
     for k, (label, values) in enumerate(zip(curves.labels, np.asarray(curves.values, float).T, strict=True)):
         color = tuple(colors[k]) if colors is not None else COLORS[k % len(COLORS)]
-        axes.plot(seconds, values, color=color, linewidth=1.1, label=label)
+        width, alpha = (3.5, 0.4) if label == "measured" else (1.1, 1.0)  # models are drawn over it, and fit it
+        axes.plot(seconds, values, color=color, linewidth=width, alpha=alpha, label=label)
     if len(curves.labels) <= 6:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=7, ncols=6, borderaxespad=0.1)
     axes.set_title(curves.name.replace("_", " ").replace("/", ": "), fontsize=10)

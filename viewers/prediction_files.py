@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,21 @@ def find_prediction(folder: Path, time_ns: np.ndarray) -> Prediction | None:
     """
     paths = prediction_paths(folder)
     return next((read_prediction(path) for path in paths if np.isin(_times(path), time_ns).any()), None)
+
+
+def first_predicted(folder: Path, spans: Iterable[tuple[int, int, int]]) -> int | None:
+    """Return the first of some episodes of which a folder holds a prediction, or None.
+
+    Args:
+        folder: As in `find_prediction`.
+        spans: Number, first and last time [ns] of each episode, in order.
+
+    Raises:
+        UsageError: If there is no such folder or no prediction in it.
+        FormatError: If a file is damaged.
+    """
+    begins = np.array([_times(path)[0] for path in prediction_paths(folder)])
+    return next((number for number, a, b in spans if ((begins >= a) & (begins <= b)).any()), None)
 
 
 def prediction_paths(folder: Path) -> list[Path]:

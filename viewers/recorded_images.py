@@ -15,12 +15,41 @@ from mcap.stream_reader import get_chunk_data_stream
 
 from tacdata.recording import channels
 from tacdata.recording.mcap_records import read_records
-from viewers.thinning import IMAGES, evenly
+from viewers.thinning import IMAGE_BYTES, IMAGES, evenly
 
 RECORD = 1 + 8
 """Opcode and length before a record's body [bytes] (MCAP specification, "Records")."""
 MESSAGE = 2 + 4 + 8 + 8
 """Channel, sequence and two times before a message's data [bytes] (MCAP specification, "Message")."""
+
+
+class ImageSampler:
+    """Keeps at most twice as many images of a camera as are drawn, at equal distance, while a file is read once."""
+
+    def __init__(self, most: int = IMAGES) -> None:
+        self._most, self._step, self._count = most, {}, {}
+        self._kept: dict[str, list[bytes]] = {}
+
+    def take(self, topic: str, message: memoryview) -> None:
+        """Take the next image message of a topic."""
+        number = self._count.get(topic, 0)
+        self._count[topic] = number + 1
+        kept, step = self._kept.setdefault(topic, []), self._step.setdefault(topic, 1)
+        if number % step:
+            return
+        kept.append(bytes(message))
+        if len(kept) > 2 * self._most:
+            del kept[1::2]
+            self._step[topic] = 2 * step
+
+    def images(self, cameras: tuple[str, ...]) -> Iterator[tuple[str, int, bytes]]:
+        """Yield camera name, time of exposure [ns] and JPEG image of those that are drawn."""
+        for camera in cameras:
+            kept = self._kept.get(channels.image(camera), [])
+            room = IMAGE_BYTES * len(kept) // max(sum(map(len, kept)), 1)
+            for k in evenly(len(kept), max(min(self._most, room), 2)):
+                image = CompressedImage.FromString(kept[k])
+                yield camera, image.timestamp.ToNanoseconds(), image.data
 
 
 def recorded_images(path: Path, cameras: tuple[str, ...], most: int = IMAGES) -> Iterator[tuple[str, int, bytes]]:

@@ -69,12 +69,16 @@ class RerunParts:
             self._cloud(cloud)
         for bars in scene.bars:
             self._bars(bars)
+        for page in scene.pages:
+            self._static(f"pages/{page.name}", rr.EncodedImage(contents=page.png, media_type="image/png"))
         self._phases()
 
     def _static(self, path: str, *parts: rr.AsComponents) -> None:
         self._recording.log(path, *parts, static=True)
 
     def _columns(self, path: str, time_ns: np.ndarray, columns: Iterable) -> None:
+        if not len(time_ns):
+            return
         if not self._scene.on_host_clock:
             elapsed = [rr.TimeColumn(ELAPSED, duration=1e-9 * time_ns)]
             self._recording.send_columns(path, indexes=elapsed, columns=columns)

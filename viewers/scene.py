@@ -20,6 +20,7 @@ __all__ = [
     "Cloud",
     "Curves",
     "DepthMaps",
+    "Page",
     "Scene",
     "Span",
     "Surface",
@@ -122,6 +123,15 @@ class Bars:
 
 
 @dataclass(frozen=True)
+class Page:
+    """A picture that was drawn by somebody else and lies beside the data."""
+
+    name: str
+    title: str
+    png: bytes
+
+
+@dataclass(frozen=True)
 class CameraView:
     """What one camera saw, and where it saw the cube."""
 
@@ -185,6 +195,7 @@ class Scene:
     trails: tuple[Trail, ...] = ()
     clouds: tuple[Cloud, ...] = ()
     bars: tuple[Bars, ...] = ()
+    pages: tuple[Page, ...] = ()
     kind: str = "episode"
     """Which layout it has: "episode", "hand", "verdict" or "comparison"."""
     device_ns: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))

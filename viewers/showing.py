@@ -6,6 +6,7 @@ import tempfile
 import webbrowser
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from tacdata.errors import UsageError
@@ -35,6 +36,16 @@ class Output:
     def only_web(self) -> bool:
         """Whether a browser is all that is asked for."""
         return self.web and not (self.save or self.picture or self.video)
+
+    def prepare(self) -> None:
+        """Import what is going to draw, which takes as long as reading a large file."""
+        import viewers.episode_scene
+
+        import_module("trimesh.creation")  # of which indenters are made
+        if self.save is not None or self.opens:
+            import viewers.rerun_backend
+        if self.picture is not None:
+            import viewers.picture_backend  # noqa: F401
 
     def check(self) -> None:
         """Refuse what cannot be done, before anything is read.

@@ -14,6 +14,7 @@ from tacdata.sensor import Sensor
 from viewers import thinning
 from viewers.color_scale import ColorScale, scale_of
 from viewers.scene import Curves, Span, TaxelArray
+from viewers.shown_label import ShownLabel
 
 FRAMES_WITHOUT_REST = 10
 """Frames that stand in for the rest phase where none is marked."""
@@ -121,7 +122,7 @@ def tag_curves(tags: TagStream) -> list[Curves]:
     ]
 
 
-def label_curves(label: Label) -> tuple[Curves, ...]:
+def label_curves(label: Label | ShownLabel) -> tuple[Curves, ...]:
     """Return the simulated force on the indenter."""
     return (Curves("force", "N", ("x", "y", "z"), label.time_ns, label.force),)
 

@@ -37,20 +37,27 @@ def read_single(root: Path, number: int) -> tuple[Dataset, int]:
     if main is None or not known:
         whole = read_dataset(root)
         return whole, len(whole.episodes)
-    rows = folder.read_rows(root, info)
-    if not 0 <= number < len(rows):
-        return Dataset(root, {}, (), {}, info["fps"], ""), len(rows)
-    row = rows[number]
+    count = info["total_episodes"]
+    if not 0 <= number < count:
+        return Dataset(root, {}, (), {}, info["fps"], ""), count
+    row = _row(root, info, number)
     columns = _columns(root / folder.data_path(row.data_file), info, row)
     by_key = {features.short_hash(digest): digest for digest in main["sensors"]}
     digest = by_key.get(int(columns[features.SENSOR][0]))
-    record = metadata.read_records(root).get(int(columns[features.RECORD][0]))
+    record = metadata.read_record(root, int(columns[features.RECORD][0]))
     if digest is None or record is None:
         whole = read_dataset(root)
         return whole, len(whole.episodes)
     sensor = metadata.Sensor.from_document(main["sensors"][digest], str(root))
     entry = DatasetEpisode(number, 0, row.stop - row.start, " / ".join(row.tasks), digest, record)
-    return Dataset(root, columns, (entry,), {digest: sensor}, info["fps"], ""), len(rows)
+    return Dataset(root, columns, (entry,), {digest: sensor}, info["fps"], ""), count
+
+
+def _row(root: Path, info: dict, number: int) -> folder.EpisodeRow:
+    """Return an episode's row, from the file of its number where each has one, as we write them."""
+    path = root / folder.row_path(number)
+    own = folder.rows_in(path).get(number) if path.is_file() else None
+    return own or folder.read_rows(root, info)[number]
 
 
 def _columns(path: Path, info: dict, row: folder.EpisodeRow) -> dict[str, np.ndarray]:

@@ -13,6 +13,7 @@ from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
 from training.prediction import Prediction
 from viewers.scene import CameraView, DepthMaps
+from viewers.shown_label import ShownLabel
 
 LINE_LENGTH = 170
 """Characters that fit across a page."""
@@ -35,7 +36,7 @@ def of_sensor(sensor: Sensor) -> str:
 
 def of_episode(
     episode: Episode,
-    label: Label | None,
+    label: Label | ShownLabel | None,
     prediction: Prediction | None,
     maps: tuple[DepthMaps, ...],
     cameras: tuple[CameraView, ...],
@@ -119,7 +120,7 @@ def rmse(maps: tuple[DepthMaps, ...]) -> str:
 
 def missing(
     episode: Episode,
-    label: Label | None,
+    label: Label | ShownLabel | None,
     prediction: Prediction | None,
     maps: tuple[DepthMaps, ...],
     cameras: tuple[CameraView, ...],
@@ -143,7 +144,7 @@ def missing(
 
 
 def plain(markdown: str) -> str:
-    """Return a summary without its heading and marks, one item a line, long ones broken."""
+    """Return a summary without its heading, tables and marks, one item a line, long ones broken."""
     items = [line.removeprefix("- ").replace("**", "") for line in markdown.splitlines()]
-    lines = [wrap(item, LINE_LENGTH) for item in items if not item.startswith("#")]
+    lines = [wrap(item, LINE_LENGTH) for item in items if not item.startswith(("#", "|"))]
     return "\n".join(line for wrapped in lines for line in wrapped)

@@ -8,6 +8,10 @@ MAPS, CURVES, ARRAYS, IMAGES = 600, 6000, 3000, 900
 """Most maps and skins, rows of a set of curves, pictures of the taxels, and images of a camera that are drawn."""
 
 
+IMAGE_BYTES = 24_000_000
+"""Most bytes of a camera's images: large ones are fewer, so that the file stays light."""
+
+
 def strongest(strength: np.ndarray, most: int) -> np.ndarray:
     """Return the row of the greatest strength in each of ``most`` stretches of equal length, ascending.
 
@@ -19,11 +23,16 @@ def strongest(strength: np.ndarray, most: int) -> np.ndarray:
     """
     if len(strength) <= most:
         return np.arange(len(strength))
-    starts = np.linspace(0, len(strength), most + 1).astype(int)[:-1]
+    starts = stretches(len(strength), most)
     highest = np.maximum.reduceat(strength, starts)
     stretch = np.repeat(np.arange(most), np.diff(np.append(starts, len(strength))))
     found = np.flatnonzero(strength == highest[stretch])
     return found[np.unique(stretch[found], return_index=True)[1]]
+
+
+def stretches(count: int, most: int) -> np.ndarray:
+    """Return where each of ``most`` stretches of equal length begins among ``count`` rows, shape (most,)."""
+    return np.linspace(0, count, most + 1).astype(int)[:-1]
 
 
 def extremes(values: np.ndarray, most: int) -> np.ndarray:

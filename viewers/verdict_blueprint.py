@@ -14,6 +14,8 @@ def verdict_blueprint(scene: Scene) -> rrb.Blueprint:
     for curves in scene.curves:
         name = f"{curves.name.replace('_', ' ')} [{curves.unit}]"
         parts.append(rrb.TimeSeriesView(origin=entity("curves", curves.name), name=name))
+    for page in scene.pages:
+        parts.insert(0, rrb.Spatial2DView(origin=f"pages/{page.name}", name=page.title))
     columns = [rrb.TextDocumentView(origin="about", name="About")]
     grid = [rrb.Grid(*parts, grid_columns=2 if len(parts) > 3 else 1)] if parts else []
     return rrb.Blueprint(

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from viewers.scene import Bars, Curves, Scene
+from viewers.scene import Bars, Curves, Page, Scene
 
 GATE = 0.01
 """Largest share of sign flips at which a gap counts as one (`tacdata.discrepancy`)."""
+WIDE = 20.0
+"""Ratio from which bars are drawn on a logarithmic axis."""
 SURELY = 2.33
 """Standard errors by which a name must be better than another (`tacdata.discrepancy`)."""
 
 
-def verdict_scene(title: str, verdict: dict[str, Any], picture: str | None = None) -> Scene:
+def verdict_scene(title: str, verdict: dict[str, Any], picture: Path | None = None) -> Scene:
     """Return a verdict in words and bars.
 
     Args:
         title: What stands on top.
         verdict: The document (`schemas/verdict.schema.json`).
-        picture: Name of the picture that lies beside it, if one does.
+        picture: The page with residuals that lies beside it, if one does.
     """
-    return _scene(
-        title, verdict_words(title, verdict, picture), (*_left(verdict), *_margins(verdict), *_limits(verdict))
-    )
+    words = verdict_words(title, verdict, picture.name if picture else None)
+    scene = _scene(f"{title}: {verdict['status']}", words, (*_left(verdict), *_margins(verdict), *_limits(verdict)))
+    if picture is None:
+        return scene
+    return replace(scene, pages=(Page("residuals", "Residuals before and after", picture.read_bytes()),))
 
 
 def revision_scene(title: str, revision: dict[str, Any], table: str, curves: tuple[Curves, ...]) -> Scene:
@@ -37,7 +43,8 @@ def revision_scene(title: str, revision: dict[str, Any], table: str, curves: tup
         curves: Readings measured, before and after, one entry an episode.
     """
     gap = revision["gap"] or {}
-    rows = [entry for entry in gap.values() if isinstance(entry, dict) and "before" in entry]
+    rows = [gap[key] for key in ("sealed", "worst") if gap.get(key)]
+    rows += [{**entry, "name": f"left out: {entry['name']}"} for entry in gap.get("elsewhere", ())]
     names = [f"{entry['name']}, {when}" for entry in rows for when in ("before", "after")]
     values = np.array([entry[when] for entry in rows for when in ("before", "after")], float)
     added = ", ".join(f"**{entry['effect'] if isinstance(entry, dict) else entry}**" for entry in revision["added"])
@@ -51,7 +58,9 @@ def revision_scene(title: str, revision: dict[str, Any], table: str, curves: tup
         "",
     ]
     lines += [f"- next: {press}" for press in (revision.get("next") or {}).get("presses", [])]
-    bars = (Bars("gap", "Mean square over the noise; 1 is the floor", tuple(names), values, 1.0),) if rows else ()
+    wide = bool(len(values)) and bool(values.max() > WIDE * values.min())
+    title_of_bars = "Residual: mean square over the noise; 1 is the floor"
+    bars = (Bars("gap", title_of_bars, tuple(names), values, 1.0, wide),) if rows else ()
     return _scene(title, "\n".join(lines), bars, curves)
 
 
@@ -68,7 +77,8 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
         for name, p in effect["parameters"].items():
             value = np.ravel(p["value"])
             shown = f"{value[0]:.4g}" if len(value) == 1 else f"{value.min():.3g} to {value.max():.3g}, one a channel"
-            lines.append(f"- {name} = {shown} {p['unit']}" + (f" ± {p['error']:.2g}" if p["error"] is not None else ""))
+            spread = f" ± {p['error']:.2g}" if p["error"] is not None else ""
+            lines.append(f"- {name} = {shown}{spread}" + (f" {p['unit']}" if p["unit"] != "1" else ""))
         if effect["alternatives"]:
             lines.append(f"- could also be: {', '.join(effect['alternatives'])}")
         lines.append(f"- told apart by: {effect['experiment']}")
@@ -94,7 +104,8 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
 def _left(verdict: dict[str, Any]) -> list[Bars]:
     names, left = ("before", "after", "noise floor"), verdict["left"]
     values = np.array([left["before"], left["after"], left["floor"]], float)
-    return [Bars("gap", "Residual: mean square over the noise", names, values, 1.0)]
+    wide = values[0] > WIDE * min(values[1:])
+    return [Bars("gap", "Residual: mean square over the noise", names, values, 1.0, bool(wide))]
 
 
 def _margins(verdict: dict[str, Any]) -> list[Bars]:

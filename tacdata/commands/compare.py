@@ -49,7 +49,8 @@ def run(
         scene = comparison_sources.predictions_at(path, predictions, episode)
     else:
         scene = _models(path, spec or [], episode)
-    print("\n".join(line.removeprefix("- ") for line in scene.summary.splitlines() if line.startswith("- ")))
+    said = (line for line in scene.summary.splitlines() if line.startswith("- "))
+    print("\n".join(line.removeprefix("- ").replace("**", "") for line in said))
     showing.show(scene, output)
 
 

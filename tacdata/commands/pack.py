@@ -27,6 +27,7 @@ def run(
 ) -> None:
     """Write the recordings and their labels as a LeRobot v3 dataset."""
     from tacdata.dataset.features import asked_for
+    from tacdata.dataset.flags import carry_flags
     from tacdata.dataset.pack import LabelFiles, pack, refuse_existing
     from tacdata.recording.reader import read_episode
     from tacdata.recording.session import read_session
@@ -50,5 +51,7 @@ def run(
             print(f"  {name} has no label because: {why}")
     for path in found.unfinished:
         print(f"  {path.name}  left out: the recording was broken off")
+    for flag in carry_flags(session, out):
+        print(f"  {flag.file}  set aside, training leaves it out: {flag.reason}")
     print(f"{packed.episodes} episodes, {packed.frames} frames in {out}")
     print(f"next: tacdata train {out}")

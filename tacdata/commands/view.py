@@ -36,7 +36,7 @@ def run(
     ] = None,
 ) -> None:
     """Look at an episode, a demonstration, targets or a verdict, in a window or browser, or save what is to be seen."""
-    from viewers import output_file, showing
+    from viewers import following, output_file, showing
     from viewers.source import scene_at
 
     if foxglove is not None:
@@ -47,13 +47,17 @@ def run(
         return
     output = showing.Output(save, picture, video, web)
     output.check()
+    path = following.finished_name(path)
     if path.suffix == output_file.RERUN and path.is_file():
         showing.show_saved(path, output)
+        return
+    if output.opens and following.is_growing(path) and not (save or picture or video):
+        following.follow(path, web)
         return
     if output.only_web and episode is None and _is_list(path):
         browse.serve(path, labels, predictions)
         return
-    showing.show(scene_at(path, labels, predictions, episode), output)
+    showing.show(scene_at(path, labels, predictions, episode, output.prepare), output)
 
 
 def _is_list(path: Path) -> bool:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import schemas
 from tacdata import documents
+from tacdata.dataset import metadata
 from tacdata.dataset.reader import Dataset
 from tacdata.errors import UsageError
 
@@ -78,6 +79,28 @@ def clear_flag(folder: Path, recording: str) -> None:
     flags = read_flags(folder)
     if flags.pop(recording, None) is not None:
         _write(folder, flags)
+
+
+def carry_flags(session: Path, dataset: Path) -> list[Flag]:
+    """Give a dataset the flags of the session that it was packed from; what it says of an episode itself stays.
+
+    Args:
+        session: Folder of recordings.
+        dataset: Folder of the dataset.
+
+    Returns:
+        The flags that are new to the dataset, in the order of the session's recordings.
+
+    Raises:
+        FormatError: If a file of flags is damaged.
+        DeviceError: If the disk refuses it.
+    """
+    own = read_flags(dataset)
+    held = {record.recording for record in metadata.read_records(dataset).values()}
+    carried = {key: flag for key, flag in read_flags(session).items() if key in held and key not in own}
+    if carried:
+        _write(dataset, carried | own)
+    return list(carried.values())
 
 
 def flagged_episodes(dataset: Dataset) -> dict[int, str]:

@@ -138,11 +138,11 @@ def row_columns(root: Path) -> set[str]:
     return set(read_parquet(first).column_names)
 
 
-def read_rows(root: Path, info: dict[str, Any]) -> list[EpisodeRow]:
-    """Return the rows of the episodes that info.json counts, in order; what a crash left is passed over.
+def rows_in(path: Path) -> dict[int, EpisodeRow]:
+    """Return the rows of one file of meta/episodes, by the episode's number.
 
     Raises:
-        FormatError: If rows are missing, damaged, or do not follow each other.
+        FormatError: If it is damaged.
     """
     wanted = [
         "episode_index",
@@ -154,17 +154,28 @@ def read_rows(root: Path, info: dict[str, Any]) -> list[EpisodeRow]:
         "meta/episodes/chunk_index",
         "meta/episodes/file_index",
     ]
-    rows = {}
+    return {
+        entry["episode_index"]: EpisodeRow(
+            entry["episode_index"],
+            entry["dataset_from_index"],
+            entry["dataset_to_index"],
+            tuple(entry["tasks"]),
+            entry["data/chunk_index"] * FILES_PER_CHUNK + entry["data/file_index"],
+            entry["meta/episodes/chunk_index"] * FILES_PER_CHUNK + entry["meta/episodes/file_index"],
+        )
+        for entry in read_parquet(path, wanted).to_pylist()
+    }
+
+
+def read_rows(root: Path, info: dict[str, Any]) -> list[EpisodeRow]:
+    """Return the rows of the episodes that info.json counts, in order; what a crash left is passed over.
+
+    Raises:
+        FormatError: If rows are missing, damaged, or do not follow each other.
+    """
+    rows: dict[int, EpisodeRow] = {}
     for path in sorted((root / "meta/episodes").glob("*/*.parquet")):
-        for entry in read_parquet(path, wanted).to_pylist():
-            rows[entry["episode_index"]] = EpisodeRow(
-                entry["episode_index"],
-                entry["dataset_from_index"],
-                entry["dataset_to_index"],
-                tuple(entry["tasks"]),
-                entry["data/chunk_index"] * FILES_PER_CHUNK + entry["data/file_index"],
-                entry["meta/episodes/chunk_index"] * FILES_PER_CHUNK + entry["meta/episodes/file_index"],
-            )
+        rows |= rows_in(path)
     ordered = [rows[index] for index in range(info["total_episodes"]) if index in rows]
     gapless = [row.start for row in ordered] == [0, *(row.stop for row in ordered[:-1])] if ordered else True
     frames = ordered[-1].stop if ordered else 0

@@ -161,6 +161,21 @@ def read_records(root: Path) -> dict[int, EpisodeRecord]:
     return records
 
 
+def read_record(root: Path, key: int) -> EpisodeRecord | None:
+    """Return the record of a key, checked; None if there is none. The others are not looked at closely."""
+    path = root / RECORDS
+    found = None
+    for number, line in enumerate(path.read_text(errors="replace").splitlines() if path.is_file() else (), start=1):
+        try:
+            document = json.loads(line)
+            identity = [document["sensor"], document["recording"], document["label"]]
+        except (ValueError, KeyError, TypeError):
+            continue
+        if short_hash(provenance.content_hash(identity)) == key:
+            found = EpisodeRecord.from_document(document, f"{path}: line {number}")
+    return found
+
+
 def shard_metadata(sensor: Sensor, record: EpisodeRecord) -> bytes:
     """Return what stands under the key ``tacdata`` in a data file's Parquet metadata."""
     content = {

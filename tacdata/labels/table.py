@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,8 @@ def write(path: Path, label: Label) -> None:
     arrays = {name: _column(np.asarray(getattr(label, name), dtype=columns.DTYPES[name])) for name in names}
     table = pa.table(arrays).replace_schema_metadata({HEADER: json.dumps(header)})
     with replacement(path) as stream:
-        pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
+        # Digits of maps hardly repeat: dictionaries of them took as long again and made files half as large again.
+        pq.write_table(table, stream, compression="zstd", use_dictionary=False, write_page_checksum=True)
 
 
 def read(path: Path) -> Label:
@@ -67,24 +69,74 @@ def read(path: Path) -> Label:
         FormatError: If it is damaged, no label file, or of another major format version.
     """
     file = _open(path)
+    header, arrays = _arrays(file, path, file.schema_arrow.names)
+    return Label(episode=header["episode"], provenance=header["provenance"], **arrays)
+
+
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Return some columns of a label file, as `Label` documents them; the others are not read, nor checked.
+
+    Args:
+        path: The file.
+        names: Columns that every label has (`columns.REQUIRED`).
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: If these columns are damaged, it is no label file, or of another major format version.
+    """
+    return _arrays(_open(path), path, names)[1]
+
+
+def map_batches(path: Path, name: str, rows: int) -> Iterator[np.ndarray]:
+    """Yield the maps of a label file, ``rows`` at most at a time, so that a long one needs little memory.
+
+    Args:
+        path: The file.
+        name: A column of maps, such as ``signed``.
+        rows: Frames a batch.
+
+    Yields:
+        Maps as `Label` documents them, shape (rows or fewer, pixels_x, pixels_y), all frames in order.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: As `read_columns`.
+    """
+    file = _open(path)
+    header = _checked(file, path)
+    pixels = header["pixels_x"], header["pixels_y"]
     try:
-        table = file.read()
+        for batch in file.iter_batches(rows, columns=[name], use_threads=False):
+            yield _values(batch.column(0), name, columns.shape(name, len(batch), pixels, header["taxels"]))
     except (pa.ArrowException, OSError) as error:
         raise _damaged(path, error) from None
-    header = _header(table.schema, path)
-    names = set(table.column_names)
-    if not set(columns.REQUIRED) <= names <= set(columns.ALL) or table.num_rows != header["frames"]:
+    except (ValueError, TypeError) as error:
+        raise FormatError(f"{path}: {error}", "columns as its header says", REMEDY) from None
+
+
+def _arrays(file: pq.ParquetFile, path: Path, names: Sequence[str]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    header = _checked(file, path)
+    try:
+        table = file.read(columns=list(names))
+    except (pa.ArrowException, OSError) as error:
+        raise _damaged(path, error) from None
+    size = (header["frames"], (header["pixels_x"], header["pixels_y"]), header["taxels"])
+    try:
+        return header, {name: _values(table.column(name), name, columns.shape(name, *size)) for name in names}
+    except (ValueError, TypeError, pa.ArrowException) as error:
+        raise FormatError(f"{path}: {error}", "columns as its header says", REMEDY) from None
+
+
+def _checked(file: pq.ParquetFile, path: Path) -> dict[str, Any]:
+    """Return the header of a file whose columns are those of a label."""
+    header, present = _header(file.schema_arrow, path), set(file.schema_arrow.names)
+    if not set(columns.REQUIRED) <= present <= set(columns.ALL) or file.metadata.num_rows != header["frames"]:
         raise FormatError(
-            f"{path}: {table.num_rows} rows of {', '.join(table.column_names)}",
+            f"{path}: {file.metadata.num_rows} rows of {', '.join(file.schema_arrow.names)}",
             f"{header['frames']} rows of {', '.join(columns.REQUIRED)}; perhaps {', '.join(columns.OPTIONAL)}",
             REMEDY,
         )
-    size = (header["frames"], (header["pixels_x"], header["pixels_y"]), header["taxels"])
-    try:
-        arrays = {name: _values(table, name, columns.shape(name, *size)) for name in table.column_names}
-    except (ValueError, TypeError, pa.ArrowException) as error:
-        raise FormatError(f"{path}: {error}", "columns as its header says", REMEDY) from None
-    return Label(episode=header["episode"], provenance=header["provenance"], **arrays)
+    return header
 
 
 def read_header(path: Path) -> dict[str, Any]:
@@ -138,10 +190,10 @@ def _check_version(header: Any, path: Path) -> None:
         )
 
 
-def _values(table: pa.Table, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    column = table.column(name).combine_chunks()
+def _values(column: pa.ChunkedArray | pa.Array, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    if isinstance(column, pa.ChunkedArray):
+        column = column.chunk(0) if column.num_chunks == 1 else column.combine_chunks()
     flat = column.flatten() if isinstance(column, pa.FixedSizeListArray) else column
-    values = flat.to_numpy(zero_copy_only=False)
-    if values.dtype != columns.DTYPES[name]:
-        raise ValueError(f"column {name} is {values.dtype}, not {columns.DTYPES[name]}")
-    return values.reshape(shape)
+    if flat.type != pa.from_numpy_dtype(columns.DTYPES[name]) or flat.null_count:
+        raise ValueError(f"column {name} is {flat.type} with {flat.null_count} missing, not {columns.DTYPES[name]}")
+    return np.from_dlpack(flat).reshape(shape)  # pyarrow's own way imports pandas for it

@@ -10,6 +10,7 @@ import pytest
 
 from tacdata import cli, documents, provenance
 from tacdata.dataset import read_dataset
+from tacdata.dataset.flags import carry_flags, flagged_episodes, read_flags, set_flag
 from tacdata.labels import write_label
 from tacdata.recording import reader, session
 
@@ -96,3 +97,16 @@ def test_a_damaged_label(recorded: Path, tmp_path: Path, monkeypatch, capsys) ->
     assert run(monkeypatch, recorded, "--out", tmp_path / "d") == 3
     assert "episode-000001.parquet is damaged" in capsys.readouterr().err
     assert not (tmp_path / "d").exists()
+
+
+def test_a_sessions_flags_go_with_its_recordings(recorded: Path, tmp_path: Path, monkeypatch, capsys) -> None:
+    hashes = [provenance.file_hash(recorded / f"episode-{number:06d}.mcap") for number in range(3)]
+    for number in (1, 2):  # the last is not packed
+        set_flag(recorded, hashes[number], f"episode-{number:06d}.mcap", "the tool slipped")
+    assert run(monkeypatch, recorded, "--out", tmp_path / "d") == 0
+    assert "episode-000001.mcap  set aside, training leaves it out: the tool slipped" in capsys.readouterr().out
+    assert flagged_episodes(read_dataset(tmp_path / "d")) == {1: "the tool slipped"}
+    assert set(read_flags(tmp_path / "d")) == {hashes[1]}
+    set_flag(tmp_path / "d", hashes[1], "episode-000001.mcap", "seen again: the skin lifted")
+    assert carry_flags(recorded, tmp_path / "d") == []
+    assert read_flags(tmp_path / "d")[hashes[1]].reason == "seen again: the skin lifted"

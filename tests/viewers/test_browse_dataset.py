@@ -17,6 +17,7 @@ from training.data import frames_of
 from training.prediction import write_prediction
 from viewers import single_episode
 from viewers.list_sources import episodes_at
+from viewers.prediction_files import first_predicted
 from viewers.source import scene_at
 
 APART = 10**11
@@ -93,3 +94,15 @@ def test_the_verb_lists_flags_and_takes_back(dataset, capsys):
     assert frames_of(read_dataset(dataset)).valid.any(), "and takes it back"
     with pytest.raises(UsageError, match="reason"):
         browse.run(dataset, flag=1)
+
+
+def test_without_a_number_the_first_episode_with_a_prediction_is_shown(dataset, tmp_path):
+    run = dataset.parent / "run" / "predictions"
+    (tmp_path / "episode-000002.parquet").write_bytes((run / "episode-000002.parquet").read_bytes())
+    assert scene_at(dataset, predictions=tmp_path).title == "set/episode 2"
+    assert scene_at(dataset, predictions=tmp_path, episode=0).maps[0].name == "label"
+    assert "no prediction of this episode" in scene_at(dataset, predictions=tmp_path, episode=0).summary
+    start = int(read_dataset(dataset)[features.TIME][0])
+    spans = [(number, start + number * APART, start + number * APART + 10**10) for number in range(3)]
+    assert first_predicted(tmp_path, spans) == 2
+    assert first_predicted(tmp_path, spans[:2]) is None

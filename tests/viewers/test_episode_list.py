@@ -80,12 +80,11 @@ def test_errors_are_of_the_frames_that_both_hold():
 
 
 @pytest.fixture
-def served(listed, tmp_path, monkeypatch):
+def served(listed, tmp_path):
     """The page without Rerun's viewer beside it."""
     from http.server import ThreadingHTTPServer
     from threading import Thread
 
-    monkeypatch.setattr("viewers.browse_server.episodes_at", lambda root, labels: listed)
     pages = Pages(listed, None, None, tmp_path, "http://127.0.0.1:9")
     server = ThreadingHTTPServer(("127.0.0.1", 0), _handler(pages))
     thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
@@ -108,6 +107,7 @@ def test_the_page_lists_and_flags(served):
     rows = json.loads(get(served.address + "/list"))["episodes"]
     assert [row["number"] for row in rows] == [0, 1, 2] and rows[1]["error"] == 0.05
     assert "slipped" in json.loads(get(served.address + "/flag", {"number": 1, "reason": "slipped"}))["said"]
+    assert [row["flag"] for row in json.loads(get(served.address + "/list"))["episodes"]] == ["", "slipped", ""]
     assert documents.read(served.listed.root / "flags.json", "flags")["flags"][0]["reason"] == "slipped"
     assert "taken back" in json.loads(get(served.address + "/flag", {"number": 1, "reason": " "}))["said"]
 

@@ -129,7 +129,7 @@ def verdict(tmp_path):
 
 def test_a_verdict_in_words_and_bars(verdict, tmp_path):
     scene = scene_at(verdict)
-    assert "named" in scene.summary and "tau = 2 s ± 0.1" in scene.summary and "hold longer" in scene.summary
+    assert "named" in scene.summary and "tau = 2 ± 0.1 s" in scene.summary and "hold longer" in scene.summary
     bars = {b.name: b for b in scene.bars}
     assert bars["gap"].values.tolist() == [8.0, 1.1, 1.0]
     assert bars["margins/creep"].labels == ("relaxation", "drift")
@@ -216,8 +216,40 @@ def test_the_layout_for_foxglove_names_only_what_the_recording_has(episode, imag
     assert names == set(layout["configById"]) and "Image!camera-top-image" in names
     plotted = [p["value"] for panel in layout["configById"].values() for p in panel.get("paths", [])]
     assert "/taxels.counts[:]" in plotted
+    assert layout["configById"]["3D!camera-top-image"]["topics"].keys() == {"/camera/top/pose"}
     for path in plotted:
         topic, field = re.fullmatch(r"(/[\w/]+)\.(\w+).*", path).groups()
         assert field in getattr(tacdata_pb2, messages[topic]).DESCRIPTOR.fields_by_name, path
     with pytest.raises(UsageError, match="exists"):
         write_foxglove_layout(recording, tmp_path / "layout.json")
+
+
+def test_foxglove_reads_a_recording_by_the_schemas_that_it_carries(episode, images, tmp_path):
+    """By descriptors from the file alone: names and fields are those that Foxglove documents."""
+    from google.protobuf import descriptor_pool, message_factory
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+    from mcap.reader import make_reader
+    from recorded_press import write_recording
+
+    recording, found = write_recording(tmp_path / "episode-000003.mcap", episode, images), {}
+    with recording.open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            assert (schema.encoding, channel.message_encoding) == ("protobuf", "protobuf")
+            if channel.topic in found:
+                continue
+            pool = descriptor_pool.DescriptorPool()
+            for file in FileDescriptorSet.FromString(schema.data).file:
+                pool.Add(file)
+            kind = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
+            found[channel.topic] = (schema.name, kind.FromString(message.data))
+    assert {topic: found[topic][0] for topic in ("/camera/top/image", "/camera/top/pose")} == {
+        "/camera/top/image": "foxglove.CompressedImage",
+        "/camera/top/pose": "foxglove.PoseInFrame",
+    }
+    image, pose = found["/camera/top/image"][1], found["/camera/top/pose"][1]
+    assert image.format == "jpeg" and image.data[:2] == b"\xff\xd8"
+    assert image.frame_id == pose.frame_id == "top"
+    assert image.timestamp.ToNanoseconds() == images[0][1]
+    turn = pose.pose.orientation
+    assert turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2 == pytest.approx(1.0)
+    assert len(found["/taxels"][1].counts) == 24

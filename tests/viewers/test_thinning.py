@@ -1,6 +1,9 @@
 import numpy as np
 import pytest
 
+from tacdata.labels import write_label
+from viewers import shown_label as room
+from viewers.shown_label import shown_label
 from viewers.thinning import evenly, extremes, strongest
 
 
@@ -38,3 +41,17 @@ def test_missing_readings_do_not_hide_the_others():
     values[:, 1] = np.sin(np.arange(9_000) / 500)
     rows = extremes(values, 300)
     assert values[rows, 1].max() == np.nanmax(values[:, 1]) and rows[0] == 0 and rows[-1] == 8_999
+
+
+def test_a_long_label_keeps_the_deepest_map_of_each_stretch(label, tmp_path):
+    write_label(tmp_path / "a.parquet", label)
+    for batch in (7, 1000):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(room, "BATCH", batch)
+            shown = shown_label(tmp_path / "a.parquet", 17)
+        depth = label.signed.reshape(len(label.signed), -1).max(axis=1)
+        assert np.array_equal(shown.kept, strongest(depth, 17))
+        assert np.array_equal(shown.signed, label.signed[shown.kept])
+        assert np.array_equal(shown.map_ns, label.time_ns[shown.kept])
+        assert len(shown.time_ns) == len(shown.force) == len(label.time_ns)
+    assert np.array_equal(shown_label(tmp_path / "a.parquet").signed, label.signed)

@@ -32,6 +32,8 @@ class Dataset(Kind):
         if asked.labels is not None:
             raise UsageError("--labels with a dataset", "a dataset holds its labels", "leave it out")
         number = asked.episode or 0
+        if asked.episode is None and asked.predictions is not None:
+            number = _predicted(path, asked.predictions)
         dataset, count = read_single(path, number)
         prediction, remarks = None, []
         entry = next((own for own in dataset.episodes if own.index == number), None)
@@ -39,3 +41,19 @@ class Dataset(Kind):
             time = np.asarray(dataset[features.TIME][entry.start : entry.stop])
             prediction, remarks = prediction_for(asked.predictions, time, entry.sensor)
         return dataset_scene(dataset, number, prediction, tuple(remarks), count)
+
+
+def _predicted(path: Path, predictions: Path) -> int:
+    """Return the first episode of which there is a prediction; else the first of all."""
+    from tacdata.dataset import features
+    from viewers.prediction_files import first_predicted, prediction_paths
+    from viewers.single_episode import read_single
+
+    for file in prediction_paths(predictions):  # named by the episode of the dataset that was predicted
+        number = int(file.stem.rsplit("-", 1)[-1])
+        dataset, _ = read_single(path, number)
+        for entry in (own for own in dataset.episodes if own.index == number):
+            time = np.asarray(dataset[features.TIME][entry.start : entry.stop])
+            if first_predicted(predictions, [(number, int(time[0]), int(time[-1]))]) is not None:
+                return number
+    return 0

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,6 +17,10 @@ from tacdata.errors import UsageError
 from viewers.scene import Scene
 
 ROOM, BASE = "viewers.kinds", "kind"
+
+
+def nothing() -> None:
+    """Do nothing meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,8 @@ class Asked:
     """Folder of predictions, or a training run."""
     episode: int | None = None
     """Number of the episode in a folder."""
+    meanwhile: Callable[[], None] = nothing
+    """What can be done while a large file is read: imports, mostly."""
 
 
 class Kind(ABC):

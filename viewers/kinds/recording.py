@@ -22,4 +22,4 @@ class Recording(Kind):
         from viewers.source import recording_scene
 
         refuse(asked, "one recording", "labels", "predictions")
-        return recording_scene(path, asked.labels, asked.predictions)
+        return recording_scene(path, asked)

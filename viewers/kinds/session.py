@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from tacdata.errors import UsageError
 from tacdata.recording import file_names
 from viewers.kinds.kind import Asked, Kind
 from viewers.scene import Scene
+
+EARLIER = 1_000_000_000
+"""By how much the first frame may have been sampled before its arrival [ns]."""
 
 
 class Session(Kind):
@@ -20,10 +26,27 @@ class Session(Kind):
         return path.is_dir()
 
     def scene(self, path: Path, asked: Asked) -> Scene:
-        """Return one episode, the first if none is named."""
+        """Return one episode; if none is named the first, or the first that the predictions are of."""
+        from viewers.prediction_files import first_predicted
         from viewers.source import recording_scene
 
-        return recording_scene(episode_of(path, asked.episode), asked.labels, asked.predictions)
+        number = asked.episode
+        if number is None and asked.predictions is not None:
+            number = first_predicted(asked.predictions, spans(path))
+        return recording_scene(episode_of(path, number), asked)
+
+
+def spans(folder: Path) -> Iterator[tuple[int, int, int]]:
+    """Yield number, first and last time [ns] of each finished recording, as its summary says."""
+    from mcap.exceptions import McapError
+    from mcap.reader import SeekingReader
+
+    for number, path in file_names.finished(folder).items():
+        with path.open("rb") as stream, suppress(McapError, ValueError, struct.error):
+            summary = SeekingReader(stream).get_summary()
+            if summary is not None and summary.statistics is not None:
+                span = summary.statistics
+                yield number, span.message_start_time - EARLIER, span.message_end_time
 
 
 def episode_of(folder: Path, episode: int | None) -> Path:

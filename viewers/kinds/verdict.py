@@ -28,4 +28,4 @@ class Verdict(Kind):
         file = path if path.is_file() else path / FILE
         picture = file.with_suffix(".png")
         document = documents.read(file, "verdict")
-        return verdict_scene(file.resolve().parent.name, document, picture.name if picture.is_file() else None)
+        return verdict_scene(file.resolve().parent.name, document, picture if picture.is_file() else None)
