@@ -107,7 +107,7 @@ class Race:
                 raise UsageError(
                     f"after {time.perf_counter() - began:.0f} s not every worker has solved a press: "
                     f"{[change.error for change in self._ledger.changes(0) if not change.done] or 'no failure'}",
-                    "workers that solve a press each", "see the reason above; with --device cpu it shows without a card",
+                    "workers that solve a press each", "see the reason above",
                 )  # fmt: skip
             self._turn()
         self._wait()

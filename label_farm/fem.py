@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from label_farm import environment
 from label_farm.job import Job
+from label_farm.tolerance import Tolerance
 from tacdata import provenance
 from tacdata.errors import SolveError
 from tacdata.indenters import from_document
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 _ROUNDS = 2
 """How often a path is solved at most until its states are near enough to each other; the coarser mesh said before where
 they are needed."""
+
+_AGAIN = 1.5
+"""By which factor a state must miss the tolerance for its path to be solved again [1]: what it misses is what its
+neighbours would say without it, several times what they leave out with it."""
 
 _AT_A_TIME = {"cpu": 4, "cuda": 256}
 """How many presses a device solves at a time [1] (benchmarks/skin_throughput.py): a CPU reads its factor once for 4."""
@@ -93,10 +98,10 @@ class FemModel:
                 if isinstance(solution, SolveError):
                     yield job, solution
                     continue
-                depths = job.tolerance.refined(solution.depth, solution.surface) if job.tolerance else request.depths
-                if depths == request.depths or round_ == _ROUNDS - 1:
+                if job.tolerance is None or round_ == _ROUNDS - 1 or not _far_apart(job.tolerance, solution):
                     yield job, self._finished(job, request, solution)
                 else:
+                    depths = job.tolerance.refined(solution.depth, solution.surface)
                     requests[number] = replace(request, depths=depths)
                     again.append(number)
             open_ones = again
@@ -116,13 +121,15 @@ class FemModel:
             return error
 
 
+def _far_apart(tolerance: Tolerance, solution: PathSolution) -> bool:
+    return tolerance.exceeded(solution.depth, solution.surface) > _AGAIN
+
+
 def _foreseen(job: Job, request: PressRequest, coarse: CoarsePress | None) -> PressRequest:
     """Return a request with the states that the coarser mesh asks for."""
     if job.tolerance is None or coarse is None:
         return request
-    return replace(
-        request, depths=job.tolerance.foretold(request.depths, coarse.figures.depth, coarse.figures.surface)
-    )
+    return replace(request, depths=job.tolerance.foretold(request.depths, coarse.figures.depth, coarse.figures.surface))
 
 
 def _request(job: Job) -> PressRequest:

@@ -48,7 +48,8 @@ class Tolerance:
         if not (0 <= self.share < np.inf and 0 < self.least < np.inf):
             raise UsageError(
                 f"a tolerance of {self.share:g} of the depth, at least {self.least:g} mm",
-                "a share of 0 or more and a positive least [mm]", "correct the tolerance",
+                "a share of 0 or more and a positive least [mm]",
+                "correct the tolerance",
             )
 
     def at(self, depth: np.ndarray) -> np.ndarray:

@@ -183,6 +183,8 @@ class Foreman:
         submission = self.submissions.get(number)
         with self._guard:
             run = self._runs.get(number)
+        if run is not None and submission.state in OPEN:
+            submission = run.state()  # the file follows at the next round
         if submission.state != "refused" and (run is not None or submission.state == "done"):
             return run
         raise UsageError(

@@ -26,7 +26,7 @@ RIVAL = 2.33
 """A rival is out when the winner is better by so many standard errors over episodes [1]."""
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
-MINOR = 0.015
+MINOR = 0.003
 """Share of what all explain that a further effect must explain [1]; less may be numerics of the larger ones."""
 SWAPS = 2
 """How often a rival may take the place of an effect [1]."""
@@ -195,7 +195,7 @@ def _gains(problem: Problem) -> np.ndarray:
     if not len(problem.nuisances) or "channel_gain" not in problem.setting.nuisance:
         return np.zeros(channels)
     _, values = fitted(problem, [], np.arange(len(problem.folds)))
-    unit, first = load("channel_gain").amplitudes[0].typical, len(problem.tangent.columns)
+    unit, first = load("channel_gain").amplitudes[0].typical, len(problem.tangent.columns) + len(problem.forms)
     own = np.broadcast_to(values[first : len(values) - channels] * unit, (channels,)).copy()
     columns = problem.nuisances[: len(values) - channels - first] + 1
     power = np.diag(problem.evidence.of(np.arange(len(problem.folds))))[columns]
@@ -231,9 +231,9 @@ def _gain(problem: Problem, chosen: list[Candidate]) -> float:
 
 def _beside(problem: Problem, first: Candidate, others: list[Candidate]) -> list[float]:
     """Return the gain of a first effect with each of others, without bounds, less half a log of episodes a number."""
-    fixed = np.concatenate([problem.nuisances, problem.tangent.columns, first.columns]).astype(int) + 1
+    fixed = np.concatenate([problem.fixed, first.columns]).astype(int) + 1
     total = problem.evidence.of(np.arange(len(problem.folds)))
-    ridge = np.concatenate([problem.ridge, np.ones(len(problem.tangent.columns)), np.zeros(len(first.columns))])
+    ridge = np.concatenate([problem.fixed_ridge(1.0), np.zeros(len(first.columns))])
     matrix = total[np.ix_(fixed, fixed)] + np.diag(ridge + 1e-9 * max(float(np.trace(total)), 1e-12) / len(total))
     rest = total - total[:, fixed] @ np.linalg.solve(matrix, total[fixed])
     alone, fee = _gain(problem, [first]), 0.5 * float(np.log(max(len(problem.folds), 2)))

@@ -17,8 +17,7 @@ def limits(problem: Problem) -> dict[str, float]:
     The error of an amplitude is told from how the episodes' scores scatter, so that whatever an episode's rows have in
     common counts once. Of several shapes or directions the easiest counts. inf: these episodes do not excite it.
     """
-    fixed = np.concatenate([problem.nuisances, problem.tangent.columns]).astype(int)
-    ridge = np.concatenate([problem.ridge, np.zeros(len(problem.tangent.columns))])
+    fixed, ridge = problem.fixed, problem.fixed_ridge(0.0)
     gram = eliminated(problem.evidence.gram, fixed, ridge)
     total = gram.sum(axis=0)
     result: dict[str, float] = {}

@@ -13,6 +13,7 @@ from tacdata.discrepancy.candidates import Board, Candidate, build
 from tacdata.discrepancy.evidence import Evidence, Noise
 from tacdata.discrepancy.fit import fold_of, solve
 from tacdata.discrepancy.fitted_response import contexts
+from tacdata.discrepancy.forms import forms
 from tacdata.discrepancy.generic import depth_slope, generic, slow
 from tacdata.discrepancy.spline_response import taken_up
 from tacdata.discrepancy.streams import Streams
@@ -80,6 +81,8 @@ class Problem:
     evidence: Evidence
     tangent: Tangent
     """Columns by which what is placed already may still move."""
+    forms: np.ndarray
+    """Columns of what the equations of what is placed may be off about, from 0, shape (k,), int64."""
     nuisances: np.ndarray
     """Columns of nuisances, from 0, shape (k,), int64."""
     generic: np.ndarray
@@ -98,6 +101,15 @@ class Problem:
     def ridge(self) -> np.ndarray:
         """Weight of each nuisance's prior, shape (k,)."""
         return self.frame.ridge
+
+    @property
+    def fixed(self) -> np.ndarray:
+        """Columns that stand beside every candidate: nuisances, what is placed, what its forms may be off about."""
+        return np.concatenate([self.nuisances, self.tangent.columns, self.forms]).astype(int)
+
+    def fixed_ridge(self, moving: float) -> np.ndarray:
+        """Return the weights of their priors; ``moving``: of what is placed [1]."""
+        return np.concatenate([self.ridge, np.full(len(self.tangent.columns), moving), np.ones(len(self.forms))])
 
     @property
     def folds(self) -> np.ndarray:
@@ -145,19 +157,21 @@ def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Pr
     taken = () if response.fitted else (*setting.nuisance, *common)
     board = build(course, response, [*setting.given, *placed], setting.effects, taken)
     moving = tangents(course, response, placed, setting.given)
+    off = forms(course, response, placed, setting.given)
     count = board.values.shape[2] - 1
     numerics = _numerics(setting, placed)
-    last = count + moving.values.shape[2]
+    slack = count + moving.values.shape[2]
+    last = slack + off.shape[2]
     first = last + (numerics is not None)
-    values = np.concatenate([board.values, moving.values, *([] if numerics is None else [numerics])], axis=2)
+    values = np.concatenate([board.values, moving.values, off, *([] if numerics is None else [numerics])], axis=2)
     features = taken_up(course, response, [*setting.given, *placed])
     found = evidence.collect(values, course.reduced, frame.noise, frame.context, features, frame.errors, frame.beside)
     second = first + len(frame.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
     board = replace(board, values=board.values[:, :, :1])
     return Problem(
-        setting, frame, tuple(placed), board, found, moving.at(count), nuisances, rich, _rise(setting, frame),
-        None if numerics is None else last,
+        setting, frame, tuple(placed), board, found, moving.at(count), np.arange(slack, last), nuisances, rich,
+        _rise(setting, frame), None if numerics is None else last,
     )  # fmt: skip
 
 

@@ -44,9 +44,7 @@ def test(problem: Problem, seed: int = 0) -> Tested:
     Decoys are all candidates again, with the scatter of each episode (or stretch of them) times a normal number in
     place of its score: what candidates have in common stays, whatever memory or tails the noise has.
     """
-    fixed = np.concatenate([problem.nuisances, problem.tangent.columns]).astype(int)
-    ridge = np.concatenate([problem.ridge, np.zeros(len(problem.tangent.columns))])
-    gram = eliminated(problem.evidence.gram, fixed, ridge)
+    gram = eliminated(problem.evidence.gram, problem.fixed, problem.fixed_ridge(0.0))
     normal = np.random.default_rng([seed, 13]).normal(size=(FLIPS, len(gram)))
     scores = [clustered(gram, c.columns, follows_clock(c.effect)) for c in problem.candidates]
     clock = [follows_clock(c.effect) for c in problem.candidates]
@@ -131,12 +129,13 @@ def fitted(problem: Problem, chosen: Sequence[Candidate], episodes: np.ndarray) 
     """
     own = [c.columns for c in chosen]
     moving = problem.tangent
-    columns = np.concatenate([*own, moving.columns, problem.nuisances]).astype(int)
+    columns = np.concatenate([*own, moving.columns, problem.forms, problem.nuisances]).astype(int)
     wide = sum(map(len, own))
     rooms = [k.room(problem.placed) for k in moving.knobs]
-    low = np.concatenate([*(c.low for c in chosen), [r[0] for r in rooms], np.full(len(problem.nuisances), -np.inf)])
-    high = np.concatenate([*(c.high for c in chosen), [r[1] for r in rooms], np.full(len(problem.nuisances), np.inf)])
-    ridge = np.concatenate([np.full(wide, 1e-6), np.full(len(rooms), 1.0), problem.ridge])
+    free = np.full(len(problem.forms) + len(problem.nuisances), np.inf)
+    low = np.concatenate([*(c.low for c in chosen), [r[0] for r in rooms], -free])
+    high = np.concatenate([*(c.high for c in chosen), [r[1] for r in rooms], free])
+    ridge = np.concatenate([np.full(wide, 1e-6), np.full(len(rooms), 1.0), np.ones(len(problem.forms)), problem.ridge])
     low, high = np.minimum(low, -1e-12), np.maximum(high, 1e-12)
     return columns, solve(problem.evidence.of(episodes), columns, ridge, low, high)
 
@@ -204,7 +203,7 @@ def _stream_gains(problem: Problem, strength: float) -> np.ndarray:
     )
     if len(problem.nuisances):
         _, values = fitted(problem, [], np.arange(len(problem.folds)))
-        weights = values[len(problem.tangent.columns) :].astype(np.float32)
+        weights = values[len(problem.tangent.columns) + len(problem.forms) :].astype(np.float32)
         residual = residual - same.beside[:, :, : len(weights)] @ weights
     columns = own_histories(problem)
     weight = strength * float(np.mean(np.einsum("ij,ij->j", columns, columns)))

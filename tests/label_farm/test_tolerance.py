@@ -1,6 +1,6 @@
 """States are added where a path bends, on the branch where it does, and nowhere else."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -83,38 +83,86 @@ def test_a_job_is_named_by_its_tolerance_too():
         assert Job.from_document(wish.document) == wish
 
 
+@dataclass(frozen=True)
+class Coarse:
+    """What a coarser mesh says of the loading."""
+
+    figures: object
+
+
 class Kinked:
-    """A skin whose paths have a kink; it counts how often it is asked."""
+    """A skin whose paths have a kink; it counts what it is asked."""
 
-    def __init__(self):
-        self.sensor, self.asked = replace(SENSOR, uncertainty={}), []
+    def __init__(self, foresees=True):
+        self.sensor, self.foresees = replace(SENSOR, uncertainty={}), foresees
+        self.asked, self.asked_coarsely, self.given = [], [], []
 
-    def solve(self, press):
-        self.asked.append(press.depths)
-        return path(SENSOR, press.depths, kink)
+    def solve_coarsely(self, requests, capacity):
+        self.asked_coarsely += [press.depths for press in requests]
+        return [Coarse(self.loading(press.depths)) if self.foresees else None for press in requests]
+
+    @staticmethod
+    def loading(depths):
+        return path(SENSOR, depths[1 : int(np.argmax(depths)) + 1], kink)
+
+    def solve_many(self, requests, capacity, coarse):
+        for number, press in enumerate(requests):
+            self.asked.append(press.depths)
+            self.given.append(coarse[number])
+            yield number, path(SENSOR, press.depths, kink)
 
 
-def test_the_model_solves_again_until_the_states_are_near_enough_or_three_times():
+def farm_model(**given):
     model = FemModel.__new__(FemModel)
+    model._model, model.batch = Kinked(**given), 4
+    return model, model._model
+
+
+def job_of(depth=1.5, **more):
     ladder = Ladder()
-    job = Job(
-        SENSOR.content_hash,
-        "a" * 64,
-        {"shape": "sphere", "radius": 2.0},
-        0.5,
-        0.0,
-        0.0,
-        ladder.depths(1.5),
-        ladder.tolerance,
-    )
-    model._model = Kinked()
+    sphere = {"shape": "sphere", "radius": 2.0}
+    made = Job(SENSOR.content_hash, "a" * 64, sphere, 0.5, 0.0, 0.0, ladder.depths(depth), ladder.tolerance)
+    return replace(made, **more)
+
+
+def test_a_rougher_model_foretells_where_states_are_needed_on_both_branches():
+    depths = Ladder().depths(1.5)
+    rough = Kinked.loading(depths)
+    more = STRICT.foretold(depths, rough.depth, rough.surface)
+    states = path(SENSOR, depths, kink)
+    known = STRICT.refined(states.depth, states.surface)
+    assert set(depths) < set(more) and set(known) - set(depths) <= set(more)
+    peak = int(np.argmax(more))
+    assert np.all(np.diff(more[: peak + 1]) > 0) and np.all(np.diff(more[peak:]) < 0)
+    assert set(more[:peak]) - set(depths) == set(more[peak:]) - set(depths)
+    assert STRICT.foretold(depths, np.zeros(0), np.zeros((0, *SENSOR.map.shape))) == depths
+
+
+def test_a_path_is_solved_once_where_the_coarser_mesh_foretold_it():
+    model, skin = farm_model()
+    found = model.solve(job_of(tolerance=Tolerance(0.02, 0.02)))
+    [asked], [coarsely] = skin.asked, skin.asked_coarsely
+    assert len(asked) > len(coarsely) and tuple(found.depth) == asked
+    assert found.provenance["ladder"]["left_out_over_tolerance"] <= 1
+
+
+def test_without_a_coarser_mesh_a_path_is_solved_again_and_the_coarse_one_never():
+    model, skin = farm_model(foresees=False)
+    job = job_of()
     found = model.solve(job)
-    asked = model._model.asked
-    assert 2 <= len(asked) <= 3 and len(asked[-1]) > len(asked[0])
-    assert tuple(found.depth) == asked[-1]
+    assert len(skin.asked) == 2 and len(skin.asked[1]) > len(skin.asked[0]) and len(skin.asked_coarsely) == 1
+    assert tuple(found.depth) == skin.asked[-1]
     said = found.provenance["ladder"]
-    assert said["asked"] == len(asked[0]) and said["states"] == len(asked[-1])
+    assert said["asked"] == len(skin.asked[0]) and said["states"] == len(skin.asked[-1])
     assert said["left_out_over_tolerance"] == pytest.approx(STRICT.exceeded(found.depth, found.surface), abs=1e-3)
-    model._model = Kinked()
+    model, skin = farm_model()
     model.solve(replace(job, tolerance=None))
-    assert model._model.asked == [job.depths]
+    assert skin.asked == [job.depths]
+
+
+def test_each_press_keeps_what_the_coarser_mesh_said_of_it():
+    model, skin = farm_model()
+    jobs = [job_of(depth, tolerance=Tolerance(0.001, 0.001)) for depth in (0.7, 1.5)]
+    assert {job.deepest for job, _ in model.solve_many(jobs)} == {0.7, 1.5}
+    for depths, coarse in zip(skin.asked, skin.given, strict=True):
+        assert max(depths) == coarse.figures.depth[-1]

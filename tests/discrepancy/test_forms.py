@@ -1,0 +1,60 @@
+"""A large effect whose equation is a little wrong is no evidence of a small one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pressing import course
+
+from tacdata.chain import predict
+from tacdata.discrepancy import search
+from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.discrepancy.forms import FORM, forms, modulations
+from tacdata.discrepancy.problem import Setting, frame, prepare
+from tacdata.discrepancy.streams import Streams
+from tacdata.effects import Placed, load
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    made = course(delay=0.05)
+    return made, FittedResponse(made), Placed(load("latency"), {"L": np.array(0.05)})
+
+
+def test_modulations_are_of_size_one_and_leave_the_contribution_itself(pressed):
+    made, response, late = pressed
+    streams = Streams.of(made)
+    own = streams.predicted(predict(made, response, [late])) - streams.predicted(predict(made, response, []))
+    weight = np.sum(own**2)
+    for by in modulations(made, streams, own):
+        changed = own * by
+        assert np.sum(changed**2) == pytest.approx(weight, rel=1e-6)
+        assert abs(np.sum(changed * own)) < 1e-6 * weight
+
+
+def test_columns_are_a_share_of_each_effect(pressed):
+    made, response, late = pressed
+    assert forms(made, response, []).shape[2] == 0
+    one = forms(made, response, [late])
+    assert one.shape == (len(made.read), 3, 5)
+    twice = forms(made, response, [replace(late, values={"L": np.array(0.1)})])
+    size = np.linalg.norm(twice, axis=(0, 1)) / np.linalg.norm(one, axis=(0, 1))
+    assert np.all((size > 1.7) & (size < 2.1))
+    assert FORM == 0.1
+
+
+def test_what_a_wrong_form_leaves_is_no_second_effect(pressed):
+    """Latency that is a tenth larger while unloading: without the forms, others are seen in what it leaves."""
+    made, response, late = pressed
+    streams = Streams.of(made)
+    own = streams.predicted(predict(made, response, [late])) - streams.predicted(predict(made, response, []))
+    readings = made.readings.copy()
+    readings[made.read] += 0.1 * own * np.sign(made.speed)[made.read][:, None]
+    wrong = replace(made, readings=readings)
+    few = [load(name) for name in ("backlash", "relaxation", "proportional_hysteresis", "creep")]
+    setting = Setting(wrong, response, few)
+    problem = prepare(setting, frame(replace(setting, given=(late,))), [late])
+    slack = search.test(problem)
+    bare = search.test(replace(problem, forms=np.zeros(0, dtype=int)))
+    assert bare.gain.max() > 20
+    assert slack.gain.max() < 0.3 * bare.gain.max()
