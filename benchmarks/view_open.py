@@ -109,8 +109,8 @@ def _image(writer: EpisodeWriter, number: int, at: int, jpeg: bytes) -> None:
 
 
 def _moves(writer: EpisodeWriter, seconds: float) -> None:
-    names, corners = ("approach", "press", "hold", "release", ""), (0.0, 1.0, 2.0, 4.0, 5.0, PERIOD)
-    for begun in np.arange(0, seconds - PERIOD, PERIOD):
+    names, corners = ("rest", "press", "hold", "release", ""), (0.0, 1.0, 2.0, 4.0, 5.0, PERIOD)
+    for begun in np.arange(0, seconds - PERIOD + 1e-6, PERIOD):
         for name, a, b in zip(names, corners[:-1], corners[1:], strict=True):
             start, target = (np.array([51.0, 39.5, -20.0 - depth_at(np.array(t))]) for t in (a, b - 1e-9))
             sent, ends = (START + round(1e9 * (begun + t)) for t in (a, b))

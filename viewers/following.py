@@ -98,8 +98,13 @@ def is_growing(path: Path) -> bool:
     return path.is_file() and path.name.endswith(file_names.PARTIAL) and isinstance(kind_of(path), Recording)
 
 
-def finished_name(path: Path) -> Path:
-    """Return the path of a recording that ended since somebody read its name, else the path as it is."""
+def meant(path: Path) -> Path:
+    """Return the recording that a path stands for: one that has ended since, or a session's first that has not.
+
+    Any other path stands for itself.
+    """
+    if path.is_dir() and not file_names.finished(path):
+        return next((own for own in file_names.unfinished(path) if is_growing(own)), path)
     whole = path.with_name(path.name.removesuffix(file_names.PARTIAL) + ".mcap")
     return whole if path.name.endswith(file_names.PARTIAL) and not path.exists() and whole.is_file() else path
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ WIDTH, TITLE, LINE, SPACE, MAPS, CURVES = 16.0, 0.65, 0.2, 5.2, 2.6, 1.9
 BAR, MOST_BARS = 0.24, 26
 """Height of a bar [inch], and bars that are drawn at most, the first of them."""
 COLORS = [tuple(channel / 255 for channel in hue) for hue in HUES]
+TITLE_LETTERS = 40
+"""Letters of a line of a title above bars, of which three sets lie beside each other."""
 FULL = 6
 """Sets of curves that a page holds."""
 
@@ -116,7 +119,8 @@ def bar_chart(axes: Axes, bars: Bars) -> None:
         end = max(float(value), 0.0) if np.isfinite(value) else 0.0
         axes.text(end, float(at), f" {value:.3g}", va="center", fontsize=8)
     left = len(bars.values) - len(values)
-    axes.set_title(bars.title + (f" (first {len(values)} of {len(bars.values)})" if left else ""), fontsize=10)
+    title = bars.title + (f" (first {len(values)} of {len(bars.values)})" if left else "")
+    axes.set_title(fill(title, TITLE_LETTERS), fontsize=10)
     axes.margins(x=0.15)
 
 

@@ -38,7 +38,7 @@ class ImageSampler:
         if number % step:
             return
         kept.append(bytes(message))
-        if len(kept) > 2 * self._most:
+        if len(kept) > 2 * self._most or len(kept) * len(message) > 2 * IMAGE_BYTES:
             del kept[1::2]
             self._step[topic] = 2 * step
 

@@ -25,7 +25,7 @@ class ShownLabel:
     error: np.ndarray
     """Root mean square of the estimated numerical error [mm], shape (n,), float32."""
     kept: np.ndarray
-    """Rows whose maps are here, shape (k,), ascending."""
+    """Rows whose maps are here [frames], shape (k,), ascending."""
     signed: np.ndarray
     """Their maps: undeformed minus deformed height of the outer face [mm], shape (k, pixels_x, pixels_y), float32."""
 

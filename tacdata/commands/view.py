@@ -47,7 +47,7 @@ def run(
         return
     output = showing.Output(save, picture, video, web)
     output.check()
-    path = following.finished_name(path)
+    path = following.meant(path) if episode is None else path
     if path.suffix == output_file.RERUN and path.is_file():
         showing.show_saved(path, output)
         return

@@ -47,11 +47,12 @@ def turn_against(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> np.nd
     return angles
 
 
-def wrong_tags(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> dict[int, float]:
+def wrong_tags(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> tuple[dict[int, float], tuple[int, ...]]:
     """Return tags that, seen alone, contradict the other tags, and by which angle [rad]: turned, or with wrong numbers.
 
     The path may rest on the wrong tag, if that is seen most. So tags are grouped by how they are turned against the
-    path; the group of most tags is right, of two such groups the one that is seen more often.
+    path; the group of most tags is right, of two such groups the one that is seen more often. In that case nothing but
+    frequency speaks for it, and its tags are returned too; otherwise no tags are.
     """
     nearest = _nearest(times_ns, seen.time_ns)
     turns: dict[int, list[np.ndarray]] = {}
@@ -62,9 +63,11 @@ def wrong_tags(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> dict[in
     means = {tag: _mean(found) for tag, found in turns.items() if len(found) >= LEAST}
     groups = [[b for b in means if _angle(means[a], means[b]) < TURNED] for a in means]
     if not groups:
-        return {}
+        return {}, ()
     right = max(groups, key=lambda group: (len(group), sum(len(turns[tag]) for tag in group)))
-    return {tag: _angle(means[tag], means[right[0]]) for tag in sorted(means) if tag not in right}
+    wrong = {tag: _angle(means[tag], means[right[0]]) for tag in sorted(means) if tag not in right}
+    tied = any(len(group) == len(right) for group in groups if group[0] in wrong)
+    return wrong, tuple(sorted(right)) if tied else ()
 
 
 def _nearest(times_ns: np.ndarray, wanted_ns: np.ndarray) -> np.ndarray:

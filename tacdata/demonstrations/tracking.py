@@ -107,13 +107,9 @@ def _path(
     words: list[str] = []
     wander = choose(seen)
     path = smooth(seen, times, wander)
-    wrong = path_faults.wrong_tags(seen, path, times)
+    wrong, rivals = path_faults.wrong_tags(seen, path, times)
     if wrong:
-        for tag, angle in wrong.items():
-            words.append(
-                f"{seen.finger}: tag {tag}, seen alone in {seen.ids.count((tag,))} images, contradicts the others by "
-                f"{np.degrees(angle):.0f} deg: it is glued on turned, or is another cube's; left out where it is alone"
-            )
+        words += _wrong_words(seen, wrong, rivals)
         kept = np.array([not (len(ids) == 1 and ids[0] in wrong) for ids in seen.ids])
         if kept.sum() >= FEWEST:
             seen = seen.where(kept)
@@ -131,6 +127,26 @@ def _path(
             words.append(f"{UNSEARCHED} {when}: a camera or the host did not keep up")
     chosen = {"velocity_density": wander.velocity, "turning_density": wander.turning}
     return seen, path, {**chosen, "left_out_tags": list(wrong)}, words
+
+
+def _wrong_words(seen: Sightings, wrong: dict[int, float], rivals: tuple[int, ...]) -> list[str]:
+    """Say which tags are left out, and whether it may as well be the others that are wrong."""
+    words = []
+    for tag, angle in wrong.items():
+        count, off = seen.ids.count((tag,)), f"{np.degrees(angle):.0f} deg"
+        if rivals:
+            others = " and ".join(map(str, rivals))
+            words.append(
+                f"{seen.finger}: tags {tag} and {others}, each seen alone, contradict each other: one of them "
+                f"is glued on turned, or is another cube's, and the images do not tell which; tag {tag}, seen less "
+                f"often ({count} images), is left out where it is alone: look at both"
+            )
+        else:
+            words.append(
+                f"{seen.finger}: tag {tag}, seen alone in {count} images, contradicts the others by {off}: it is glued "
+                "on turned, or is another cube's; left out where it is alone"
+            )
+    return words
 
 
 def _track(

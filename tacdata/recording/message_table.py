@@ -92,6 +92,7 @@ class MessageTable:
     """All messages of a file, in the order of writing."""
 
     _heads: list[np.ndarray] = field(default_factory=list)
+    """Heads (`HEAD`) of each part that was added [in the file's own units], shape (messages of the part,)."""
     data: list[bytes] = field(default_factory=list)
     """What each says."""
 

@@ -172,7 +172,9 @@ def test_arguments_that_do_not_fit_are_refused(tmp_path, capsys):
     assert run(["track", str(tmp_path / "demos")]) == 2
 
 
-def test_a_virtual_demonstration_is_refused_what_it_cannot_do(tmp_path):
+def test_a_virtual_demonstration_is_refused_what_it_cannot_do(tmp_path, capsys):
+    assert run(["virtual-rig", str(tmp_path / "rig"), "--nub", "8"]) == 2
+    assert "--nub 8 without --demo" in capsys.readouterr().err
     with pytest.raises(UsageError, match="fault 'fire'"):
         VirtualDemo(tmp_path, fault="fire")
     with pytest.raises(UsageError, match="nubs of 0 mm"):

@@ -107,6 +107,18 @@ def test_a_tag_glued_on_turned_is_named_even_if_it_is_seen_most(tmp_path, share)
     assert np.quantile(errors(made, "index")[1], 0.95) < 2.0
 
 
+@pytest.mark.parametrize("mixed", [False, True])
+def test_of_two_tags_that_contradict_each_other_both_are_named(tmp_path, mixed):
+    whole = view("index", seed=2)
+    count = len(whole.sample_ns)
+    often = (np.random.default_rng(0).random(count) if mixed else np.arange(count) / count) < 0.65
+    turned = (Rotation.from_quat(whole.quaternion) * Rotation.from_euler("z", 180, degrees=True)).as_quat()
+    wrong = changed(changed(whole, often, quaternion=turned, ids=(6,)), ~often, ids=(7,))
+    made = track(recording(tmp_path, (view("thumb"), wrong, view("middle"))))
+    (words,) = note(made, "index: tags 7 and 6", "do not tell which", "look at both")
+    assert "tag 7, seen less often" in words
+
+
 def test_fingers_whose_numbers_are_exchanged_for_a_while_are_named(tmp_path):
     thumb, index = view("thumb"), view("index")
     seconds = (index.sample_ns - START) * 1e-9

@@ -16,7 +16,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.recording import chunked_file
 from tacdata.recording.growing_file import GrowingFile
 from tacdata.recording.reader import read_recording, recording_of
-from viewers.following import Follower, finished_name, is_growing
+from viewers.following import Follower, is_growing, meant
 
 
 @pytest.fixture(scope="module")
@@ -91,9 +91,10 @@ def test_what_is_no_recording_is_refused_in_words(tmp_path):
     (tmp_path / "episode-000000.partial.mcap").write_bytes(b"nothing of the kind")
     with pytest.raises(FormatError, match="no MCAP file"):
         GrowingFile(tmp_path / "episode-000000.partial.mcap")
+    assert meant(tmp_path) == tmp_path / "episode-000000.partial.mcap"
     (tmp_path / "episode-000001.mcap").write_bytes(b"")
-    assert finished_name(tmp_path / "episode-000001.partial.mcap") == tmp_path / "episode-000001.mcap"
-    assert finished_name(tmp_path / "episode-000000.partial.mcap").name == "episode-000000.partial.mcap"
+    assert meant(tmp_path / "episode-000001.partial.mcap") == tmp_path / "episode-000001.mcap"
+    assert meant(tmp_path) == tmp_path
     assert is_growing(tmp_path / "episode-000000.partial.mcap")
     assert not is_growing(tmp_path / "episode-000000.mcap")
 

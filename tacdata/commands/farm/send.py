@@ -21,10 +21,12 @@ def run(
     ] = "",
 ) -> None:
     """Send a session's recordings to the service; run again, it goes on. Not needed where it sees the same disk."""
+    from shlex import quote
+
     from label_farm.service.client import Client
     from label_farm.service.send import send
 
     name = to or session.resolve().name
     sent = send(Client(url, token), session, name)
     print(f"files sent: {sent.files} ({sent.size / 1e6:.1f} MB), already there: {sent.there}")
-    print(f"next: tacdata farm submit {name}, then tacdata farm fetch NUMBER {session} --wait")
+    print(f"next: tacdata farm submit {quote(name)}, then tacdata farm fetch NUMBER {quote(str(session))} --wait")

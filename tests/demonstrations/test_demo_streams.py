@@ -1,0 +1,107 @@
+"""Streams of a demonstration: each recording counts its own frames, and one broken board costs no other."""
+
+import time
+
+import numpy as np
+
+from tacdata.clock import Clock
+from tacdata.demonstrations.demo_streams import DemoStreams
+from tacdata.devices.device import StreamCounts, TaxelBoard, TaxelFrame
+from tacdata.errors import DeviceError
+
+
+class Board(TaxelBoard):
+    """A board that gives a frame every two milliseconds, and breaks after some."""
+
+    def __init__(self, clock, most=None):
+        super().__init__(clock)
+        self._counts, self._most, self.quiet = StreamCounts(), most, False
+
+    @property
+    def counts(self):
+        return self._counts
+
+    def describe(self):
+        return {"rate": {"nominal": 500.0}, "clock": "counter"}
+
+    def open(self):
+        pass
+
+    def close(self):
+        pass
+
+    def read(self, timeout):
+        time.sleep(0.002)
+        if self._most is not None and self._counts.received >= self._most:
+            raise DeviceError("the line broke", "a line that holds", "check the cable")
+        if self.quiet:
+            return []
+        self._counts.received += 1
+        return [TaxelFrame(self.clock.now_ns(), self._counts.received, np.full(24, 9000.0))]
+
+
+class Sink:
+    """Stands where a recording's writer would."""
+
+    failure = None
+
+    def __init__(self, clock):
+        self.begun_ns, self.frames, self.notes = clock.now_ns(), [], []
+
+    def taxels(self, frame, sample_ns, board=""):
+        self.frames.append((board, frame.counter))
+
+    def note(self, words, level):
+        self.notes.append((words, level))
+
+
+def until(true, patience=5.0):
+    end = time.monotonic() + patience
+    while not true() and time.monotonic() < end:
+        time.sleep(0.005)
+    assert true()
+
+
+def recorded(streams, clock, count):
+    sink = Sink(clock)
+    streams.record_into(sink)
+    until(lambda: len(sink.frames) > count)
+    streams.catch_up()
+    counts = streams.counts
+    streams.record_into(None)
+    return sink, counts
+
+
+def test_each_recording_counts_its_own_frames():
+    clock = Clock.start()
+    with DemoStreams({"thumb": Board(clock)}, {}, {}, {}, None, lambda words: None) as streams:
+        until(lambda: streams.heard == {"taxels thumb"})
+        for count in (100, 20):
+            sink, counts = recorded(streams, clock, count)
+            assert abs(counts["taxels thumb"].received - len(sink.frames)) <= 2
+            assert {name for name, _ in sink.frames} == {"thumb"}
+            assert np.diff([number for _, number in sink.frames]).tolist() == [1] * (len(sink.frames) - 1)
+        assert streams.clock_models["taxels thumb"].frames > 120
+
+
+def test_a_board_that_breaks_is_said_with_what_to_do_and_costs_no_other():
+    clock, said = Clock.start(), []
+    boards = {"thumb": Board(clock), "index": Board(clock, most=10)}
+    with DemoStreams(boards, {}, {}, {}, None, said.append) as streams:
+        until(lambda: streams.silent)
+        sink, _ = recorded(streams, clock, 30)
+        assert said == ["taxels index: the line broke; check the cable"]
+        assert sink.notes[0] == (said[0], "error") and {name for name, _ in sink.frames} == {"thumb"}
+
+
+def test_a_board_that_falls_silent_may_speak_again(monkeypatch):
+    monkeypatch.setattr(DemoStreams, "silence", 0.05)
+    clock, said = Clock.start(), []
+    board = Board(clock)
+    with DemoStreams({"thumb": board}, {}, {}, {}, None, said.append) as streams:
+        until(lambda: streams.heard)
+        board.quiet = True
+        until(lambda: "taxels thumb" in streams.silent)
+        board.quiet = False
+        until(lambda: not streams.silent)
+    assert "nothing received for 0.05 s; check cable and power" in said[0] and "speaks again" in said[1]
