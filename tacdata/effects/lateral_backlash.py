@@ -19,7 +19,7 @@ class LateralBacklash(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal")
     group = "lateral"
-    equation = "x = play_{b/2}(x), y = play_{b/2}(y): depends on the side it came from"
+    equation = "x = play_{b/2}(x), y = play_{b/2}(y): half the play aside of the command, on the side it came from"
     source = "play operator"
     experiment = "the same place approached from +x, -x, +y, -y"
     parameters = (Parameter("b", "mm", "play", 0.05, 0.0, 0.6),)
@@ -32,7 +32,7 @@ class LateralBacklash(Effect):
             return state
         pose = state.pose.copy()
         for axis in (0, 1):
-            pose[:, axis] = play(pose[:, axis], half) + half
+            pose[:, axis] = play(pose[:, axis], half)
         return replace(state, pose=pose)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
