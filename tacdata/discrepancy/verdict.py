@@ -44,7 +44,7 @@ def document(
     remarks = [*wires, *remarks]
     if course.episodes < FEWEST or wires:
         status = "unknown"
-    effects = [_effect(m, features(found, m, len(answer))) for m in answer]
+    effects = [_effect(m, status, features(found, m, len(answer))) for m in answer]
     tested = found.tested
     values = max(float(found.values.sum()), 1.0)
     return {
@@ -66,7 +66,9 @@ def document(
     }  # fmt: skip
 
 
-def _effect(member: Member, told: dict[str, float]) -> dict[str, Any]:
+def _effect(member: Member, verdict: str, told: dict[str, float]) -> dict[str, Any]:
+    # Whoever reads the effects alone must not take for a name what the verdict refuses to name.
+    status = "suspected" if verdict == "unknown" else decide.settled(member)
     effect = member.placed.effect
     parameters = {}
     for p in effect.parameters:
@@ -78,7 +80,7 @@ def _effect(member: Member, told: dict[str, float]) -> dict[str, Any]:
         parameters[p.name] = entry
     return {
         "mechanism": effect.called, "effect": effect.name, "title": effect.title, "stage": effect.stage,
-        "moves": list(effect.moves), "status": decide.settled(member), "alternatives": list(member.rivals),
+        "moves": list(effect.moves), "status": status, "alternatives": list(member.rivals),
         "parameters": parameters, "margins": {k: float(np.clip(v, -99, 99)) for k, v in member.margins.items()},
         "necessity": float(np.clip(member.necessity, -99, 99)), "at_bound": list(member.at_bound),
         "experiment": effect.experiment, "features": told, "confidence": confidence(told),

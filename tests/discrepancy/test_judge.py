@@ -74,6 +74,7 @@ def test_few_episodes_carry_no_verdict():
     document = verdict.document(answer, [], {})
     assert document["status"] == "unknown"
     assert "5 episodes" in document["why"]
+    assert {e["status"] for e in document["effects"]} <= {"suspected"}, "no name by the back door"
 
 
 def test_a_fitted_response_cannot_learn_history():
