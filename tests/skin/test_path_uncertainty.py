@@ -47,9 +47,10 @@ def test_all_states_get_the_companions_loading_branch(skin, solved):
     assert np.array_equal(known.surface, solved.surface)
     spreads = spreads_of(skin.sensor, PRESS.indenter)
     first, second = (u for _, _, u in uncertainties(skin.companion, replace(PRESS, depths=(0.15, 0.4)), spreads))
-    np.testing.assert_allclose(known.uncertainty[1], first.surface, rtol=1e-4, atol=1e-7)
-    np.testing.assert_allclose(known.uncertainty[2], second.surface, rtol=1e-4, atol=1e-7)
-    np.testing.assert_allclose(known.force_uncertainty[3], 0.6 * first.force + 0.4 * second.force, rtol=1e-4, atol=1e-7)
+    # Its linear solves are less exact than those of `uncertainties`, by what spreads can bear.
+    np.testing.assert_allclose(known.uncertainty[1], first.surface, rtol=1e-3, atol=1e-7)
+    np.testing.assert_allclose(known.uncertainty[2], second.surface, rtol=1e-3, atol=1e-7)
+    np.testing.assert_allclose(known.force_uncertainty[3], 0.6 * first.force + 0.4 * second.force, rtol=1e-3, atol=1e-7)
     assert not known.uncertainty[0].any() and not known.uncertainty[-1].any() and not known.force_uncertainty[-1].any()
     assert 0.018 < known.uncertainty[2].max() < 0.04, "under the tip at least the spread of the height"
     said = known.provenance["uncertainty"]
