@@ -87,7 +87,11 @@ class Foreman:
         """
         run = self._run(wish)
         if not run.session.is_dir():
-            raise UsageError(f"no session {wish.session!r}", f"a folder of recordings in {self.root.name}/", "record")
+            raise UsageError(
+                f"no session {wish.session!r} in the service's {self.root.name}/",
+                f"a folder of recordings, named as seen from {self.root.name}/",
+                "leave out the way to it, or bring it there: tacdata farm send SESSION",
+            )
         run.check_paths()
         with self._guard:
             filed = self.submissions.add(wish)
