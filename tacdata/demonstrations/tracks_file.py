@@ -73,6 +73,10 @@ def read_tracks(path: Path) -> Demonstration:
         UsageError: If it does not exist.
         FormatError: If it is damaged or of another kind.
     """
+    folder = path.with_name(path.name.removesuffix(ENDING))
+    if not path.is_file() and folder.is_dir():
+        known = ", ".join(sorted(found.name for found in folder.glob(f"*{ENDING}"))) or "none yet"
+        raise UsageError(f"the folder {folder}", f"one of its tracks ({known})", "name one; `tacdata track` makes them")
     if not path.is_file():
         raise UsageError(f"no file {path}", f"a file that ends in {ENDING}", "run `tacdata track` first")
     try:

@@ -265,3 +265,10 @@ def test_a_stretch_without_images_is_no_hidden_tag(tmp_path):
     (words,) = note(made, "no image was searched for tags from 4.0 to 4.6 s")
     assert note(made, "tacdata track --every-image")
     assert "keep up" in words and not note(made, "no tag that fits")
+
+
+def test_a_folder_in_place_of_tracks_is_answered_with_what_is_in_it(tmp_path):
+    (tmp_path / "demos").mkdir()
+    (tmp_path / "demos" / "episode-000000.tracks.parquet").touch()
+    with pytest.raises(UsageError, match=r"episode-000000\.tracks\.parquet"):
+        read_tracks(tmp_path / "demos.tracks.parquet")
