@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.discrepancy.excitation import inseparable
-from tacdata.discrepancy.judge import DECOYS, GATE, Judgement, Member
+from tacdata.discrepancy.judge import DECOYS, GATE, NEEDED, Judgement, Member
 from tacdata.effects import Placed, load
 
 LEFT = 0.05
@@ -92,4 +92,5 @@ def status(found: Judgement) -> str:
 
 def settled(member: Member) -> str:
     """Return whether one effect may be named: named or ambiguous."""
-    return "ambiguous" if member.rivals or member.at_bound or member.decoys > DECOYS else "named"
+    doubt = member.rivals or member.at_bound or member.decoys > DECOYS or member.necessity < NEEDED
+    return "ambiguous" if doubt else "named"

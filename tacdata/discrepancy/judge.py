@@ -28,6 +28,8 @@ AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
 MINOR = 0.003
 """Share of what all explain that a further effect must explain [1]; less may be numerics of the larger ones."""
+NEEDED = 2.8
+"""... and an effect is needed if the answer is worse by so many without it [1]: more, as it was chosen among many."""
 SWAPS = 2
 """How often a rival may take the place of an effect [1]."""
 AHEAD = 1.0
@@ -292,7 +294,7 @@ def _members(setting: Setting, current: Refined, problem: Problem, swaps: int = 
         without = {k: refine(start, placed[:k] + placed[k + 1 :], problem.frame, 3) for k in range(len(placed))}
         need = {k: clipped_t(r.energy - current.energy) for k, r in without.items()}
         weakest = min(need, key=lambda k: need[k])
-        if need[weakest] >= RIVAL:
+        if need[weakest] >= NEEDED:
             break
         current = without[weakest]
         placed = list(current.placed)

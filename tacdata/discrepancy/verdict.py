@@ -14,7 +14,7 @@ from tacdata.chain import Course
 from tacdata.discrepancy import decide
 from tacdata.discrepancy.amiss import FEWEST, amiss, clocks
 from tacdata.discrepancy.confidence import confidence, features
-from tacdata.discrepancy.judge import Judgement, Member
+from tacdata.discrepancy.judge import NEEDED, Judgement, Member
 from tacdata.discrepancy.limits import limits
 from tacdata.discrepancy.located import Slice, in_words
 from tacdata.discrepancy.sealed import Gap
@@ -106,7 +106,9 @@ def why(status: str, found: Judgement, answer: list[Member], course: Course) -> 
     if status == "ambiguous":
         bounds = [m.placed.effect.called for m in answer if m.at_bound]
         told = f"these recordings cannot tell {sets} apart" if any(m.rivals for m in answer) else f"{sets}"
-        return told + (f"; {', '.join(bounds)} would need an unphysical size" if bounds else "")
+        weak = [m.placed.effect.called for m in answer if m.necessity < NEEDED]
+        told += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
+        return told + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
     if answer:
         closest = " with ".join(m.placed.effect.called for m in answer)
         return (
