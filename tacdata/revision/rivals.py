@@ -40,7 +40,7 @@ def rivals(held: Comparison, verdict: dict[str, Any], most: int = 6) -> list[Riv
         most: Most rivals.
     """
     own = named(verdict)
-    at = next((k for k, e in enumerate(verdict["effects"]) if e["status"] == "ambiguous"), None)
+    at = next((k for k, e in enumerate(verdict["effects"]) if e["alternatives"]), None)
     if at is None or not own:
         return []
     kept = [p for k, p in enumerate(own) if k != at]
