@@ -52,7 +52,8 @@ def verdict(folder, effect, values, status="named", alternatives=()):
     spec = read_spec(None)
     entry = {
         "mechanism": kind.called, "effect": effect, "title": kind.title, "stage": kind.stage,
-        "moves": list(kind.moves), "status": "ambiguous" if alternatives else "named",
+        "moves": list(kind.moves),
+        "status": "suspected" if status == "unknown" else "ambiguous" if alternatives else "named",
         "alternatives": list(alternatives),
         "parameters": {n: {"value": v, "unit": "u", "error": 0.01, "interval": [v - 0.02, v + 0.02]}
                        for n, v in values.items()},

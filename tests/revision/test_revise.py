@@ -67,8 +67,9 @@ def test_a_wrong_effect_does_not_close_the_gap(late, tmp_path):
     assert max(c["after"] for c in wrong["elsewhere"]) > 5, "another rate gives it away"
 
 
-def test_an_undecided_verdict_adds_nothing_and_plans_presses_that_decide(loose, tmp_path):
-    judged = verdict(tmp_path / "verdict", "backlash", {"b": 0.06}, "ambiguous", ["latency"])
+@pytest.mark.parametrize("status", ["ambiguous", "unknown"])
+def test_an_undecided_verdict_adds_nothing_and_plans_presses_that_decide(loose, tmp_path, status):
+    judged = verdict(tmp_path / "verdict", "backlash", {"b": 0.06}, status, ["latency"])
     made = revise(judged, [loose], read_spec(None), tmp_path / "revision")
     assert made.document["added"] == [] and made.document["spec"]["after"] is None
     assert not (made.folder / "spec.json").exists()
