@@ -1,4 +1,4 @@
-"""A closed surface from an STL, OBJ or PLY file, refused with a place where it bounds no solid."""
+"""A closed surface from an STL, OBJ, PLY or STEP file, refused with a place where it bounds no solid."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.surfaces import step_file
 
 if TYPE_CHECKING:
     import trimesh
 
-FORMATS = (".stl", ".obj", ".ply")
+FORMATS = (".stl", ".obj", ".ply", *step_file.FORMATS)
 """File endings that are read."""
 
-_CAD = (".step", ".stp", ".iges", ".igs", ".brep", ".3mf", ".sldprt", ".f3d")
+_CAD = (".iges", ".igs", ".brep", ".3mf", ".sldprt", ".f3d")
 
 _FEWEST = 1e-9
 """Volume over that of the bounding box at which a surface counts as flat [1]."""
@@ -26,7 +27,7 @@ def read_closed(path: Path, scale: float, what: str) -> trimesh.Trimesh:
 
     Args:
         path: The file.
-        scale: Millimetres in the file's unit (1 for mm, 1000 for m, 25.4 for inches).
+        scale: Millimetres in the file's unit (1 for mm, 1000 for m, 25.4 for inches); a STEP file knows its own, so 1.
         what: What the file is to be, for errors ("indenter", "skin").
 
     Raises:
@@ -37,7 +38,12 @@ def read_closed(path: Path, scale: float, what: str) -> trimesh.Trimesh:
 
     _check_name(path, what)
     try:
-        mesh = trimesh.load_mesh(path, file_type=path.suffix[1:].lower(), process=True)
+        if path.suffix.lower() in step_file.FORMATS:
+            mesh = step_file.read_step(path, what)
+        else:
+            mesh = trimesh.load_mesh(path, file_type=path.suffix[1:].lower(), process=True)
+    except TacdataError:
+        raise
     except Exception as error:  # readers of trimesh raise whatever their parser meets
         raise FormatError(
             f"{what} surface {path.name} cannot be read: {error or type(error).__name__}",

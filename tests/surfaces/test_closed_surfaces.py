@@ -88,9 +88,9 @@ def test_garbage_is_refused_in_words(tmp_path):
             read_closed(tmp_path / name, 1.0, "indenter")
     with pytest.raises(UsageError, match="no file"):
         read_closed(tmp_path / "none.stl", 1.0, "indenter")
-    with pytest.raises(UsageError, match="STEP files are not read"):
-        read_closed(tmp_path / "a.STEP", 1.0, "indenter")
-    with pytest.raises(UsageError, match=r"ending in \.stl, \.obj, \.ply"):
+    with pytest.raises(UsageError, match="IGES files are not read"):
+        read_closed(tmp_path / "a.IGES", 1.0, "indenter")
+    with pytest.raises(UsageError, match=r"ending in \.stl, \.obj, \.ply, \.step"):
         read_closed(tmp_path / "a.png", 1.0, "indenter")
 
 

@@ -1,0 +1,62 @@
+"""Solids from STEP files, as triangles: OpenCASCADE reads them, through the package cascadio."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tacdata.errors import FormatError, UsageError
+
+if TYPE_CHECKING:
+    import trimesh
+
+FORMATS = (".step", ".stp")
+"""File endings that are read."""
+
+CHORD, TURN = 0.005, 0.2
+"""How far triangles may lie off the solid's faces [mm], and neighbours differ in direction [rad]."""
+
+_PER_METRE = 1000.0
+"""What cascadio writes is in metres, whatever unit the file states [mm]."""
+
+_DIGITS = 6
+"""Decimal places [mm] to which corners of neighbouring faces agree: single precision holds no more."""
+
+
+def read_step(path: Path, what: str) -> trimesh.Trimesh:
+    """Return all solids of a file as one surface [mm], corners of neighbouring faces joined; not checked further.
+
+    Args:
+        path: The file.
+        what: What it is to be, for errors.
+
+    Raises:
+        UsageError: If cascadio is not installed.
+        FormatError: If the file cannot be read.
+    """
+    import trimesh
+
+    try:
+        import cascadio
+    except ImportError:
+        raise UsageError(
+            f"{what} surface {path.name}: reading STEP needs the package cascadio, which is not installed",
+            "cascadio, or an STL file",
+            "pip install cascadio, or export the solid as STL from the CAD program (in mm; chord tolerance "
+            f"{CHORD:g} mm or less)",
+        ) from None
+    with tempfile.TemporaryDirectory() as scratch:
+        converted = Path(scratch) / "solid.glb"
+        cascadio.step_to_glb(str(path), str(converted), tol_linear=CHORD, tol_angular=TURN)
+        if not converted.is_file():
+            raise FormatError(
+                f"{what} surface {path.name} cannot be read as STEP",
+                "a STEP file (AP203, AP214, AP242) with a solid",
+                "export it again",
+            )
+        mesh = trimesh.load_scene(converted).to_mesh()
+    mesh.apply_scale(_PER_METRE)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=_DIGITS)
+    mesh.update_faces(mesh.nondegenerate_faces())
+    return mesh
