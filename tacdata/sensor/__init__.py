@@ -1,10 +1,12 @@
 """The sensor description: one versioned file says everything about a taxel skin."""
 
+from tacdata.sensor.adhesion import Adhesion
 from tacdata.sensor.material import Material, PronyTerm
 from tacdata.sensor.sensor import Contact, DepthMap, Sensor, Skin, Taxels, default_sensor, read_sensor
 from tacdata.sensor.transduction import Transduction
 
 __all__ = [
+    "Adhesion",
     "Contact",
     "DepthMap",
     "Material",

@@ -14,6 +14,7 @@ import yaml
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import FormatError
+from tacdata.sensor.adhesion import Adhesion
 from tacdata.sensor.material import Material
 from tacdata.sensor.skin import Skin
 from tacdata.sensor.transduction import Transduction
@@ -59,13 +60,17 @@ class Contact:
     """True if a rigid board at the protrusions' tips (z = -skin.protrusion_tip) carries them (unilateral)."""
     rim_width: float = 1.0
     """Width of the underside's border that "rim" fixes [mm]."""
+    adhesion: Adhesion | None = None
+    """How the outer face sticks to the indenter; None: not at all."""
 
     @property
     def document(self) -> dict[str, Any]:
-        """The contact as its part of the sensor's document; a width that nothing uses is left out."""
+        """The contact as its part of the sensor's document; what nothing uses is left out."""
         values: dict[str, Any] = {**asdict(self), "bonded": list(self.bonded)}
         if "rim" not in self.bonded:
             del values["rim_width"]
+        if self.adhesion is None:
+            del values["adhesion"]
         return values
 
 
@@ -159,6 +164,8 @@ class Sensor:
         documents.check(document, "sensor", origin)
         contact = dict(document["contact"])
         contact["bonded"] = tuple(contact["bonded"])
+        if "adhesion" in contact:
+            contact["adhesion"] = Adhesion(**contact["adhesion"])
         sensor = cls(
             name=document["name"],
             taxels=Taxels(**document["taxels"]),

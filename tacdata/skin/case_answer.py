@@ -131,6 +131,7 @@ def answer(
     Raises:
         SolveError: If the press is impossible or an equilibrium is not found.
     """
+    request.check(sensor)  # before seconds or minutes go into a mesh
     model = SkinModel(sensor, settings)
     states, seconds, began = [], [], time.perf_counter()
     for depth, state in model.states(request):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tacdata.indenters import Indenter
 from tacdata.sensor import Sensor
 from tacdata.skin.meshing.settings import MeshSettings
 from tacdata.skin.press import PressRequest
@@ -24,8 +25,19 @@ the contact radius that a sphere has at a twentieth of its radius."""
 _MARGIN = 0.4
 """How far beyond the contact the mesh stays fine [mm]."""
 
+_RIM, _EVEN = 0.4, 1e-6
+"""Width inside a punch's fillet that stays fine, and height within which its face is flat [mm]."""
+
 _TOUCHED = 0.6
 """Share of the depth to which the skin follows a shape upward: half on a sphere (Hertz)."""
+
+
+def _flat(indenter: Indenter) -> float:
+    """Return the radius of the largest disc about the tip that is flat [mm]: under a punch only its edge is sharp."""
+    radius = np.linspace(0, indenter.extent, 129)
+    turn = np.linspace(0, 2 * np.pi, 65)[:, None]
+    flat = np.all(np.abs(indenter.profile(radius * np.cos(turn), radius * np.sin(turn))) < _EVEN, axis=0)
+    return float(radius[max(int(flat.argmin()) - 1, 0)]) if not flat.all() else 0.0
 
 
 def mesh_for(sensor: Sensor, request: PressRequest) -> MeshSettings:
@@ -33,8 +45,11 @@ def mesh_for(sensor: Sensor, request: PressRequest) -> MeshSettings:
     fine = float(np.clip(_FEATURE * request.indenter.sharpest + _ALLOWANCE, _FINEST, _COARSEST))
     reach = max(request.indenter.footprint(_TOUCHED * max(request.depths), request.yaw), default=0.0)
     radius = sensor.skin.protrusion_radius
+    focus = (request.x, request.y, round(reach + _MARGIN, 3), round(fine, 3))
+    if (hole := _flat(request.indenter) - _RIM) > fine:
+        focus = (*focus, round(hole, 3))
     return MeshSettings(
-        outer=_OUTER, interior=_INTERIOR, focus=(request.x, request.y, round(reach + _MARGIN, 3), round(fine, 3)),
+        outer=_OUTER, interior=_INTERIOR, focus=focus,
         **({"protrusion": round(_PROTRUSION * radius, 3), "tip": round(_TIP * radius, 3)} if radius else {}),
     )
 

@@ -24,6 +24,9 @@ RECIPE = 2
 PINNED = Path(__file__).parent / "meshes"
 """Meshes that ship with the model; made by `python -m tacdata.skin.pin_mesh`."""
 
+_REFUSALS = 3
+"""How many meshes may fail to take the skin's true faces before the skin is refused [1]."""
+
 _TRIES, _SLIVER, _FLAT = 6, 0.03, 1e-3
 """How often a slab is meshed in search of elements whose radius ratio is nowhere below this [1]."""
 
@@ -64,11 +67,16 @@ def make_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
     """
     if sensor.skin.surface is not None:
         return own_mesh(sensor, sensor.skin.surface, settings)
-    # fTetWild gives another mesh at every run, once in some dozens one with a sliver.
-    found = []
-    while len(found) < _TRIES and (not found or found[-1][0] < _SLIVER):
-        mesh = quadratic(sensor, *tetrahedralize(surface(sensor, settings.tip), sensor.skin, settings))
-        found.append((quality(mesh).worst_ratio, mesh))
+    # fTetWild gives another mesh at every run, once in some dozens one with a sliver, or one that cannot be snapped.
+    found, failed = [], []
+    while len(found) < _TRIES and len(failed) < _REFUSALS and (not found or found[-1][0] < _SLIVER):
+        try:
+            mesh = quadratic(sensor, *tetrahedralize(surface(sensor, settings.tip), sensor.skin, settings))
+            found.append((quality(mesh).worst_ratio, mesh))
+        except SolveError as error:
+            failed.append(error)
+    if not found:
+        raise failed[-1]
     ratio, mesh = max(found, key=lambda pair: pair[0])
     if ratio < _FLAT:
         raise SolveError(

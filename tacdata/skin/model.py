@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -17,6 +18,8 @@ from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 from tacdata.skin import fineness
+from tacdata.skin.adhesions import load_adhesion_law
+from tacdata.skin.attraction import AdhesiveContact
 from tacdata.skin.batch import Batch, Members, Press
 from tacdata.skin.companion import CoarsePress, blind_spot, companion_mesh, edge_ratio, press_coarsely
 from tacdata.skin.conditions import conditions
@@ -46,6 +49,12 @@ beyond costs iterations, not accuracy."""
 
 _FIRST = 0.3
 """Longest first load step over the smallest radius of curvature of the shape [1]."""
+
+_LIFT = 0.5
+"""Longest load step upward over the range of adhesion [1]."""
+
+_JUMP = (200, 40)
+"""Newton iterations per state, and without progress, that a jump into contact or off it may take."""
 
 _NEARLY_INCOMPRESSIBLE = 0.495
 """Poisson's ratio from which on the sparse preconditioner knows of averaged volume changes [1]."""
@@ -90,6 +99,9 @@ class SkinModel:
             SolveError: If the geometry cannot be meshed or nothing holds the skin.
         """
         self.sensor, self.settings, self.device = sensor, settings or ModelSettings(), device
+        load_law(sensor.material.law)  # a name that is none is refused before seconds go into a mesh
+        if sensor.contact.adhesion:
+            load_adhesion_law(sensor.contact.adhesion.law)
         self.mesh = mesh or build_mesh(sensor, self.settings.mesh)
         self._companion_mesh = companion
         self._nodes = torch.as_tensor(self.mesh.nodes, device=device)
@@ -159,8 +171,10 @@ class SkinModel:
     def _contacts(self, request: PressRequest) -> list[Contact]:
         penalty, stick = self.settings.penalty, self.settings.stick
         distance = request.indenter.distance_function()
+        rough, adhesion = self.sensor.contact.friction > 0, self.sensor.contact.adhesion
         contacts = [
-            Contact(self._nodes, self._outer, 1, distance, self.sensor.contact.friction > 0, penalty, stick)
+            AdhesiveContact(self._nodes, self._outer, distance, rough, penalty, stick, adhesion) if adhesion
+            else Contact(self._nodes, self._outer, 1, distance, rough, penalty, stick)
         ]
         if self._on_board:
             flat: Any = board_distance
@@ -168,14 +182,24 @@ class SkinModel:
         return contacts
 
     def _press(self, number: int, request: PressRequest) -> Press:
+        adhesion = self.sensor.contact.adhesion
         walk = Walk(
             request.depths, self.settings.step, f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm",
-            _FIRST * request.indenter.sharpest,
+            _FIRST * request.indenter.sharpest, _LIFT * adhesion.range if adhesion else math.inf,
         )
         own = conditions(
             self.sensor.material, self.sensor.contact.friction, request.indenter, device=self.device
         )
         return Press(number, walk, touch(self.sensor, self._face, request), rotation(request), own)
+
+    @property
+    def _solver(self) -> SolverSettings:
+        """The settings; where the skin sticks, with the steps that a jump takes."""
+        solver = self.settings.solver
+        if self.sensor.contact.adhesion is None:
+            return solver
+        limit, patience = (max(a, b) for a, b in zip((solver.newton_limit, solver.patience), _JUMP, strict=True))
+        return replace(solver, newton_limit=limit, patience=patience)
 
     def _batch(self, request: PressRequest, capacity: int) -> tuple[Batch, list[Contact]]:
         contacts = self._contacts(request)
@@ -183,7 +207,7 @@ class SkinModel:
         loadable = torch.as_tensor(self._loadable, device=self.device)
         size, modulus = 3 * len(self.mesh.nodes), self.sensor.material.youngs_modulus
         preconditioner = ContactPreconditioner(self._rest, contacts, loadable, size, modulus)
-        newton = Newton(self._body, contacts, fixed, preconditioner, self.settings.solver)
+        newton = Newton(self._body, contacts, fixed, preconditioner, self._solver)
         idle = conditions(self.sensor.material, self.sensor.contact.friction, request.indenter, device=self.device)
         floor = -self.sensor.skin.protrusion_tip
         return Batch(newton, idle, len(self.mesh.nodes), capacity, floor), contacts
@@ -337,6 +361,7 @@ class SkinModel:
             "indenter": request.indenter.document, "x": request.x, "y": request.y, "yaw": request.yaw,
             **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(request, name))},
             "depths": list(request.depths), "settings": asdict(self.settings), "law": self.sensor.material.law,
+            **({"adhesion": adhesion.document} if (adhesion := self.sensor.contact.adhesion) else {}),
             "device": self.device, "seconds": round(seconds, 3), "newton": sum(state.newton for state in states),
         }
         for depth, state in zip(request.depths, states, strict=True):

@@ -19,13 +19,14 @@ from tacdata.skin.pose import Pose
 
 UNITS = {
     "x": "mm", "y": "mm", "z": "mm", "yaw": "deg", "tilt_x": "deg", "tilt_y": "deg", "thickness": "mm",
-    "youngs_modulus": "MPa", "poisson_ratio": "1", "friction": "1",
+    "youngs_modulus": "MPa", "poisson_ratio": "1", "friction": "1", "bonding": "mm/MPa",
 }
 """Units of the parameters that every press has.
 
 x, y, z: the indenter's place in the sensor's frame; z is up, so that a lower z is a deeper press. yaw, tilt_x, tilt_y:
 its turn about its own axis, then about the sensor's x and y, at its origin. thickness: of the slab, the depth still
-counted from its outer face, so that the indenter rises along; where it stays in place, subtract the derivative by z."""
+counted from its outer face, so that the indenter rises along; where it stays in place, subtract the
+derivative by z. bonding: the compliance of what holds the held faces (`tacdata.skin.bonding`), 0 in the model."""
 
 _STEP = 1e-5
 """Step of the central differences that turn a parameter into the numbers of a law or a shape, over its size [1]."""
@@ -95,6 +96,8 @@ def directions(
             change.pose.place[2, column] = touch.place[2, 0] / sensor.skin.thickness
         elif name == "friction":
             conditions.friction[column] = 1.0
+        elif name == "bonding":
+            continue  # `Tangents` moves the held faces
         elif name.startswith("indenter/"):
             conditions.indenter[:, column] = _padded(_by_size(indenter, name.removeprefix("indenter/")), device)
         else:

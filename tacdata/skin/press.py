@@ -28,7 +28,8 @@ class PressRequest:
     yaw: float
     """Rotation about its own axis [deg]."""
     depths: tuple[float, ...]
-    """Depths of the states to report [mm]: 0, rising to the deepest, then falling to 0 (or ending at the deepest).
+    """Depths of the states to report [mm]: 0, rising to the deepest, then falling to 0 (or ending at the deepest);
+    below 0, above the face, only where the skin sticks.
 
     Counted from the undeformed face at (x, y) to the lowest point of the indenter as it is turned."""
     tilt_x: float = 0.0
@@ -43,8 +44,13 @@ class PressRequest:
             SolveError: Saying which.
         """
         skin = sensor.skin
-        if not self.depths or not np.all(np.isfinite(self.depths)) or min(self.depths) < 0:
+        if not self.depths or not np.all(np.isfinite(self.depths)):
             raise SolveError(f"depths {self.depths} mm", "one or more depths of 0 mm or more", "correct the press")
+        if min(self.depths) < 0 and sensor.contact.adhesion is None:
+            raise SolveError(
+                f"a depth of {min(self.depths):g} mm, above a skin that does not stick", "0 mm or more",
+                "correct the press, or state contact/adhesion in the sensor file",
+            )
         angles = f"yaw {self.yaw} deg, tilts {self.tilt_x} and {self.tilt_y} deg"
         if not np.all(np.isfinite([self.x, self.y, self.yaw, self.tilt_x, self.tilt_y])):
             raise SolveError(f"press at ({self.x}, {self.y}) mm, {angles}", "finite numbers", "correct the press")

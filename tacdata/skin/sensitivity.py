@@ -11,6 +11,7 @@ import torch
 
 from tacdata.errors import SolveError
 from tacdata.skin.batch import Members
+from tacdata.skin.bonding import Bonding
 from tacdata.skin.contact import board_distance
 from tacdata.skin.contact_change import ConditionsChange
 from tacdata.skin.depth_raster import DepthRaster
@@ -18,7 +19,7 @@ from tacdata.skin.parameter import check, directions, known
 from tacdata.skin.pose import Pose
 from tacdata.skin.press import PressRequest
 from tacdata.skin.state import State
-from tacdata.skin.tangents import TOLERANCE, Tangents
+from tacdata.skin.tangents import TOLERANCE, Slack, Tangents
 from tacdata.skin.trail import Trail
 
 if TYPE_CHECKING:
@@ -72,6 +73,11 @@ def sensitivities(
     """
     names = list(parameters)
     check(model.sensor, request.indenter, names)
+    if model.sensor.contact.adhesion:
+        raise SolveError(
+            "derivatives of a press into a skin that sticks", "a sensor file without contact/adhesion",
+            "sample whole presses (tacdata.skin.uncertainty.sampled_spread)",
+        )
     press = model._press(0, request)
     batch, contacts = model._batch(request, 1)
     trail, reader = Trail(contacts), _Reader(model, request, names)
@@ -81,7 +87,8 @@ def sensitivities(
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
     distances = [request.indenter.distance_function(), board_distance][: len(contacts)]
     free = torch.as_tensor(~model._fixed, device=model.device).to(torch.float64)[:, None, None]
-    tangents = Tangents(model._batch(request, len(names))[0]._newton, distances, free, label, tolerance)  # pyright: ignore
+    newton = model._batch(request, len(names))[0]._newton  # pyright: ignore
+    tangents = Tangents(newton, distances, free, label, tolerance, _slack(model, names))
 
     def collect(members: Members) -> list[State]:
         return model._gauge.states(members, contacts, True)
@@ -92,6 +99,15 @@ def sensitivities(
         for milestone in trail.take():
             tangents.advance(milestone, along if tangents.changes else at_touch)
         yield depth, state, reader.read(state, tangents, along)
+
+
+def _slack(model: SkinModel, names: list[str]) -> Slack | None:
+    """Return how held nodes move with each parameter: with the bonding alone."""
+    if "bonding" not in names:
+        return None
+    bonding = Bonding(model.mesh, model._fixed)
+    own = torch.tensor([name == "bonding" for name in names], dtype=torch.float64, device=model.device)
+    return lambda reaction: bonding.slack(reaction) * own
 
 
 def _without_depth(names: list[str], along: ConditionsChange) -> ConditionsChange:

@@ -11,6 +11,7 @@ points; where a point just changes its status, derivatives jump.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import torch
@@ -34,6 +35,10 @@ _LAW_STEP = 1e-5
 
 _AUGMENTATIONS, _FOLLOWED = 3, 1e-2
 """How often multipliers follow pressures at most, and the change relative to the largest at which they have [1]."""
+
+
+Slack = Callable[[torch.Tensor], torch.Tensor]
+"""From reactions of held nodes to how they move."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,8 @@ class Tangents:
     """The derivatives on their way along the load path, one column a parameter."""
 
     def __init__(
-        self, newton: Newton, distances: list[wp.Function], free: torch.Tensor, label: str, tolerance: float = TOLERANCE
+        self, newton: Newton, distances: list[wp.Function], free: torch.Tensor, label: str,
+        tolerance: float = TOLERANCE, slack: Slack | None = None,
     ) -> None:
         """Start.
 
@@ -82,8 +88,10 @@ class Tangents:
             free: 1 for nodes that are not held, else 0, shape (n, 1, 1).
             label: The press in words, for errors.
             tolerance: Residual of the linear solves over their right-hand sides [1].
+            slack: How held nodes move with each parameter [mm over its unit], of the reactions [N], shapes (n, 3, p);
+                None: not at all.
         """
-        self._tolerance = tolerance
+        self._tolerance, self._slack = tolerance, slack
         self._newton, self._contacts, self._distances = newton, newton.contacts, distances
         self._free, self._label = free, label
         self.du = torch.empty(0)
@@ -122,7 +130,7 @@ class Tangents:
             contact.sharp = torch.ones_like(contact.sharp)
         self._newton.balance(point.u, point.poses, point.states, point.conditions)
         if not touch:
-            self._solve(point, self._augmented(milestone))
+            self._solve(point, self._augmented(milestone), self._held(point))
         self.changes = point.changes(self.du, self._history)
         self._pressure = [contact.pressure[..., 0].clone() for contact in self._contacts]
         self._history = [
@@ -137,8 +145,18 @@ class Tangents:
             for state, pressure in zip(milestone.states, self._pressure, strict=True)
         )
 
-    def _solve(self, point: _Point, augmented: bool) -> None:
-        """Find du."""
+    def _held(self, point: _Point) -> torch.Tensor:
+        """Return how held nodes move along each direction [mm over its unit], shape (n, 3, p)."""
+        if self._slack is None:
+            return torch.zeros_like(point.u)
+        internal = self._newton.body.internal_force(point.u, point.conditions)[0]
+        external = torch.zeros_like(internal)
+        for contact, pose, state in zip(self._contacts, point.poses, point.states, strict=True):
+            contact.add_force(point.u, pose, state, point.conditions, external)
+        return self._slack((internal - external) * (1 - self._free))
+
+    def _solve(self, point: _Point, augmented: bool, held: torch.Tensor) -> None:
+        """Find du; at held nodes it is ``held``."""
         body, free = self._newton.body, self._free
         self._newton.preconditioner.update(point.conditions.modulus)
         internal = self._internal(point)
@@ -151,8 +169,11 @@ class Tangents:
         for _ in range(_AUGMENTATIONS if augmented else 1):
             still = point.changes(torch.zeros_like(point.u), self._history)
             rhs = (torch.stack([change.force for change in still]).sum(dim=0) - internal) * free
-            found = gmres.solve(product, self._newton.preconditioner.apply, rhs, self.du, self._tolerance)
-            self.du, self.products = found.x, self.products + found.iterations
+            if self._slack:
+                rhs -= product(held)
+            guess = self.du * free
+            found = gmres.solve(product, self._newton.preconditioner.apply, rhs, guess, self._tolerance)
+            self.du, self.products = found.x + held, self.products + found.iterations
             self.residual = max(self.residual, float(found.residual.max()))
             if not self.residual <= self._tolerance:
                 raise SolveError(

@@ -100,7 +100,7 @@ def sampled_spread(
         request: The press.
         spreads: Standard deviations by name, in the parameters' units; of material and indenter they must be small, as
             these are moved along their first derivatives.
-        samples: How many presses, at least 2.
+        samples: How many presses, at least 2. The spread of bonding is not drawn, but taken to first order.
         seed: Of the random numbers.
         capacity: How many presses are in work at a time.
 
@@ -108,11 +108,19 @@ def sampled_spread(
         UsageError: If fewer than two samples are asked for, or a spread is not of a parameter of this press.
         SolveError: If one of the presses is not solved.
     """
-    spreads = _checked(model, request, spreads)
+    spreads = dict(_checked(model, request, spreads))
     if samples < 2:
         raise UsageError(f"{samples} samples", "at least 2", "draw more presses")
-    drawn = np.random.default_rng(seed).normal(size=(samples, len(spreads))) * list(spreads.values())
-    presses = (_moved(model, request, k, dict(zip(spreads, values, strict=True))) for k, values in enumerate(drawn))
+    bonding = spreads.pop("bonding", 0.0)
+    if bonding:
+        # Held faces do not move while a press is solved; to first order they do, and independently of the rest.
+        beside = [own for _, _, own in uncertainties(model, request, {"bonding": bonding})]
+        if not spreads:
+            return list(zip(request.depths, beside, strict=True))
+        drawn = sampled_spread(model, request, spreads, samples, seed, capacity)
+        return [(depth, _joined(one, other)) for (depth, one), other in zip(drawn, beside, strict=True)]
+    moves = np.random.default_rng(seed).normal(size=(samples, len(spreads))) * list(spreads.values())
+    presses = (_moved(model, request, k, dict(zip(spreads, values, strict=True))) for k, values in enumerate(moves))
     batch, contacts = model._batch(request, min(capacity, samples))
     found: list[list[State]] = [[] for _ in range(samples)]
     for number, _, state in batch.run(presses, lambda members: model._gauge.states(members, contacts, True)):
@@ -120,6 +128,11 @@ def sampled_spread(
             raise state
         found[number].append(state)
     return [(depth, _spread_of(model, [states[k] for states in found])) for k, depth in enumerate(request.depths)]
+
+
+def _joined(one: Uncertainty, other: Uncertainty) -> Uncertainty:
+    """Return the standard deviations of two independent causes together."""
+    return Uncertainty(*(np.hypot(getattr(one, name), getattr(other, name)) for name in QUANTITIES))
 
 
 def _checked(model: SkinModel, request: PressRequest, spreads: Mapping[str, float] | None) -> Mapping[str, float]:

@@ -31,6 +31,8 @@ class Walk:
     """The press in words, for errors."""
     first: float = math.inf
     """Longest step from the first touch [mm]; an edge must not be pressed in by much of its own radius at once."""
+    lift: float = math.inf
+    """Longest step upward [mm]; a skin that sticks must not be torn off by a long one."""
     depth: float = 0.0
     """Of the last equilibrium [mm]."""
     attempt: float = 0.0
@@ -55,7 +57,7 @@ class Walk:
 
     def _propose(self) -> None:
         way = self.depths[self._wanted] - self.depth
-        self.attempt = self.depth + min(max(way, -self._step), self._step)
+        self.attempt = self.depth + min(max(way, -min(self._step, self.lift)), self._step)
         self.newton, self._best, self._best_at = 0, math.inf, 0
 
     def judge(

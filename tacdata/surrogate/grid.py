@@ -41,6 +41,8 @@ class Reach:
     """Largest x and y [mm]."""
     deepest: float
     """Largest depth [mm]."""
+    tilt: tuple[float, float] = (0.0, 0.0)
+    """How far its axis leans about x and y [deg]."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def covering(reaches: list[Reach], sensor: Sensor, spacing: float) -> Grid:
     sides = [(float(a), float(b)) for a, b in zip(low - MARGIN, high + MARGIN, strict=True)]
     x, y = (_axis(a, b, spacing) for a, b in sides)
     grids = [Grid(x, y, depth, False)]
-    if all(foldable(sensor, r.indenter, r.yaw) for r in reaches):
+    if all(r.tilt == (0.0, 0.0) and foldable(sensor, r.indenter, r.yaw) for r in reaches):
         x, y = (_axis(-max(abs(a), abs(b)), max(abs(a), abs(b)), spacing) for a, b in sides)
         grids.append(Grid(x, y, depth, True))
     return min(grids, key=lambda g: sum(len(g.presses(r)) for r in reaches))
@@ -112,7 +114,7 @@ def request(reach: Reach, x: float, y: float, depths: np.ndarray, sensor: Sensor
     for count in range(len(depths), 1, -1):
         wanted = PressRequest(
             reach.indenter, round(float(x), 6), round(float(y), 6), reach.yaw,
-            tuple(round(float(d), 6) for d in depths[:count]),
+            tuple(round(float(d), 6) for d in depths[:count]), *reach.tilt,
         )  # fmt: skip
         try:
             wanted.check(sensor)

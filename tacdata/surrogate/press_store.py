@@ -49,6 +49,7 @@ class PressStore:
         """Return where a press is kept: its name is a hash of all that decides it but its end (32 hex digits)."""
         parts = {
             "indenter": request.indenter.document, "x": request.x, "y": request.y, "yaw": request.yaw,
+            **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(request, name))},
             "depths": list(request.depths[:3]), "model": self.model.content_hash,
         }  # fmt: skip
         return self.folder / f"{provenance.content_hash(parts)[:32]}.npz"

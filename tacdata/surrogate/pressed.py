@@ -70,19 +70,19 @@ def pressed(paths: list[Path]) -> Pressed:
 
 def _reach(name: str, found: list[tuple[Episode, np.ndarray]]) -> Reach:
     first = found[0][0].press
-    yaws = {round(e.press.yaw, 3) for e, _ in found}
-    if round_about_axis(first.indenter):
-        yaws = {0.0}
-    if len(yaws) > 1:
+    round_one = round_about_axis(first.indenter)
+    ways = {(0.0 if round_one else round(p.yaw, 3), p.tilt_x, p.tilt_y): p.turned for p in (e.press for e, _ in found)}
+    if len(ways) > 1:
         raise FormatError(
-            f"{name} mounted at {', '.join(f'{y:g}' for y in sorted(yaws))} deg", "one way for each name",
+            f"{name} mounted at {'; '.join(ways[way] for way in sorted(ways))}", "one way for each name",
             "judge the ways one at a time, or give them names of their own in the plan",
         )  # fmt: skip
+    [(yaw, *tilt)] = ways
     tips = np.concatenate([t for _, t in found])
     low, high = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
     return Reach(
-        first.indenter, yaws.pop(), (float(low[0]), float(low[1])), (float(high[0]), float(high[1])),
-        float(tips[:, 2].max()),
+        first.indenter, yaw, (float(low[0]), float(low[1])), (float(high[0]), float(high[1])),
+        float(tips[:, 2].max()), (tilt[0], tilt[1]),
     )  # fmt: skip
 
 

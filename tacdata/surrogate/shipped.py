@@ -45,7 +45,9 @@ class Shipped:
         return self.folder / f"{provenance.content_hash(indenter)[:16]}.npz"
 
     def get(self, request: PressRequest) -> Solved | None:
-        """Return a press, if it is among them."""
+        """Return a press, if it is among them: upright ones are."""
+        if request.tilt_x or request.tilt_y:
+            return None
         press = _read(self.path(request.indenter.document)).get((request.x, request.y, request.yaw))
         return press.down_to(request.depths) if press else None
 

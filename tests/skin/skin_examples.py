@@ -52,6 +52,12 @@ def box_mesh(sensor: Sensor, nx: int, ny: int, nz: int) -> SkinMesh:
         np.linspace(-skin.size_y / 2, skin.size_y / 2, ny + 1),
         np.linspace(0, skin.thickness, nz + 1),
     ]
+    return kuhn_mesh(sensor, axes)
+
+
+def kuhn_mesh(sensor: Sensor, axes: list[np.ndarray]) -> SkinMesh:
+    """A mesh of the boxes between lines along x, y and z, every one cut into six tetrahedra (Kuhn)."""
+    nx, ny, nz = (len(axis) - 1 for axis in axes)
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     index = np.arange(len(points)).reshape(nx + 1, ny + 1, nz + 1)
     tets = []

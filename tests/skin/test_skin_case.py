@@ -6,12 +6,18 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from skin_examples import bumps_sensor
+from skin_examples import bumps_sensor, slab_sensor
 from typer.testing import CliRunner
 
 from tacdata import cli, documents
 from tacdata.errors import FormatError, UsageError
+from tacdata.indenters.flat_punch import FlatPunch
+from tacdata.indenters.ring import Ring
+from tacdata.indenters.sphere import Sphere
 from tacdata.skin.case import read_case
+from tacdata.skin.case_mesh import mesh_for
+from tacdata.skin.meshing.background import edge_length
+from tacdata.skin.press import PressRequest
 
 MESH = {"outer": 0.6, "interior": 1.0, "protrusion": 0.8}
 CASE = {
@@ -84,3 +90,15 @@ def test_the_estimate_is_on_unless_the_case_says_no(tmp_path):
     (tmp_path / "case.json").write_text(json.dumps({**CASE, "error_estimate": "yes"}))
     with pytest.raises(FormatError, match="error_estimate"):
         read_case(tmp_path / "case.json")
+
+
+def test_under_a_punch_the_mesh_is_fine_at_its_edge_alone():
+    slab = slab_sensor(size=10.0)
+    wide, round_one, hollow = FlatPunch(2.0, 0.3), Sphere(4.0), Ring(2.0, 0.5)
+    of = {shape: mesh_for(slab, PressRequest(shape, 1.0, 0.0, 0.0, (0.5,))) for shape in (wide, round_one, hollow)}
+    focus = of[wide].focus
+    assert focus and len(focus) == 5 and focus[4] == pytest.approx(1.7 - 0.4, abs=0.02)
+    assert all(len(of[shape].focus or ()) == 4 for shape in (round_one, hollow))
+    points = np.array([[1.0, 0.0, 2.0], [2.8, 0.0, 2.0], [5.0, 0.0, 2.0]])
+    middle, edge, away = edge_length(slab.skin, of[wide], points, np.zeros(3))
+    assert edge == focus[3] and middle > 3 * edge and away > 3 * edge

@@ -10,6 +10,7 @@ from skin_examples import box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.errors import FormatError, SolveError, UsageError
 from tacdata.sensor import Sensor, Skin, read_sensor
+from tacdata.skin import mesher
 from tacdata.skin.mesh import quality
 from tacdata.skin.mesher import MeshSettings, make_mesh, mesh_key
 from tacdata.skin.meshing.protrusion import Protrusion
@@ -197,10 +198,10 @@ def test_an_open_surface_is_refused_with_the_place(tmp_path):
         read_sensor(written(tmp_path, document(surface={"file": "dome.stl"}), dome=mesh))
 
 
-def test_step_files_are_answered_with_how_to_convert_them(tmp_path):
-    (tmp_path / "skin.step").write_text("ISO-10303-21;")
-    with pytest.raises(UsageError, match="STEP files are not read") as failure:
-        read_sensor(written(tmp_path, document(surface={"file": "skin.step"})))
+def test_files_of_cad_programs_are_answered_with_how_to_convert_them(tmp_path):
+    (tmp_path / "skin.iges").write_text("")
+    with pytest.raises(UsageError, match="IGES files are not read") as failure:
+        read_sensor(written(tmp_path, document(surface={"file": "skin.iges"})))
     assert "STL" in failure.value.remedy
 
 
@@ -230,3 +231,23 @@ def test_the_sizes_of_a_curved_pad_survive_its_file(tmp_path):
     values = sensor.document
     assert values["skin"]["curvature_radius_y"] == 11.0
     assert read_sensor(written(tmp_path, values)).skin == skin
+
+
+def test_a_mesh_that_does_not_take_the_true_faces_is_made_again(monkeypatch):
+    """fTetWild's next one may; a skin that never does is refused with the reason."""
+    sensor, calls = slab_sensor(), []
+
+    def quadratic(sensor, vertices, tets):
+        calls.append(len(calls))
+        if len(calls) < wanted:
+            raise SolveError("element 7 is flat", "positive volumes", "refine")
+        return box_mesh(sensor, 2, 2, 2)
+
+    monkeypatch.setattr(mesher, "quadratic", quadratic)
+    monkeypatch.setattr(mesher, "tetrahedralize", lambda *_: (None, None))
+    wanted = 3
+    assert len(make_mesh(sensor, COARSE).tets) == 48 and len(calls) == 3
+    wanted = 99
+    with pytest.raises(SolveError, match="element 7 is flat"):
+        make_mesh(sensor, COARSE)
+    assert len(calls) == 6

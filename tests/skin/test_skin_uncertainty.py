@@ -60,7 +60,7 @@ def test_a_place_known_to_the_size_of_the_contact_is_beyond_the_first_order(skin
 
 
 def test_spreads_are_refused_in_words(skin):
-    for spreads in ({}, {"z": -0.1}, {"z": float("nan")}, {"bonding": 0.1}, {"friction": 0.05}):
+    for spreads in ({}, {"z": -0.1}, {"z": float("nan")}, {"glue": 0.1}, {"friction": 0.05}):
         with pytest.raises(UsageError):
             list(uncertainties(skin, DEEP, spreads))
     with pytest.raises(UsageError, match="at least 2"):

@@ -41,8 +41,11 @@ def edge_length(skin: Skin, settings: MeshSettings, points: np.ndarray, below: n
     if skin.protrusion_radius:
         size = np.where(points[:, 2] < 0.3, np.minimum(size, settings.protrusion), size)
     if settings.focus:
-        x, y, radius, fine = settings.focus
-        away = np.maximum(np.hypot(points[:, 0] - x, points[:, 1] - y) - radius, 0)
+        x, y, radius, fine, *hole = settings.focus
+        from_middle = np.hypot(points[:, 0] - x, points[:, 1] - y)
+        away = np.maximum(from_middle - radius, 0)
+        if hole:
+            away = np.maximum(away, hole[0] - from_middle)
         size = np.minimum(size, fine + 0.5 * np.hypot(away, np.maximum(below, 0)))
     return size
 

@@ -19,5 +19,6 @@ class MeshSettings:
     """At the protrusions' tips [mm]; None: one ring of edges around the contact patch."""
     envelope: float = 1e-3
     """fTetWild's envelope over the bounding box's diagonal [1]."""
-    focus: tuple[float, float, float, float] | None = None
-    """A disc of the outer face to refine: x, y, radius, edge length [mm]."""
+    focus: tuple[float, ...] | None = None
+    """A disc of the outer face to refine: x, y, radius, edge length [mm]; a fifth number leaves out a disc of that
+    radius in its middle, where the mesh grows coarser again: a punch is sharp at its edge alone."""

@@ -1,0 +1,30 @@
+# Warp kernels are Python in form only; their operators have no types that pyright knows.
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportCallIssue=false, reportReturnType=false
+"""Strongest where the surfaces touch, falling exponentially: t = w/d exp(-gap/d)."""
+
+from functools import cache
+
+import warp as wp
+
+from tacdata.skin.adhesions.adhesion_law import AdhesionLaw
+
+
+class Exponential(AdhesionLaw):
+    """Initially rigid, as Camacho and Ortiz (Int. J. Solids Struct. 33 (1996) 2899) ask of a cohesive law."""
+
+    reach = 12.0
+
+    @staticmethod
+    @cache
+    def functions() -> tuple[wp.Function, wp.Function, wp.Function]:
+        """Return exp(-s), -exp(-s), exp(-s)."""
+
+        @wp.func
+        def shape(s: wp.float64):
+            return wp.exp(-s)
+
+        @wp.func
+        def slope(s: wp.float64):
+            return -wp.exp(-s)
+
+        return shape, slope, shape
