@@ -136,7 +136,9 @@ def _request(job: Job) -> PressRequest:
     from tacdata.skin.press import PressRequest
 
     indenter = from_document(job.indenter, f"job {job.key[:12]}")
-    return PressRequest(indenter=indenter, x=job.x, y=job.y, yaw=job.yaw, depths=job.depths)
+    return PressRequest(
+        indenter=indenter, x=job.x, y=job.y, yaw=job.yaw, depths=job.depths, tilt_x=job.tilt_x, tilt_y=job.tilt_y
+    )
 
 
 def _with_ladder(job: Job, request: PressRequest, solution: PathSolution) -> PathSolution:

@@ -23,15 +23,19 @@ class Job:
     indenter: dict[str, Any]
     """The indenter as plain data: shape and parameters [mm, deg]."""
     x: float
-    """Location of the indenter's lowest point [mm]."""
+    """Location of the indenter's tip [mm]: its lowest point, if it stands upright."""
     y: float
-    """Location of the indenter's lowest point [mm]."""
+    """Location of the indenter's tip [mm]."""
     yaw: float
-    """Rotation of the indenter about z [deg]."""
+    """Rotation of the indenter about its own axis [deg]."""
     depths: tuple[float, ...]
     """Depths of the states [mm]: from 0 rising to the deepest, then falling to 0."""
     tolerance: Tolerance | None = None
     """Where states are to be added; None for these depths alone."""
+    tilt_x: float = 0.0
+    """How far its axis leans about x [deg], after the yaw and the tilt about y."""
+    tilt_y: float = 0.0
+    """How far its axis leans about y [deg], after the yaw."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -47,6 +51,7 @@ class Job:
             "x": self.x,
             "y": self.y,
             "yaw": self.yaw,
+            **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(self, name))},
             "depths": list(self.depths),
             **({"tolerance": asdict(self.tolerance)} if self.tolerance else {}),
         }

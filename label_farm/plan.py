@@ -104,6 +104,8 @@ def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> Lab
             yaw=float(episode.press.yaw),
             depths=ladder.depths(_settled_depth(episode)),
             tolerance=ladder.tolerance,
+            tilt_x=float(episode.press.tilt_x),
+            tilt_y=float(episode.press.tilt_y),
         )
     return LabelRequest(
         episode=episode.number,

@@ -80,10 +80,20 @@ def baseline(episode: Episode) -> np.ndarray:
     return episode.taxels.counts[resting].mean(axis=0)
 
 
+LOST = 1.8
+"""A time between frames of so many usual ones has lost a frame [1]."""
+
+
 def valid(episode: Episode) -> np.ndarray:
-    """Return which frames follow their neighbour without loss and lie on the commanded path, (n,), bool."""
-    times = episode.taxels.sample_ns
-    follows = np.diff(episode.taxels.counter, prepend=episode.taxels.counter[:1] - 1) == 1
+    """Return which frames follow their neighbour without loss and lie on the commanded path, (n,), bool.
+
+    Imported readings may have no counter (-1): then a loss is told by their times.
+    """
+    times, counter = episode.taxels.sample_ns, episode.taxels.counter
+    follows = np.diff(counter, prepend=counter[:1] - 1) == 1
+    if len(counter) > 1 and (counter < 0).all():
+        step = np.diff(times)
+        follows = np.append(True, step < LOST * np.median(step))
     return follows & (times >= episode.tip_ns[0]) & (times <= episode.tip_ns[-1])
 
 

@@ -23,13 +23,13 @@ class Press:
     indenter_name: str
     """The plan's name for that specimen."""
     x: float
-    """Location of the indenter's lowest point [mm]."""
+    """Location of the indenter's tip [mm]: its lowest point, if it stands upright."""
     y: float
-    """Location of the indenter's lowest point [mm]."""
+    """Location of the indenter's tip [mm]."""
     yaw: float
-    """Rotation of the indenter about z [deg]."""
+    """Rotation of the indenter about its own axis [deg]."""
     depth: float
-    """Depth of the lowest point below the undeformed outer face [mm]; negative flies over without contact."""
+    """Depth of the lowest point below the undeformed outer face at (x, y) [mm]; negative flies over without contact."""
     speed: float
     """Loading and unloading speed [mm/s]."""
     hold: float
@@ -46,6 +46,27 @@ class Press:
     """How much deeper than ``depth`` the guide goes before it comes back up to it [mm]."""
     purpose: str = ""
     """What the press is for, in words; presses with the same words belong together."""
+    tilt_x: float = 0.0
+    """How far the indenter's axis leans about x [deg], after the yaw and the tilt about y."""
+    tilt_y: float = 0.0
+    """How far the indenter's axis leans about y [deg], after the yaw."""
+
+    @property
+    def angles(self) -> dict[str, float]:
+        """How the indenter is turned [deg]: the yaw, and the tilts that are not 0, as entries of a plan."""
+        tilts = {"tilt_x": self.tilt_x, "tilt_y": self.tilt_y}
+        return {"yaw": self.yaw, **{name: tilt for name, tilt in tilts.items() if tilt}}
+
+    @property
+    def turned(self) -> str:
+        """The angles in words, for example ``15 deg, leaning 5 deg about x``."""
+        leans = [f"{t:g} deg about {axis}" for axis, t in (("x", self.tilt_x), ("y", self.tilt_y)) if t]
+        return f"{self.yaw:g} deg" + (f", leaning {' and '.join(leans)}" if leans else "")
+
+    @property
+    def mounting(self) -> tuple[str, float, float, float]:
+        """The indenter's name and angles [deg]: presses that share it follow each other without a hand."""
+        return self.indenter_name, self.yaw, self.tilt_x, self.tilt_y
 
     @property
     def deepest(self) -> float:
@@ -55,7 +76,8 @@ class Press:
     @property
     def document(self) -> dict[str, Any]:
         """The press as plain data (JSON types)."""
-        values = {k: v for k, v in vars(self).items() if k != "indenter"}
+        left_out = {"indenter", *({"tilt_x", "tilt_y"} - self.angles.keys())}
+        values = {k: v for k, v in vars(self).items() if k not in left_out}
         return {**values, "indenter": self.indenter.document}
 
     @classmethod
@@ -160,6 +182,7 @@ def _press(index: int, entry: dict[str, Any], indenter: Indenter, motion: Motion
         hold=entry.get("hold", motion.hold), repeat=entry.get("repeat", 0), rest=entry.get("rest"),
         recovery=entry.get("recovery", 0.0), approach_from=entry.get("approach_from", ""),
         overshoot=entry.get("overshoot", 0.0), purpose=entry.get("purpose", ""),
+        tilt_x=entry.get("tilt_x", 0.0), tilt_y=entry.get("tilt_y", 0.0),
     )  # fmt: skip
 
 

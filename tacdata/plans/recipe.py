@@ -23,9 +23,9 @@ def write_out(recipe: dict[str, Any], sensor: Sensor, origin: str, seed: int = 0
     """Return the plan's document (`schemas/plan.schema.json`) of a recipe (`plan_recipe.schema.json`).
 
     Within a block the repeats of one press follow each other; holds vary fastest next, then speeds, depths,
-    approach directions and sites. ``order: random`` shuffles the block. Blocks keep their order, except that
-    presses of one indenter and yaw are brought together, so that each is mounted once, unless the recipe says
-    ``grouped: false``.
+    approach directions, sites, tilts and yaws. ``order: random`` shuffles the block. Blocks keep their order, except
+    that presses of one indenter, yaw and tilt are brought together, so that each is mounted once, unless the recipe
+    says ``grouped: false``.
 
     Args:
         recipe: The recipe's document.
@@ -42,8 +42,8 @@ def write_out(recipe: dict[str, Any], sensor: Sensor, origin: str, seed: int = 0
     for number, block in enumerate(recipe["blocks"]):
         presses += _block(block, sensor, rng, f"{origin}: blocks/{number}")
     if recipe.get("grouped", True):
-        mountings = list(dict.fromkeys((p["indenter"], p.get("yaw", 0.0)) for p in presses))
-        presses.sort(key=lambda p: mountings.index((p["indenter"], p.get("yaw", 0.0))))
+        mountings = list(dict.fromkeys(_mounting(press) for press in presses))
+        presses.sort(key=lambda press: mountings.index(_mounting(press)))
     document = {
         "version": schemas.version("plan"), "name": recipe["name"], "purpose": recipe.get("purpose", ""),
         "indenters": recipe["indenters"], "motion": recipe["motion"], "presses": presses,
@@ -62,6 +62,10 @@ def read_recipe(path: Path) -> dict[str, Any]:
     return documents.read(path, "plan_recipe")
 
 
+def _mounting(press: dict[str, Any]) -> tuple[Any, ...]:
+    return press["indenter"], *(press.get(angle, 0.0) for angle in ("yaw", "tilt_x", "tilt_y"))
+
+
 def _block(block: dict[str, Any], sensor: Sensor, rng: np.random.Generator, origin: str) -> list[dict[str, Any]]:
     places = sites(block["at"], sensor, rng, origin)
     if not len(places):
@@ -69,12 +73,13 @@ def _block(block: dict[str, Any], sensor: Sensor, rng: np.random.Generator, orig
     indenters = [block["indenter"]] if isinstance(block["indenter"], str) else block["indenter"]
     copied = {key: block[key] for key in COPIED if key in block}
     entries = []
-    for indenter, yaw, place, side, depth, speed, hold in product(
-        indenters, block.get("yaws", [0.0]), places.tolist(), block.get("approach_from", [None]),
-        block["depths"], block.get("speeds", [None]), block.get("holds", [None]),
+    for indenter, yaw, tilt, place, side, depth, speed, hold in product(
+        indenters, block.get("yaws", [0.0]), block.get("tilts", [[0.0, 0.0]]), places.tolist(),
+        block.get("approach_from", [None]), block["depths"], block.get("speeds", [None]), block.get("holds", [None]),
     ):  # fmt: skip
         x, y = (round(float(value), 3) for value in place)
         entry = {"indenter": indenter, "x": x, "y": y, "yaw": float(yaw)}
+        entry |= {name: float(lean) for name, lean in zip(("tilt_x", "tilt_y"), tilt, strict=True) if lean}
         optional = {"approach_from": side, "speed": speed, "hold": hold}
         entry |= {"depth": depth, **{k: v for k, v in optional.items() if v is not None}, **copied}
         entries += [{**entry, "repeat": repeat} for repeat in range(block.get("repeats", 1))]

@@ -109,6 +109,11 @@ def test_lost_frames_and_frames_off_the_path_are_not_valid() -> None:
         episode, taxels=replace(episode.taxels, counter=counter), tip_ns=episode.tip_ns - 2 * example.PERIOD
     )
     assert np.flatnonzero(~frames.valid(lossy)).tolist() == [7, 19]
+    bare = replace(episode, taxels=replace(episode.taxels, counter=np.full_like(episode.taxels.counter, -1)))
+    assert frames.valid(bare).all(), "without a counter the times tell"
+    kept = np.delete(np.arange(len(bare.taxels.counter)), 7)
+    gone = {n: getattr(bare.taxels, n)[kept] for n in ("arrival_ns", "sample_ns", "counter", "counts")}
+    assert np.flatnonzero(~frames.valid(replace(bare, taxels=replace(bare.taxels, **gone)))).tolist() == [7]
 
 
 @pytest.mark.parametrize("name", ["recording", "sensor", "model"])

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from farm_examples import SENSOR, press_episode
 
+from label_farm.fem import _request as pressed
 from label_farm.job import Job
 from label_farm.ladder import Ladder
 from label_farm.plan import request
 from tacdata.errors import FormatError, UsageError
+from tacdata.plans import Press
 
 MODEL = "0" * 64
 
@@ -46,10 +48,28 @@ def test_a_key_depends_on_all_that_decides_and_on_nothing_else(tmp_path):
         replace(job, x=0.1),
         replace(job, y=0.1),
         replace(job, yaw=0.1),
+        replace(job, tilt_x=0.1),
+        replace(job, tilt_y=0.1),
         replace(job, depths=(0.0, 0.5, 0.0)),
         replace(job, indenter={"shape": "sphere", "radius": 2.1}),
     ]
-    assert len({job.key, *(other.key for other in changed)}) == 8
+    assert len({job.key, *(other.key for other in changed)}) == 10
+
+
+def test_a_leaning_indenter_leans_in_its_job_and_in_the_press_that_is_solved(tmp_path):
+    episode = press_episode(tmp_path)
+    press = replace(episode.press, yaw=20.0, tilt_x=4.0, tilt_y=-7.0)
+    job = job_of(replace(episode, press=Press.from_document(press.document)))
+    assert (job.yaw, job.tilt_x, job.tilt_y) == (20.0, 4.0, -7.0)
+    assert Job.from_document(job.document) == job
+    asked = pressed(job)
+    assert (asked.yaw, asked.tilt_x, asked.tilt_y) == (20.0, 4.0, -7.0)
+
+
+def test_an_upright_press_is_the_job_that_it_was_before_indenters_could_lean(tmp_path):
+    job = job_of(press_episode(tmp_path))
+    assert "tilt_x" not in job.document and "tilt_x" not in press_episode(tmp_path).press.document
+    assert Job.from_document({**job.document, "version": "1.1"}).key == job.key
 
 
 def test_the_recorded_depth_counts_and_small_scatter_does_not(tmp_path):

@@ -52,6 +52,19 @@ def test_a_block_is_every_combination_once():
     assert written({**block, "order": "random"}, seed=1) == shuffled
 
 
+def test_leaning_mountings_are_plan_entries_that_stay_together():
+    block = {"indenter": "pin", "tilts": [[0, 0], [5, -3]], "at": {"kind": "center"}, "depths": [0.3]}
+    presses = written(block, {"indenter": "ball", "at": {"kind": "center"}, "depths": [0.3]}, {**block, "yaws": [90]})
+    assert [p.mounting for p in presses] == [
+        ("pin", 0.0, 0.0, 0.0), ("pin", 0.0, 5.0, -3.0), ("ball", 0.0, 0.0, 0.0),
+        ("pin", 90.0, 0.0, 0.0), ("pin", 90.0, 5.0, -3.0),
+    ]  # fmt: skip
+    assert presses[1].turned == "0 deg, leaning 5 deg about x and -3 deg about y"
+    assert presses[1].angles == {"yaw": 0.0, "tilt_x": 5.0, "tilt_y": -3.0} and presses[0].angles == {"yaw": 0.0}
+    with pytest.raises(FormatError, match="tilts/0/1: 45 is greater than the maximum of 30"):
+        written({**block, "tilts": [[0, 45]]})
+
+
 @pytest.mark.parametrize(
     ("at", "count", "test"),
     [
