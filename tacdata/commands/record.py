@@ -146,14 +146,14 @@ def _mounting(rig: Rig, bar: _Bar) -> Callable[[Press], None]:
     if "mounting" in rig.document:
         from tacdata.virtual_rig.mounting import mount
 
-        return lambda press: mount(rig.document, press.indenter.document, press.yaw)
+        return lambda press: mount(rig.document, press.indenter.document, **press.angles)
 
     def ask(press: Press) -> None:
         from tacdata.errors import UsageError
 
         bar.pause()
         sizes = ", ".join(f"{k} {v:g}" for k, v in press.indenter.document.items() if k != "shape")
-        print(f"\nMount {press.indenter_name} ({press.indenter.shape}; {sizes}) at {press.yaw:g} deg.")
+        print(f"\nMount {press.indenter_name} ({press.indenter.shape}; {sizes}) at {press.turned}.")
         if _answer("Mounted, and its tip zeroed? [y/N] ").lower() not in ("y", "yes"):
             raise UsageError(
                 f"{press.indenter_name} was not mounted",

@@ -32,6 +32,13 @@ def run(
         float | None,
         typer.Option(metavar="MM", help="with --demo: fingers press round nubs of this radius on ball or eraser"),
     ] = None,
+    hide: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND=SIZE",
+            help="something that rig.yaml does not tell of, for discrepancy to find: play=0.06, late=0.08, give=0.05",
+        ),
+    ] = None,
     fault: Annotated[
         str | None, typer.Option(help="with --demo: no-tag, turned-tag, swapped-fingers or silent-finger")
     ] = None,
@@ -39,8 +46,12 @@ def run(
     """Emulate a rig (GRBL, taxel board, camera) that other verbs reach by its rig.yaml, until Ctrl-C."""
     from tacdata.errors import UsageError
     from tacdata.sensor import read_sensor
+    from tacdata.virtual_rig.hidden import hidden_from
     from tacdata.virtual_rig.rig import VirtualRig
 
+    secret = hidden_from(hide or [])
+    if secret and demo:
+        raise UsageError("--hide with --demo", "one of them", "leave one out")
     if task != "grasp" and not demo:
         raise UsageError(f"--task {task} without --demo", "--demo --task wipe", "add --demo")
     if nub is not None and not demo:
@@ -57,7 +68,7 @@ def run(
             directory, 0.5 if speed is None else speed, seed, cameras, fault, skin, task, RADIUS if nub is None else nub
         )
     else:
-        rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skin, rough)
+        rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skin, rough, secret)
     try:
         rig.start()
         print("\n".join([*rig.emulates, f"rig file           {rig.path}", "Ctrl-C stops it."]), flush=True)

@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import threading
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 import schemas
 from tacdata import documents
 from tacdata.errors import DeviceError, TacdataError, UsageError
 from tacdata.indenters import Indenter, from_document
+from tacdata.virtual_rig.lower_face import LowerFace
 
 POLL = 0.01
 """Time between two looks at a file [s]."""
 LONGEST = 60.0
 """Longest time that taking an indenter may last [s]: a new solid's distances are computed first."""
-SPACING = 0.05
-"""Between samples of a solid's lower surface [mm]."""
-FAR = 100.0
-"""Height that stands for no solid [mm]."""
 
 
-def mount(rig: dict[str, Any] | Path, indenter: dict[str, Any], yaw: float = 0.0) -> None:
+def mount(
+    rig: dict[str, Any] | Path, indenter: dict[str, Any], yaw: float = 0.0, tilt_x: float = 0.0, tilt_y: float = 0.0
+) -> None:
     """Mount an indenter on a virtual rig; it is in place when this returns.
 
     Args:
         rig: A rig file's document with ``mounting: {file: PATH}``, or the directory of a virtual rig.
         indenter: ``{"shape": name, parameter: value, ...}``, as in a plan.
-        yaw: Rotation about z in the sensor's frame [deg].
+        yaw: Rotation about its own axis in the sensor's frame [deg].
+        tilt_x: How far that axis leans about x [deg], after the yaw and the tilt about y.
+        tilt_y: How far it leans about y [deg], after the yaw.
 
     Raises:
         UsageError: If the rig has no mounting file: there a person mounts.
@@ -51,7 +48,9 @@ def mount(rig: dict[str, Any] | Path, indenter: dict[str, Any], yaw: float = 0.0
     else:
         path = rig / "mounted.json"
     from_document(indenter, "mounting")
-    documents.write(path, {"version": schemas.version("mounting"), "indenter": indenter, "yaw": yaw}, "mounting")
+    leans = {name: tilt for name, tilt in (("tilt_x", tilt_x), ("tilt_y", tilt_y)) if tilt}
+    document = {"version": schemas.version("mounting"), "indenter": indenter, "yaw": yaw, **leans}
+    documents.write(path, document, "mounting")
     status = path.stat()
     mark, end = str((status.st_ino, status.st_mtime_ns)), time.monotonic() + LONGEST
     while taken(path).exists() and taken(path).read_text() != mark:
@@ -75,7 +74,7 @@ class Mounted:
     def __init__(self, path: Path) -> None:
         """Watch a file that may not exist yet."""
         self.path = path
-        self.indenter: Indenter | Lowest | None = None
+        self.indenter: Indenter | LowerFace | None = None
         self.yaw = 0.0
         self._seen: tuple[int, int] | None = None
         self._stopped = threading.Event()
@@ -105,8 +104,14 @@ class Mounted:
             return
         document = documents.read(self.path, "mounting")
         indenter = from_document(document["indenter"], str(self.path))
-        self.indenter = Lowest.of(indenter) if indenter.shape == "mesh" else indenter
-        self.yaw, self._seen = float(document["yaw"]), mark
+        tilts = [float(document.get(name, 0.0)) for name in ("tilt_x", "tilt_y")]
+        if any(tilts):
+            # The leaning axis is fixed in the sensor's frame: the table holds the yaw as well.
+            self.indenter, self.yaw = LowerFace.of(indenter, float(document["yaw"]), *tilts), 0.0
+        else:
+            self.indenter = LowerFace.upright(indenter) if indenter.shape == "mesh" else indenter
+            self.yaw = float(document["yaw"])
+        self._seen = mark
 
     def _watch(self) -> None:
         while not self._stopped.wait(POLL):
@@ -117,32 +122,3 @@ class Mounted:
                 print(error, file=sys.stderr, flush=True)
             if self._seen != before:
                 taken(self.path).write_text(str(self._seen))
-
-
-@dataclass(frozen=True)
-class Lowest:
-    """The lower surface of a solid from a file as a table: the solid itself answers too slowly for a stream."""
-
-    extent: float
-    """Largest horizontal distance of the solid from its axis [mm]."""
-    heights: np.ndarray
-    """Height over a square of twice the extent [mm], shape (n, n); ``FAR`` beside the solid."""
-
-    @classmethod
-    def of(cls, indenter: Indenter) -> Lowest:
-        """Sample an indenter every `SPACING`."""
-        n = 2 * math.ceil(indenter.extent / SPACING) + 1
-        line = np.linspace(-indenter.extent, indenter.extent, n)
-        x, y = np.meshgrid(line, line, indexing="ij")
-        return cls(indenter.extent, np.minimum(indenter.profile(x, y), FAR))
-
-    def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height [mm] over (x, y) [mm], linear between the samples; `FAR` beside them."""
-        last = len(self.heights) - 1
-        i, j = ((np.asarray(v) / self.extent + 1) * last / 2 for v in (x, y))
-        beside = (i < 0) | (i > last) | (j < 0) | (j > last)
-        a, b = (np.clip(np.floor(v).astype(int), 0, last - 1) for v in (i, j))
-        s, t = np.clip(i - a, 0, 1), np.clip(j - b, 0, 1)
-        h = self.heights
-        low, high = (1 - t) * h[a, b] + t * h[a, b + 1], (1 - t) * h[a + 1, b] + t * h[a + 1, b + 1]
-        return np.where(beside, FAR, (1 - s) * low + s * high)

@@ -21,6 +21,7 @@ from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import Board, draw_timing
 from tacdata.virtual_rig.camera import Camera
 from tacdata.virtual_rig.controller import Controller
+from tacdata.virtual_rig.hidden import HiddenWorld
 from tacdata.virtual_rig.mounting import Mounted
 from tacdata.virtual_rig.scene import CUBE, INTRINSICS, draw_scene
 from tacdata.virtual_rig.world import World, draw
@@ -53,12 +54,12 @@ class VirtualRig:
 
     def __init__(
         self, directory: Path, speed: float = 1.0, seed: int = 0, camera: bool = True,
-        sensor: Sensor | None = None, rough: bool = False,
+        sensor: Sensor | None = None, rough: bool = False, hidden: dict[str, float] | None = None,
     ) -> None:  # fmt: skip
         """Set up a rig whose clock runs ``speed`` times as fast as real time; ``seed`` decides its world.
 
         With ``rough`` the sensor was put down by eye, up to a millimetre and some degrees off; the rig file does not
-        say that it was registered.
+        say that it was registered. ``hidden``: kind -> size of what no file but truth.yaml tells of (`hidden.KINDS`).
 
         Raises:
             UsageError: If ``speed`` is not positive or too fast.
@@ -71,7 +72,10 @@ class VirtualRig:
         self.sensor = sensor or default_sensor()
         self.truth = draw(seed, self.sensor, NOMINAL, rough)
         self._rough = rough
+        self._hidden = hidden or {}
         self.world = World(self.truth, self.sensor)
+        if self._hidden:
+            self.world = HiddenWorld(self.truth, self.sensor, self._hidden, directory)
         self.mounted = Mounted(directory / "mounted.json")
         parked = (NOMINAL.origin[0], NOMINAL.origin[1], NOMINAL.origin[2] + PARKED)
         self.controller = Controller(self.clock, seed, parked)
@@ -146,7 +150,7 @@ class VirtualRig:
             {"rate": self.camera.rate, "start_ns": self.camera.start_ns, **self.scene.document} if self.camera else None
         )
         truth = {
-            "version": schemas.version("virtual_truth"), "world": self.truth.document,
+            "version": schemas.version("virtual_truth"), "world": {**self.truth.document, "hidden": self._hidden},
             "board": asdict(self.board.timing), "camera": camera,
         }  # fmt: skip
         documents.write(self.directory / "truth.yaml", truth, "virtual_truth")

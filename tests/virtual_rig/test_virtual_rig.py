@@ -13,7 +13,8 @@ from tacdata.indenters import from_document
 from tacdata.rig import read_rig
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig import mount
-from tacdata.virtual_rig.mounting import Lowest, Mounted
+from tacdata.virtual_rig.lower_face import LowerFace
+from tacdata.virtual_rig.mounting import Mounted
 from tacdata.virtual_rig.rig import NOMINAL, VirtualRig, board_format, running
 from tacdata.virtual_rig.scene import CUBE, INTRINSICS, draw_scene
 
@@ -110,7 +111,7 @@ def test_a_solid_from_a_file_is_in_place_when_mounting_returns(tmp_path):
         mount(read_rig(path).document, solid.document)
         assert (tmp_path / "rig" / "mounted.taken").exists()
     assert not (tmp_path / "rig" / "mounted.taken").exists()
-    lowest = Lowest.of(solid)
+    lowest = LowerFace.upright(solid)
     x, y = np.random.default_rng(0).uniform(-1.9, 1.9, (2, 400))
     x, y = x[x**2 + y**2 < 1.7**2], y[x**2 + y**2 < 1.7**2]
     np.testing.assert_allclose(lowest.profile(x, y), 2 - np.sqrt(4 - x**2 - y**2), atol=0.02)
