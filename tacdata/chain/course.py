@@ -54,6 +54,8 @@ class Course:
     """Measured temperature [degC], shape (n,)."""
     notes: tuple[str, ...] = ()
     """What a person should know of these data, in words."""
+    numbers: tuple[int, ...] = ()
+    """Each channel's number in the recordings; empty: none was left out."""
 
     @property
     def rows(self) -> int:
@@ -64,6 +66,11 @@ class Course:
     def channels(self) -> int:
         """Number of channels."""
         return self.readings.shape[1]
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """What each channel is called, by its number in the recordings."""
+        return tuple(f"channel {k}" for k in self.numbers or range(self.channels))
 
     @property
     def episodes(self) -> int:

@@ -19,6 +19,12 @@ SHORT = 0.4
 """A sudden change of speed over less of the longest way does not matter [1]."""
 SETTLED = 0.4
 """Time after the last motion from which readings are averaged [s]."""
+MANY = 300
+"""Readings in motion of one episode from which on those of slow motion are averaged too [1]..."""
+SLOW = 0.01
+"""...over no more than this way [mm, and of the deepest point, whichever is more]..."""
+BRIEF = 0.032
+"""...and no longer than this [s]."""
 WIDEST = 0.12
 """Share of the time at rest that an average may span [1]."""
 
@@ -58,7 +64,8 @@ def rows_of(
     tip = tip_at(time)
     moving = np.abs(np.diff(tip, axis=0, prepend=tip[:1])).max(axis=1) > 1e-5
     last = np.maximum.accumulate(np.where(moving, time, time[0] - SETTLED if not moving[0] else time[0]))
-    group = _groups(time, last)
+    slow = SLOW * max(1.0, float(path[:, 2].max())) if moving.sum() > MANY else -1.0
+    group = _groups(time, last, tip, slow)
     count = np.bincount(group).astype(float)
     mean_time = np.bincount(group, time) / count
     mean = np.stack([_mean(group, column) for column in values.T], axis=-1)
@@ -81,14 +88,24 @@ def _mean(group: np.ndarray, column: np.ndarray) -> np.ndarray:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def _groups(time: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Number the groups of readings that become one row."""
+def _groups(time: np.ndarray, last: np.ndarray, tip: np.ndarray, slow: float) -> np.ndarray:
+    """Number the groups of readings that become one row.
+
+    Args:
+        time: Of each reading [s], shape (n,).
+        last: Time of the last motion before each [s], shape (n,).
+        tip: [mm], shape (n, 3).
+        slow: Longest way within a group that moves [mm]; below 0 each reading that moves is a row.
+    """
     result, number, begin = np.zeros(len(time), dtype=np.int64), 0, 0
     for i in range(1, len(time)):
         rest = time[begin] - last[begin]
         wide = max(rest, 0.0) * WIDEST
-        if rest < SETTLED or last[i] != last[begin] or time[i] - time[begin] > wide:
-            number, begin = number + 1, i
+        resting = rest >= SETTLED and last[i] == last[begin] and time[i] - time[begin] <= wide
+        if not resting:
+            near = slow >= 0 and time[i] - time[begin] <= BRIEF and np.abs(tip[i] - tip[begin]).max() <= slow
+            if not near:
+                number, begin = number + 1, i
         result[i] = number
     return result
 

@@ -17,7 +17,7 @@ def run(
     recordings: Annotated[
         list[Path], typer.Argument(help="Recordings (.mcap) or session folders; several sessions in one verdict.")
     ],
-    out: Annotated[Path, typer.Option(help="New folder for verdict.json, verdict.txt, verdict.png and a new spec.")],
+    out: Annotated[Path, typer.Option(help="New folder: verdict.json, .txt, .png, residuals.parquet, a new spec.")],
     spec: Annotated[
         Path | None,
         typer.Option(help="Model spec (schemas/model_spec.schema.json); else a response fitted to the recordings."),

@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.chain import Course
+from tacdata.discrepancy.clocks import shifted
 
 FEWEST = 8
 """Fewer episodes carry no name."""
+RATES = 2.5
+"""Rates of pressing must differ by such a factor for lags to be told from play and friction [1]."""
+TOUCHING = 0.02
+"""Depth, over the largest of all, from which on a speed is one of pressing and not of the way there [1]."""
 
 
 def amiss(course: Course) -> list[str]:
@@ -18,8 +23,7 @@ def amiss(course: Course) -> list[str]:
             f"{course.episodes} episodes are too few for a verdict: record {FEWEST} or more, better 40, presses of "
             "several depths and rates (`tacdata plan diagnostic`)"
         )
-    speeds = np.array([np.abs(course.speed[course.episode == e]).max() for e in range(course.episodes)])
-    if len(speeds) > 1 and speeds.max() < 2 * max(np.median(speeds), 1e-9) and speeds.min() > 0.5 * np.median(speeds):
+    if course.episodes > 1 and one_rate(course):
         told.append(
             "one rate only: delay, filter, backlash and relaxation look alike; record three rates over a decade"
         )
@@ -39,6 +43,7 @@ def amiss(course: Course) -> list[str]:
         told.append("an indenter without a known radius: what depends on it is not judged")
     if len(course.tools) < 2:
         told.append("one indenter: compliance, stiffening and poroelasticity need a second radius")
+    told += shifted(course)
     told += units(course)
     told += stuck(course)
     if course.force is None:
@@ -46,6 +51,16 @@ def amiss(course: Course) -> list[str]:
     if course.tag is None:
         told.append("no second observation of the pose: the guide and the skin are told apart by their response alone")
     return told
+
+
+def one_rate(course: Course) -> bool:
+    """Return whether all episodes are pressed at about the same rate; how they come to the skin does not count."""
+    deep = course.tip[:, 2] > TOUCHING * course.span
+    touching = deep & np.append(False, deep[:-1])  # a speed is the way from the row before
+    pressed = np.unique(course.episode[touching])
+    speeds = np.array([np.abs(course.speed[touching & (course.episode == e)]).max() for e in pressed])
+    low, high = np.quantile(speeds, [0.1, 0.9]) if len(speeds) else (0.0, 0.0)
+    return bool(high < RATES * low or high <= 0)
 
 
 STROKE, RATE, RADIUS, EVERY = (0.02, 60.0), 500.0, 200.0, (2e-5, 5.0)
@@ -85,25 +100,6 @@ def stuck(course: Course) -> list[str]:
     return told
 
 
-def clocks(called: set[str], late: float) -> list[str]:
-    """Return in words what a named delay says of the clocks.
-
-    Args:
-        called: Mechanisms in the answer.
-        late: The delay found [s]; 0 for none.
-    """
-    told = []
-    if abs(late) > LATE:
-        told.append(f"readings are {late:.2f} s late: more than a sensor is; were the clocks of path and readings one?")
-    if "clock_skew" in called:
-        told.append("the clocks of path and readings run apart: record both on one clock, or a tap early and late")
-    return told
-
-
-LATE = 0.25
-"""Delays beyond this are of clocks, not of sensors [s]."""
-
-
 def longest_hold(course: Course) -> float:
     """Return the longest rest at depth [s]."""
     deep = course.tip[:, 2] > course.tip[:, 2].min() + 0.3 * course.stroke
@@ -119,7 +115,8 @@ def _recovers(course: Course) -> bool:
     for e in range(course.episodes):
         rows = np.flatnonzero(course.episode == e)
         top = rows[np.argmax(course.tip[rows, 2])]
-        after = rows[(rows > top) & (course.tip[rows, 2] <= course.tip[rows, 2].min() + 0.02 * course.stroke)]
+        away = max(0.0, float(course.tip[rows, 2].min()) + 0.02 * course.stroke)
+        after = rows[(rows > top) & (course.tip[rows, 2] <= away)]
         if len(after) > 1 and course.time[after[-1]] - course.time[after[0]] > 2.0:
             return True
     return False

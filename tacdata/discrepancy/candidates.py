@@ -16,6 +16,12 @@ MOST_CHANNELS = 32
 """Up to so many channels, parameters that every channel has of its own get a column each; beyond, one for all."""
 
 
+SMALL = (0.1, 0.02)
+"""An effect with a threshold looks otherwise where it is small: it is tried at these shares of its size too..."""
+ALIKE = 0.95
+"""...if what it changes there is no more alike than this [cosine] to what it does at the larger size."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect at one choice of its shapes."""
@@ -86,11 +92,20 @@ def build(
         if reason:
             unjudgeable[effect.name] = reason
             continue
+        shares = SMALL
         for shapes in _shapes(effect):
             made, low, high = _columns(effect, shapes, course, response, placed, streams, now)
-            index = np.arange(len(columns) - 1, len(columns) - 1 + len(made))
-            columns += made
-            candidates.append(Candidate(effect, shapes, index, np.array(low), np.array(high)))
+            sizes = [made]
+            for share in shares:
+                small, _, _ = _columns(effect, shapes, course, response, placed, streams, now, share)
+                if not _unlike(sizes[-1], small):
+                    shares = shares[: shares.index(share)]  # A threshold is one at all times and lengths, or at none.
+                    break
+                sizes.append(small)
+            for columns_of in sizes:
+                index = np.arange(len(columns) - 1, len(columns) - 1 + len(columns_of))
+                columns += columns_of
+                candidates.append(Candidate(effect, shapes, index, np.array(low), np.array(high)))
     return Board(np.stack(columns, axis=-1), candidates, unjudgeable)
 
 
@@ -126,6 +141,13 @@ def _absorbed(effect: Effect, nuisance: Sequence[str]) -> str:
     return "read off the calibration of each channel's gain" if effect.name in nuisance else ""
 
 
+def _unlike(first: list[np.ndarray], second: list[np.ndarray]) -> bool:
+    """Return whether two sets of columns of one effect point elsewhere."""
+    both = sum(float(np.vdot(a, b)) for a, b in zip(first, second, strict=True))
+    sizes = [sum(float(np.vdot(a, a)) for a in columns) for columns in (first, second)]
+    return both < ALIKE * float(np.sqrt(sizes[0] * sizes[1]))
+
+
 def _shapes(effect: Effect) -> list[dict[str, float]]:
     names = [p.name for p in effect.shapes]
     return [dict(zip(names, values, strict=True)) for values in product(*(p.grid for p in effect.shapes))]
@@ -133,16 +155,17 @@ def _shapes(effect: Effect) -> list[dict[str, float]]:
 
 def _columns(
     effect: Effect, shapes: dict[str, float], course: Course, response: Response, placed: Sequence[Placed],
-    streams: Streams, now: np.ndarray,
+    streams: Streams, now: np.ndarray, share: float = 1.0,
 ) -> tuple[list[np.ndarray], list[float], list[float]]:  # fmt: skip
+    """Return what an effect changes at a share of its typical sizes, over that share, and the bounds."""
     made, low, high = [], [], []
     rest = {p.name: np.full(course.channels, p.default) if p.per_channel else np.array(p.default)
             for p in effect.amplitudes}  # fmt: skip
     rest |= {name: np.array(value) for name, value in shapes.items()}
     for p in effect.amplitudes:
-        values = {**rest, p.name: rest[p.name] + p.typical}
+        values = {**rest, p.name: rest[p.name] + share * p.typical}
         change = streams.predicted(predict(course, response, [*placed, Placed(effect, values)])) - now
-        change = change.astype(np.float32)
+        change = (change / share).astype(np.float32)
         if p.per_channel and course.channels <= MOST_CHANNELS:
             for channel in range(course.channels):
                 own = np.zeros_like(change)

@@ -48,6 +48,8 @@ class Clustered:
     """Degrees of freedom of the statistic: of the pull, of the scatter [1]."""
     expected: float = 1.0
     """What `power` is if nothing but the noise shakes [1]."""
+    drawn: float = 1.0
+    """Degrees of freedom of what `by_chance` draws: no more than the stretches at hand span [1]."""
 
     @property
     def power(self) -> float:
@@ -72,7 +74,7 @@ class Clustered:
             normal: Of each stretch's number, at least as many as there are, shape (draws, stretches or more).
         """
         pulls = normal[:, : len(self.scatter)] @ self.scatter
-        return _normal(np.sum(np.square(pulls), axis=1) / self.power, self.freedom[0], 1e6)
+        return _normal(np.sum(np.square(pulls), axis=1) / self.power, self.drawn, 1e6)
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,8 @@ def clustered(gram: np.ndarray, columns: np.ndarray, clock: bool) -> Clustered:
         return _nothing(len(gram))
     scatter = together[:, told] / (1 - heavy[:, told])
     expected = float(np.sum(heavy[:, told] / (1 - heavy[:, told])))
-    return Clustered(pull[told], scatter, of, _freedom(scatter, heavy[:, told]), expected)
+    own, freedom = _freedom(scatter, heavy[:, told])
+    return Clustered(pull[told], scatter, of, freedom, expected, own)
 
 
 def _nothing(episodes: int) -> Clustered:
@@ -177,12 +180,20 @@ def _alike(bare: np.ndarray, leverage: np.ndarray, beyond: float) -> bool:
     return (common + 1 / len(bare)) * np.sqrt(len(bare) * freedom) > beyond
 
 
-def _freedom(scatter: np.ndarray, heavy: np.ndarray) -> tuple[float, float]:
+def _freedom(scatter: np.ndarray, heavy: np.ndarray) -> tuple[float, tuple[float, float]]:
+    """Return the degrees of freedom that the scatter spans, and those of the pull and of its power.
+
+    Few stretches span fewer directions than the pull has: the participation ratio (tr C)^2 / tr C^2 of the amplitudes'
+    covariance C is told without that bias, as tr C^2 from n equal stretches is too large by (tr C)^2 / n.
+    """
     product = scatter @ scatter.T
-    own = max(float(np.trace(product)) ** 2 / max(float(np.sum(product**2)), 1e-300), 1.0)
+    whole, square = float(np.trace(product)) ** 2, max(float(np.sum(product**2)), FLOOR)
     share = heavy.sum(axis=1) / max(float(heavy.sum()), 1e-12)
-    count = 1 / float(np.sum(share**2))
-    return own, max(own * (count - 1), 1.0)
+    together = float(np.sum(share**2))
+    least = whole / scatter.shape[1]
+    own = whole / max((square - together * whole) / (1 + together), least, FLOOR)
+    own = max(own, 1.0)
+    return max(whole / square, 1.0), (own, max(own * (1 / together - 1), 1.0))
 
 
 def _normal(ratio: np.ndarray, first: float, second: float) -> np.ndarray:

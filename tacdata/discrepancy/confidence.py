@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.discrepancy.judge import Judgement, Member
+from tacdata.discrepancy.judgement import Judgement, Member
 
 FILE = "confidence.json"
 """The map: weights, and the worlds and the command that they come from."""
-MOST = 8.0
+MOST = 12.0
 """Margins beyond so many standard errors are all the same [1]."""
 
 

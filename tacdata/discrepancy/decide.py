@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.discrepancy.excitation import inseparable
-from tacdata.discrepancy.judge import DECOYS, GATE, NEEDED, Judgement, Member
+from tacdata.discrepancy.judge import DECOYS, GATE
+from tacdata.discrepancy.judgement import Judgement, Member
 from tacdata.effects import Placed, load
 
 LEFT = 0.05
@@ -18,6 +19,8 @@ FAR = 5.0
 """A rival beaten by so many standard errors over episodes is out, whatever the answer leaves [1]."""
 SURE = 3.0
 """Without any effect that helps, leftovers must show by so many standard errors to be called a gap [1]."""
+LOUD = 2.0
+"""A residual of so many times the noise floor is not nothing, even if several episodes bear no effect out [1]."""
 BEYOND = 3.0
 """A channel's gain is more than calibration's business beyond so many of its standard deviations [1]."""
 OUTLYING = 4.0
@@ -64,7 +67,7 @@ def calibrated(found: Judgement) -> list[Member]:
         placed = Placed(load("gain"), {"e": np.array(common)})
         error = float(1.25 * np.std(known) / np.sqrt(len(known)))
         rivals = COMMON if found.problem.setting.course.force is None else ()
-        made.append(Member(placed, {"e": error}, (), rivals, {}, abs(common) / max(error, 1e-9)))
+        made.append(Member(placed, {"e": error}, (), rivals, {}, abs(common) / max(error, 1e-9), needed=BEYOND))
     own = np.nan_to_num(found.gains - common)
     spread = float(np.sqrt(np.mean(np.square(known - common))))
     # Gains may all be worse than calibration was thought to be; else a channel must stand out against its kind.
@@ -72,8 +75,13 @@ def calibrated(found: Judgement) -> list[Member]:
     far = np.abs(own) > (BEYOND if spread > WIDE * prior else OUTLYING) * usual
     if far.any():
         placed = Placed(load("channel_gain"), {"e": np.where(far, own, 0.0)})
-        made.append(Member(placed, {"e": prior}, (), (), {}, float(np.abs(own).max() / prior)))
+        made.append(Member(placed, {"e": prior}, (), (), {}, float(np.abs(own).max() / prior), needed=BEYOND))
     return made
+
+
+def loudness(found: Judgement) -> float:
+    """Return the mean square of the whitened residual of the model as it was given [noise floor]."""
+    return 2 * float(found.energy[0].sum()) / max(float(found.values.sum()), 1.0)
 
 
 def status(found: Judgement) -> str:
@@ -81,10 +89,11 @@ def status(found: Judgement) -> str:
     answer = members(found)
     if found.until != "decide":
         return "unknown" if found.gap else "none"
+    quiet = "unknown" if loudness(found) > LOUD else "none"
     if not found.gap and not answer:
-        return "none"
+        return quiet
     if not answer and found.tested.p_generic > GATE and found.left.t < SURE:
-        return "none"  # one effect in a hundred flips, and nothing that bears it out
+        return quiet  # one effect in a hundred flips, and nothing that bears it out
     if not answer or not adequate(found):
         return "unknown"
     return "ambiguous" if any(settled(m) != "named" for m in answer) else "named"
@@ -92,5 +101,5 @@ def status(found: Judgement) -> str:
 
 def settled(member: Member) -> str:
     """Return whether one effect may be named: named or ambiguous."""
-    doubt = member.rivals or member.at_bound or member.decoys > DECOYS or member.necessity < NEEDED
+    doubt = member.rivals or member.at_bound or member.decoys > DECOYS or member.necessity < member.needed
     return "ambiguous" if doubt else "named"

@@ -10,9 +10,6 @@ from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.streams import Streams
 from tacdata.effects import Placed
 
-FORM = 0.1
-"""Standard deviation of what an equation is off by, along each modulation, over the contribution [1]."""
-
 
 def forms(course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()) -> np.ndarray:
     """Return columns at one standard deviation, shape (n, streams, k), float32; k is 0 without placed effects.
@@ -26,7 +23,8 @@ def forms(course: Course, response: Response, placed: Sequence[Placed], given: S
     for at in range(len(placed)):
         rest = [p for k, p in enumerate(placed) if k != at]
         own = whole - streams.predicted(predict(course, response, [*every, *rest]))
-        columns += [FORM * own * by for by in modulations(course, streams, own)]
+        off = placed[at].effect.form_error
+        columns += [off * own * by for by in modulations(course, streams, own)]
     if not columns:
         return np.zeros((len(course.read), streams.count, 0), dtype=np.float32)
     return np.stack(columns, axis=-1).astype(np.float32)

@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tacdata.discrepancy.candidates import Candidate
+from tacdata.discrepancy.clusters import Lent
 from tacdata.discrepancy.fit import clipped_t, gains
+from tacdata.discrepancy.judgement import Judgement, Member
+from tacdata.discrepancy.paired import ahead
 from tacdata.discrepancy.problem import Frame, Problem, Setting, frame, prepare
 from tacdata.discrepancy.refine import Refined, refine
 from tacdata.discrepancy.search import Left, Tested, best_shapes, fitted, held_out, leftovers, test
-from tacdata.effects import Placed, load
+from tacdata.effects import load
 
 ALPHA = 0.01
 """Share of decoys that may do as well, over all candidates together."""
-GATE = 0.5 * ALPHA
+GATE = ALPHA
 """The same for each of the gate's two looks: at all effects, and at columns that belong to none."""
 MOST = 4
 """Most effects in one verdict."""
 TOP = 8
 """How many effects are tried as members of pairs and as rivals."""
-RIVAL = 2.33
+RIVAL = 2.58
 """A rival is out when the winner is better by so many standard errors over episodes [1]."""
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
-MINOR = 0.003
-"""Share of what all explain that a further effect must explain [1]; less may be numerics of the larger ones."""
-NEEDED = 2.8
-"""... and an effect is needed if the answer is worse by so many without it [1]: more, as it was chosen among many."""
+MINOR = 0.3
+"""A further effect must explain so much of what the equations of the others may be off about, in energy [1]."""
+KEPT = 2.8
+"""An effect stays in the answer if that is worse by so many standard errors without it [1]."""
 SWAPS = 2
 """How often a rival may take the place of an effect [1]."""
 AHEAD = 1.0
@@ -56,62 +59,6 @@ STEPS = ("gate", "locate", "fit", "decide")
 Note = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Member:
-    """One effect of the answer, with those that would do as well."""
-
-    placed: Placed
-    error: dict[str, float]
-    """Standard error of each parameter, in its unit."""
-    at_bound: tuple[str, ...]
-    """Parameters at a physical bound."""
-    rivals: tuple[str, ...]
-    """Mechanisms that explain the episodes as well in its place."""
-    margins: dict[str, float]
-    """Rival effect -> by how many standard errors over episodes the member is better."""
-    necessity: float
-    """By how many standard errors over episodes the model is worse without it."""
-    losses: dict[str, float] = field(default_factory=dict)
-    """Rival effect -> by how much half the whitened energy is larger with it [nats]."""
-    selected: float = 1.0
-    """Share of resamplings of the episodes in which its mechanism explains most [1]."""
-    decoys: float = 0.0
-    """Share of decoys, all effects with chance scores, that do as well [1]."""
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """What was found."""
-
-    gap: bool
-    """Whether anything is missing."""
-    tested: Tested
-    members: tuple[Member, ...]
-    left: Left
-    """What is still predictable with the members in place."""
-    explained: float
-    """Gain of the members in half the whitened energy [nats]."""
-    energy: tuple[np.ndarray, np.ndarray]
-    """Half the whitened energy of each episode before and after [nats], each of shape (episodes,)."""
-    values: np.ndarray
-    """Whitened values behind each episode [1], shape (episodes,)."""
-    problem: Problem
-    """The model as it was given."""
-    final: Problem
-    """The model with the members in place."""
-    gains: np.ndarray
-    """Gain of each channel beyond the response's, as calibration finds it [1], shape (channels,); 0 if fitted, NaN for
-    channels that these presses do not stir."""
-    until: str = "decide"
-    """The last step that was made, one of `STEPS`."""
-
-    @property
-    def share_left(self) -> float:
-        """Share of what could be explained that the members leave [1]."""
-        whole = self.left.gain + max(self.explained, 0.0)
-        return self.left.gain / whole if whole > 0 else 0.0
-
-
 def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide") -> Judgement:
     """Find what a model lacks.
 
@@ -126,19 +73,20 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     tested = test(problem)
     gap = bool(min(tested.p.min(initial=1.0), tested.p_generic) <= GATE)
     nothing = refine(setting, [], problem.frame)
-    now, current, members = problem, nothing, []
+    now, current, members, off = problem, nothing, [], 0.0
     verdicts, beaten = tested, _beaten(problem, tested, {})
     while gap and len(members) < MOST and until not in STEPS[:2]:
         chosen = _next(now, verdicts)
         if not chosen:
             break
         note(f"fit: {', '.join(' with '.join(c.effect.name for c in one) for one in chosen)}")
-        best, _ = _race(now, current, chosen)
+        best, _ = _race(now, current, chosen, verdicts.lent)
         if best is None:
             break
-        whole = float((nothing.energy - best.energy).sum())
-        if members and float((current.energy - best.energy).sum()) < MINOR * whole:
+        more = float((current.energy - best.energy).sum())
+        if members and more < MINOR * off:
             break
+        off += more * float(np.mean([p.effect.form_error**2 for p in best.placed[len(members) :]]))
         members = list(best.placed)
         # Noise told beside a large missing effect is too large: tell it again.
         same = frame(replace(setting, response=best.response, given=(*setting.given, *best.placed)))
@@ -156,14 +104,14 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     note("rivals and leftovers")
     if members:
         problem = prepare(setting, same)
-    found, current = _members(setting, current, problem)
+    found, current = _members(setting, current, problem, verdicts.lent)
     found = [replace(m, decoys=_decoys(setting, current, k, same, beaten)) for k, m in enumerate(found)]
     while len(found) > 1 and max(m.decoys for m in found) > DECOYS:
         # Held-out episodes lie between others: a slow wander helps there, and is no effect.
         weakest = max(range(len(found)), key=lambda k: found[k].decoys)
         rest = [p for k, p in enumerate(current.placed) if k != weakest]
         current = refine(replace(setting, response=current.response), rest, same, AGAIN)
-        found, current = _members(setting, current, problem)
+        found, current = _members(setting, current, problem, verdicts.lent)
         found = [replace(m, decoys=_decoys(setting, current, k, same, beaten)) for k, m in enumerate(found)]
     if found and [p.effect.name for p in current.placed] != [p.effect.name for p in now.placed]:
         now = prepare(replace(setting, response=current.response), same, current.placed)
@@ -214,7 +162,7 @@ def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:
     singles = sorted(((_gain(problem, [c]), c) for c in free), key=lambda item: -item[0])[:TOP]
     significant = {c.effect.name for c, p in zip(problem.candidates, tested.p, strict=True) if p <= ALPHA}
     held = {c.effect.name: held_out(problem, [c]) for _, c in singles}
-    order = [c for _, c in singles if c.effect.name in significant and clipped_t(held[c.effect.name]) > 2.0]
+    order = [c for _, c in singles if c.effect.name in significant and held[c.effect.name].sum() > 0]
     pair = _pair(problem, [c for _, c in singles], free)
     if order:
         alone = max((held[c.effect.name] for c in order), key=lambda h: h.sum())
@@ -267,7 +215,9 @@ def _pair(problem: Problem, first: list[Candidate], free: list[Candidate]) -> li
     return sorted(pair, key=lambda c: -_gain(problem, [c]))
 
 
-def _race(problem: Problem, current: Refined, sets: list[list[Candidate]]) -> tuple[Refined | None, list[Refined]]:
+def _race(
+    problem: Problem, current: Refined, sets: list[list[Candidate]], lent: dict[bool, Lent | None]
+) -> tuple[Refined | None, list[Refined]]:  # fmt: skip
     """Refine each choice on the chain; return the best, if it is better than what there is, and the others."""
     everything = np.arange(len(problem.folds))
     tried = []
@@ -280,21 +230,23 @@ def _race(problem: Problem, current: Refined, sets: list[list[Candidate]]) -> tu
             at += len(candidate.columns)
         tried.append(refine(problem.setting, [*problem.placed, *first], problem.frame))
     tried.sort(key=_cost)
-    if not tried or clipped_t(current.energy - tried[0].energy) < RIVAL:
+    if not tried or ahead(tried[0], current, lent) < KEPT:
         return None, tried
     return tried[0], tried[1:]
 
 
-def _members(setting: Setting, current: Refined, problem: Problem, swaps: int = SWAPS) -> tuple[list[Member], Refined]:
+def _members(
+    setting: Setting, current: Refined, problem: Problem, lent: dict[bool, Lent | None], swaps: int = SWAPS
+) -> tuple[list[Member], Refined]:
     """Test that every effect is needed and find those that would do as well in its place."""
     placed = list(current.placed)
     without: dict[int, Refined] = {}
     while len(placed) > 1:
         start = replace(setting, response=current.response)
         without = {k: refine(start, placed[:k] + placed[k + 1 :], problem.frame, 3) for k in range(len(placed))}
-        need = {k: clipped_t(r.energy - current.energy) for k, r in without.items()}
+        need = {k: ahead(current, r, lent) for k, r in without.items()}
         weakest = min(need, key=lambda k: need[k])
-        if need[weakest] >= NEEDED:
+        if need[weakest] >= KEPT:
             break
         current = without[weakest]
         placed = list(current.placed)
@@ -302,16 +254,16 @@ def _members(setting: Setting, current: Refined, problem: Problem, swaps: int = 
         without = {0: refine(setting, [], problem.frame)}
     made = []
     for k in range(len(placed)):
-        member, better = _member(setting, current, without[k], k, problem)
+        member, better = _member(setting, current, without[k], k, problem, lent)
         if better is not None and swaps > 0:
             # A rival that was behind to first order is ahead on the chain: it takes the place.
-            return _members(setting, better, problem, swaps - 1)
+            return _members(setting, better, problem, lent, swaps - 1)
         made.append(member)
     return made, current
 
 
 def _member(
-    setting: Setting, current: Refined, without: Refined, at: int, problem: Problem
+    setting: Setting, current: Refined, without: Refined, at: int, problem: Problem, lent: dict[bool, Lent | None]
 ) -> tuple[Member, Refined | None]:
     start = replace(setting, response=without.response)
     bare = problem if not without.placed else prepare(start, problem.frame, without.placed)
@@ -330,16 +282,18 @@ def _member(
     close = [n for n in close if score[n] > BEHIND * top or clipped_t(first - each[n]) < FAR]
     close = sorted(close, key=lambda n: -score[n])[:TOP]
     margins, losses, rivals = {}, {}, []
+    need = ahead(current, without, lent)
     better: Refined | None = None
     for name in close:
         _, values = fitted(bare, [best[name]], everything)
         first = best[name].placed(values[: len(best[name].columns)], setting.course.channels)
         other = refine(start, [*without.placed, first], problem.frame)
-        margins[name] = clipped_t(other.energy - current.energy)
+        margins[name] = ahead(current, other, lent)
         if (
             margins[name] < -AHEAD
             and (better is None or _cost(other) < _cost(better))
             and _cost(other) < _cost(current)
+            and ahead(other, without, lent) > need
         ):
             better = other
         losses[name] = float((other.energy - current.energy).sum())
@@ -347,7 +301,6 @@ def _member(
         if margins[name] < RIVAL and not (richer and _cost(other) > _cost(current) + SIMPLER):
             rivals.append(best[name].called)
     error, bound = _errors(current, at)
-    need = clipped_t(without.energy - current.energy)
     chosen = _selected(bare, best, each, mine.effect.called)
     return Member(mine, error, bound, tuple(dict.fromkeys(rivals)), margins, need, losses, chosen), better
 

@@ -8,7 +8,8 @@ from typing import Any
 
 from tacdata.chain import Course
 from tacdata.discrepancy import verdict
-from tacdata.discrepancy.judge import Judgement, judge
+from tacdata.discrepancy.judge import judge
+from tacdata.discrepancy.judgement import Judgement
 from tacdata.discrepancy.located import Slice, residual, slices
 from tacdata.discrepancy.problem import Setting
 from tacdata.discrepancy.sealed import chosen, gap, without_readings

@@ -15,7 +15,9 @@ def first_guess(residual: np.ndarray, course: Course) -> Noise:
     inner = ~course.first & ~np.roll(course.first, -1) & ~np.roll(course.first, 1)
     second = residual[1:-1] - 0.5 * (residual[:-2] + residual[2:])
     second = second[inner[1:-1]]
-    whole = np.nanstd(residual, axis=0)
+    seen = np.isfinite(residual).any(axis=0)  # a gauge sees the depth alone
+    whole = np.ones(residual.shape[1])
+    whole[seen] = np.nanstd(residual[:, seen], axis=0)
     known = np.isfinite(second).sum(axis=0) > 10
     scale = whole.copy()
     if known.any():
@@ -34,6 +36,13 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
         course: Whose rows.
         before: The guess so far.
     """
+    seen = np.isfinite(leftover).any(axis=0)
+    if not seen.all():
+        own = replace(before, scale=before.scale[seen], missing=None)
+        told = refined(leftover[:, seen], course, own)
+        scale = before.scale.copy()
+        scale[seen] = told.scale
+        return replace(before, scale=scale, memory=told.memory)
     inside = ~course.first
     median = float(np.median(course.step[inside])) if inside.any() else 1.0
     pairs = inside & (course.step < 1.5 * median)
@@ -133,12 +142,16 @@ HALF = 0.4549
 """Median of the square of a standard normal number [1]."""
 FEW_GAPS = 6
 """Fewer differences tell no spread."""
+SHARED = 40
+"""The best known differences, so many, count alike: no few of them decide [1]."""
 
 
 def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
     """Return the standard deviation that numbers have beyond their known errors, 0 or more.
 
-    Told from differences of successive ones by their median: neither a slow change nor a step makes it larger.
+    Told from differences of successive ones by their median: neither a slow change nor a step makes it larger. Each
+    counts by what it says of the spread (the Fisher information of a variance), so that many that are hardly known do
+    not drown the few that are.
 
     Args:
         gaps: Differences of successive numbers, shape (n,).
@@ -147,15 +160,19 @@ def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
     if len(gaps) < FEW_GAPS:
         return 0.0
     square = np.square(gaps)
+    floor = float(np.partition(known, min(SHARED, len(known)) - 1)[min(SHARED, len(known)) - 1])
+
+    def beyond(power: float) -> bool:
+        ratio = square / np.maximum(2 * power + known, 1e-30)
+        weight = 1 / np.square(2 * power + np.maximum(known, floor) + 1e-30)
+        return float(weight[ratio > HALF].sum()) > 0.5 * float(weight.sum())
+
     low, high = 0.0, float(np.max(square)) + 1e-30
-    if np.median(square / np.maximum(known, 1e-30)) <= HALF:
+    if not beyond(0.0):
         return 0.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        if np.median(square / (2 * middle + known)) > HALF:
-            low = middle
-        else:
-            high = middle
+        low, high = (middle, high) if beyond(middle) else (low, middle)
     return float(np.sqrt(high))
 
 

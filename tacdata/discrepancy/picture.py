@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.discrepancy.judge import Judgement
+from tacdata.discrepancy.judgement import Judgement
 from tacdata.discrepancy.located import Slice, residual
 
 MOST_ROWS = 1200

@@ -21,6 +21,8 @@ FEW_ROWS = 8
 """A stroke with fewer readings is left out."""
 MISSING = 0.3
 """A channel that lacks a larger share of its readings is left out [1]."""
+UNKNOWN = "unknown"
+"""What an import calls an indenter that its source does not name."""
 HELD = 1.0
 """Gaps of a measured quantity up to so long are bridged by a straight line [s]."""
 LONG_PAUSE = 36000.0
@@ -57,13 +59,14 @@ def course_of(paths: list[Path]) -> Course:
             f"no readings in {', '.join(map(str, paths))}", "recordings with taxel readings", "record some"
         )
     found.sort(key=lambda item: int(item[1].taxels.sample_ns[0]))
+    notes += _of_one_sensor([e for _, e in found])
     counts = {e.taxels.counts.shape[1] for _, e in found}
     if len(counts) > 1:
         raise FormatError(
             f"recordings of {', '.join(map(str, sorted(counts)))} channels", "the same channels throughout",
             "judge sensors one at a time",
         )  # fmt: skip
-    kept, left_out = _channels(np.concatenate([e.taxels.counts for _, e in found]))
+    kept, left_out = _channels([e.taxels.counts for _, e in found])
     notes += left_out
     names = sorted({m.name for _, e in found for m in e.measured})
     force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
@@ -83,6 +86,24 @@ def course_of(paths: list[Path]) -> Course:
     return _joined(parts, kept, found[0][1], (bool(force), bool(temperature), bool(views)), notes)
 
 
+def _of_one_sensor(episodes: list[Episode]) -> list[str]:
+    """Return in words whether recordings name several sensors.
+
+    Raises:
+        FormatError: If they are of several kinds.
+    """
+    names = sorted({e.sensor.name for e in episodes})
+    if len(names) < 2:
+        return []
+    kinds = {(t.columns, t.rows, t.pitch_x, t.pitch_y) for t in (e.sensor.taxels for e in episodes)}
+    if len(kinds) > 1:
+        raise FormatError(
+            f"recordings of sensors of several kinds: {', '.join(names)}", "one sensor in one verdict",
+            "judge them one at a time",
+        )  # fmt: skip
+    return [f"recordings name {len(names)} sensors ({', '.join(names[:4])}): judge them apart, unless they are one"]
+
+
 def _files(path: Path) -> list[Path]:
     if path.is_dir():
         if not (path / FILE).is_file():
@@ -95,22 +116,28 @@ def _files(path: Path) -> list[Path]:
     return [path]
 
 
-def _channels(counts: np.ndarray) -> tuple[np.ndarray, list[str]]:
+def _channels(recorded: list[np.ndarray]) -> tuple[np.ndarray, list[str]]:
     """Return which channels can be used, and in words why others cannot."""
-    notes, kept = [], []
+    notes, kept, counts = [], [], np.concatenate(recorded)
+    still = np.all([np.fmax.reduce(r) == np.fmin.reduce(r) for r in recorded if len(r)], axis=0)
     for channel, values in enumerate(counts.T):
         good = values[np.isfinite(values)]
         if len(good) < (1 - MISSING) * len(values):
             notes.append(f"channel {channel}: {100 * (1 - len(good) / len(values)):.0f} % missing, left out")
         elif len(good) == 0 or np.ptp(good) == 0:
             notes.append(f"channel {channel}: always {good[0] if len(good) else 'nothing'}, stuck or dead, left out")
+        elif still[channel]:
+            notes.append(f"channel {channel}: one reading throughout each recording, stuck or dead, left out")
         else:
             top = np.mean(good == good.max())
             if top > 0.05 and len(np.unique(good)) > 20:
                 notes.append(f"channel {channel}: {100 * top:.0f} % of its readings are its largest: clipped")
             kept.append(channel)
     if not kept:
-        raise FormatError("no channel with usable readings", "at least one that changes", "; ".join(notes[:3]))
+        raise FormatError(
+            f"no channel with usable readings ({'; '.join(notes[:3])})", "at least one that changes",
+            "mend the board, or name other columns in the import's mapping, and record or import again",
+        )  # fmt: skip
     return np.array(kept), notes
 
 
@@ -153,10 +180,9 @@ def _strokes_of(
     time_ns, values = time_ns[good], values[good]
     if len(time_ns) < FEW_ROWS or len(episode.tip_ns) < 2:
         return []
-    radius = getattr(episode.press.indenter, "radius", np.nan)
-    tool = Tool(episode.press.indenter_name, episode.press.indenter.shape, float(radius))
+    tool = _tool(episode)
     made = []
-    spans = strokes(episode.tip_ns, episode.tip[:, 2])
+    spans = _to_the_end(strokes(episode.tip_ns, episode.tip[:, 2]), episode, time_ns)
     for number, (first, last) in enumerate(spans):
         rows = (time_ns >= first) & (time_ns < last)
         if rows.sum() < FEW_ROWS:
@@ -168,6 +194,25 @@ def _strokes_of(
         name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
         made.append(_Stroke(name, session, float(origin) * 1e-9, laid, tool, deepest[:2]))
     return made
+
+
+def _to_the_end(spans: list[tuple[int, int]], episode: Episode, time_ns: np.ndarray) -> list[tuple[int, int]]:
+    """Return spans with what was read before the tip began to move and after it came to rest, off the skin."""
+    depth = episode.tip[:, 2]
+    away = depth <= max(0.0, float(depth.min()) + 0.05 * float(np.ptp(depth)))
+    if away[0]:
+        spans = [(min(spans[0][0], int(time_ns[0])), spans[0][1]), *spans[1:]]
+    if away[-1]:
+        spans = [*spans[:-1], (spans[-1][0], max(spans[-1][1], int(time_ns[-1]) + 1))]
+    return spans
+
+
+def _tool(episode: Episode) -> Tool:
+    """Return the indenter; a stand-in for one that nobody named has neither shape nor radius."""
+    name, solid = episode.press.indenter_name, episode.press.indenter
+    if name == UNKNOWN:
+        return Tool(name, UNKNOWN, np.nan)  # one object: equal to itself
+    return Tool(name, solid.shape, float(getattr(solid, "radius", np.nan)))
 
 
 def _joined(
@@ -199,7 +244,7 @@ def _joined(
         centers=centers[kept] if len(centers) > int(kept.max()) else None,
         force=values[:, channels] if force else None,
         temperature=_filled(values[:, channels + force]) if temperature else None, notes=tuple(notes),
-        tag=values[:, channels + force + temperature :] if tag else None,
+        tag=values[:, channels + force + temperature :] if tag else None, numbers=tuple(int(k) for k in kept),
     )  # fmt: skip
 
 

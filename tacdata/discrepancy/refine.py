@@ -35,6 +35,10 @@ class Refined:
     """Half the whitened energy of each episode, nuisances fitted [nats], shape (episodes,)."""
     covariance: np.ndarray
     """Of the knobs [their steps], robust to what episodes have in common, shape (knobs, knobs)."""
+    left: np.ndarray
+    """Whitened residual without nuisances [noise scales], shape (m, streams), float32."""
+    episode: np.ndarray
+    """Of each of its rows, shape (m,), int64."""
 
 
 def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int = STEPS) -> Refined:
@@ -70,7 +74,18 @@ def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int 
         state, now, response = best
         if gained < SMALL:
             break
-    return Refined(tuple(now), response, state.tangent, state.energy, state.covariance)
+    return Refined(
+        tuple(now), response, state.tangent, state.energy, state.covariance, state.left, setting.course.reduced.episode
+    )
+
+
+def corrected(setting: Setting, placed: Sequence[Placed]) -> Response:
+    """Return the response beside effects whose numbers stay: a fitted one takes up what they leave to it."""
+    if not isinstance(setting.response, FittedResponse) or not placed:
+        return setting.response
+    response = copy.deepcopy(setting.response)
+    _correct(response, setting, placed)
+    return response
 
 
 @dataclass(frozen=True)
@@ -79,6 +94,7 @@ class _State:
     move: np.ndarray
     energy: np.ndarray
     covariance: np.ndarray
+    left: np.ndarray
 
 
 def _evaluate(setting: Setting, response: Response, placed: list[Placed], frame: Frame) -> _State:
@@ -89,9 +105,9 @@ def _evaluate(setting: Setting, response: Response, placed: list[Placed], frame:
     values = np.concatenate([residual[:, :, None].astype(np.float32), moving.values], axis=2)
     ridge = frame.ridge
     features = taken_up(course, response, [*setting.given, *placed])
-    found = evidence.collect(
-        values, course.reduced, frame.noise, frame.context, features, frame.errors, frame.beside[:, :, : len(ridge)]
-    )
+    beside = frame.beside[:, :, : len(ridge)]
+    clean = evidence.cleaned(values, course.reduced, frame.noise, frame.context, features, frame.errors)
+    found = evidence.summed(np.concatenate([clean, beside], axis=2), course.reduced)
     k = len(moving.knobs)
     rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
     weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
@@ -102,7 +118,8 @@ def _evaluate(setting: Setting, response: Response, placed: list[Placed], frame:
     total = found.gram.sum(axis=0)
     best = solve(total, every, weight, low, high)
     still = np.concatenate([np.zeros(k), _without(total, every[k:], ridge)])
-    return _State(moving, best[:k], _energy(found, still), _covariance(found, best, weight)[:k, :k])
+    left = clean[:, :, 0] - beside @ still[k:].astype(np.float32)
+    return _State(moving, best[:k], _energy(found, still), _covariance(found, best, weight)[:k, :k], left)
 
 
 def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:

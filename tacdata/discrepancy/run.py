@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tacdata import documents, provenance
-from tacdata.discrepancy import decide, verdict
+from tacdata.discrepancy import decide, residuals, verdict
+from tacdata.discrepancy.beside_model import beside_model
 from tacdata.discrepancy.judge import STEPS
 from tacdata.discrepancy.judged import judged
+from tacdata.discrepancy.located import beside
 from tacdata.discrepancy.picture import draw
 from tacdata.discrepancy.recordings import course_of
+from tacdata.discrepancy.sealed import chosen
 from tacdata.discrepancy.spec import Spec
 from tacdata.errors import UsageError
 
@@ -51,14 +55,20 @@ def run(
         raise UsageError(f"step {until!r}", ", ".join(STEPS), "choose one of them for --stop-after")
     note("reading")
     course = course_of(paths)
-    parents = {"spec": spec.content_hash, **{f"recording {p.name}": _hash(p) for p in paths}}
+    called = Counter(path.name for path in paths)
+    names = [path.name if called[path.name] == 1 else str(path) for path in paths]
+    hashes = {f"recording {name}": recording_hash(path) for name, path in zip(names, paths, strict=True)}
+    parents = {"spec": spec.content_hash, **hashes}
     done = judged(course, spec, note, parents, until=until)
-    answer, found = done.verdict, done.found
+    found = done.found
+    answer = {**done.verdict, "slices": beside(done.before, done.after)}
     out.mkdir(parents=True)
     documents.write(out / VERDICT, answer, "verdict")
     text = verdict.in_text(answer)
     documents.write_text(out / TEXT, text)
     draw(found, done.before, done.after, answer, out / PICTURE)
+    told = beside_model(course, found, chosen(course))
+    residuals.write(out / residuals.FILE, told, provenance.content_hash(answer))
     if answer["status"] == "named":
         members = decide.members(found)
         following = spec.with_effects([m.placed for m in members], [m.error for m in members], VERDICT)
@@ -66,7 +76,8 @@ def run(
     return Written(answer, text, out)
 
 
-def _hash(path: Path) -> str:
+def recording_hash(path: Path) -> str:
+    """Return the content hash by which a verdict knows a recording, or a folder of them (hex)."""
     if path.is_file():
         return provenance.file_hash(path)
     return provenance.content_hash({p.name: provenance.file_hash(p) for p in sorted(path.glob("*.mcap"))})

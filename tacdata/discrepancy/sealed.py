@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.generic import histories
-from tacdata.discrepancy.judge import Judgement
+from tacdata.discrepancy.judgement import Judgement
 
 SHARE = 0.2
 """Share of the episodes that is sealed [1]."""
@@ -101,6 +101,8 @@ def gap(course: Course, response: Response, found: Judgement, episodes: np.ndarr
         found: What was found without the sealed episodes.
         episodes: The sealed ones.
     """
+    if not len(episodes):
+        return Gap(np.zeros(0), np.zeros(0), np.zeros(0), ())
     given = list(found.problem.setting.given)
     rows = course.read
     first = course.readings[rows] - predict(course, response, given).signal[rows]

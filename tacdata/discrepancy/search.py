@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from tacdata.discrepancy import evidence
 from tacdata.discrepancy.candidates import Candidate, StandIn
-from tacdata.discrepancy.clusters import Clustered, clustered, lent
+from tacdata.discrepancy.clusters import Clustered, Lent, clustered, lent
 from tacdata.discrepancy.evidence import Noise
 from tacdata.discrepancy.fit import eliminated, flips, gains, solve, t_value
 from tacdata.discrepancy.generic import histories
@@ -36,6 +36,8 @@ class Tested:
     """By how much half the whitened energy falls [nats], shape (candidates,)."""
     p_generic: float
     """The same for columns that belong to no effect."""
+    lent: dict[bool, Lent | None]
+    """What candidates say of how much scores scatter: of those that follow the clock (True), of the others."""
 
 
 def test(problem: Problem, seed: int = 0) -> Tested:
@@ -56,7 +58,7 @@ def test(problem: Problem, seed: int = 0) -> Tested:
     z = np.where([_numerics(problem, gram, c) for c in problem.candidates], np.minimum(z, 0.0), z)
     p = (1 + (top[:, None] >= z).sum(axis=0)) / (FLIPS + 1) if problem.setting.decoys else ndtr(-z)
     gain = np.array([0.5 * float(np.sum(np.square(s.pull))) for s in scores])
-    return Tested(z, p, gain, _test_generic(problem, gram, seed, top))
+    return Tested(z, p, gain, _test_generic(problem, gram, seed, top), kinds)
 
 
 def _by_effect(

@@ -12,15 +12,20 @@ import schemas
 from tacdata import provenance
 from tacdata.chain import Course
 from tacdata.discrepancy import decide
-from tacdata.discrepancy.amiss import FEWEST, amiss, clocks
+from tacdata.discrepancy.amiss import FEWEST, amiss, units
+from tacdata.discrepancy.clocks import clocks
 from tacdata.discrepancy.confidence import confidence, features
-from tacdata.discrepancy.judge import NEEDED, Judgement, Member
+from tacdata.discrepancy.judgement import Judgement, Member
 from tacdata.discrepancy.limits import limits
-from tacdata.discrepancy.located import Slice, in_words
+from tacdata.discrepancy.located import NOWHERE, Slice, in_words, outstanding
 from tacdata.discrepancy.sealed import Gap
 from tacdata.discrepancy.wiring import miswired
 from tacdata.effects import load
 
+FITTED = (
+    "the base was fitted to these recordings and takes up all that has no memory (stiffness, gain, thickness, offsets, "
+    "compliance): such effects need a model of the sensor (--spec, --fem), or for compliance a gauge at the tip"
+)
 Z90 = 1.645
 """Standard errors either way of a 90 % interval."""
 
@@ -40,16 +45,19 @@ def document(
     answer, status = decide.members(found), decide.status(found)
     late = [float(m.placed.values["L"]) for m in answer if m.placed.effect.name == "latency"]
     remarks = [*amiss(course), *clocks({m.placed.effect.called for m in answer}, max(late, key=abs, default=0.0))]
+    if found.problem.setting.response.fitted:
+        remarks.append(FITTED)
     wires = miswired(course, found.problem.setting.response) if not found.problem.setting.given else []
     remarks = [*wires, *remarks]
-    if course.episodes < FEWEST or wires:
+    odd = units(course)
+    if course.episodes < FEWEST or wires or odd:
         status = "unknown"
     effects = [_effect(m, status, features(found, m, len(answer))) for m in answer]
     tested = found.tested
     values = max(float(found.values.sum()), 1.0)
     return {
         "version": schemas.version("verdict"), "status": status,
-        "why": "; ".join(wires) or why(status, found, answer, course),
+        "why": "; ".join([*wires, *odd]) or why(status, found, answer, course),
         "effects": effects,
         "gate": {"gap": found.gap, "p": float(tested.p.min(initial=1.0)), "p_generic": tested.p_generic,
                  "noise": [float(v) for v in found.problem.frame.noise.scale],
@@ -57,13 +65,19 @@ def document(
         "left": {"share": float(found.share_left), "t": float(np.clip(found.left.t, -99, 99)),
                  "before": float(2 * found.energy[0].sum() / values),
                  "after": float(2 * found.energy[1].sum() / values), "floor": 1.0},
-        "located": in_words(sliced), "unjudgeable": found.problem.board.unjudgeable,
+        "located": _located(sliced, found, course), "unjudgeable": found.problem.board.unjudgeable,
         "limits": {k: (round(v, 4) if np.isfinite(v) and v < 1e3 else None) for k, v in limits(found.final).items()},
         "untested": untested(answer), "data": {**data(course), "sealed": list(shown.names) if shown else []},
         "sealed": shown.document() if shown else {"episodes": 0, "share": 0.0, "rule": "none was sealed"},
         "remarks": remarks, "next": following(answer, status),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": 999}),
     }  # fmt: skip
+
+
+def _located(sliced: list[Slice], found: Judgement, course: Course) -> list[str]:
+    alone = outstanding(course.names, found.energy[1], found.values)
+    words = in_words(sliced)
+    return [*alone, *(w for w in words if not (alone and w == NOWHERE))]
 
 
 def _effect(member: Member, verdict: str, told: dict[str, float]) -> dict[str, Any]:
@@ -90,9 +104,7 @@ def _effect(member: Member, verdict: str, told: dict[str, float]) -> dict[str, A
 def why(status: str, found: Judgement, answer: list[Member], course: Course) -> str:
     """Return the verdict in a sentence."""
     names = " and ".join(m.placed.effect.title.lower() for m in answer)
-    sets = "; ".join(
-        f"{m.placed.effect.called} or {' or '.join(m.rivals)}" if m.rivals else m.placed.effect.called for m in answer
-    )
+    sets = _sets(answer)
     if course.episodes < FEWEST:
         return f"{course.episodes} episodes cannot carry a verdict" + (f"; they point to {sets}" if answer else "")
     if found.until != "decide":
@@ -106,7 +118,7 @@ def why(status: str, found: Judgement, answer: list[Member], course: Course) -> 
     if status == "ambiguous":
         bounds = [m.placed.effect.called for m in answer if m.at_bound]
         told = f"these recordings cannot tell {sets} apart" if any(m.rivals for m in answer) else f"{sets}"
-        weak = [m.placed.effect.called for m in answer if m.necessity < NEEDED]
+        weak = [m.placed.effect.called for m in answer if m.necessity < m.needed]
         told += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
         return told + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
     if answer:
@@ -115,7 +127,24 @@ def why(status: str, found: Judgement, answer: list[Member], course: Course) -> 
             f"something is missing; {closest} comes closest and leaves {100 * found.share_left:.0f} % of what could be "
             "explained, so it is not the name, or not all of it"
         )
+    if not found.gap:
+        return (
+            f"readings are off by {decide.loudness(found):.1f} times the noise, but no effect is borne out by several "
+            "episodes: look at where it lives"
+        )
     return "something is missing that no modelled effect explains"
+
+
+def _sets(answer: list[Member]) -> str:
+    """Return what each effect may be; effects that may be the same are told of once."""
+    groups: dict[frozenset[str], list[Member]] = {}
+    for m in answer:
+        groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
+    told = []
+    for own in groups.values():
+        words = " or ".join((own[0].placed.effect.called, *own[0].rivals))
+        told.append(words if len(own) == 1 else f"{len(own)} effects, each of them {words}")
+    return "; ".join(told)
 
 
 def untested(answer: list[Member]) -> list[str]:

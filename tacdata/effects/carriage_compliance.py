@@ -17,7 +17,7 @@ class CarriageCompliance(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal", "force")
     group = "depth curvature"
-    equation = "d = z - F(d) / K, by three fixed-point steps; seen by the tag"
+    equation = "d = z - c F(d) / max F(d), by fixed-point steps; seen by the tag"
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564: h = z - F C_f"
     experiment = "press a rigid block while the tag is in view"
     parameters = (Parameter("c", "mm per largest force", "deflection at the largest force", 0.05, 0.0, 2.0),)

@@ -22,6 +22,7 @@ class ClockSkew(Effect):
     equation = "s(t) = s_e(t - r (t - T/2))"
     source = "standard form"
     experiment = "an early and a late sync event"
+    form_error = 0.02
     parameters = (Parameter("r", "s", "delay gained over all recordings", 0.1, -5.0, 5.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -69,6 +69,9 @@ class Effect(ABC):
     """Whether a tag on the carriage sees it (kinematics only)."""
     by_channel: ClassVar[bool] = False
     """Whether it mixes channels, or treats each in a way of its own."""
+    form_error: ClassVar[float] = 0.1
+    """How far its equation may be off, over its contribution, as a standard deviation [1]; less where it is geometry,
+    arithmetic or a clock rather than a law of a material."""
     mechanism: ClassVar[str] = ""
     """The name it shares with other functional forms of the same thing; empty: its own."""
 

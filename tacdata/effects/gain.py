@@ -21,6 +21,7 @@ class Gain(Effect):
     equation = "s = (1 + e) s above idle"
     source = "standard form"
     experiment = "a reference capacitor; force"
+    form_error = 0.02
     parameters = (Parameter("e", "1", "relative excess", 0.1, -0.9, 3.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -22,6 +22,7 @@ class Latency(Effect):
     equation = "s(t) = s_e(t - L)"
     source = "standard form"
     experiment = "three rates: constant in time, and edges keep their shape"
+    form_error = 0.02
     parameters = (Parameter("L", "s", "delay", 0.05, -1.0, 2.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

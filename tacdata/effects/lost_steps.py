@@ -21,6 +21,7 @@ class LostSteps(Effect):
     equation = "d -> d + dz from a share s of the episodes on"
     source = "standard form"
     experiment = "home again, and repeat the reference press"
+    form_error = 0.02
     parameters = (
         Parameter("dz", "mm", "lost", 0.05, -1.0, 1.0),
         Parameter(

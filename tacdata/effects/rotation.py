@@ -21,6 +21,7 @@ class Rotation(Effect):
     equation = "(x, y) -> (x - theta y, y + theta x)"
     source = "standard form"
     experiment = "presses far from the centre at all four corners"
+    form_error = 0.02
     parameters = (Parameter("theta", "rad", "turn about z", 0.02, -0.3, 0.3),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

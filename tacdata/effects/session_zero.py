@@ -21,6 +21,7 @@ class SessionZero(Effect):
     equation = "d -> d + dz (session - mean session)"
     source = "standard form"
     experiment = "home and touch off several times"
+    form_error = 0.02
     parameters = (Parameter("dz", "mm", "from one session to the next", 0.05, -1.0, 1.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -21,6 +21,7 @@ class Skew(Effect):
     equation = "x -> x + g y"
     source = "standard form"
     experiment = "corner presses with a tag"
+    form_error = 0.02
     parameters = (Parameter("g", "1", "shear of x with y", 0.02, -0.3, 0.3),)
     seen_by_tag = True
 

@@ -21,6 +21,7 @@ class Tilt(Effect):
     equation = "d -> d + a x + b y"
     source = "standard form"
     experiment = "touch-off at three corners"
+    form_error = 0.02
     parameters = (
         Parameter("a", "mm/mm", "slope along x", 0.01, -0.2, 0.2),
         Parameter("b", "mm/mm", "slope along y", 0.01, -0.2, 0.2),

@@ -24,6 +24,7 @@ class XyOffset(Effect):
         "a cross of presses around one taxel from opposite sides; optical touch-off of the skin's edges tells "
         "a shifted skin from a shifted frame"
     )
+    form_error = 0.02
     parameters = (
         Parameter("dx", "mm", "shift along x", 0.1, -2.0, 2.0),
         Parameter("dy", "mm", "shift along y", 0.1, -2.0, 2.0),

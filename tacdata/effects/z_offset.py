@@ -24,6 +24,7 @@ class ZOffset(Effect):
         "slow approaches at three corners and the centre: a constant onset error is dz, a plane is tilt, one "
         "per channel an air gap"
     )
+    form_error = 0.02
     parameters = (Parameter("dz", "mm", "deeper than commanded", 0.05, -1.0, 1.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

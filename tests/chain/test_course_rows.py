@@ -29,3 +29,21 @@ def test_rests_are_averaged_and_fast_motion_is_dense():
     hold = (rows.time > 2.5) & (rows.time < 11.0)
     assert rows.averaged[hold].max() > 5
     assert np.isnan(rows.values[rows.averaged == 0]).all()
+
+
+def test_slow_motion_read_often_is_averaged_and_fast_motion_is_not():
+    path_time, path = np.array([0.0, 5.0, 6.0, 6.2]), np.array([[0, 0, 0.0], [0, 0, 1.0], [0, 0, 1.0], [0, 0, 0.0]])
+    time = np.arange(0, 6.2, 0.01)  # 0.2 mm/s down, 5 mm/s up
+    depth = np.interp(time, path_time, path[:, 2])
+    values = np.column_stack([100 * depth, 50 * depth]) + 1e-3 * np.arange(len(time))[:, None]
+    rows = rows_of(time, values, path_time, path)
+    read = rows.averaged > 0
+    slow, fast = read & (rows.time < 5.0), read & (rows.time > 6.01)
+    assert slow.sum() < 0.3 * (time < 5.0).sum() and rows.averaged[slow].max() <= 8
+    assert fast.sum() == (time > 6.01).sum()
+    assert rows.averaged.sum() == len(time)
+    # Averages lie where the tip was on average, so nothing is late.
+    want = 100 * rows.tip[slow, 2] + 1e-3 * rows.time[slow] / 0.01
+    assert np.abs(rows.values[slow, 0] - want).max() < 0.02
+    few = rows_of(time[::4], values[::4], path_time, path)
+    assert (few.averaged[few.time < 5.0] <= 1).all()

@@ -2,17 +2,22 @@
 
 import json
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 import yaml
 
 from tacdata import documents
+from tacdata.discrepancy.recordings import _channels, _of_one_sensor, _to_the_end
+from tacdata.discrepancy.residuals import read
 from tacdata.discrepancy.run import run
 from tacdata.discrepancy.spec import read_spec
 from tacdata.discrepancy.strokes import strokes
 from tacdata.errors import FormatError, UsageError
 from tacdata.importing.imported_session import import_session
+from tacdata.recording import Episode
 
 MAPPING = {
     "version": "1.0",
@@ -55,6 +60,12 @@ def test_imported_recordings_are_judged_into_a_folder(session, tmp_path):
     assert any("latency" in (e["mechanism"], *e["alternatives"]) for e in answer["effects"])
     assert (tmp_path / "verdict" / "verdict.png").stat().st_size > 10_000
     assert written.text.startswith(answer["status"].upper())
+    told = read(tmp_path / "verdict" / "residuals.parquet")
+    assert told.streams == ("channel 0", "channel 1") and told.measured.shape == (answer["data"]["rows"], 2)
+    left = [float(np.mean(np.square(told.off(said)))) for said in (told.before, told.after)]
+    assert left[1] < 0.1 * left[0] and left[1] < 3, "what is left is about the noise"
+    slices = {(s["by"], s["name"]): s for s in answer["slices"]}
+    assert slices["phase", "loading"]["before"] > 10 * slices["phase", "loading"]["after"]
     if answer["status"] == "named":
         following = documents.read(tmp_path / "verdict" / "spec.json", "model_spec")
         assert following["parent"] == read_spec(None).content_hash
@@ -85,3 +96,33 @@ def test_a_recording_of_many_strokes_is_cut_between_them():
     edges = np.array([s[0] for s in spans[1:]]) / 1e9
     np.testing.assert_allclose(edges, [10, 20, 30], atol=0.11)
     assert all(a[1] == b[0] for a, b in pairwise(spans))
+
+
+def test_a_channel_that_is_dead_at_another_reading_each_day_is_left_out_and_named():
+    rng = np.random.default_rng(0)
+    days = [np.column_stack([rng.normal(size=50), np.full(50, 5.0 + day), rng.normal(size=50)]) for day in (0, 1)]
+    kept, notes = _channels(days)
+    assert kept.tolist() == [0, 2]
+    assert len(notes) == 1 and "channel 1" in notes[0] and "left out" in notes[0]
+
+
+def test_what_is_read_after_the_tip_came_to_rest_counts_where_it_is_off_the_skin():
+    """A recovery is read long after the guide's last motion; where the tip rests in the skin, nobody knows how long."""
+    time_ns = np.arange(0, 20_000, 100) * 1_000_000
+    span = [(2_000_000_000, 5_000_000_001)]
+    away = SimpleNamespace(tip=np.array([[0, 0, -2.0], [0, 0, 1.0], [0, 0, -2.0]]))
+    inside = SimpleNamespace(tip=np.array([[0, 0, -2.0], [0, 0, 0.5], [0, 0, 1.0]]))
+    assert _to_the_end(span, cast(Episode, away), time_ns) == [(0, 19_900_000_001)]
+    assert _to_the_end(span, cast(Episode, inside), time_ns) == [(0, 5_000_000_001)]
+
+
+def test_recordings_of_several_sensors_are_told_of_or_refused():
+    def worn(name, pitch=4.0):
+        taxels = SimpleNamespace(columns=2, rows=1, pitch_x=pitch, pitch_y=4.0)
+        return cast(Episode, SimpleNamespace(sensor=SimpleNamespace(name=name, taxels=taxels)))
+
+    assert _of_one_sensor([worn("a"), worn("a")]) == []
+    [words] = _of_one_sensor([worn("monday"), worn("tuesday")])
+    assert "monday, tuesday" in words
+    with pytest.raises(FormatError, match="several kinds"):
+        _of_one_sensor([worn("a"), worn("b", pitch=2.0)])

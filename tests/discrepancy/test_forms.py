@@ -9,7 +9,7 @@ from pressing import course
 from tacdata.chain import predict
 from tacdata.discrepancy import search
 from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.forms import FORM, forms, modulations
+from tacdata.discrepancy.forms import forms, modulations
 from tacdata.discrepancy.problem import Setting, frame, prepare
 from tacdata.discrepancy.streams import Streams
 from tacdata.effects import Placed, load
@@ -40,12 +40,24 @@ def test_columns_are_a_share_of_each_effect(pressed):
     twice = forms(made, response, [replace(late, values={"L": np.array(0.1)})])
     size = np.linalg.norm(twice, axis=(0, 1)) / np.linalg.norm(one, axis=(0, 1))
     assert np.all((size > 1.7) & (size < 2.1))
-    assert FORM == 0.1
 
 
-def test_what_a_wrong_form_leaves_is_no_second_effect(pressed):
-    """Latency that is a tenth larger while unloading: without the forms, others are seen in what it leaves."""
+def test_a_clock_is_known_better_than_a_law_of_a_material(pressed):
+    made, response, _ = pressed
+    streams = Streams.of(made)
+    for name, value, share in (("latency", {"L": np.array(0.05)}, 0.02), ("relaxation", {}, 0.1)):
+        effect = load(name)
+        given = {p.name: np.array(p.default + p.typical) for p in effect.parameters} | value
+        placed = Placed(effect, given)
+        own = streams.predicted(predict(made, response, [placed])) - streams.predicted(predict(made, response, []))
+        by = np.linalg.norm(forms(made, response, [placed]), axis=(0, 1)) / np.linalg.norm(own)
+        assert by == pytest.approx(np.full(5, share), rel=1e-3)
+
+
+def test_what_a_wrong_form_leaves_is_no_second_effect(pressed, monkeypatch):
+    """Latency, known as a material is, that is a tenth larger while unloading: others are seen in what it leaves."""
     made, response, late = pressed
+    monkeypatch.setattr(type(late.effect), "form_error", 0.1)
     streams = Streams.of(made)
     own = streams.predicted(predict(made, response, [late])) - streams.predicted(predict(made, response, []))
     readings = made.readings.copy()

@@ -1,6 +1,7 @@
 """What is missing is named when it can be, and only then."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -67,6 +68,28 @@ def test_a_verdict_fits_its_schema_and_says_what_cannot_be_judged():
     assert "gain" in document["unjudgeable"]
     assert document["limits"]["latency"] is not None
     assert "latency" in verdict.in_text(document)
+
+
+def test_two_presses_unlike_all_others_are_no_effect_and_not_nothing():
+    made = course()
+    readings = made.readings.copy()
+    odd = np.isin(made.episode, (0, 1))
+    readings[odd] = 5000 + 0.7 * (readings[odd] - 5000)
+    wrong = replace(made, readings=readings)
+    answer = judge(Setting(wrong, FittedResponse(wrong), [load(name) for name in FEW]))
+    assert decide.status(answer) == "unknown"
+    told = verdict.why("unknown", answer, decide.members(answer), wrong)
+    assert answer.gap or "times the noise" in told
+
+
+@pytest.mark.parametrize(("gain", "named"), [(0.14, None), (0.18, "named")])
+def test_a_channel_is_named_by_what_calibration_leaves_open(gain, named):
+    """It was chosen among channels, not among all effects: three standard deviations of the prior are its bar."""
+    gains = np.array([gain, -gain, *np.tile([0.12, -0.12], 11)])
+    setting = SimpleNamespace(nuisance={"channel_gain": 0.05}, course=SimpleNamespace(force=None))
+    made = decide.calibrated(SimpleNamespace(gains=gains, problem=SimpleNamespace(setting=setting)))
+    assert [decide.settled(m) for m in made] == ([named] if named else [])
+    assert all(m.needed == decide.BEYOND for m in made)
 
 
 def test_few_episodes_carry_no_verdict():

@@ -1,0 +1,75 @@
+"""Which of two models the episodes bear out: made-up residuals with a known difference."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tacdata.discrepancy.noise import spread_of
+from tacdata.discrepancy.paired import ahead
+from tacdata.effects import load
+
+EPISODES, ROWS = 48, 40
+
+
+class Nothing:
+    """Candidates that lend nothing."""
+
+    def get(self, kind):
+        return None
+
+
+def model(left, *names):
+    episode = np.repeat(np.arange(EPISODES), ROWS)
+    energy = 0.5 * np.bincount(episode, np.square(left).sum(axis=1))
+    placed = tuple(SimpleNamespace(effect=load(name)) for name in names)
+    return SimpleNamespace(left=left, episode=episode, energy=energy, placed=placed)
+
+
+def signal(size, episodes, rng):
+    """A signature of a given length [standard deviations], in some episodes alone."""
+    made = rng.normal(size=(EPISODES * ROWS, 1)) * np.isin(np.repeat(np.arange(EPISODES), ROWS), episodes)[:, None]
+    return size * made / np.linalg.norm(made)
+
+
+@pytest.mark.parametrize("count", [5, 48])
+def test_few_presses_bear_an_effect_out_as_well_as_all(count):
+    """A mean over episodes of the gain cannot reach 2.4 standard errors with 5 of 48 presses; this does."""
+    told = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        noise, true = rng.normal(size=(EPISODES * ROWS, 1)), signal(9.0, np.linspace(0, 47, count, dtype=int), rng)
+        told.append(ahead(model(noise, "relaxation"), model(noise + true), Nothing()))
+    assert np.median(told) == pytest.approx(6.0 if count == 48 else 3.3, abs=1.2)
+    assert np.quantile(told, 0.1) > 2.4
+    assert min(told) >= 0
+
+
+def test_without_a_difference_nothing_is_borne_out():
+    told = []
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        noise, wrong = rng.normal(size=(EPISODES * ROWS, 1)), signal(3.0, np.arange(48), rng)
+        told.append(ahead(model(noise - wrong, "relaxation"), model(noise), Nothing()))
+    # The first is wrong: only chance can bear it out, and seldom far.
+    assert np.mean(np.array(told) > 2.33) < 0.02
+    assert ahead(model(noise), model(noise), Nothing()) == 0.0
+
+
+def test_order_only_changes_the_sign():
+    rng = np.random.default_rng(1)
+    noise, true = rng.normal(size=(EPISODES * ROWS, 1)), signal(6.0, np.arange(20), rng)
+    first, second = model(noise, "creep"), model(noise + true, "drift")
+    assert ahead(first, second, Nothing()) == -ahead(second, first, Nothing())
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.003, 0.03])
+def test_a_spread_is_told_from_those_that_know_it(spread):
+    """Most differences are hardly known; the few that are must not drown among them."""
+    told = []
+    for seed in range(50):
+        rng = np.random.default_rng(seed)
+        known = np.exp(rng.normal(-8, 2.5, 400))
+        told.append(spread_of(rng.normal(size=400) * np.sqrt(2 * spread**2 + known), known))
+    assert np.median(told) == pytest.approx(spread, abs=max(0.1 * spread, 3e-4))
+    assert np.quantile(told, 0.95) < 1.3 * spread + 2e-3
