@@ -25,6 +25,15 @@ def run(
         int, typer.Option(min=0, help="Presses to solve by finite elements where the effect matters most.")
     ] = 0,
     presses: Annotated[int, typer.Option(min=1, help="Different presses of the next plan.")] = 4,
+    retrain: Annotated[
+        bool, typer.Option("--retrain", help="Train a network on the data before and one on those after; score both.")
+    ] = False,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes of each training.")] = 10,
+    network: Annotated[str, typer.Option(help="A file name in training/networks.")] = "paper",
+    truth: Annotated[
+        Path | None,
+        typer.Option(help="CSV of the tip's true path, if one is known: time_ns, x, y, depth [mm]; else the tag's."),
+    ] = None,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> None:
     """Add what a verdict named to the model, show the gap before and after, and plan the next presses."""
@@ -33,13 +42,16 @@ def run(
     from label_farm.labelling import FarmSettings
     from label_farm.model import FACTORY
     from tacdata.discrepancy.spec import read_spec
+    from tacdata.revision.retrain import Recipe
     from tacdata.revision.revise import CARD, SPEC, Wishes, revise
+    from tacdata.revision.table import in_words
     from viewers.gap_recording import write
 
     console = Console(stderr=True)
     farm = FarmSettings(factory=factory or FACTORY, uncertainty=uncertainty) if relabel else None
     with console.status("reading") as status:
-        done = revise(verdict, recordings, read_spec(spec), out, Wishes(farm, store, confirm, presses), status.update)
+        wishes = Wishes(farm, store, confirm, presses, Recipe(epochs, network) if retrain else None, truth)
+        done = revise(verdict, recordings, read_spec(spec), out, wishes, status.update)
         if done.shown:
             status.update("Rerun file")
             write(done.shown, out / "gap.rrd", done.document["status"])
@@ -53,6 +65,8 @@ def run(
         )
         for change in gap["elsewhere"]:
             print(f"  left out, {change['name']}: {change['before']:.3g} before, {change['after']:.3g} after")
+        worst = max(gap["slices"], key=lambda c: c["after"])
+        print(f"  worst of them after, {worst['name']}: {worst['before']:.3g} before, {worst['after']:.3g} after")
     for moved in document["labels"]:
         print(
             f"{moved['session']}: {moved['paths']} of {moved['episodes']} paths move, {moved['path_rms']:.4f} mm rms, "
@@ -63,6 +77,17 @@ def run(
                 f"  {moved['labels']} labels made again: {moved['rms']:.4f} mm rms, {moved['most']:.4f} mm at most; "
                 f"{moved['solved']} paths solved, {moved['found']} found in the store"
             )
+    for t in document["tips"]:
+        print(
+            f"{t['session']}: tip {t['before']:.4f} mm off before, {t['after']:.4f} after (rms in contact, against "
+            f"{t['against']}); {t['better']} of {t['episodes']} episodes better, {t['worse']} worse; "
+            f"beside that a constant {t['constant_before']:.4f} mm before, {t['constant_after']:.4f} after"
+        )
+    if document["retrained"]:
+        print(in_words(document["retrained"]))
+        for m in document["retrained"]["metrics"]:
+            pair = ("–" if m[side] is None else f"{m[side]:.4g}" for side in ("before", "after"))
+            print(f"  {m['title']} [{m['unit']}]: {' before, '.join(pair)} after")
     for c in document["confirmed"]:
         told = f"{100 * c['difference']:.1f} % off" if c["solved"] else "no equilibrium"
         print(f"finite elements, {c['tool']} {c['depth']:.3f} mm deep: {told}")

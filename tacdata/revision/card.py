@@ -7,6 +7,10 @@ import html
 from pathlib import Path
 from typing import Any
 
+from tacdata.revision.table import in_words
+
+CHANNELS = 6
+"""Channels that are listed, the worst first."""
 STYLE = """
 body{font:15px/1.45 system-ui,sans-serif;max-width:60rem;margin:1.5rem auto;padding:0 1rem;color:#1a1a1a}
 h1{font-size:1.5rem;margin:.2rem 0}h2{font-size:1.05rem;margin:1.4rem 0 .3rem;border-bottom:1px solid #ddd}
@@ -30,6 +34,8 @@ def card(revision: dict[str, Any], verdict: dict[str, Any], picture: Path | None
     """
     status, answer = verdict["status"], verdict["effects"]
     title = " and ".join(e["title"] for e in answer) or "No effect"
+    if status == "unknown" and answer:
+        title = f"Suspected, not named: {title}"
     parts = [
         f"<p class='status {status}'>{status}</p><h1>{_t(title)}</h1><p>{_t(verdict['why'])}</p>",
         _tiles(revision, verdict),
@@ -37,7 +43,8 @@ def card(revision: dict[str, Any], verdict: dict[str, Any], picture: Path | None
     if picture is not None:
         data = base64.b64encode(picture.read_bytes()).decode()
         parts.append(f"<img alt='readings and residuals before and after' src='data:image/png;base64,{data}'>")
-    parts += [_parameters(answer), _rivals(answer), _gap(revision["gap"]), _labels(revision)]
+    parts += [_parameters(answer), _rivals(answer), _gap(revision["gap"]), _slices(revision["gap"]), _labels(revision)]
+    parts += [_tips(revision.get("tips") or []), _networks(revision.get("retrained"))]
     parts += [_confirmed(revision["confirmed"]), _refuted(verdict, answer), _next(revision["next"])]
     parts += [_data(verdict), _hashes(revision, verdict)]
     head = f"<!doctype html><html lang='en'><meta charset='utf-8'><title>{_t(title)}</title><style>{STYLE}</style>"
@@ -115,6 +122,46 @@ def _gap(gap: dict[str, Any] | None) -> str:
     rows += [(f"{c['name']}, not fitted to", c) for c in gap["elsewhere"]]
     cells = [(name, c["episodes"], f"{c['before']:.3g}", f"{c['after']:.3g}") for name, c in rows]
     return "<h2>The gap</h2>" + _table(("where", "episodes", "before", "after (1 is the noise floor)"), cells)
+
+
+def _slices(gap: dict[str, Any] | None) -> str:
+    told = (gap or {}).get("slices") or []
+    if not told:
+        return ""
+    worst = max(told, key=lambda c: c["after"])
+    lost = [c["name"] for c in told if c["after"] > 1.1 * max(c["before"], 1.0)]
+    words = f"Worst after: {worst['name']}, {worst['before']:.3g} before, {worst['after']:.3g} after."
+    words += f" Worse than before: {', '.join(lost)}." if lost else " None became worse."
+    channels = sorted((c for c in told if c["name"].startswith("channel")), key=lambda c: -c["after"])
+    shown = [*(c for c in told if c not in channels), *channels[:CHANNELS]]
+    if len(channels) > CHANNELS:
+        words += f" Of {len(channels)} channels the {CHANNELS} worst are listed; gap.csv has all."
+    words += " Contact that differs from press to press is in these figures, and not in those above."
+    cells = [(c["name"], c["episodes"], f"{c['before']:.3g}", f"{c['after']:.3g}") for c in shown]
+    head = ("of the sealed episodes", "episodes", "before", "after (1 is the noise floor)")
+    return f"<h2>Where it lives</h2><p>{_t(words)}</p>" + _table(head, cells)
+
+
+def _tips(told: list[dict[str, Any]]) -> str:
+    if not told:
+        return ""
+    rows = [
+        (t["session"], t["against"], t["episodes"], f"{t['before']:.4f} / {t['most_before']:.3f}",
+         f"{t['after']:.4f} / {t['most_after']:.3f}", f"{t['better']} / {t['worse']}",
+         f"{t['constant_before']:.4f} / {t['constant_after']:.4f}")
+        for t in told
+    ]  # fmt: skip
+    head = ("session", "held against", "episodes", "before, rms / most [mm]", "after, rms / most [mm]",
+            "episodes better / worse", "constant part, before / after [mm]")  # fmt: skip
+    return "<h2>How far the labels' tip is off</h2>" + _table(head, rows)
+
+
+def _networks(trained: dict[str, Any] | None) -> str:
+    if not trained:
+        return ""
+    rows = [(m["title"], m["unit"], _number(m["before"]), _number(m["after"])) for m in trained["metrics"]]
+    table = _table(("network", "unit", "before", "after"), rows)
+    return f"<h2>What it does to a network</h2><p>{_t(in_words(trained))}</p>{table}"
 
 
 def _labels(revision: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.problem import Frame, Setting, frame
-from tacdata.discrepancy.refine import Refined, refine
+from tacdata.discrepancy.refine import Refined, corrected, refine
 from tacdata.discrepancy.sealed import without_readings
 from tacdata.discrepancy.spec import Spec
 from tacdata.discrepancy.streams import Streams
@@ -38,12 +38,8 @@ class Comparison:
     @cached_property
     def frame(self) -> Frame:
         """Noise and nuisances, the same before and after."""
-        first = frame(self.setting)
-        if not self.answer:
-            return first
-        there = refine(self.setting, self.answer, first, steps=0)
-        given = (*self.setting.given, *self.answer)
-        return frame(replace(self.setting, response=there.response, given=given))
+        response = corrected(self.setting, self.answer)
+        return frame(replace(self.setting, response=response, given=(*self.setting.given, *self.answer)))
 
     @cached_property
     def before(self) -> Refined:
@@ -70,8 +66,9 @@ class Comparison:
             course = without_readings(self.course, left_out)
         else:
             course = part(self.course, kept)
-        own = Comparison(course, self.spec)  # weights need no better noise, and telling it twice costs as much again
-        return refine(own.setting, placed, own.frame, STEPS).placed
+        setting = Comparison(course, self.spec).setting
+        rows = ~np.isin(self.course.reduced.episode, left_out)
+        return refine(setting, placed, _frame_of(self.frame, rows), STEPS).placed
 
     @cached_property
     def _contexts(self) -> np.ndarray:
@@ -86,3 +83,14 @@ class Comparison:
     def said(self, response: Response, placed: Sequence[Placed]) -> np.ndarray:
         """Return what a model says of the readings, shape (rows, channels)."""
         return predict(self.course, response, [*self.setting.given, *placed]).signal
+
+
+def _frame_of(whole: Frame, rows: np.ndarray) -> Frame:
+    """Return a frame for some of the rows: what weighs readings is known from all of them, what they say is not."""
+    noise = whole.noise
+    swing = None if noise.swing is None else noise.swing[rows]
+    missing = None if noise.missing is None else noise.missing[rows]
+    return replace(
+        whole, context=whole.context[rows], features=None if whole.features is None else whole.features[rows],
+        errors=whole.errors[rows], beside=whole.beside[rows], noise=replace(noise, swing=swing, missing=missing),
+    )  # fmt: skip

@@ -123,4 +123,4 @@ def _press(reach: Reach, pose: np.ndarray) -> PressRequest:
     states = max(int(np.ceil(np.sqrt(depth / UNIT))), 3)
     depths = depth * (np.arange(states + 1) / states) ** 2
     x, y = (round(float(v), 4) for v in pose[:2])
-    return PressRequest(reach.indenter, x, y, reach.yaw, tuple(round(float(d), 6) for d in depths))
+    return PressRequest(reach.indenter, x, y, reach.yaw, tuple(round(float(d), 6) for d in depths), *reach.tilt)

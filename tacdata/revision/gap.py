@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,15 +48,20 @@ class Gap:
     """The sealed episode that is worst after."""
     elsewhere: tuple[Change, ...]
     """Groups whose episodes the effects' numbers were not fitted to: another rate, depth, indenter."""
+    fitted: tuple[Placed, ...]
+    """The effects with numbers fitted without the sealed episodes."""
 
 
-def gap(held: Comparison, placed: Sequence[Placed], chosen: Sealed) -> Gap:
+def gap(
+    held: Comparison, placed: Sequence[Placed], chosen: Sealed, note: Callable[[str], None] = lambda text: None
+) -> Gap:
     """Measure the gap.
 
     Args:
         held: Recordings and the model before.
         placed: The effects to add.
         chosen: Episodes that the effects' numbers are not fitted to.
+        note: Is told what is left out.
     """
     numbers = chosen.numbers
     fitted = held.fitted_without(placed, numbers)
@@ -69,10 +74,11 @@ def gap(held: Comparison, placed: Sequence[Placed], chosen: Sealed) -> Gap:
     )
     elsewhere = []
     for name, own in groups(held.course):
+        note(f"gap, fitted without: {name}")
         there = held.after(held.fitted_without(placed, own))
         elsewhere.append(Change(name, len(own), held.mean_square(before, own), held.mean_square(there, own)))
     pair = np.array([before.energy[numbers], after.energy[numbers]])
-    return Gap(whole, _interval(pair, held.values[numbers]), chosen.unseen, worst, tuple(elsewhere))
+    return Gap(whole, _interval(pair, held.values[numbers]), chosen.unseen, worst, tuple(elsewhere), fitted)
 
 
 def _interval(energy: np.ndarray, values: np.ndarray) -> tuple[float, float]:

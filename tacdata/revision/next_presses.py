@@ -86,10 +86,10 @@ def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repea
     for turn in range(repeats):
         for c in chosen:
             tool = held.course.tools[c.trial.tool].name
-            yaw = next((p.yaw for p in plan.presses if p.indenter_name == tool), 0.0)
+            angles = next((p.angles for p in plan.presses if p.indenter_name == tool), {"yaw": 0.0})
             best = max(c.nats, key=lambda pair: c.nats[pair])
             purpose = f"tells {best[0]} from {best[1]}"
-            entries.append({**c.trial.entry(tool, yaw), "repeat": turn, "purpose": purpose})
+            entries.append({**c.trial.entry(tool, angles["yaw"]), **angles, "repeat": turn, "purpose": purpose})
     tools = list(dict.fromkeys(e["indenter"] for e in entries))
     entries.sort(key=lambda e: tools.index(e["indenter"]))
     mechanisms = list(dict.fromkeys(m for c in chosen for pair in c.nats for m in pair))

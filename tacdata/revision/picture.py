@@ -15,7 +15,9 @@ BEFORE, AFTER, MEASURED = "#d55e00", "#0072b2", "#000000"
 """Okabe and Ito's vermilion and blue, which all eyes tell apart."""
 
 
-def draw(title: str, shown: Sequence[EpisodeCurves], found: Gap, path: Path) -> None:
+def draw(
+    title: str, shown: Sequence[EpisodeCurves], found: Gap, path: Path, networks: Sequence[dict[str, Any]] = ()
+) -> None:
     """Draw the page into a PNG file.
 
     Args:
@@ -23,6 +25,7 @@ def draw(title: str, shown: Sequence[EpisodeCurves], found: Gap, path: Path) -> 
         shown: Episodes, at most three.
         found: The gap.
         path: File to write.
+        networks: Metrics of networks before and after (`tacdata.revision.retrain`), if any were trained.
     """
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -38,11 +41,13 @@ def draw(title: str, shown: Sequence[EpisodeCurves], found: Gap, path: Path) -> 
         halves: Any = figure.subfigures(2, 1)
         upper, lower = halves
         top: Any = np.atleast_1d(upper.subplots(1, max(len(shown), 1)))
-        bottom: Any = lower.subplots(1, 2)
+        bottom: Any = lower.subplots(1, 3 if networks else 2)
         for k, own in enumerate(shown):
             _curves(top[k], own, k == 0)
         _residuals(bottom[0], shown)
         _groups(bottom[1], found)
+        if networks:
+            _networks(bottom[2], networks)
         with written_beside(path) as temporary:
             figure.savefig(temporary, dpi=110)
 
@@ -83,3 +88,16 @@ def _groups(axis: Any, found: Gap) -> None:
     axis.set(xscale="log", xlim=(0.8 * low, None), xlabel="mean square of the residual; 1 is the noise floor",
              title="the gap, where the numbers were not fitted")  # fmt: skip
     axis.legend(loc="lower right", fontsize=8)
+
+
+def _networks(axis: Any, metrics: Sequence[dict[str, Any]]) -> None:
+    """Draw each metric after over before: they have different units."""
+    known = [m for m in metrics if m["before"] and m["after"] is not None]
+    where = np.arange(len(known))
+    axis.barh(where, [m["after"] / m["before"] for m in known], 0.6, color=AFTER)
+    axis.axvline(1.0, color=BEFORE, lw=1.5)
+    for at, m in zip(where, known, strict=True):
+        axis.text(0.02, at, f"{m['before']:.3g} → {m['after']:.3g} {m['unit']}", va="center", fontsize=8, color="white")
+    axis.set_yticks(where, [m["title"].partition(",")[0] for m in known], fontsize=8)
+    axis.invert_yaxis()
+    axis.set(xlim=(0, None), xlabel="after / before", title="a network trained before and after")

@@ -15,18 +15,26 @@ from tacdata.recording import Episode
 
 BETWEEN = 0.02
 """Longest way between points of a path [mm]."""
+LATE = "latency"
+"""The effect by which a reading belongs to where the tip was before."""
 
 
 def moved_episodes(episodes: Sequence[Episode], placed: Sequence[Placed]) -> list[Episode]:
     """Return the episodes with the tip's path as kinematic effects make it, in the order of their time.
 
     Effects with memory see the whole session, turning points included: rows are the commanded profile's own points, and
-    points between them, since what follows a straight way need not be straight.
+    points between them, since what follows a straight way need not be straight. Where readings come late the path comes
+    late with them: a label is paired with a reading by its time.
 
     Args:
         episodes: Of one session.
-        placed: The model's effects; those of other stages are passed over.
+        placed: The model's effects; other ones than kinematic ones and a constant delay are passed over.
     """
+    late = round(1e9 * sum(float(p.values["L"]) for p in placed if p.effect.name == LATE))
+    return [replace(e, tip_ns=e.tip_ns + late) for e in _placed_elsewhere(episodes, placed)]
+
+
+def _placed_elsewhere(episodes: Sequence[Episode], placed: Sequence[Placed]) -> list[Episode]:
     ordered = [_dense(e) for e in sorted(episodes, key=lambda e: int(e.tip_ns[0]) if len(e.tip_ns) else 0)]
     kinematic = [p for p in placed if p.stage == "kinematics"]
     ready = [e for e in ordered if len(e.tip_ns) > 1]

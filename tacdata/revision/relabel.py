@@ -13,7 +13,7 @@ from label_farm.store import Store
 from tacdata.effects import Placed
 from tacdata.labels import read_label
 from tacdata.recording import read_episode, read_session
-from tacdata.revision.pose_path import moved_episodes
+from tacdata.revision.pose_path import LATE, moved_episodes
 from tacdata.sensor import Sensor
 
 THICKNESS = "thickness"
@@ -51,8 +51,8 @@ LEAST = 0.001
 
 
 def moves_labels(placed: Sequence[Placed]) -> bool:
-    """Return whether effects change labels: the tip's path, or the skin's thickness."""
-    return any(p.stage == "kinematics" or p.effect.name == THICKNESS for p in placed)
+    """Return whether effects change labels: the tip's path, when it was read, or the skin's thickness."""
+    return any(p.stage == "kinematics" or p.effect.name in (THICKNESS, LATE) for p in placed)
 
 
 def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:

@@ -13,7 +13,7 @@ import schemas
 from label_farm.labelling import FarmSettings
 from tacdata import documents, provenance
 from tacdata.discrepancy.recordings import course_of
-from tacdata.discrepancy.run import VERDICT
+from tacdata.discrepancy.run import VERDICT, recording_hash
 from tacdata.discrepancy.spec import Spec
 from tacdata.effects import Placed
 from tacdata.errors import UsageError
@@ -26,11 +26,14 @@ from tacdata.revision.comparison import Comparison
 from tacdata.revision.confirm import Confirmed, confirm, touches_fem
 from tacdata.revision.curves import EpisodeCurves, curves
 from tacdata.revision.episodes import sealed
-from tacdata.revision.gap import Gap, gap
+from tacdata.revision.gap import Change, Gap, gap
 from tacdata.revision.next_presses import choose, plan_of
 from tacdata.revision.picture import draw
+from tacdata.revision.realised import TipError, tip_error
 from tacdata.revision.relabel import Moved, moves_labels, paths_moved, relabelled
+from tacdata.revision.retrain import Recipe, Retrained, retrained
 from tacdata.revision.rivals import named, rivals
+from tacdata.revision.worst_slice import sealed_slices
 from tacdata.skin.mesher import MeshSettings
 from tacdata.surrogate.pressed import pressed
 
@@ -39,6 +42,10 @@ REVISION, SPEC, CARD, PICTURE, TABLE, CSV, PLAN, LABELS = (
 )  # fmt: skip
 """Files of the folder."""
 
+KIND = "recording "
+"""What the names of a verdict's recordings begin with among its parents."""
+NETWORKS = "networks"
+"""Folder of the datasets and networks of either model."""
 Note = Callable[[str], None]
 
 
@@ -54,6 +61,10 @@ class Wishes:
     """Presses to solve by finite elements where the revision moves the loads most."""
     presses: int = 4
     """Different presses of the next plan."""
+    retrain: Recipe | None = None
+    """How to train networks before and after; None to train none."""
+    truth: Path | None = None
+    """File of the tip's true path (`tacdata.revision.realised.COLUMNS`); else what a tag or gauge saw."""
 
 
 @dataclass(frozen=True)
@@ -89,24 +100,34 @@ def revise(
     if out.exists():
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
     verdict = documents.read(judged / VERDICT, "verdict")
-    _same(verdict, spec, judged)
-    note("reading")
+    _same(verdict, spec, judged, recordings)
     answer, status = named(verdict), verdict["status"]
+    if asked.retrain is not None and asked.relabel is None and moves_labels(answer) and status == "named":
+        raise UsageError(
+            "--retrain without --relabel: the effect moves labels, and a network needs the new ones",
+            "both", "add --relabel",
+        )  # fmt: skip
+    note("reading")
     held = Comparison(course_of(recordings), spec, tuple(answer))
     out.mkdir(parents=True)
     note("gap, with the numbers fitted without the sealed episodes")
-    found = gap(held, answer, sealed(held.course, verdict)) if answer else None
+    found = gap(held, answer, sealed(held.course, verdict), note) if answer else None
+    slices = sealed_slices(held, found.fitted, sealed(held.course, verdict).numbers) if found else []
     moved = _labels(recordings, answer, out, asked, note) if status == "named" else []
+    tips = _tips(recordings, answer, asked, note)
     confirmed = _confirmed(recordings, held, answer, asked, note) if status == "named" else []
     after = _added(verdict, judged, spec, answer, out) if status == "named" else None
+    trained = _retrained(recordings, held, answer, out, asked, note) if status == "named" else None
     following = _next(recordings, held, verdict, asked, out, note)
     parents = {"verdict": provenance.content_hash(verdict), "spec": spec.content_hash}
     document = {
         "version": schemas.version("revision"), "verdict": parents["verdict"], "status": status,
         "added": [e.effect.name for e in answer] if after else [],
-        "spec": {"before": spec.content_hash, "after": after}, "gap": _gap(found),
+        "spec": {"before": spec.content_hash, "after": after}, "gap": _gap(found, slices),
         "labels": [{"session": s, **_finite(asdict(m)), "failed": {str(k): v for k, v in m.failed.items()}}
                    for s, m in moved],
+        "tips": [{"session": s, **asdict(t)} for s, t in tips],
+        "retrained": None if trained is None else {**asdict(trained), "metrics": list(trained.metrics)},
         "confirmed": [{**_finite(asdict(c)), "place": list(c.place)} for c in confirmed], "next": following,
         "provenance": provenance.stamp("tacdata revise", parents, {"confirm": asked.confirm}),
     }  # fmt: skip
@@ -115,7 +136,17 @@ def revise(
     return Revised(document, out, shown)
 
 
-def _same(verdict: dict[str, Any], spec: Spec, judged: Path) -> None:
+def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Path]) -> None:
+    parents = verdict["provenance"].get("parents", {})
+    told = {name.removeprefix(KIND): digest for name, digest in parents.items() if name.startswith(KIND)}
+    given = {recording_hash(path): path for path in recordings if path.exists()}
+    if told and set(told.values()) != set(given):
+        other = [str(path) for digest, path in given.items() if digest not in told.values()]
+        raise UsageError(
+            f"{judged} was reached from other recordings than {', '.join(other or map(str, recordings))}",
+            f"those that it was reached from, unchanged: {', '.join(told)}",
+            "name them, or run `tacdata discrepancy` with the ones that there are",
+        )  # fmt: skip
     known = verdict["provenance"].get("parents", {}).get("spec")
     if known is not None and known != spec.content_hash:
         raise UsageError(
@@ -143,6 +174,24 @@ def _labels(
             told = relabelled(session, answer, folder, asked.relabel, asked.store, _told(note, session.name))
             found.append((session.name, told))
     return found
+
+
+def _tips(recordings: list[Path], answer: list[Placed], asked: Wishes, note: Note) -> list[tuple[str, TipError]]:
+    if not answer or not any(p.stage == "kinematics" for p in answer):
+        return []
+    note("where the tip truly was")
+    told = [(session.name, tip_error(session, answer, asked.truth)) for session in _sessions(recordings)]
+    return [(name, error) for name, error in told if error is not None]
+
+
+def _retrained(
+    recordings: list[Path], held: Comparison, answer: list[Placed], out: Path, asked: Wishes, note: Note
+) -> Retrained | None:
+    if asked.retrain is None:
+        return None
+    sessions = _sessions(recordings)
+    labels = {s: out / LABELS / s.name for s in sessions} if moves_labels(answer) else {}
+    return retrained(sessions, labels, held, answer, out / NETWORKS, asked.retrain, lambda t: note(f"networks, {t}"))
 
 
 def _told(note: Note, name: str) -> Callable[[str, int, int], None]:
@@ -202,7 +251,7 @@ def _next(
     if status not in ("ambiguous", "unknown"):
         return {"plan": None, "presses": [], "remark": ""}
     sessions = _sessions(recordings)
-    found = rivals(held, verdict)
+    found = rivals(held, verdict, note=note)
     if len(found) < 2 or not sessions:
         why = "no session with a plan" if not sessions else "the rivals do not come out differently in these recordings"
         return {"plan": None, "presses": list(verdict["next"]), "remark": f"no plan: {why}"}
@@ -226,7 +275,7 @@ def _next(
     return {"plan": PLAN, "presses": told, "remark": "judge the new session together with those there are"}
 
 
-def _gap(found: Gap | None) -> dict[str, Any] | None:
+def _gap(found: Gap | None, slices: list[Change]) -> dict[str, Any] | None:
     if found is None:
         return None
     changes = {
@@ -235,7 +284,7 @@ def _gap(found: Gap | None) -> dict[str, Any] | None:
     return {
         "unseen": found.unseen, **{n: asdict(c) for n, c in changes.items()},
         "closed": _or_none(found.whole.closed), "interval": [_or_none(v) for v in found.interval], "floor": 1.0,
-        "elsewhere": [asdict(c) for c in found.elsewhere],
+        "elsewhere": [asdict(c) for c in found.elsewhere], "slices": [asdict(c) for c in slices],
     }  # fmt: skip
 
 
@@ -257,7 +306,8 @@ def _show(
         shown = curves(held, answer, sealed(held.course, verdict).numbers)
         names = " and ".join(p.effect.title.lower() for p in answer)
         drawn = out / PICTURE
-        draw(f"{verdict['status']}: {names}", shown, found, drawn)
+        networks = (document["retrained"] or {}).get("metrics", ())
+        draw(f"{verdict['status']}: {names}", shown, found, drawn, networks)
         documents.write_text(out / TABLE, table.markdown(document))
         documents.write_text(out / CSV, table.as_csv(document))
     documents.write_text(out / CARD, card(document, verdict, drawn))

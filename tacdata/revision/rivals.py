@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,13 +32,16 @@ def named(verdict: dict[str, Any]) -> list[Placed]:
     ]
 
 
-def rivals(held: Comparison, verdict: dict[str, Any], most: int = 6) -> list[Rival]:
+def rivals(
+    held: Comparison, verdict: dict[str, Any], most: int = 6, note: Callable[[str], None] = lambda text: None
+) -> list[Rival]:
     """Return the verdict's own answer and what would do as well in the place of its first undecided effect.
 
     Args:
         held: Recordings and model.
         verdict: An ambiguous verdict.
         most: Most rivals.
+        note: Is told which is fitted.
     """
     own = named(verdict)
     at = next((k for k, e in enumerate(verdict["effects"]) if e["alternatives"]), None)
@@ -52,6 +56,7 @@ def rivals(held: Comparison, verdict: dict[str, Any], most: int = 6) -> list[Riv
     everything = np.arange(len(bare.folds))
     best: dict[str, Rival] = {}
     for candidate in best_shapes(bare).values():
+        note(f"next presses: {candidate.effect.name} fitted")
         _, values = fitted(bare, [candidate], everything)
         first = candidate.placed(values[: len(candidate.columns)], held.course.channels)
         model = refine(setting, [*kept, first], held.frame)

@@ -16,6 +16,7 @@ def rows(revision: dict[str, Any]) -> list[tuple[str, int, float, float, float |
         return []
     found = [("sealed episodes", gap["sealed"]), (f"worst: {gap['worst']['name']}", gap["worst"])]
     found += [(f"left out: {c['name']}", c) for c in gap["elsewhere"]]
+    found += [(f"sealed, {c['name']}", c) for c in gap.get("slices", ())]
     return [(name, c["episodes"], c["before"], c["after"], _closed(c)) for name, c in found]
 
 
@@ -29,7 +30,45 @@ def markdown(revision: dict[str, Any]) -> str:
     lines = [f"| {' | '.join(HEAD)} |", "|---|---:|---:|---:|---:|"]
     for name, count, before, after, closed in rows(revision):
         lines.append(f"| {name} | {count} | {before:.4g} | {after:.4g} | {'' if closed is None else f'{closed:.3f}'} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_tips(revision), *_networks(revision)]) + "\n"
+
+
+def _tips(revision: dict[str, Any]) -> list[str]:
+    told = revision.get("tips") or []
+    if not told:
+        return []
+    lines = ["", "| tip off where it was [mm] | against | episodes | before | after | better | worse |"]
+    lines.append("|---|---|---:|---:|---:|---:|---:|")
+    for t in told:
+        lines.append(
+            f"| {t['session']} | {t['against']} | {t['episodes']} | {t['before']:.4f} | {t['after']:.4f} "
+            f"| {t['better']} | {t['worse']} |"
+        )
+    return lines
+
+
+def _networks(revision: dict[str, Any]) -> list[str]:
+    trained = revision.get("retrained")
+    if not trained:
+        return []
+    lines = ["", f"{in_words(trained)}", "", "| network | unit | before | after |", "|---|---|---:|---:|"]
+    for m in trained["metrics"]:
+        values = ("–" if m[side] is None else f"{m[side]:.4g}" for side in ("before", "after"))
+        lines.append(f"| {m['title']} | {m['unit']} | {' | '.join(values)} |")
+    return lines
+
+
+def in_words(trained: dict[str, Any]) -> str:
+    """Return what two networks learnt from and were scored on."""
+    learnt = {
+        "labels": "both learnt from the readings measured, with labels of either model; scored on labels of the model "
+        "after, which is right as far as the effect is",
+        "readings": "both learnt from readings as either model says them; scored on the readings measured",
+    }[trained["by"]]
+    return (
+        f"Networks of {trained['epochs']} epochs, {trained['episodes']} episodes that neither saw "
+        f"({trained['frames']} frames in contact): {learnt}."
+    )
 
 
 def as_csv(revision: dict[str, Any]) -> str:

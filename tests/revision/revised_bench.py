@@ -5,6 +5,7 @@ import yaml
 
 import schemas
 from tacdata import documents, provenance
+from tacdata.discrepancy.run import recording_hash
 from tacdata.discrepancy.spec import read_spec
 from tacdata.effects import load
 from tacdata.importing.imported_session import import_session
@@ -46,10 +47,11 @@ def record(folder, late=0.0, play=0.0, episodes=16, rates=(0.5, 1.5), seed=3):
     return import_session(folder, folder / "mapping.yaml", folder / "session").folder
 
 
-def verdict(folder, effect, values, status="named", alternatives=()):
+def verdict(folder, effect, values, status="named", alternatives=(), session=None):
     """Write a verdict's folder that names an effect, as `tacdata discrepancy` would; return the folder."""
     kind = load(effect)
     spec = read_spec(None)
+    known = {} if session is None else {f"recording {session.name}": recording_hash(session)}
     entry = {
         "mechanism": kind.called, "effect": effect, "title": kind.title, "stage": kind.stage,
         "moves": list(kind.moves),
@@ -64,7 +66,7 @@ def verdict(folder, effect, values, status="named", alternatives=()):
         "gate": {"gap": True, "p": 0.001, "p_generic": 0.001, "noise": [0.1, 0.1], "memory": 0.0},
         "left": {"share": 0.0, "t": 0.0, "before": 9.0, "after": 1.0, "floor": 1.0}, "located": [],
         "unjudgeable": {}, "limits": {}, "untested": [], "data": {"episodes": 16}, "remarks": [], "next": [],
-        "provenance": provenance.stamp("test", {"spec": spec.content_hash, "recording session": "0" * 64}, {}),
+        "provenance": provenance.stamp("test", {"spec": spec.content_hash, **known}, {}),
     }  # fmt: skip
     folder.mkdir()
     documents.write(folder / "verdict.json", document, "verdict")

@@ -49,8 +49,15 @@ def test_a_shifted_depth_is_solved_anew_and_moves_labels_by_as_much(session):
     assert moved.most == pytest.approx(0.05, abs=0.005)
 
 
+def test_late_readings_belong_to_where_the_tip_was_before(session):
+    moved = relabelled(session, placed("latency", L=0.1), session / "new", SETTINGS)
+    assert moves_labels(placed("latency", L=0.1))
+    assert (moved.labels, moved.solved, moved.found) == (2, 0, 2), "the same presses"
+    assert moved.most == pytest.approx(0.15, abs=0.01), "1.5 mm/s for 0.1 s"
+
+
 def test_effects_of_the_readings_leave_labels_alone(session):
-    assert not moves_labels(placed("latency", L=0.05)) and moves_labels(placed("backlash", b=0.1))
+    assert not moves_labels(placed("low_pass_filter", tau=0.05)) and moves_labels(placed("backlash", b=0.1))
     assert changed_skin(SENSOR, placed("latency", L=0.05)) is None
     thicker = changed_skin(SENSOR, placed("thickness", e=0.1))
     assert thicker is not None and thicker.skin.thickness == pytest.approx(1.1 * SENSOR.skin.thickness)

@@ -18,7 +18,7 @@ from tacdata.revision.revise import revise
 def right(late, tmp_path_factory):
     """The right effect with numbers that are a little off."""
     folder = tmp_path_factory.mktemp("right")
-    judged = verdict(folder / "verdict", "latency", {"L": 0.07})
+    judged = verdict(folder / "verdict", "latency", {"L": 0.07}, session=late)
     return revise(judged, [late], read_spec(None), folder / "revision")
 
 
@@ -29,7 +29,10 @@ def test_the_right_effect_closes_the_gap_where_its_numbers_were_not_fitted(right
     assert not gap["unseen"], "the verdict did not seal them, and it is said so"
     rates = [c for c in gap["elsewhere"] if "rate" in c["name"]]
     assert len(rates) == 2 and all(c["after"] < 0.1 * c["before"] for c in rates), "another rate is foretold too"
-    assert right.document["labels"] == [], "a late reading moves no label"
+    [moved] = right.document["labels"]
+    assert moved["path_most"] == pytest.approx(0.07 * 2.6, rel=0.1), "a late reading is paired with an earlier depth"
+    worst = max(gap["slices"], key=lambda c: c["after"])
+    assert worst["after"] < 3 and {"loading", "hold", "unloading", "channel 0"} <= {c["name"] for c in gap["slices"]}
 
 
 def test_the_new_model_carries_its_evidence(right):
@@ -98,12 +101,16 @@ def test_play_moves_the_paths_of_labels_on_the_way_back_alone(loose):
         np.testing.assert_allclose(after.tip[up, 2], nominal[up, 2] + 0.06, atol=1e-6)
 
 
-def test_nothing_is_overwritten_and_a_verdict_of_another_model_is_refused(late, right, tmp_path):
+def test_nothing_is_overwritten_and_a_verdict_of_something_else_is_refused(late, loose, right, tmp_path):
     judged = verdict(tmp_path / "verdict", "latency", {"L": 0.08})
     with pytest.raises(UsageError, match="exists"):
         revise(judged, [late], read_spec(None), tmp_path)
     with pytest.raises(UsageError, match="another model"):
         revise(judged, [late], read_spec(right.folder / "spec.json"), tmp_path / "new")
+    known = verdict(tmp_path / "known", "latency", {"L": 0.08}, session=late)
+    with pytest.raises(UsageError, match="other recordings") as caught:
+        revise(known, [loose], read_spec(None), tmp_path / "new")
+    assert "session" in caught.value.allowed
     with pytest.raises(UsageError, match="no file"):
         revise(tmp_path / "nothing", [late], read_spec(None), tmp_path / "new")
     assert not (tmp_path / "new").exists()
