@@ -149,7 +149,7 @@ def plan_of(name: str, presses: list[Any]) -> dict[str, Any]:
     motion = {"clearance": 1.0, "travel_speed": slowest, "approach_speed": slowest, "press_speed": slowest,
               "hold": 0.0, "rest": 0.0}  # fmt: skip
     entries = [
-        {"indenter": p.indenter_name, "x": p.x, "y": p.y, "yaw": p.yaw, "depth": p.depth, "speed": p.speed,
+        {"indenter": p.indenter_name, "x": p.x, "y": p.y, **p.angles, "depth": p.depth, "speed": p.speed,
          "hold": p.hold}
         for p in presses
     ]  # fmt: skip

@@ -24,11 +24,22 @@ from tacdata.indenters import Indenter, from_document
 from tacdata.plans import Press
 from tacdata.rig import Registration
 
+DEEPEST = 100.0
+"""Depth beyond which a unit must be wrong [mm]; a plan allows no more."""
 NO_INDENTER = {"shape": "sphere", "radius": 2.0}
 """What stands in for an indenter that is not known."""
 SLOWEST = 1e-4
 """Least speed that a press is given [mm/s]."""
-UNITS = {"x": "mm", "y": "mm", "yaw": "deg", "depth": "mm", "speed": "mm/s", "hold": "s"}
+UNITS = {
+    "x": "mm",
+    "y": "mm",
+    "yaw": "deg",
+    "tilt_x": "deg",
+    "tilt_y": "deg",
+    "depth": "mm",
+    "speed": "mm/s",
+    "hold": "s",
+}
 
 
 def presses_of(
@@ -85,15 +96,23 @@ def _imported(
         raise FormatError("no position", "a position", "add it to the mapping")
     tip = place.to_sensor(position.values)
     path = press_path(position.time_ns, tip)
+    if abs(path.depth) > DEEPEST:
+        raise FormatError(
+            f"trial {record['trial'] or 'without a name'}: {path.depth:.4g} mm deep, as the mapping has it",
+            f"presses of at most {DEEPEST:g} mm",
+            "say the unit of the position's columns in the mapping (unit: um, m, inch), or correct contact",
+        )  # fmt: skip
     indenter, name = _indenter(mapping)
     if name == "unknown":
         stand_ins.append("indenter: not said by the source; a sphere of 2 mm stands in")
     if path.speed is None and "speed" not in known:
         stand_ins.append("speed: the indenter does not move; 1 mm/s stands in")
-    values = {"x": path.x, "y": path.y, "yaw": 0.0, "depth": path.depth, "speed": path.speed or 1.0, "hold": path.hold}
+    angles = {"yaw": 0.0, "tilt_x": 0.0, "tilt_y": 0.0}
+    values = {"x": path.x, "y": path.y, "depth": path.depth, "speed": path.speed or 1.0, "hold": path.hold, **angles}
     values = {key: round(value, 4) for key, value in {**values, **known}.items()}
     press = Press(
-        index=0, indenter=indenter, indenter_name=name, x=values["x"], y=values["y"], yaw=values["yaw"],
+        index=0, indenter=indenter, indenter_name=name, x=values["x"], y=values["y"],
+        yaw=values["yaw"], tilt_x=values["tilt_x"], tilt_y=values["tilt_y"],
         depth=values["depth"], speed=max(values["speed"], SLOWEST), hold=values["hold"],
     )  # fmt: skip
     phases = planned.phases(int(taxels.time_ns[0])) if planned else path.phases

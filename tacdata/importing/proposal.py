@@ -25,6 +25,8 @@ GUESSES = {
     "counter": r"(counter|frame|seq(uence)?|sample|index|n)",
 }
 """What a column's name, without its unit, says of it."""
+GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
+"""Words in the names of lengths that were measured beside the commanded ones."""
 SHOWN = 30
 """Columns that are listed of each file."""
 
@@ -93,6 +95,10 @@ def proposed_mapping(source: Path, tables: dict[str, Table]) -> dict[str, Any]:
             alias += "_"
         aliases[alias] = kind
     roles = {alias: _roles(tables[kind]) for alias, kind in aliases.items()}
+    if not any(found["channels"] for found in roles.values()):
+        # Nothing else was read: the load cell is the sensor.
+        for found in roles.values():
+            found["channels"] = found.pop("force", [])
     wide = max(aliases, key=lambda alias: len(roles[alias]["channels"]))
     document: dict[str, Any] = {
         "version": schemas.version("import_mapping"), "name": source.stem, "source": "say where the data come from",
@@ -100,12 +106,20 @@ def proposed_mapping(source: Path, tables: dict[str, Table]) -> dict[str, Any]:
         "sensor": {"name": source.stem},
         "taxels": {"file": wide, "columns": roles[wide]["channels"] or [0]},
     }  # fmt: skip
+    units = {plain(tables[aliases[wide]].units.get(name, "")) for name in roles[wide]["channels"]}
+    if len(units) == 1 and units != {""}:
+        document["taxels"]["unit"] = units.pop()
     for alias, found in roles.items():
         if "position" not in document and ("depth" in found or "z" in found):
             chosen = ("x", "y", "depth") if "depth" in found else ("x", "y", "z")
             document["position"] = {"file": alias} | {
                 key: _axis(tables[aliases[alias]], found[key][0]) for key in chosen if key in found
             }
+        lengths = found.get("depth", [])
+        if len(lengths) > 1 and "displacement" not in document.get("measured", {}):
+            # A second length is a gauge beside the drive: it tells what bends from what the skin does.
+            told = {"file": alias, "columns": lengths[1:2], "unit": _unit(tables[aliases[alias]], lengths[1])}
+            document.setdefault("measured", {})["displacement"] = told
         for key in ("force", "temperature"):
             if key in found and key not in document.get("measured", {}):
                 unit = tables[aliases[alias]].units.get(found[key][0])
@@ -114,6 +128,10 @@ def proposed_mapping(source: Path, tables: dict[str, Table]) -> dict[str, Any]:
         if "trial" in found:
             document["trials"] = {"column": found["trial"][0]}
     return document
+
+
+def _unit(table: Table, name: str) -> str:
+    return plain(table.units.get(name, "")) or "mm"
 
 
 def _roles(table: Table) -> dict[str, list[str]]:
@@ -128,6 +146,9 @@ def _roles(table: Table) -> dict[str, list[str]]:
             roles["channels"].append(name)
         elif role:
             roles.setdefault(role, []).append(name)
+    roles["depth"] = sorted(roles.get("depth", []), key=lambda name: bool(re.search(GAUGE, name.lower())))
+    if not roles["depth"]:
+        del roles["depth"]
     if "time" not in roles and table.columns and not any(re.search(r"[A-Za-z]", name) for name in table.columns):
         # Without a header the first column that only grows is most likely the time.
         for name in list(roles["channels"]):

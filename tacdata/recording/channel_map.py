@@ -48,7 +48,7 @@ class Answers:
     sites: np.ndarray
     """Places of the presses [mm, sensor frame], shape (presses, 2)."""
     indenters: np.ndarray
-    """Name and yaw of each press's indenter [text], shape (presses,)."""
+    """Name and angles of each press's indenter [text], shape (presses,)."""
     noise: np.ndarray
     """Noise of each channel [counts], shape (taxels,)."""
     taxels: Taxels
@@ -72,7 +72,7 @@ def answers(recordings: list[Figures]) -> Answers | None:
     return Answers(
         np.array([[0.0 if v is None else v for v in f.document["taxels"]["response"]] for f in chosen]),
         np.array([(e.press.x, e.press.y) for e in episodes]),
-        np.array([f"{e.press.indenter_name} {e.press.yaw:g}" for e in episodes]),
+        np.array([f"{e.press.indenter_name} {e.press.turned}" for e in episodes]),
         np.maximum(np.nan_to_num(middle, nan=1.0), 0.5),
         episodes[0].sensor.taxels,
     )

@@ -94,7 +94,7 @@ def read_records(
         raise FormatError(
             f"{path} is no MCAP file, or nothing of it can be read",
             "an MCAP file recorded by tacdata",
-            "check the path; for a file of another kind, convert it first",
+            "check the path; measured files of another rig come in by `tacdata import`",
         )
     return records
 

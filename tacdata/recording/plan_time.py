@@ -41,5 +41,5 @@ def plan_time(plan: Plan, limits: AxisLimits = USUAL_LIMITS) -> PlanTime:
         start: Position = position or path[0].target or (0.0, 0.0, 0.0)
         needed, position = duration(path, start, limits)
         seconds.append(needed + SECONDS_PER_PRESS)
-    order = [(press.indenter_name, press.yaw) for press in plan.presses]
+    order = [press.mounting for press in plan.presses]
     return PlanTime(tuple(seconds), sum(a != b for a, b in zip(order, [None, *order[:-1]], strict=True)))

@@ -65,7 +65,7 @@ class Recorder:
             out: Session folder to create, or to continue with ``resume``.
             resume: Continue with the next press that has no finished recording.
             devices: Drivers; by default those that the rig file names.
-            mount: Called when another indenter, or another yaw of it, is wanted; returns once it sits.
+            mount: Called when another indenter, or another turn of it, is wanted; returns once it sits.
             detect: Searches an image for its cube (`detection_process`); without it images are only stored.
             progress: Called with (presses done, presses wanted, real seconds left) after each press.
             sync_tap: Begin with a few touches that measure the streams' constant delays.
@@ -75,7 +75,7 @@ class Recorder:
         self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(out), resume
         self.devices = devices or RigDevices.of(rig)
         self._mount, self._detect, self._progress = mount, detect, progress
-        self._mounted: tuple[str, float] | None = None
+        self._mounted: tuple[str, float, float, float] | None = None
         self._height = safe_height(plan, rig)
         self._motion = GuardedMotion(self.devices.cnc, rig.clock)
         self._tap = sync_tap_motion.touch(plan, sensor) if sync_tap else None
@@ -194,7 +194,7 @@ class Recorder:
 
     def _change_indenter(self, press: Press, position: Position, streams: Streams) -> Position:
         """Have the press's indenter mounted, high enough for the longest; return where the guide stands [mm]."""
-        wanted = (press.indenter_name, press.yaw)
+        wanted = press.mounting
         if wanted != self._mounted and self._mount:
             if position[2] < self._height:
                 up = Step("", (*position[:2], self._height), self.plan.motion.approach_speed)

@@ -57,8 +57,10 @@ def read_session(folder: Path) -> Session:
         by_hand = (folder / "demonstrations.json").is_file()
         raise UsageError(
             f"{folder} is no session: no {FILE} in it",
-            "a folder written by tacdata record",
-            "demonstrations by hand lie in it: work them up with tacdata track" if by_hand else "check the path",
+            "a folder written by tacdata record or tacdata import",
+            "demonstrations by hand lie in it: work them up with tacdata track"
+            if by_hand
+            else "check the path; measured files of another rig come in by `tacdata import`",
         )
     document = documents.read(folder / FILE, "session")
     origin = str(folder / FILE)

@@ -10,6 +10,7 @@ from foreign import T0, mapping, press_data, wide_csv
 from tacdata import cli, provenance
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.importing.imported_session import import_session
+from tacdata.importing.proposal import described, proposed_mapping
 from tacdata.recording import read_session
 from tacdata.recording.check import check
 from tacdata.recording.mcap_records import read_records
@@ -307,6 +308,17 @@ def test_looking_first_proposes_a_mapping_that_works(tmp_path, monkeypatch, capf
     assert found["measured"]["force"]["columns"] == ["Fz [g]"]
     run(tmp_path, "--mapping", proposal, "--out", tmp_path / "session")
     assert read_episode(tmp_path / "session" / "episode-000000.mcap").press.depth == pytest.approx(1.5, abs=1e-3)
+
+
+def test_a_load_cell_alone_is_the_sensor_and_a_second_length_a_gauge(tmp_path):
+    rows = [f"0,{0.1 * k:.1f},{0.01 * k},{0.012 * k},{0.1 * k}" for k in range(9)]
+    lines = ["run,t_s,lvdt_mm,crosshead_mm,Fz_N", *rows]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    tables, _ = described(tmp_path)
+    found = proposed_mapping(tmp_path, tables)
+    assert found["taxels"] == {"file": "log", "columns": ["Fz_N"], "unit": "N"}
+    assert found["position"]["depth"]["column"] == "crosshead_mm", "what was commanded"
+    assert found["measured"] == {"displacement": {"file": "log", "columns": ["lvdt_mm"], "unit": "mm"}}
 
 
 @pytest.mark.parametrize(
