@@ -85,10 +85,10 @@ def _course(axes, plan: Plan, press_seconds: tuple[float, ...], names: list[str]
         )
     last = None
     for press, begin in zip(plan.presses, begins, strict=True):
-        if last not in (None, (press.indenter_name, press.yaw)):
+        if last not in (None, press.mounting):
             axes.axvline(begin, color="0.6", linewidth=0.8)
             axes.text(begin, 0.99, " mount", transform=axes.get_xaxis_transform(), fontsize=7, va="top")
-        last = press.indenter_name, press.yaw
+        last = press.mounting
     axes.axhline(0.0, color="0.6", linewidth=0.6)
     axes.set(xlabel="time [min], mounting not counted", ylabel="depth [mm]")
     axes.legend(fontsize=8, frameon=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
@@ -81,20 +82,23 @@ def indenter_body(sensor: Sensor, press: Press, time_ns: np.ndarray, tip: np.nda
 
     Args:
         sensor: Gives the height of the undeformed face.
-        press: Gives the shape and its yaw.
+        press: Gives the shape and how it is turned.
         time_ns: Times [ns], shape (n,).
         tip: x, y and depth of the lowest point [mm], shape (n, 3).
     """
     mesh = press.indenter.surface()
-    position = np.column_stack([tip[:, :2], sensor.skin.thickness - tip[:, 2]])
+    turn = Rotation.from_euler("XYZ", [press.tilt_x, press.tilt_y, press.yaw], degrees=True)
+    # The depth is that of the lowest point; a body is placed by its origin, which lies above it if it leans.
+    leans = press.tilt_x or press.tilt_y
+    rise = -float(turn.apply(np.asarray(mesh.vertices))[:, 2].min()) if leans else 0.0
+    position = np.column_stack([tip[:, :2], sensor.skin.thickness - tip[:, 2] + rise])
     rows = thinning.strongest(tip[:, 2], thinning.ARRAYS)
     time_ns, position = time_ns[rows], position[rows]
-    half = np.radians(press.yaw) / 2
     return Body(
         "indenter",
         np.asarray(mesh.vertices),
         np.asarray(mesh.faces),
-        np.array([0.0, 0.0, np.sin(half), np.cos(half)]),
+        turn.as_quat(),
         time_ns,
         position,
     )

@@ -5,15 +5,17 @@ from __future__ import annotations
 import rerun.blueprint as rrb
 
 from viewers.rerun_parts import ELAPSED, entity
-from viewers.scene import Bars, Scene
+from viewers.residual_curves import READINGS, RESIDUALS
+from viewers.scene import Bars, Curves, Scene
 
 
 def verdict_blueprint(scene: Scene) -> rrb.Blueprint:
     """Return the words beside bars, and curves where there are some."""
     parts: list[rrb.ContainerLike] = [_bars(bars) for bars in scene.bars]
-    for curves in scene.curves:
-        name = f"{curves.name.replace('_', ' ')} [{curves.unit}]"
-        parts.append(rrb.TimeSeriesView(origin=entity("curves", curves.name), name=name))
+    streams = [c.name.partition("/")[2] for c in scene.curves if c.name.startswith(f"{READINGS}/")]
+    parts += [_series(c) for c in scene.curves if not streams]
+    if streams:
+        parts.append(_streams(scene, streams))
     for page in scene.pages:
         parts.insert(0, rrb.Spatial2DView(origin=f"pages/{page.name}", name=page.title))
     columns = [rrb.TextDocumentView(origin="about", name="About")]
@@ -24,6 +26,21 @@ def verdict_blueprint(scene: Scene) -> rrb.Blueprint:
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )
+
+
+def _series(curves: Curves) -> rrb.TimeSeriesView:
+    name = f"{curves.name.replace('_', ' ').replace('/', ': ')} [{curves.unit}]"
+    return rrb.TimeSeriesView(origin=entity("curves", curves.name), name=name)
+
+
+def _streams(scene: Scene, streams: list[str]) -> rrb.Tabs:
+    """Return a tab for each stream: readings, what is left of them, the depth; the stream with most to see first."""
+    by_name = {c.name: c for c in scene.curves}
+    tabs = []
+    for name in streams:
+        own = [by_name[f"{READINGS}/{name}"], by_name[f"{RESIDUALS}/{name}"], by_name["depth"]]
+        tabs.append(rrb.Vertical(*map(_series, own), row_shares=[3, 2, 1], name=name.replace("_", " ")))
+    return rrb.Tabs(*tabs, name="Readings")
 
 
 def _bars(bars: Bars) -> rrb.TextDocumentView:

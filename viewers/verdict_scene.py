@@ -18,16 +18,20 @@ SURELY = 2.33
 """Standard errors by which a name must be better than another (`tacdata.discrepancy`)."""
 
 
-def verdict_scene(title: str, verdict: dict[str, Any], picture: Path | None = None) -> Scene:
+def verdict_scene(
+    title: str, verdict: dict[str, Any], picture: Path | None = None, curves: tuple[Curves, ...] = ()
+) -> Scene:
     """Return a verdict in words and bars.
 
     Args:
         title: What stands on top.
         verdict: The document (`schemas/verdict.schema.json`).
         picture: The page with residuals that lies beside it, if one does.
+        curves: Readings beside the model before and after, if they are there.
     """
     words = verdict_words(title, verdict, picture.name if picture else None)
-    scene = _scene(f"{title}: {verdict['status']}", words, (*_left(verdict), *_margins(verdict), *_limits(verdict)))
+    bars = (*_left(verdict), *_slices(verdict), *_margins(verdict), *_limits(verdict))
+    scene = _scene(f"{title}: {verdict['status']}", words, bars, curves)
     if picture is None:
         return scene
     return replace(scene, pages=(Page("residuals", "Residuals before and after", picture.read_bytes()),))
@@ -106,6 +110,17 @@ def _left(verdict: dict[str, Any]) -> list[Bars]:
     values = np.array([left["before"], left["after"], left["floor"]], float)
     wide = values[0] > WIDE * min(values[1:])
     return [Bars("gap", "Residual: mean square over the noise", names, values, 1.0, bool(wide))]
+
+
+def _slices(verdict: dict[str, Any]) -> list[Bars]:
+    """Return where the residual lives, before and after."""
+    told = [s for s in verdict.get("slices", ()) if s["by"] != "stream"]
+    if not told:
+        return []
+    names = tuple(f"{s['by']}: {s['name']}, {when}" for s in told for when in ("before", "after"))
+    values = np.array([s[when] for s in told for when in ("before", "after")], float)
+    title = "Where it lives: mean square over the noise; 1 is the floor"
+    return [Bars("slices", title, names, values, 1.0, bool(values.max() > WIDE * max(values.min(), 1e-9)))]
 
 
 def _margins(verdict: dict[str, Any]) -> list[Bars]:

@@ -6,6 +6,7 @@ they are, and each half of them by itself: two halves of one recording must not 
 
 import argparse
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -108,7 +109,9 @@ def tacdata(engine, *words):
     """Run a verb; a status of 3 is an import that left trials out."""
     code = "from tacdata.cli import main; main()"
     command = [sys.executable, "-c", code, *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env={"PYTHONPATH": str(engine)})
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": str(engine)}
+    )
     if done.returncode not in (0, 3):
         raise SystemExit(done.stderr[-1500:] or done.stdout[-1500:])
 

@@ -10,6 +10,8 @@ import schemas
 from tacdata import documents, registry
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.demonstrations.tracks_file import read_tracks, write_tracks
+from tacdata.discrepancy.residuals import Residuals
+from tacdata.discrepancy.residuals import write as write_residuals
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import exporter
 from tacdata.replay.targets import targets_of
@@ -136,6 +138,21 @@ def test_a_verdict_in_words_and_bars(verdict, tmp_path):
     assert bars["limits"].labels == ("creep", "tilt"), "what is not excited has no bar"
     assert {"/bars/gap", "/bars/limits", "/about"} <= drawn(scene, tmp_path)
     assert scene_at(verdict / "verdict.json").bars[0].labels == scene.bars[0].labels
+
+
+def test_a_verdict_shows_its_readings_beside_the_model(verdict, tmp_path):
+    rng, rows = np.random.default_rng(0), 300
+    measured = rng.normal(size=(rows, 2)).astype(np.float32)
+    told = Residuals(
+        np.repeat(np.arange(3), 100).astype(np.int32), np.arange(rows) * 0.1, np.zeros(rows, np.int8),
+        np.zeros(rows, np.float32), np.zeros(rows, np.float32), measured, measured - [1.0, 5.0], measured * 1.0,
+        np.ones(2), ("channel 0", "channel 3"), ("hold",), ("a", "b", "c"),
+    )  # fmt: skip
+    write_residuals(verdict / "residuals.parquet", told, "a" * 64)
+    scene = scene_at(verdict)
+    assert [c.name for c in scene.curves][:2] == ["readings/channel_3", "residuals/channel_3"], "most to see first"
+    assert "/curves/residuals/channel_0" in drawn(scene, tmp_path)
+    assert np.nanmax(np.abs(scene.curves[1].values[:, 1])) < 1e-6
 
 
 def test_options_that_mean_nothing_are_refused(verdict, tracks):

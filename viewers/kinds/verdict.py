@@ -7,7 +7,7 @@ from pathlib import Path
 from viewers.kinds.kind import Asked, Kind, refuse
 from viewers.scene import Scene
 
-FILE = "verdict.json"
+FILE, RESIDUALS = "verdict.json", "residuals.parquet"
 
 
 class Verdict(Kind):
@@ -20,12 +20,16 @@ class Verdict(Kind):
         return (path / FILE).is_file() or (path.is_file() and path.name == FILE)
 
     def scene(self, path: Path, asked: Asked) -> Scene:
-        """Return it in words and bars."""
+        """Return it in words and bars, with the readings beside the model before and after."""
         from tacdata import documents
+        from tacdata.discrepancy.residuals import read
+        from viewers.residual_curves import residual_curves
         from viewers.verdict_scene import verdict_scene
 
         refuse(asked, "a verdict")
         file = path if path.is_file() else path / FILE
         picture = file.with_suffix(".png")
         document = documents.read(file, "verdict")
-        return verdict_scene(file.resolve().parent.name, document, picture if picture.is_file() else None)
+        lies = file.parent / RESIDUALS
+        curves = residual_curves(read(lies)) if lies.is_file() else ()
+        return verdict_scene(file.resolve().parent.name, document, picture if picture.is_file() else None, curves)
