@@ -47,10 +47,22 @@ def scan(source: np.ndarray, ratio: np.ndarray) -> np.ndarray:
 
 
 def play(values: np.ndarray, width: float) -> np.ndarray:
-    """Return the play operator: what follows an input through a dead band of +- ``width``, shape (n,).
+    """Return the play operator: what follows an input through a dead band of +- ``width``, shape as the input.
 
     y_i = max(u_i - w, min(u_i + w, y_{i-1})); before the first row the input came from below.
+
+    Args:
+        values: Input, shape (n,) or (n, k).
+        width: Half the dead band, in the input's unit.
     """
+    if values.ndim == 2:
+        # Row by row for all columns at once.
+        low, high = values - width, values + width
+        result, last = np.empty_like(low), low[0]
+        for below, above, out in zip(low, high, result, strict=True):
+            np.minimum(above, last, out=out)
+            last = np.maximum(below, out, out=out)
+        return result
     result = np.empty(len(values))
     last = float(values[0]) - width
     for i, u in enumerate(values.tolist()):

@@ -16,6 +16,7 @@ import numpy as np
 
 from tacdata.chain import Course
 from tacdata.discrepancy.own_errors import Own, without
+from tacdata.discrepancy.wander import Wander
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,8 @@ class Noise:
     """Standard deviation of the innovations [each stream's unit], shape (streams,)."""
     memory: float
     """Correlation of successive rows at the median step [1]."""
-    offset: float
-    """Standard deviation of an episode's own offset, in noise scales [1]; inf leaves it free."""
+    wander: Wander | None = None
+    """How episodes' offsets go on from one to the next; None leaves each free."""
     swing: np.ndarray | None = None
     """What one standard deviation of an episode's own gain of a stream changes [its unit], shape (n, streams)."""
     missing: np.ndarray | None = None
@@ -55,32 +56,34 @@ class Evidence:
         return self._sums[key]
 
 
-def whiten(values: np.ndarray, course: Course, noise: Noise) -> np.ndarray:
+def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | None = None) -> np.ndarray:
     """Filter by e_i - phi^(dt / median dt) e_{i-1} within episodes and divide by the innovations' scale.
 
     Args:
         values: Shape (n, streams, columns).
         course: Whose rows.
         noise: Scales and memory.
+        rows: Rows of the course, of whole episodes, that ``values`` are of; all, unless given.
     """
+    some = slice(None) if rows is None else rows
     inside = course.step[~course.first]
     median = float(np.median(inside)) if len(inside) else 1.0
     decay = noise.memory ** np.clip(course.step / max(median, 1e-9), 0.0, 50.0)
-    decay = np.where(course.first, 0.0, decay)
+    decay = np.where(course.first, 0.0, decay)[some]
     result = values.astype(np.float32)
     if noise.missing is not None:
-        result[noise.missing] = 0.0
+        missing = noise.missing[some]
+        result[missing] = 0.0
         before = result[:-1].copy()
         result[1:] -= decay[1:, None, None].astype(np.float32) * before
-        gone = noise.missing.copy()
-        gone[1:] |= noise.missing[:-1] & ~course.first[1:, None]
+        gone = missing.copy()
+        gone[1:] |= missing[:-1] & ~course.first[some][1:, None]
         result[gone] = 0.0
     else:
-        result[1:] -= decay[1:, None, None].astype(np.float32) * values[:-1].astype(np.float32)
+        result[1:] -= decay[1:, None, None].astype(np.float32) * values[:-1].astype(np.float32, copy=False)
     spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
-    spread = spread / np.sqrt(np.minimum(course.averaged, 4.0))
-    result /= spread[:, None, None].astype(np.float32)
-    result /= noise.scale[None, :, None].astype(np.float32)
+    spread = spread / np.sqrt(np.minimum(course.averaged[some], 4.0))
+    result /= (spread[:, None] * noise.scale[None]).astype(np.float32)[:, :, None]
     return result
 
 
@@ -144,34 +147,64 @@ def _cleaned(
     columns: np.ndarray, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None,
     jitter: np.ndarray,
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:  # fmt: skip
-    white = whiten(columns, course, noise)
-    streams = white.shape[1]
+    streams = columns.shape[1]
+    seen = streams - (3 if noise.tag is not None else 0)
     flat = replace(noise, scale=np.ones(1))
-    shared = None if features is None else whiten(features[:, None, :], course, replace(flat, missing=None))[:, 0]
+    one = replace(flat, missing=None)
     offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
     moved = whiten(jitter, course, noise)
     swung = None if noise.swing is None else whiten(noise.swing[:, :, None], course, noise)[:, :, 0]
-    seen = streams - (3 if noise.tag is not None else 0)
+    shared = None if features is None else whiten(features[:, None, :], course, one)
+    expected = None
+    if noise.wander is not None:
+        gone = None if noise.missing is None else noise.missing[:, :seen]
+        expected = noise.wander.expected(columns[:, :seen], gone)
+        expected = (expected / noise.scale[:seen, None]).astype(np.float32)
+        if shared is not None and features is not None:
+            ones = whiten(np.ones((course.rows, 1, 1)), course, one)[:, :, 0]
+            said = noise.wander.expected(features[:, None, :]).astype(np.float32)
+            _follow(shared, ones, course.episode, said)
     order = np.argsort(context, kind="stable")
+    # A place at a time: columns of all rows together would not stay in a processor's cache.
     for group in np.split(order, np.flatnonzero(np.diff(context[order])) + 1):
         local = course.episode[group]
         rows = np.argsort(local, kind="stable")
         spans = np.split(rows, np.flatnonzero(np.diff(local[rows])) + 1)
-        part = np.empty_like(white[group])
+        white = whiten(columns[group], course, noise, group)
+        if expected is not None:
+            _follow(white[:, :seen], offset[group], local, expected)
+        free = np.full(len(spans), np.inf)
         own = Own(
-            _turned(offset[group, :seen]), noise.offset,
+            _turned(offset[group, :seen]),
+            free if noise.wander is None else noise.wander.spread[[local[span[0]] for span in spans]],
             None if swung is None else _turned(swung[group, :seen]),
             _turned(moved[group, :seen]),
-            None if shared is None else _features(shared[group], offset[group, :seen]),
+            None if shared is None else _features(shared[group, 0], offset[group, :seen]),
         )  # fmt: skip
-        part[:, :seen] = _turned(without(_turned(white[group, :seen]), spans, own))
+        part = np.empty_like(white)
+        part[:, :seen] = _turned(without(_turned(white[:, :seen]), spans, own))
         if seen < streams:
             # A tag knows nothing of the response: it has a free offset for the place, and each episode's own.
             own = Own(
-                _turned(offset[group, seen:]), float(noise.tag or 1.0), features=_turned(offset[group, seen:, None])
-            )
-            part[:, seen:] = _turned(without(_turned(white[group, seen:]), spans, own))
+                _turned(offset[group, seen:]), np.full(len(spans), float(noise.tag or 1.0)),
+                features=_turned(offset[group, seen:, None]),
+            )  # fmt: skip
+            part[:, seen:] = _turned(without(_turned(white[:, seen:]), spans, own))
         yield group, part
+
+
+def _follow(white: np.ndarray, offset: np.ndarray, episode: np.ndarray, expected: np.ndarray) -> None:
+    """Take off whitened columns, in place, what the offsets of the episodes before let one expect.
+
+    Args:
+        white: Shape (n, streams, columns).
+        offset: Whitened constants, shape (n, streams or more).
+        episode: Of each row, shape (n,).
+        expected: In noise scales, shape (episodes, streams, columns).
+    """
+    edges = np.flatnonzero(np.diff(episode, prepend=-1))
+    for begin, end in zip(edges, [*edges[1:], len(episode)], strict=True):
+        white[begin:end] -= offset[begin:end, : white.shape[1], None] * expected[episode[begin]]
 
 
 def _turned(values: np.ndarray) -> np.ndarray:

@@ -47,6 +47,7 @@ class FittedResponse(Response):
             filled = np.interp(rows, rows[there], reduced.force[there]) if there.any() else np.zeros(len(rows))
             streams = np.column_stack([streams, filled])
         count = knots or self._chosen(streams)
+        self._designs: list[tuple[np.ndarray, list[np.ndarray]]] = []
         self._bases = [self._basis(reduced.tip[self._within(k), 2], count) for k in range(self.context.max() + 1)]
         self._weights: list[np.ndarray] = []
         self._fit(streams)
@@ -77,10 +78,8 @@ class FittedResponse(Response):
     def basis(self, pose: np.ndarray) -> np.ndarray:
         """Return the splines at poses of all rows of the course, shape (n, most splines of a place)."""
         result = np.zeros((len(pose), self.width))
-        for k, basis in enumerate(self._bases):
-            rows = self.context == k
-            design = self._design(basis, pose[rows, 2])
-            result[np.ix_(rows, np.arange(design.shape[1]))] = design
+        for k, design in enumerate(self._designs_at(pose)):
+            result[np.ix_(self.context == k, np.arange(design.shape[1]))] = design
         return result
 
     @property
@@ -161,10 +160,20 @@ class FittedResponse(Response):
         if len(pose) != len(self.context):
             pose = np.broadcast_to(pose, (len(self.context), 3))
         result = np.empty((len(pose), self._weights[0].shape[1]))
-        for k, basis in enumerate(self._bases):
-            rows = self.context == k
-            result[rows] = self._design(basis, pose[rows, 2]) @ self._weights[k]
+        for k, design in enumerate(self._designs_at(pose)):
+            result[self.context == k] = design @ self._weights[k]
         return result
+
+    def _designs_at(self, pose: np.ndarray) -> list[np.ndarray]:
+        """Return each place's splines at depths of all rows. The last are kept: most effects move nothing."""
+        depth = np.array(pose[:, 2])
+        for at, (known, designs) in enumerate(self._designs):
+            if np.array_equal(known, depth):
+                self._designs.append(self._designs.pop(at))
+                return designs
+        designs = [self._design(basis, depth[self.context == k]) for k, basis in enumerate(self._bases)]
+        self._designs = [*self._designs[-2:], (depth, designs)]
+        return designs
 
     @staticmethod
     def _basis(depth: np.ndarray, knots: int) -> BSpline:

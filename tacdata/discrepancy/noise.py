@@ -25,7 +25,7 @@ def first_guess(residual: np.ndarray, course: Course) -> Noise:
     missing = ~np.isfinite(residual)
     tag = np.inf if course.tag is not None else None
     found = np.maximum(scale, 1e-3 * whole + 1e-12)
-    return Noise(found, 0.0, np.inf, missing=missing if missing.any() else None, tag=tag)
+    return Noise(found, 0.0, missing=missing if missing.any() else None, tag=tag)
 
 
 def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
@@ -54,66 +54,6 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
     spread = 1.4826 * np.nanmedian(np.abs(leftover - np.nanmedian(leftover, axis=0)), axis=0)
     mixed = np.maximum(0.5 * (spread + np.nanstd(leftover, axis=0)), before.scale * 0.3)
     return replace(before, scale=mixed * np.sqrt(max(1 - memory**2, 0.02)), memory=memory)
-
-
-def wander(residual: np.ndarray, course: Course, known: Noise) -> float:
-    """Return how far an episode's offset is off a smooth course in time, as a standard deviation in noise scales [1].
-
-    Enlarged by what successive episodes have in common, so that a slow wander is no evidence of drift: a line through
-    episodes is as uncertain with this spread as it is with a wander of the increments that are seen.
-
-    Args:
-        residual: Shape (n, streams).
-        course: Whose rows.
-        known: Noise so far.
-    """
-    quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
-    means, times = [], []
-    for number in range(course.episodes):
-        rows = quiet & (course.episode == number)
-        if rows.sum() >= 3:
-            means.append(np.mean(residual[rows][:, : course.channels], axis=0) / known.scale[: course.channels])
-            times.append(course.time[rows].mean())
-    if len(means) < 6:
-        return np.inf
-    line = np.vander(np.array(times) / max(times[-1], 1e-9), 4 if len(times) >= 16 else 2)
-    offsets = np.array(means)
-    slow = _as_wander(offsets)
-    offsets = offsets - line @ np.linalg.lstsq(line, offsets, rcond=None)[0]
-    power = float(np.sum(offsets**2))
-    common = float(np.clip(np.sum(offsets[1:] * offsets[:-1]) / max(power, 1e-12) + 2 / len(offsets), 0.0, 0.95))
-    spread = np.sqrt(power / offsets.size * (1 + common) / (1 - common))
-    return float(max(spread, slow, 0.2))
-
-
-BEYOND = 1.5
-"""A wander counts as far as it is beyond so many standard errors, about, of what independent offsets pretend [1]."""
-
-
-def _as_wander(offsets: np.ndarray) -> float:
-    """Return the spread of independent offsets that leave a line as uncertain as a wander like these does.
-
-    A random walk of increments of variance q makes the slope of n offsets vary by 6 q / 5 n, independent offsets of
-    variance v by 12 v / n^3; a wander that does not go far, of variance s, counts as s (4 s / q - 1).
-
-    Args:
-        offsets: Shape (n, channels).
-    """
-    count = len(offsets)
-    steps = np.diff(offsets, axis=0)
-    smooth = np.vander(np.linspace(-1, 1, len(steps)), 3 if count >= 16 else 1)
-    steps = steps - smooth @ np.linalg.lstsq(smooth, steps, rcond=None)[0]
-    freedom = len(steps) - smooth.shape[1]
-    if freedom < 3:
-        return 0.0
-    # Errors of single offsets make successive steps differ in sign: they cancel here.
-    values = freedom * offsets.shape[1]
-    power = float(np.sum(steps**2)) / values
-    q = power + 2 * float(np.sum(steps[1:] * steps[:-1])) / values - BEYOND * power * 2 / np.sqrt(values)
-    if q <= 0.0:
-        return 0.0
-    far = float(np.mean(np.var(offsets, axis=0, ddof=1)))
-    return float(np.sqrt(max(min(q * count**2 / 10, far * max(4 * far / q - 1, 1.0)), 0.0)))
 
 
 def gain_spread(residual: np.ndarray, rises: np.ndarray, context: np.ndarray) -> float:

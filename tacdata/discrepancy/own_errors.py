@@ -25,8 +25,8 @@ class Own:
 
     offset: np.ndarray
     """A constant [1], shape (streams, n)."""
-    prior: float
-    """Its standard deviation, in noise scales [1]; inf leaves it free."""
+    prior: np.ndarray
+    """Its standard deviation in each episode, in noise scales [1], shape (episodes,); inf leaves it free."""
     swing: np.ndarray | None = None
     """What one standard deviation of a stream's own gain changes [1], shape (streams, n)."""
     moved: np.ndarray | None = None
@@ -51,8 +51,8 @@ def without(columns: np.ndarray, spans: list[np.ndarray], own: Own) -> np.ndarra
     result = np.empty_like(columns)
     free = None if own.features is None else _Free(streams, own.features.shape[2])
     later = []
-    for rows in spans:
-        pieces = np.split(_steadied(stacked[:, rows], own, rows), edges, axis=2)
+    for rows, prior in zip(spans, own.prior, strict=True):
+        pieces = np.split(_steadied(stacked[:, rows], own.offset[:, rows, None], float(prior)), edges, axis=2)
         left, rest = np.ascontiguousarray(pieces[0]), dict(zip(given, pieces[1:], strict=True))
         errors = _Errors(streams, len(rows), rest.get("moved"), rest.get("swing"))
         left = errors.rooted(left)
@@ -67,11 +67,10 @@ def without(columns: np.ndarray, spans: list[np.ndarray], own: Own) -> np.ndarra
     return result
 
 
-def _steadied(block: np.ndarray, own: Own, rows: np.ndarray) -> np.ndarray:
+def _steadied(block: np.ndarray, offset: np.ndarray, prior: float) -> np.ndarray:
     """Return columns (streams, m, k) of one episode with its streams' own offsets accounted for."""
-    offset = own.offset[:, rows, None]
     power = np.maximum(np.square(offset).sum(axis=(1, 2)), 1e-12)[:, None, None]
-    share = 1 / power if np.isinf(own.prior) else own.prior**2 * _root(own.prior**2 * power)
+    share = 1 / power if np.isinf(prior) else prior**2 * _root(prior**2 * power)
     return block - offset * ((offset.transpose(0, 2, 1) @ block) * share.astype(np.float32))
 
 

@@ -18,6 +18,7 @@ from tacdata.discrepancy.generic import depth_slope, generic, slow
 from tacdata.discrepancy.spline_response import taken_up
 from tacdata.discrepancy.streams import Streams
 from tacdata.discrepancy.tangent import Tangent, tangents
+from tacdata.discrepancy.wander import wander
 from tacdata.effects import Effect, Placed, load
 
 NUISANCE = {"channel_gain": 0.05}
@@ -273,7 +274,18 @@ def told(
         bare[~np.isfinite(residual)] = np.nan
         known = noise.refined(bare * known.scale, course, known)
     rest = residual - rich @ best.astype(np.float32)
-    return replace(known, offset=noise.wander(rest, course, known), tag=noise.tag_wander(rest, course, known))
+    wandering = wander(rest, course, known.scale, known.memory, levels(course, context, features is not None))
+    return replace(known, wander=wandering, tag=noise.tag_wander(rest, course, known))
+
+
+def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray]:
+    """Return the kinds of levels that offsets have, each as a number an episode, shape (episodes,).
+
+    A session has a level of its own; where the response is fitted, each of its places has one too.
+    """
+    place = np.zeros(course.episodes, dtype=np.int64)
+    place[course.episode] = context
+    return [course.session, place] if fitted else [course.session]
 
 
 def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:

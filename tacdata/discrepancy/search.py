@@ -227,7 +227,7 @@ def own_histories(problem: Problem) -> np.ndarray:
     depth = course.reduced.tip[:, 2]
     share = np.clip((depth - max(0.0, float(depth.min()))) / course.span, 0, 1)[:, None]
     columns = np.column_stack([own * np.minimum(share * 10, 1), own * share])[:, None, :]
-    plain = Noise(np.ones(1), same.noise.memory, same.noise.offset)
+    plain = Noise(np.ones(1), same.noise.memory, same.noise.wander)
     none = np.zeros((len(depth), 1, 1))
     made = evidence.cleaned(columns, course.reduced, plain, same.context, same.features, none)[:, 0].astype(float)
     return made / np.maximum(np.sqrt(np.mean(made**2, axis=0)), 1e-9)

@@ -30,5 +30,4 @@ class QuantizationHysteresis(Effect):
         width = float(values["w"]) * np.abs(state.signal - idle).max()
         if width <= 0.0:
             return state
-        moved = [play(column, width) + width for column in state.signal.T]
-        return replace(state, signal=np.stack(moved, axis=-1))
+        return replace(state, signal=play(state.signal, width) + width)

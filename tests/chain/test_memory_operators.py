@@ -31,6 +31,11 @@ def test_play_follows_through_its_dead_band():
     assert back[-1] == pytest.approx(0.1)
 
 
+def test_play_of_many_columns_is_that_of_each():
+    values = np.cumsum(np.random.default_rng(0).normal(size=(200, 5)), axis=0)
+    np.testing.assert_array_equal(play(values, 0.7), np.stack([play(c, 0.7) for c in values.T], axis=-1))
+
+
 def test_delay_shifts_within_an_episode_only():
     time = np.concatenate([np.arange(10.0), 100 + np.arange(10.0)])
     episode = np.repeat([0, 1], 10)

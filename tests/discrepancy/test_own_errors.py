@@ -68,7 +68,8 @@ def test_products_are_those_of_generalized_least_squares(prior, features):
     spans = [np.arange(a, b) for a, b in pairwise(edges)]
     expected = dense(given["columns"], spans, prior, given["offset"], given["swing"], given["moved"], given["features"])
     own = Own(
-        given["offset"].astype(np.float32), prior, given["swing"].astype(np.float32), given["moved"].astype(np.float32),
+        given["offset"].astype(np.float32), np.full(len(spans), prior), given["swing"].astype(np.float32),
+        given["moved"].astype(np.float32),
         given["features"].astype(np.float32) if features else None,
     )  # fmt: skip
     left = without(given["columns"].astype(np.float32), spans, own).reshape(-1, WIDTH)

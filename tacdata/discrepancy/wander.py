@@ -1,0 +1,186 @@
+"""How offsets wander from episode to episode, and what the ones before say of the next.
+
+A stream's offset in an episode is a level of its place and session, an Ornstein-Uhlenbeck process in time, and an error
+of the episode's own. Their variances are those of restricted maximum likelihood (Patterson & Thompson, Biometrika 58,
+1971, 545) beside a line. That leaves slow wanders undecided: of the time constants that are likely, the one counts
+that makes a drift least certain. Episodes are made independent by what the offsets before them, read where nothing
+presses, let one expect of theirs (innovations: the Cholesky factor of their covariance), so that what follows the
+clock is held against the wander that it has to stand out from, and nothing else is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.optimize import minimize
+
+from tacdata.chain import Course
+
+FREE = 1e3
+"""Standard deviation of a level that is not known [noise scales]."""
+FEWEST = 6
+"""Fewer episodes tell no wander; then every offset is free."""
+AT_LEAST = 3
+"""Quiet rows that an episode's offset is read from."""
+LEAST = 0.05
+"""An episode's own offset varies by so much at least [noise scales]."""
+TOLD_BY = 160
+"""At most so many successive episodes tell the variances."""
+LENGTHS = (0.5, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 200.0)
+"""Time constants that are tried [median times between episodes]."""
+LIKELY = 1.0
+"""A time constant is likely if the likelihood is not lower by more than this [nats]: some 84 %, one-sided."""
+
+
+@dataclass(frozen=True)
+class Wander:
+    """What is known of episodes' offsets before they are read."""
+
+    weights: np.ndarray
+    """Expected offset of an episode is this times those read, shape (episodes, episodes), lower triangular."""
+    spread: np.ndarray
+    """Standard deviation of each around that [noise scales], shape (episodes,)."""
+    quiet: np.ndarray
+    """Rows where nothing presses, of those read, shape (m,), bool."""
+    episode: np.ndarray
+    """Episode of each row read, shape (m,), int64."""
+
+    def expected(self, values: np.ndarray, missing: np.ndarray | None = None) -> np.ndarray:
+        """Return the offsets that those of the episodes before let one expect, shape (episodes, streams, columns).
+
+        Args:
+            values: Shape (m, streams, columns).
+            missing: Values that were not read, shape (m, streams), bool.
+        """
+        means = _means(values, self.quiet, self.episode, len(self.spread), missing)
+        return (self.weights @ means.reshape(len(means), -1)).reshape(means.shape)
+
+
+def wander(
+    residual: np.ndarray, course: Course, scale: np.ndarray, memory: float, levels: Sequence[np.ndarray]
+) -> Wander | None:  # fmt: skip
+    """Return how offsets wander; None if there are too few episodes to say.
+
+    Args:
+        residual: What an over-rich fit leaves, shape (m, streams); NaN where nothing was read.
+        course: With the rows read alone.
+        scale: Standard deviation of the innovations of rows, shape (streams,).
+        memory: Correlation of successive rows [1].
+        levels: Kinds of unknown levels, each as the number of the one that an episode has, shape (episodes,).
+    """
+    quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
+    streams = residual[:, : course.channels] / scale[: course.channels]
+    missing = ~np.isfinite(streams)
+    there = quiet & ~missing.any(axis=1)
+    count = np.bincount(course.episode[there], minlength=course.episodes)
+    known = count >= AT_LEAST
+    if known.sum() < FEWEST:
+        return None
+    offsets = _means(streams[:, :, None], there, course.episode, course.episodes, None)[:, :, 0]
+    # The mean of n rows with memory m and innovations of variance 1.
+    error = np.where(known, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
+    time = _times(course)
+    variances = _told(offsets[known], error[known], time[known], [level[known] for level in levels])
+    return _innovations(variances, error, time, levels, quiet, course.episode)
+
+
+def _times(course: Course) -> np.ndarray:
+    count = np.maximum(np.bincount(course.episode, minlength=course.episodes), 1)
+    time = np.bincount(course.episode, course.time, minlength=course.episodes) / count
+    return np.maximum.accumulate(time)
+
+
+def _means(
+    values: np.ndarray, rows: np.ndarray, episode: np.ndarray, episodes: int, missing: np.ndarray | None
+) -> np.ndarray:
+    """Return the means of some rows of each episode, shape (episodes, ...), 0 where there are none."""
+    own, of = values[rows], episode[rows]
+    gone = ~np.isfinite(own[..., 0]) if missing is None else missing[rows]
+    own[gone] = 0.0
+    sums = np.zeros((episodes, *values.shape[1:]))
+    count = np.zeros((episodes, values.shape[1], 1))
+    edges = np.flatnonzero(np.diff(of, prepend=-1))
+    if len(edges):
+        sums[of[edges]] = np.add.reduceat(own, edges, axis=0)
+        count[of[edges]] = np.add.reduceat(~gone, edges, axis=0)[:, :, None]
+    return sums / np.maximum(count, 1)
+
+
+def _told(
+    offsets: np.ndarray, error: np.ndarray, time: np.ndarray, levels: Sequence[np.ndarray]
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return variance and time constant [s] of the wander, and the variance of episodes' own offsets.
+
+    Args:
+        offsets: In noise scales, shape (episodes, channels).
+        error: Variance of each that is known [1].
+        time: Of each [s].
+        levels: Of each.
+    """
+    offsets, error, time = offsets[:TOLD_BY], error[:TOLD_BY], time[:TOLD_BY]
+    clock = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
+    # A line beside levels that are not known: a drift is no evidence of a wander.
+    basis = np.column_stack([*(level[:TOLD_BY, None] == np.unique(level[:TOLD_BY]) for level in levels), clock])
+    values, vectors = np.linalg.eigh(basis @ basis.T)
+    kept = values < 1e-9 * values[-1]
+    contrast = vectors[:, kept]
+    if contrast.shape[1] < FEWEST // 2:
+        return 0.0, 1.0, float(np.var(offsets, axis=0).mean())
+    apart = np.abs(np.subtract.outer(time, time))
+    between = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    seen = contrast.T @ offsets
+    shaken = (contrast.T * error) @ contrast
+    size = max(float(np.mean(seen**2) - np.trace(shaken) / len(shaken)), 0.01 * float(np.mean(seen**2)), 1e-6)
+    best = []
+    for steps in LENGTHS:
+        alike = np.exp(-apart / (steps * between))
+        pattern = contrast.T @ alike @ contrast
+
+        def cost(log: np.ndarray, pattern: np.ndarray = pattern) -> float:
+            walk, own = np.exp(np.clip(log, -14, 14))
+            factor = cho_factor(walk * pattern + shaken + own * np.eye(len(shaken)), lower=True, check_finite=False)
+            power = float(np.sum(seen * cho_solve(factor, seen, check_finite=False)))
+            return seen.shape[1] * float(np.log(np.diag(factor[0])).sum()) + 0.5 * power
+
+        found = minimize(cost, np.log([size, 0.1 * size]), method="Nelder-Mead",
+                         options={"maxfev": 80, "xatol": 0.05, "fatol": 0.05})  # fmt: skip
+        walk, own = (float(v) for v in np.exp(np.clip(found.x, -14, 14)))
+        matrix = walk * alike + np.diag(error) + max(own, LEAST**2) * np.eye(len(time))
+        best.append((float(found.fun), _doubt(matrix, basis), (walk, steps * between, own)))
+    least = min(value for value, _, _ in best)
+    return max((b for b in best if b[0] <= least + LIKELY), key=lambda b: b[1])[2]
+
+
+def _doubt(covariance: np.ndarray, basis: np.ndarray) -> float:
+    """Return the variance of the last column's weight beside the others, for offsets of a covariance [1]."""
+    return float(np.linalg.pinv(basis.T @ np.linalg.solve(covariance, basis), hermitian=True)[-1, -1])
+
+
+def _innovations(
+    variances: tuple[float, float, float], error: np.ndarray, time: np.ndarray, levels: Sequence[np.ndarray],
+    quiet: np.ndarray, episode: np.ndarray,
+) -> Wander:  # fmt: skip
+    walk, length, own = variances
+    count = len(time)
+    same = np.sum([level[:, None] == level for level in levels], axis=0)
+    apart = np.abs(np.subtract.outer(time, time))
+    true = walk * np.exp(-apart / max(length, 1e-9)) + FREE**2 * same + max(own, LEAST**2) * np.eye(count)
+    # An episode whose offset cannot be read says nothing of others: it stands alone.
+    blind = ~np.isfinite(error)
+    read = true + np.diag(np.where(blind, 0.0, error))
+    read[blind] = read[:, blind] = 0.0
+    read[blind, blind] = 1.0
+    factor = cholesky(read, lower=True)
+    # Offsets read before: E[o_e | q_<e] = C_e,<e (Q_<e,<e)^-1 q_<e, all at once from the rows of the factor.
+    inverse = solve_triangular(factor, np.eye(count), lower=True)
+    weights = np.zeros((count, count))
+    spread = np.zeros(count)
+    for e in range(count):
+        cross = np.where(blind[:e], 0.0, true[e, :e])
+        half = inverse[:e, :e] @ cross
+        weights[e, :e] = half @ inverse[:e, :e]
+        spread[e] = np.sqrt(max(true[e, e] - float(half @ half), LEAST**2))
+    return Wander(weights, spread, quiet, episode)
