@@ -56,6 +56,10 @@ def shape(indenter: Indenter) -> tuple[list[tuple[str, str]], float] | None:
         case "square_punch":
             flat = q[0] / 2 - q[1]
             return [("core", f"[{_beyond('p(1)', flat)};{_beyond('p(2)', flat)};p(3)-{q[1]!r}]")], q[1]
+        case "prism":
+            return _prism(*q)
+        case "ellipsoid":
+            return _ellipsoid(*q)
     return None
 
 
@@ -78,3 +82,30 @@ def _cone(angle: float, tip: float, radius: float) -> tuple[list[tuple[str, str]
         ("out", f"(rho-along*{s!r})"),
         ("core", f"[out*p(1)/rho;out*p(2)/rho;up-along*{c!r}]"),
     ], tip
+
+
+def _prism(angle: float, edge: float, length: float, half_width: float) -> tuple[list[tuple[str, str]], float]:
+    """Distance to the sharp prism's lower edge, or to a flank; the shank is left out."""
+    c, s = float(np.cos(angle)), float(np.sin(angle))
+    return [
+        ("over", _beyond("p(1)", length / 2 - edge)),
+        ("rho", "sqrt(sqr(p(2))+1e-18)"),
+        ("up", f"(p(3)-{edge!r})"),
+        ("along", f"pos_part(rho*{s!r}+up*{c!r})"),
+        ("out", f"(rho-along*{s!r})"),
+        ("core", f"[over;out*p(2)/rho;up-along*{c!r}]"),
+    ], edge
+
+
+def _ellipsoid(a: float, b: float, c: float) -> tuple[list[tuple[str, str]], float]:
+    """Distance to first order, f / |grad f| of f = |w| - 1: off by its own square times a curvature.
+
+    The rounding of 1 mm only keeps the core from vanishing.
+    """
+    z = f"(p(3)-{c!r})"
+    return [
+        ("w", f"sqrt(sqr(p(1)/{a!r})+sqr(p(2)/{b!r})+sqr({z}/{c!r}))"),
+        ("g", f"sqrt(sqr(p(1)/{a * a!r})+sqr(p(2)/{b * b!r})+sqr({z}/{c * c!r}))"),
+        ("far", "((w-1)*w/g+1)/g"),
+        ("core", f"[far*p(1)/{a * a!r};far*p(2)/{b * b!r};far*{z}/{c * c!r}]"),
+    ], 1.0

@@ -160,8 +160,10 @@ class FittedResponse(Response):
         if len(pose) != len(self.context):
             pose = np.broadcast_to(pose, (len(self.context), 3))
         result = np.empty((len(pose), self._weights[0].shape[1]))
-        for k, design in enumerate(self._designs_at(pose)):
-            result[self.context == k] = design @ self._weights[k]
+        for k, (design, basis) in enumerate(zip(self._designs_at(pose), self._bases, strict=True)):
+            # Above what it says in the air: that is an offset of the place, which no history should go through.
+            air = self._design(basis, basis.t[:1])
+            result[self.context == k] = (design - air) @ self._weights[k]
         return result
 
     def _designs_at(self, pose: np.ndarray) -> list[np.ndarray]:

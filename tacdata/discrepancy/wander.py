@@ -11,7 +11,8 @@ clock is held against the wander that it has to stand out from, and nothing else
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
@@ -39,14 +40,56 @@ LIKELY = 1.0
 class Wander:
     """What is known of episodes' offsets before they are read."""
 
-    weights: np.ndarray
-    """Expected offset of an episode is this times those read, shape (episodes, episodes), lower triangular."""
-    spread: np.ndarray
-    """Standard deviation of each around that [noise scales], shape (episodes,)."""
+    covariance: np.ndarray
+    """Of the offsets as they are [noise scales squared], shape (episodes, episodes)."""
+    error: np.ndarray
+    """Variance with which each is read where nothing presses [the same], shape (episodes,); inf where none was read."""
     quiet: np.ndarray
     """Rows where nothing presses, of those read, shape (m,), bool."""
     episode: np.ndarray
     """Episode of each row read, shape (m,), int64."""
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Expected offset of an episode is this times those read, shape (episodes, episodes), lower triangular."""
+        return self._innovations[0]
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Standard deviation of each offset around that [noise scales], shape (episodes,)."""
+        return self._innovations[1]
+
+    @cached_property
+    def _innovations(self) -> tuple[np.ndarray, np.ndarray]:
+        count, blind = len(self.error), ~np.isfinite(self.error)
+        read = self.covariance + np.diag(np.where(blind, 0.0, self.error))
+        # An episode whose offset cannot be read says nothing of others.
+        read[blind] = read[:, blind] = 0.0
+        read[blind, blind] = 1.0
+        # Its inverse's rows up to e whiten the offsets before e: E[o_e | q_<e] = C_e,<e (Q_<e,<e)^-1 q_<e.
+        inverse = solve_triangular(cholesky(read, lower=True), np.eye(count), lower=True)
+        weights, spread = np.zeros((count, count)), np.zeros(count)
+        for e in range(count):
+            half = inverse[:e, :e] @ np.where(blind[:e], 0.0, self.covariance[e, :e])
+            weights[e, :e] = half @ inverse[:e, :e]
+            spread[e] = np.sqrt(max(self.covariance[e, e] - float(half @ half), LEAST**2))
+        return weights, spread
+
+    def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> Wander:
+        """Return what is known if only some rows were read.
+
+        Args:
+            rows: Whether each row is kept, shape (m,), bool.
+            episodes: Those that are left, numbered anew; all, unless given.
+        """
+        number = self.episode[rows]
+        if episodes is None:
+            there = np.isin(np.arange(len(self.error)), number)
+            return replace(self, error=np.where(there, self.error, np.inf), quiet=self.quiet[rows], episode=number)
+        return Wander(
+            self.covariance[np.ix_(episodes, episodes)], self.error[episodes], self.quiet[rows],
+            np.searchsorted(episodes, number),
+        )  # fmt: skip
 
     def expected(self, values: np.ndarray, missing: np.ndarray | None = None) -> np.ndarray:
         """Return the offsets that those of the episodes before let one expect, shape (episodes, streams, columns).
@@ -55,7 +98,7 @@ class Wander:
             values: Shape (m, streams, columns).
             missing: Values that were not read, shape (m, streams), bool.
         """
-        means = _means(values, self.quiet, self.episode, len(self.spread), missing)
+        means = _means(values, self.quiet, self.episode, len(self.error), missing)
         return (self.weights @ means.reshape(len(means), -1)).reshape(means.shape)
 
 
@@ -83,8 +126,11 @@ def wander(
     # The mean of n rows with memory m and innovations of variance 1.
     error = np.where(known, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
     time = _times(course)
-    variances = _told(offsets[known], error[known], time[known], [level[known] for level in levels])
-    return _innovations(variances, error, time, levels, quiet, course.episode)
+    walk, length, own = _told(offsets[known], error[known], time[known], [level[known] for level in levels])
+    apart = np.abs(np.subtract.outer(time, time))
+    same = np.sum([level[:, None] == level for level in levels], axis=0)
+    covariance = walk * np.exp(-apart / length) + FREE**2 * same + max(own, LEAST**2) * np.eye(len(time))
+    return Wander(covariance, error, quiet, course.episode)
 
 
 def _times(course: Course) -> np.ndarray:
@@ -130,7 +176,7 @@ def _told(
     if contrast.shape[1] < FEWEST // 2:
         return 0.0, 1.0, float(np.var(offsets, axis=0).mean())
     apart = np.abs(np.subtract.outer(time, time))
-    between = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    between = max(float(np.median(np.diff(time))), 1e-9)
     seen = contrast.T @ offsets
     shaken = (contrast.T * error) @ contrast
     size = max(float(np.mean(seen**2) - np.trace(shaken) / len(shaken)), 0.01 * float(np.mean(seen**2)), 1e-6)
@@ -157,30 +203,3 @@ def _told(
 def _doubt(covariance: np.ndarray, basis: np.ndarray) -> float:
     """Return the variance of the last column's weight beside the others, for offsets of a covariance [1]."""
     return float(np.linalg.pinv(basis.T @ np.linalg.solve(covariance, basis), hermitian=True)[-1, -1])
-
-
-def _innovations(
-    variances: tuple[float, float, float], error: np.ndarray, time: np.ndarray, levels: Sequence[np.ndarray],
-    quiet: np.ndarray, episode: np.ndarray,
-) -> Wander:  # fmt: skip
-    walk, length, own = variances
-    count = len(time)
-    same = np.sum([level[:, None] == level for level in levels], axis=0)
-    apart = np.abs(np.subtract.outer(time, time))
-    true = walk * np.exp(-apart / max(length, 1e-9)) + FREE**2 * same + max(own, LEAST**2) * np.eye(count)
-    # An episode whose offset cannot be read says nothing of others: it stands alone.
-    blind = ~np.isfinite(error)
-    read = true + np.diag(np.where(blind, 0.0, error))
-    read[blind] = read[:, blind] = 0.0
-    read[blind, blind] = 1.0
-    factor = cholesky(read, lower=True)
-    # Offsets read before: E[o_e | q_<e] = C_e,<e (Q_<e,<e)^-1 q_<e, all at once from the rows of the factor.
-    inverse = solve_triangular(factor, np.eye(count), lower=True)
-    weights = np.zeros((count, count))
-    spread = np.zeros(count)
-    for e in range(count):
-        cross = np.where(blind[:e], 0.0, true[e, :e])
-        half = inverse[:e, :e] @ cross
-        weights[e, :e] = half @ inverse[:e, :e]
-        spread[e] = np.sqrt(max(true[e, e] - float(half @ half), LEAST**2))
-    return Wander(weights, spread, quiet, episode)

@@ -68,7 +68,8 @@ class Comparison:
             course = part(self.course, kept)
         setting = Comparison(course, self.spec).setting
         rows = ~np.isin(self.course.reduced.episode, left_out)
-        return refine(setting, placed, _frame_of(self.frame, rows), STEPS).placed
+        left = None if course.episodes == self.course.episodes else kept
+        return refine(setting, placed, _frame_of(self.frame, rows, left), STEPS).placed
 
     @cached_property
     def _contexts(self) -> np.ndarray:
@@ -85,12 +86,20 @@ class Comparison:
         return predict(self.course, response, [*self.setting.given, *placed]).signal
 
 
-def _frame_of(whole: Frame, rows: np.ndarray) -> Frame:
-    """Return a frame for some of the rows: what weighs readings is known from all of them, what they say is not."""
+def _frame_of(whole: Frame, rows: np.ndarray, episodes: np.ndarray | None) -> Frame:
+    """Return a frame for some of the rows: what weighs readings is known from all of them, what they say is not.
+
+    Args:
+        whole: Of all rows.
+        rows: Which are kept, shape (m,), bool.
+        episodes: Those that are left, if they are numbered anew.
+    """
     noise = whole.noise
     swing = None if noise.swing is None else noise.swing[rows]
     missing = None if noise.missing is None else noise.missing[rows]
+    wander = None if noise.wander is None else noise.wander.of(rows, episodes)
     return replace(
         whole, context=whole.context[rows], features=None if whole.features is None else whole.features[rows],
-        errors=whole.errors[rows], beside=whole.beside[rows], noise=replace(noise, swing=swing, missing=missing),
+        errors=whole.errors[rows], beside=whole.beside[rows],
+        noise=replace(noise, swing=swing, missing=missing, wander=wander),
     )  # fmt: skip

@@ -90,6 +90,18 @@ def test_a_place_keeps_its_level_to_itself():
     assert expected[later & (place != 1)] == pytest.approx(0.0, abs=1e-3)
 
 
+def test_episodes_left_out_say_nothing_and_the_others_go_on():
+    rng, count = np.random.default_rng(5), 30
+    _, told = slope_score(followed(rng, count, 40.0, 0.5), rng)
+    kept = np.setdiff1d(np.arange(count), [3, 4, 11])
+    rows = np.isin(told.episode, kept)
+    unread, renumbered = told.of(rows), told.of(rows, kept)
+    assert np.all(unread.weights[:, [3, 4, 11]] == 0)
+    assert unread.weights[np.ix_(kept, kept)] == pytest.approx(renumbered.weights, abs=1e-6)
+    assert unread.spread[kept] == pytest.approx(renumbered.spread, rel=1e-4)
+    assert renumbered.expected(np.ones((rows.sum(), 2, 1))).shape == (len(kept), 2, 1)
+
+
 def test_few_episodes_tell_no_wander():
     c = course(4)
     assert wander(np.zeros((len(c.episode), 24)), c, np.ones(24), 0.0, [np.zeros(4, dtype=np.int64)]) is None

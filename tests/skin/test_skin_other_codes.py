@@ -14,7 +14,7 @@ import pytest
 from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata import documents
-from tacdata.sensor.sensor import Contact
+from tacdata.sensor.sensor import Contact, Skin
 from tacdata.skin.case import read_case
 from tacdata.skin.mesher import build_mesh
 
@@ -34,10 +34,11 @@ needs_calculix = pytest.mark.skipif(CalculiX().missing() is not None, reason=str
 pytestmark = pytest.mark.slow
 
 
-def rows(folder, peer, sensor, mesh, depths, radius=4.0):
-    """What `compare` says of a sphere [mm] pressed near the middle, at each depth [mm]."""
-    sphere = {"shape": "sphere", "radius": radius}
-    document = {"version": "1.0", "name": "press", "sensor": sensor.document, "indenter": sphere, "x": 0.2, "y": 0.1}
+def rows(folder, peer, sensor, mesh, depths, radius=4.0, indenter=None, yaw=0.0):
+    """What `compare` says of an indenter, a sphere [mm] unless given, pressed near the middle, at each depth [mm]."""
+    indenter = indenter or {"shape": "sphere", "radius": radius}
+    document = {"version": "1.0", "name": "press", "sensor": sensor.document, "indenter": indenter, "x": 0.2, "y": 0.1}
+    document["yaw"] = yaw
     path = folder / "case.json"
     # The others know displacements alone: their volumes are taken at the points.
     documents.write(path, {**document, "depths": list(depths), "mesh": mesh, "volumes": "points"}, "case")
@@ -65,6 +66,31 @@ def test_the_logarithmic_law_is_the_same_law(tmp_path):
     """The forms differ by 1.6 to 2 % in force, so the bar tells them apart."""
     sensor = replace(slab_sensor(), material=replace(slab_sensor().material, law="neo_hookean_log"))
     assert_bar(rows(tmp_path, SAME_CONTACT, sensor, SLAB, (0.25,)))
+
+
+SHAPES = [
+    {"shape": "ellipsoid", "a": 3.0, "b": 2.0, "c": 1.5},
+    {"shape": "prism", "angle": 120.0, "edge_radius": 0.6, "length": 4.0, "width": 4.0},
+    {"shape": "ring", "ring_radius": 1.4, "tube_radius": 0.8},
+    {"shape": "cylinder", "radius": 1.5, "length": 4.0, "edge_radius": 0.5},
+    {"shape": "cone", "half_angle": 60.0, "tip_radius": 0.8, "radius": 2.5},
+]
+
+
+@needs_getfem
+@pytest.mark.parametrize("indenter", SHAPES, ids=[s["shape"] for s in SHAPES])
+def test_every_shape_is_pressed_alike(indenter, tmp_path):
+    """Shapes written anew, as formulas of their own, turned by 25 degrees about the normal."""
+    # As stiff as in the other tests, edges would need four steps as small.
+    peer = replace(SAME_CONTACT, augmentation=6000.0, step=0.125)
+    assert_bar(rows(tmp_path, peer, slab_sensor(), SLAB, (0.25,), indenter=indenter, yaw=25.0))
+
+
+@needs_getfem
+@pytest.mark.parametrize("underside", ["bent", "flat"])
+def test_a_curved_pad_is_pressed_alike(underside, tmp_path):
+    skin = Skin(6.0, 6.0, 2.0, 0.0, curvature_radius_x=8.0, underside=underside)
+    assert_bar(rows(tmp_path, SAME_CONTACT, replace(slab_sensor(), skin=skin), SLAB, (0.25,), radius=2.5))
 
 
 @needs_getfem
