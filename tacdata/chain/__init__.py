@@ -1,8 +1,8 @@
 """The forward chain: what was done and read, the response that it starts from, and the stages in between."""
 
 from tacdata.chain.course import Course, Tool
-from tacdata.chain.forward import Prediction, predict
+from tacdata.chain.forward import Chain, Prediction, predict
 from tacdata.chain.response import Response
 from tacdata.chain.state import STAGES, State
 
-__all__ = ["STAGES", "Course", "Prediction", "Response", "State", "Tool", "predict"]
+__all__ = ["STAGES", "Chain", "Course", "Prediction", "Response", "State", "Tool", "predict"]

@@ -47,6 +47,39 @@ class Prediction:
     """x, y, depth of the tip as it is [mm], shape (n, 3): what the label belongs to."""
 
 
+class Chain:
+    """The chain run once, every step kept: run again with other effects, it begins where they first differ."""
+
+    def __init__(self, course: Course, response: Response, effects: Sequence[Acting]) -> None:
+        """Run the chain.
+
+        Args:
+            course: What was done; its readings are not looked at.
+            response: What it starts from; must stay as it is.
+            effects: In any order; they act by stage, within a stage in the order given.
+        """
+        empty = np.empty(0)
+        self._steps = _steps(effects)
+        self._runs = [_Run(State(course, response, course.tip, empty, empty, empty), course.tip, empty)]
+        for step in self._steps:
+            self._runs.append(_after(self._runs[-1], step))
+
+    @property
+    def prediction(self) -> Prediction:
+        """What the model says."""
+        return _said(self._runs[-1])
+
+    def again(self, effects: Sequence[Acting]) -> Prediction:
+        """Return what the model says with other effects; only what comes after the first that differs is run."""
+        steps, known = _steps(effects), 0
+        while known < min(len(steps), len(self._steps)) and steps[known] is self._steps[known]:
+            known += 1
+        run = self._runs[known]
+        for step in steps[known:]:
+            run = _after(run, step)
+        return _said(run)
+
+
 def predict(course: Course, response: Response, effects: Sequence[Acting]) -> Prediction:
     """Run the chain.
 
@@ -55,30 +88,44 @@ def predict(course: Course, response: Response, effects: Sequence[Acting]) -> Pr
         response: What it starts from.
         effects: In any order; they act by stage, within a stage in the order given.
     """
-    empty = np.empty(0)
-    state = State(course, response, course.tip, empty, empty, empty)
-    kinematic = [e for e in effects if e.stage == "kinematics"]
-    for effect in (e for e in kinematic if e.seen_by_tag):
-        state = effect.act(state)
-    tag = state.pose
-    for effect in (e for e in kinematic if not e.seen_by_tag):
-        state = effect.act(state)
-    state = replace(
-        state,
-        load=response.load(state.pose, course.tool),
-        force=response.force(state.pose, course.tool),
-    )
-    for stage in STAGES[1:_BEFORE_SIGNAL]:
-        state = _stage(state, stage, effects)
-    force = state.force
-    state = replace(state, signal=response.signal(state.load))
-    for stage in STAGES[_BEFORE_SIGNAL:]:
-        state = _stage(state, stage, effects)
-    return Prediction(state.signal, force, tag, state.pose)
+    return Chain(course, response, effects).prediction
 
 
-def _stage(state: State, stage: str, effects: Sequence[Acting]) -> State:
-    for effect in effects:
-        if effect.stage == stage:
-            state = effect.act(state)
-    return state
+@dataclass(frozen=True)
+class _Run:
+    """The state after a step, with what was put aside before."""
+
+    state: State
+    tag: np.ndarray
+    force: np.ndarray
+
+
+_TAG, _LOAD, _SIGNAL = "the tag is seen", "the skin is loaded", "the load is read"
+
+
+def _steps(effects: Sequence[Acting]) -> list[Acting | str]:
+    """Return effects in the order in which they act, with what the response does between them."""
+    by_stage = {stage: [e for e in effects if e.stage == stage] for stage in STAGES}
+    kinematic = by_stage["kinematics"]
+    return [
+        *(e for e in kinematic if e.seen_by_tag), _TAG, *(e for e in kinematic if not e.seen_by_tag), _LOAD,
+        *(e for stage in STAGES[1:_BEFORE_SIGNAL] for e in by_stage[stage]), _SIGNAL,
+        *(e for stage in STAGES[_BEFORE_SIGNAL:] for e in by_stage[stage]),
+    ]  # fmt: skip
+
+
+def _after(run: _Run, step: Acting | str) -> _Run:
+    state = run.state
+    if not isinstance(step, str):
+        return replace(run, state=step.act(state))
+    if step is _TAG:
+        return replace(run, tag=state.pose)
+    if step is _LOAD:
+        tool = state.course.tool
+        load, force = state.response.load(state.pose, tool), state.response.force(state.pose, tool)
+        return replace(run, state=replace(state, load=load, force=force))
+    return replace(run, state=replace(state, signal=state.response.signal(state.load)), force=state.force)
+
+
+def _said(run: _Run) -> Prediction:
+    return Prediction(run.state.signal, run.force, run.tag, run.state.pose)

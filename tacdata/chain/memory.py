@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-_SPAN = 30.0
-"""Longest stretch handled at once, in time constants: exp(30) loses no digits that matter."""
-
 
 def low_pass(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
     """Return the solution of tau y' + y = u for u linear between rows, from rest.
@@ -19,31 +16,12 @@ def low_pass(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
         step: Time since the row before [s], shape (n,).
         tau: Time constant [s], above 0.
     """
-    flat = values[:, None] if values.ndim == 1 else values
+    from tacdata.chain.memory_kernels import filtered
+
     ratio = step / tau
     decay = np.exp(-np.minimum(ratio, 700.0))
-    weight = np.where(ratio > 1e-8, -np.expm1(-np.minimum(ratio, 700.0)) / np.maximum(ratio, 1e-12), 1.0)
-    source = (1 - weight)[:, None] * flat
-    source[1:] += (weight - decay)[1:, None] * flat[:-1]
-    source[0] = 0.0
-    result = scan(source, ratio)
-    return result[:, 0] if values.ndim == 1 else result
-
-
-def scan(source: np.ndarray, ratio: np.ndarray) -> np.ndarray:
-    """Return y_i = exp(-ratio_i) y_{i-1} + source_i, shape (n, k)."""
-    n, result = len(source), np.empty_like(source)
-    ratio = np.minimum(ratio, _SPAN)
-    passed = np.cumsum(ratio)
-    begin, carry = 0, np.zeros(source.shape[1])
-    while begin < n:
-        before = passed[begin] - ratio[begin]
-        end = max(int(np.searchsorted(passed, before + 2 * _SPAN)), begin + 1)
-        grown = np.exp(passed[begin:end] - before)
-        result[begin:end] = (np.cumsum(source[begin:end] * grown[:, None], axis=0) + carry) / grown[:, None]
-        carry = result[end - 1]
-        begin = end
-    return result
+    weight = np.where(ratio > 1e-8, -np.expm1(-ratio) / np.maximum(ratio, 1e-12), 1.0)
+    return filtered(_wide(values), decay, weight).reshape(values.shape)
 
 
 def play(values: np.ndarray, width: float) -> np.ndarray:
@@ -55,23 +33,14 @@ def play(values: np.ndarray, width: float) -> np.ndarray:
         values: Input, shape (n,) or (n, k).
         width: Half the dead band, in the input's unit.
     """
-    if values.ndim == 2:
-        # Row by row for all columns at once.
-        low, high = values - width, values + width
-        result, last = np.empty_like(low), low[0]
-        for below, above, out in zip(low, high, result, strict=True):
-            np.minimum(above, last, out=out)
-            last = np.maximum(below, out, out=out)
-        return result
-    result = np.empty(len(values))
-    last = float(values[0]) - width
-    for i, u in enumerate(values.tolist()):
-        if last < u - width:
-            last = u - width
-        elif last > u + width:
-            last = u + width
-        result[i] = last
-    return result
+    from tacdata.chain.memory_kernels import played
+
+    return played(_wide(values), width).reshape(values.shape)
+
+
+def _wide(values: np.ndarray) -> np.ndarray:
+    """Return values as floats of shape (n, k)."""
+    return np.asarray(values, dtype=float).reshape(len(values), -1)
 
 
 def running_max(values: np.ndarray, group: np.ndarray) -> np.ndarray:

@@ -111,9 +111,13 @@ class TableResponse(Response):
             return known.signal
         at, value = self._curve
         low, high = (value[1] - value[0]) / (at[1] - at[0]), (value[-1] - value[-2]) / (at[-1] - at[-2])
-        inside = np.interp(load, at, value)
-        inside += low * np.minimum(load - at[0], 0.0) + high * np.maximum(load - at[-1], 0.0)
-        result = self.offset + self.gain * inside
+        result = np.interp(load, at, value)
+        if load.min(initial=at[0]) < at[0]:
+            result += low * np.minimum(load - at[0], 0.0)
+        if load.max(initial=at[-1]) > at[-1]:
+            result += high * np.maximum(load - at[-1], 0.0)
+        result *= self.gain
+        result += self.offset
         if known is not None:
             known.signal = _locked(result)
         return result

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from tacdata.chain import Course, Response, predict
+from tacdata.chain import Chain, Course, Response
 from tacdata.discrepancy.streams import Streams
 from tacdata.effects import Effect, Placed
 
@@ -83,7 +83,8 @@ def build(
         nuisance: Effects that calibration takes up.
     """
     streams = Streams.of(course)
-    now = streams.predicted(predict(course, response, placed))
+    chain = Chain(course, response, placed)
+    now = streams.predicted(chain.prediction)
     columns = [(streams.measured(course) - now).astype(np.float32)]
     candidates: list[Candidate] = []
     unjudgeable: dict[str, str] = {}
@@ -94,10 +95,10 @@ def build(
             continue
         shares = SMALL
         for shapes in _shapes(effect):
-            made, low, high = _columns(effect, shapes, course, response, placed, streams, now)
+            made, low, high = _columns(effect, shapes, course, chain, placed, streams, now)
             sizes = [made]
             for share in shares:
-                small, _, _ = _columns(effect, shapes, course, response, placed, streams, now, share)
+                small, _, _ = _columns(effect, shapes, course, chain, placed, streams, now, share)
                 if not _unlike(sizes[-1], small):
                     shares = shares[: shares.index(share)]  # A threshold is one at all times and lengths, or at none.
                     break
@@ -154,7 +155,7 @@ def _shapes(effect: Effect) -> list[dict[str, float]]:
 
 
 def _columns(
-    effect: Effect, shapes: dict[str, float], course: Course, response: Response, placed: Sequence[Placed],
+    effect: Effect, shapes: dict[str, float], course: Course, chain: Chain, placed: Sequence[Placed],
     streams: Streams, now: np.ndarray, share: float = 1.0,
 ) -> tuple[list[np.ndarray], list[float], list[float]]:  # fmt: skip
     """Return what an effect changes at a share of its typical sizes, over that share, and the bounds."""
@@ -164,7 +165,7 @@ def _columns(
     rest |= {name: np.array(value) for name, value in shapes.items()}
     for p in effect.amplitudes:
         values = {**rest, p.name: rest[p.name] + share * p.typical}
-        change = streams.predicted(predict(course, response, [*placed, Placed(effect, values)])) - now
+        change = streams.predicted(chain.again([*placed, Placed(effect, values)])) - now
         change = (change / share).astype(np.float32)
         if p.per_channel and course.channels <= MOST_CHANNELS:
             for channel in range(course.channels):

@@ -9,13 +9,12 @@ an episode, so that every fit, fold, bootstrap and sign flip afterwards is a sma
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.own_errors import Own, without
 from tacdata.discrepancy.wander import Wander
 
 
@@ -87,138 +86,25 @@ def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | 
     return result
 
 
-def collect(
-    columns: np.ndarray, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None,
-    jitter: np.ndarray, beside: np.ndarray | None = None,
+def summed(
+    columns: np.ndarray, course: Course, beside: np.ndarray | None = None, inner: np.ndarray | None = None
 ) -> Evidence:  # fmt: skip
-    """Reduce columns to `Evidence`.
+    """Return the `Evidence` of columns that are cleaned.
 
     Args:
-        columns: Residual first, then effects, shape (n, streams, 1 + columns).
+        columns: Shape (n, streams, k).
         course: Whose rows.
-        noise: Noise model.
-        context: Group of rows that share features, shape (n,); an episode lies in one.
-        features: What the response may take up, shape (n, k); None for nothing but offsets.
-        jitter: What an episode's own errors of pose of one standard deviation change, shape (n, streams, kinds).
-        beside: Further columns, cleaned before (`cleaned`), shape (n, streams, more).
+        beside: Further columns, cleaned before, shape (n, streams, more).
+        inner: Their own Gram matrices, shape (episodes, more, more).
     """
-    width = columns.shape[2] + (0 if beside is None else beside.shape[2])
-    gram = np.zeros((course.episodes, width, width))
-    rows = np.zeros(course.episodes)
-    for group, part in _cleaned(columns, course, noise, context, features, jitter):
-        whole = part if beside is None else np.concatenate([part, beside[group]], axis=2)
-        for number in np.unique(course.episode[group]):
-            flat = whole[course.episode[group] == number].reshape(-1, width)
-            gram[number] = flat.T @ flat
-            rows[number] = flat.shape[0]
+    few, more = columns.shape[2], 0 if beside is None else beside.shape[2]
+    gram, rows = np.zeros((course.episodes, few + more, few + more)), np.zeros(course.episodes)
+    edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
+    for number, (begin, end) in enumerate(pairwise(edges)):
+        values = (end - begin) * columns.shape[1]
+        flat = columns[begin:end].reshape(values, few)
+        gram[number, :few, :few], rows[number] = flat.T @ flat, flat.shape[0]
+        if beside is not None and inner is not None:
+            both = flat.T @ beside[begin:end].reshape(values, more)
+            gram[number, :few, few:], gram[number, few:, :few], gram[number, few:, few:] = both, both.T, inner[number]
     return Evidence(gram, rows)
-
-
-def summed(columns: np.ndarray, course: Course) -> Evidence:
-    """Return the `Evidence` of columns that are cleaned, shape (n, streams, 1 + columns)."""
-    width = columns.shape[2]
-    gram, rows = np.zeros((course.episodes, width, width)), np.zeros(course.episodes)
-    for number in range(course.episodes):
-        flat = columns[course.episode == number].reshape(-1, width)
-        gram[number], rows[number] = flat.T @ flat, flat.shape[0]
-    return Evidence(gram, rows)
-
-
-def cleaned(
-    columns: np.ndarray, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None,
-    jitter: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Return columns whitened and without nuisances, shape (n, streams, columns). Arguments as of `collect`."""
-    result = np.zeros(columns.shape, dtype=np.float32)
-    for group, part in _cleaned(columns, course, noise, context, features, jitter):
-        result[group] = part
-    return result
-
-
-def leftover(
-    column: np.ndarray, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None,
-    jitter: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Return one column whitened and without nuisances, shape (n, streams). Arguments as of `collect`."""
-    return cleaned(column[:, :, None], course, noise, context, features, jitter)[:, :, 0]
-
-
-def _cleaned(
-    columns: np.ndarray, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None,
-    jitter: np.ndarray,
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:  # fmt: skip
-    streams = columns.shape[1]
-    seen = streams - (3 if noise.tag is not None else 0)
-    flat = replace(noise, scale=np.ones(1))
-    one = replace(flat, missing=None)
-    offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
-    moved = whiten(jitter, course, noise)
-    swung = None if noise.swing is None else whiten(noise.swing[:, :, None], course, noise)[:, :, 0]
-    shared = None if features is None else whiten(features[:, None, :], course, one)
-    expected = None
-    if noise.wander is not None:
-        gone = None if noise.missing is None else noise.missing[:, :seen]
-        expected = noise.wander.expected(columns[:, :seen], gone)
-        expected = (expected / noise.scale[:seen, None]).astype(np.float32)
-        if shared is not None and features is not None:
-            ones = whiten(np.ones((course.rows, 1, 1)), course, one)[:, :, 0]
-            said = noise.wander.expected(features[:, None, :]).astype(np.float32)
-            _follow(shared, ones, course.episode, said)
-    order = np.argsort(context, kind="stable")
-    # A place at a time: columns of all rows together would not stay in a processor's cache.
-    for group in np.split(order, np.flatnonzero(np.diff(context[order])) + 1):
-        local = course.episode[group]
-        rows = np.argsort(local, kind="stable")
-        spans = np.split(rows, np.flatnonzero(np.diff(local[rows])) + 1)
-        white = whiten(columns[group], course, noise, group)
-        if expected is not None:
-            _follow(white[:, :seen], offset[group], local, expected)
-        free = np.full(len(spans), np.inf)
-        own = Own(
-            _turned(offset[group, :seen]),
-            free if noise.wander is None else noise.wander.spread[[local[span[0]] for span in spans]],
-            None if swung is None else _turned(swung[group, :seen]),
-            _turned(moved[group, :seen]),
-            None if shared is None else _features(shared[group, 0], offset[group, :seen]),
-        )  # fmt: skip
-        part = np.empty_like(white)
-        part[:, :seen] = _turned(without(_turned(white[:, :seen]), spans, own))
-        if seen < streams:
-            # A tag knows nothing of the response: it has a free offset for the place, and each episode's own.
-            own = Own(
-                _turned(offset[group, seen:]), np.full(len(spans), float(noise.tag or 1.0)),
-                features=_turned(offset[group, seen:, None]),
-            )  # fmt: skip
-            part[:, seen:] = _turned(without(_turned(white[:, seen:]), spans, own))
-        yield group, part
-
-
-def _follow(white: np.ndarray, offset: np.ndarray, episode: np.ndarray, expected: np.ndarray) -> None:
-    """Take off whitened columns, in place, what the offsets of the episodes before let one expect.
-
-    Args:
-        white: Shape (n, streams, columns).
-        offset: Whitened constants, shape (n, streams or more).
-        episode: Of each row, shape (n,).
-        expected: In noise scales, shape (episodes, streams, columns).
-    """
-    edges = np.flatnonzero(np.diff(episode, prepend=-1))
-    for begin, end in zip(edges, [*edges[1:], len(episode)], strict=True):
-        white[begin:end] -= offset[begin:end, : white.shape[1], None] * expected[episode[begin]]
-
-
-def _turned(values: np.ndarray) -> np.ndarray:
-    """Return values with rows and streams exchanged."""
-    return np.ascontiguousarray(np.swapaxes(values, 0, 1))
-
-
-def _features(shared: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """Return features of each stream, shape (streams, n, p), without those that are nowhere and where nothing was read.
-
-    Args:
-        shared: Whitened features, shape (n, k).
-        offset: Whitened constants, 0 where nothing was read, shape (n, streams).
-    """
-    used = shared[:, np.abs(shared).max(axis=0) > 1e-9]
-    there = (offset != 0).T.astype(np.float32)
-    return there[:, :, None] * used[None]

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy import evidence
 from tacdata.discrepancy.fit import t_value
 from tacdata.discrepancy.problem import Problem
 
@@ -34,11 +33,7 @@ class Slice:
 
 def residual(problem: Problem) -> np.ndarray:
     """Return the whitened residual without nuisances, shape (m, streams)."""
-    same = problem.frame
-    column = problem.board.values[:, :, 0]
-    return evidence.leftover(
-        column, problem.setting.course.reduced, same.noise, same.context, same.features, same.errors
-    )
+    return problem.frame.known.cleaned(problem.board.values[:, :, :1])[:, :, 0]
 
 
 PHASES = ("without contact", "loading", "hold", "unloading")

@@ -10,7 +10,7 @@ Gains of one episode have no mean, weighted by what the streams tell: what all s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,43 +35,58 @@ class Own:
     """What all episodes may take up together, each stream by itself [1], shape (streams, n, p)."""
 
 
-def without(columns: np.ndarray, spans: list[np.ndarray], own: Own) -> np.ndarray:
-    """Return columns as generalized least squares sees them.
+class Factored:
+    """What the episodes of one place err by, factored: takes it out of any columns."""
 
-    Args:
-        columns: Whitened, shape (streams, n, k).
-        spans: Rows of each episode.
-        own: What they err by.
-    """
-    streams, _, width = columns.shape
-    parts = {"moved": own.moved, "swing": None if own.swing is None else own.swing[:, :, None], "free": own.features}
-    given = {name: value for name, value in parts.items() if value is not None}
-    edges = np.cumsum([width, *(value.shape[2] for value in given.values())])[:-1]
-    stacked = np.concatenate([columns, *given.values()], axis=2)
-    result = np.empty_like(columns)
-    free = None if own.features is None else _Free(streams, own.features.shape[2])
-    later = []
-    for rows, prior in zip(spans, own.prior, strict=True):
-        pieces = np.split(_steadied(stacked[:, rows], own.offset[:, rows, None], float(prior)), edges, axis=2)
-        left, rest = np.ascontiguousarray(pieces[0]), dict(zip(given, pieces[1:], strict=True))
-        errors = _Errors(streams, len(rows), rest.get("moved"), rest.get("swing"))
-        left = errors.rooted(left)
-        if free is None:
-            result[:, rows] = left
-        else:
-            later.append((rows, left, free.take(left, rest["free"], errors)))
-    if free is not None:
-        weights = free.weights()
-        for rows, left, said in later:
-            result[:, rows] = left - said(weights)
-    return result
+    def __init__(self, spans: Sequence[np.ndarray], own: Own) -> None:
+        """Factor what episodes, each given by its rows, err by."""
+        swing = None if own.swing is None else own.swing[:, :, None]
+        parts = {"moved": own.moved, "swing": swing, "free": own.features}
+        given = {name: value for name, value in parts.items() if value is not None}
+        edges = np.cumsum([value.shape[2] for value in given.values()])[:-1]
+        stacked = np.concatenate([*given.values()], axis=2) if given else None
+        self._free = None if own.features is None else _Free(len(own.offset), own.features.shape[2])
+        self._episodes: list[tuple[np.ndarray, _Offsets, _Errors]] = []
+        for rows, prior in zip(spans, own.prior, strict=True):
+            offsets, rest = _Offsets(own.offset[:, rows, None], float(prior)), {}
+            if stacked is not None:
+                rest = dict(zip(given, np.split(offsets.off(stacked[:, rows]), edges, axis=2), strict=True))
+            errors = _Errors(len(own.offset), len(rows), rest.get("moved"), rest.get("swing"))
+            self._episodes.append((rows, offsets, errors))
+            if self._free is not None:
+                self._free.take(np.ascontiguousarray(rest["free"]), errors)
+        if self._free is not None:
+            self._free.factor()
+
+    def without(self, columns: np.ndarray) -> np.ndarray:
+        """Return columns as generalized least squares sees them.
+
+        Args:
+            columns: Whitened, shape (streams, n, k).
+        """
+        result = np.empty_like(columns)
+        for rows, offsets, errors in self._episodes:
+            result[:, rows] = errors.rooted(offsets.off(columns[:, rows]))
+        if self._free is not None:
+            weights = self._free.weights([result[:, rows] for rows, _, _ in self._episodes])
+            for k, (rows, _, _) in enumerate(self._episodes):
+                result[:, rows] -= self._free.said(k, weights)
+        return result
 
 
-def _steadied(block: np.ndarray, offset: np.ndarray, prior: float) -> np.ndarray:
-    """Return columns (streams, m, k) of one episode with its streams' own offsets accounted for."""
-    power = np.maximum(np.square(offset).sum(axis=(1, 2)), 1e-12)[:, None, None]
-    share = 1 / power if np.isinf(prior) else prior**2 * _root(prior**2 * power)
-    return block - offset * ((offset.transpose(0, 2, 1) @ block) * share.astype(np.float32))
+class _Offsets:
+    """One episode's own offset of every stream."""
+
+    def __init__(self, offset: np.ndarray, prior: float) -> None:
+        """Take a constant (streams, m, 1) and its standard deviation."""
+        power = np.maximum(np.square(offset).sum(axis=(1, 2)), 1e-12)[:, None, None]
+        share = 1 / power if np.isinf(prior) else prior**2 * _root(prior**2 * power)
+        self._offset = offset
+        self._pull = np.ascontiguousarray((offset * share.astype(np.float32)).transpose(0, 2, 1))
+
+    def off(self, block: np.ndarray) -> np.ndarray:
+        """Return columns (streams, m, k) with it accounted for."""
+        return block - self._offset * (self._pull @ block)
 
 
 def _root(gram: np.ndarray) -> np.ndarray:
@@ -136,43 +151,48 @@ class _Free:
 
     def __init__(self, streams: int, width: int) -> None:
         self._blocks = np.zeros((streams, width, width))
-        self._right: list[np.ndarray] = []
+        self._shared: list[np.ndarray] = []
         self._joints: list[np.ndarray] = []
-        self._inner: list[np.ndarray] = []
+        self._errors: list[_Errors] = []
 
-    def take(self, left: np.ndarray, shared: np.ndarray, errors: _Errors) -> Callable[[np.ndarray], np.ndarray]:
-        """Take an episode in; return what says what given weights change in it."""
-        streams, _, width = shared.shape
-        turned = np.ascontiguousarray(shared.transpose(0, 2, 1))
-        self._blocks += turned @ shared
-        joint = errors.joint(shared)
-        self._right.append((turned @ left).astype(np.float64) - joint @ (errors.root @ errors.inner(left)))
-        self._joints.append(joint.reshape(streams * width, len(errors.gram)))
-        self._inner.append(np.eye(len(errors.gram)) + errors.gram)
+    def take(self, shared: np.ndarray, errors: _Errors) -> None:
+        """Take an episode's features (streams, m, p) in."""
+        self._blocks += np.ascontiguousarray(shared.transpose(0, 2, 1)) @ shared
+        self._shared.append(shared)
+        self._joints.append(errors.joint(shared))
+        self._errors.append(errors)
 
-        def said(weights: np.ndarray) -> np.ndarray:
-            through = errors.root @ np.einsum("spq,spk->qk", joint, weights, optimize=True)
-            return shared @ weights.astype(np.float32) - errors.said(through)
-
-        return said
-
-    def weights(self) -> np.ndarray:
-        """Return the weights that fit best, shape (streams, p, k)."""
+    def factor(self) -> None:
+        """Invert what is the same for all columns."""
         streams, width, _ = self._blocks.shape
         mean = np.einsum("spp->s", self._blocks) / width
         floor = LEAST * np.maximum(mean, 1e-12)[:, None, None] * np.eye(width)
-        blocks = self._blocks + floor
-        right, joint = np.sum(self._right, axis=0), np.concatenate(self._joints, axis=1)
-        count = joint.shape[1]
-        both = np.concatenate([right, joint.reshape(streams, width, count)], axis=2)
-        solved = np.linalg.solve(blocks, both)
-        alone, through = solved[:, :, : right.shape[2]], solved[:, :, right.shape[2] :]
-        if not count:
-            return alone
-        matrix = -joint.T @ through.reshape(streams * width, count)
+        self._inverse = np.linalg.inv(self._blocks + floor)
+        joint = np.concatenate(self._joints, axis=2)
+        self._through = self._inverse @ joint
+        self._joint = joint.reshape(streams * width, -1)
+        matrix = -self._joint.T @ self._through.reshape(self._joint.shape)
         at = 0
-        for inner in self._inner:
-            matrix[at : at + len(inner), at : at + len(inner)] += inner
-            at += len(inner)
-        pulled = joint.T @ alone.reshape(streams * width, right.shape[2])
-        return alone + through @ np.linalg.solve(matrix, pulled)
+        for errors in self._errors:
+            count = len(errors.gram)
+            matrix[at : at + count, at : at + count] += np.eye(count) + errors.gram
+            at += count
+        self._inner = np.linalg.inv(matrix)
+
+    def weights(self, left: list[np.ndarray]) -> np.ndarray:
+        """Return the weights that fit best, shape (streams, p, k), to the columns of each episode (streams, m, k)."""
+        right = 0.0
+        for shared, joint, errors, own in zip(self._shared, self._joints, self._errors, left, strict=True):
+            right += (shared.transpose(0, 2, 1) @ own).astype(np.float64) - joint @ (errors.root @ errors.inner(own))
+        alone = self._inverse @ right
+        if not self._joint.shape[1]:
+            return alone
+        pulled = self._joint.T @ alone.reshape(len(self._joint), -1)
+        return alone + self._through @ (self._inner @ pulled)
+
+    def said(self, episode: int, weights: np.ndarray) -> np.ndarray:
+        """Return what weights change in an episode, shape (streams, m, k)."""
+        errors, joint = self._errors[episode], self._joints[episode]
+        flat = joint.reshape(-1, joint.shape[2])
+        through = errors.root @ (flat.T @ weights.reshape(len(flat), -1))
+        return self._shared[episode] @ weights.astype(np.float32) - errors.said(through)

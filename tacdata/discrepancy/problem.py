@@ -10,6 +10,7 @@ import numpy as np
 from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy import evidence, noise
 from tacdata.discrepancy.candidates import Board, Candidate, build
+from tacdata.discrepancy.cleaner import Cleaner
 from tacdata.discrepancy.evidence import Evidence, Noise
 from tacdata.discrepancy.fit import fold_of, solve
 from tacdata.discrepancy.fitted_response import contexts
@@ -65,10 +66,23 @@ class Frame:
     """Weights of their priors [1], shape (k,)."""
     beside: np.ndarray
     """Columns of nuisances, then those that belong to no effect, whitened and cleaned [1], shape (m, streams, k)."""
+    nuisances: np.ndarray
+    """Those of nuisances alone, shape (m, streams, nuisances)."""
+    inner: np.ndarray
+    """Their Gram matrices, shape (episodes, nuisances, nuisances)."""
     noise: Noise
     """Noise as an over-rich fit leaves it."""
     folds: np.ndarray
     """Fold of each episode, shape (episodes,), int64."""
+    known: Cleaner
+    """Takes nuisances out of columns, beside the model as it was given."""
+
+    def cleaner(self, course: Course, features: np.ndarray | None) -> Cleaner:
+        """Return what takes nuisances out of columns beside a response that may take up given features."""
+        before = self.known.features
+        if features is before or (features is not None and before is not None and np.array_equal(features, before)):
+            return self.known
+        return Cleaner(course.reduced, self.noise, self.context, features, self.errors)
 
 
 @dataclass(frozen=True)
@@ -140,8 +154,11 @@ def frame(setting: Setting) -> Frame:
         known = replace(known, swing=None)
         spread = _swing_told(residual, every, reduced, known, context, features, errors, rise)
         known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
-    beside = evidence.cleaned(every[:, :, : extra.shape[2] + rich.shape[2]], reduced, known, context, features, errors)
-    return Frame(context, features, errors, ridge, beside, known, fold_of(course.episodes))
+    cleaner = Cleaner(reduced, known, context, features, errors)
+    beside = cleaner.cleaned(every[:, :, : extra.shape[2] + rich.shape[2]])
+    nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
+    inner = evidence.summed(nuisances, reduced).gram
+    return Frame(context, features, errors, ridge, beside, nuisances, inner, known, fold_of(course.episodes), cleaner)
 
 
 def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Problem:
@@ -166,7 +183,7 @@ def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Pr
     first = last + (numerics is not None)
     values = np.concatenate([board.values, moving.values, off, *([] if numerics is None else [numerics])], axis=2)
     features = taken_up(course, response, [*setting.given, *placed])
-    found = evidence.collect(values, course.reduced, frame.noise, frame.context, features, frame.errors, frame.beside)
+    found = frame.cleaner(course, features).collected(values, frame.beside)
     second = first + len(frame.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
     board = replace(board, values=board.values[:, :, :1])
@@ -210,7 +227,7 @@ def _jitter_told(
     """
     left = _rich_left(residual, rich, course, known, context, features, errors)
     columns = np.concatenate([left[:, :, None].astype(np.float32), errors], axis=2)
-    gram = evidence.collect(columns, course, known, context, features, np.zeros_like(errors[:, :, :1])).gram
+    gram = Cleaner(course, known, context, features, np.zeros_like(errors[:, :, :1])).collected(columns).gram
     there = gram[:, 0, 0] > 0  # sealed episodes say nothing
     place = np.zeros(course.episodes, dtype=np.int64)
     place[course.episode] = context
@@ -240,7 +257,7 @@ def _swing_told(
     apart = rise[:, :, None] * (local[:, None, None] == np.arange(local.max() + 1))
     bare = _rich_left(residual, rich, course, known, context, features, errors)
     both = np.concatenate([bare[:, :, None], apart], axis=2)
-    white = evidence.cleaned(both, course, known, context, features, errors)
+    white = Cleaner(course, known, context, features, errors).cleaned(both)
     return noise.gain_spread(white[:, :, 0], white[:, :, 1:], context)
 
 
@@ -250,7 +267,7 @@ def _rich_left(
 ) -> np.ndarray:  # fmt: skip
     """Return what an over-rich fit leaves of a residual, shape (m, streams)."""
     columns = np.concatenate([residual[:, :, None].astype(np.float32), rich], axis=2)
-    gram = evidence.collect(columns, course, known, context, features, errors).of(np.arange(course.episodes))
+    gram = Cleaner(course, known, context, features, errors).collected(columns).of(np.arange(course.episodes))
     free = np.full(rich.shape[2], np.inf)
     best = solve(gram, np.arange(rich.shape[2]), np.full(rich.shape[2], 1.0), -free, free)
     return residual - rich @ best.astype(np.float32)
@@ -266,11 +283,12 @@ def told(
     every = np.arange(rich.shape[2])
     free = np.full(len(every), np.inf)
     for _ in range(2):
-        gram = evidence.collect(columns, course, known, context, features, errors).of(np.arange(course.episodes))
+        gram = Cleaner(course, known, context, features, errors).collected(columns).of(np.arange(course.episodes))
         best = solve(gram, every, np.full(len(every), 1.0), -free, free)
         left = (residual - rich @ best.astype(np.float32)) / known.scale
         still = noise.still(known, left.shape[1])
-        bare = evidence.leftover(left, course, still, context, features, errors / known.scale[None, :, None])
+        cleaner = Cleaner(course, still, context, features, errors / known.scale[None, :, None])
+        bare = cleaner.cleaned(left[:, :, None])[:, :, 0]
         bare[~np.isfinite(residual)] = np.nan
         known = noise.refined(bare * known.scale, course, known)
     rest = residual - rich @ best.astype(np.float32)

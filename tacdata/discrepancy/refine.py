@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from tacdata.chain import Response, predict
 from tacdata.discrepancy import evidence
+from tacdata.discrepancy.cleaner import Cleaner
 from tacdata.discrepancy.evidence import Evidence
 from tacdata.discrepancy.fit import solve
 from tacdata.discrepancy.fitted_response import FittedResponse
@@ -50,76 +50,100 @@ def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int 
         frame: Frame model, kept.
         steps: Most Gauss-Newton steps.
     """
-    response = copy.deepcopy(setting.response) if setting.response.fitted else setting.response
+    response = _own(setting.response)
     now = list(placed)
     if isinstance(response, FittedResponse) and now:
         _correct(response, setting, now)
-    state = _evaluate(setting, response, now, frame)
+    view = _looked(setting, response, now, frame)
+    state = _state(setting, response, now, frame, view)
     for _ in range(steps):
         best = None
         for share in (1.0, 0.3):
             there = now
             for knob, by in zip(state.tangent.knobs, share * state.move, strict=True):
                 there = knob.moved(there, float(np.clip(by, -1.5, 1.5) if knob.shape else by))
-            fresh = copy.deepcopy(response)
+            fresh = _own(response)
             if isinstance(fresh, FittedResponse):
                 _correct(fresh, setting, there)
-            tried = _evaluate(replace(setting, response=fresh), fresh, there, frame)
-            if tried.energy.sum() < state.energy.sum() - 1e-6:
+            tried = _looked(replace(setting, response=fresh), fresh, there, frame)
+            if tried.energy.sum() < view.energy.sum() - 1e-6:
                 best = tried, there, fresh
                 break
         if best is None:
             break
-        gained = state.energy.sum() - best[0].energy.sum()
-        state, now, response = best
+        gained = view.energy.sum() - best[0].energy.sum()
+        view, now, response = best
+        state = _state(replace(setting, response=response), response, now, frame, view)
         if gained < SMALL:
             break
     return Refined(
-        tuple(now), response, state.tangent, state.energy, state.covariance, state.left, setting.course.reduced.episode
+        tuple(now), response, state.tangent, view.energy, state.covariance, view.left, setting.course.reduced.episode
     )
+
+
+def _own(response: Response) -> Response:
+    """Return a response that may be corrected."""
+    return response.copied() if isinstance(response, FittedResponse) else response
 
 
 def corrected(setting: Setting, placed: Sequence[Placed]) -> Response:
     """Return the response beside effects whose numbers stay: a fitted one takes up what they leave to it."""
     if not isinstance(setting.response, FittedResponse) or not placed:
         return setting.response
-    response = copy.deepcopy(setting.response)
+    response = setting.response.copied()
     _correct(response, setting, placed)
     return response
 
 
 @dataclass(frozen=True)
-class _State:
-    tangent: Tangent
-    move: np.ndarray
+class _View:
+    """What a model leaves, nuisances fitted."""
+
+    clean: np.ndarray
+    """Whitened residual [1], shape (m, streams, 1)."""
+    cleaner: Cleaner
+    """What took nuisances out of it."""
     energy: np.ndarray
-    covariance: np.ndarray
     left: np.ndarray
 
 
-def _evaluate(setting: Setting, response: Response, placed: list[Placed], frame: Frame) -> _State:
+@dataclass(frozen=True)
+class _State:
+    """Where a model may go from there."""
+
+    tangent: Tangent
+    move: np.ndarray
+    covariance: np.ndarray
+
+
+def _looked(setting: Setting, response: Response, placed: list[Placed], frame: Frame) -> _View:
     course, streams = setting.course, Streams.of(setting.course)
-    moving = tangents(course, response, placed, setting.given)
     said = predict(course, response, [*setting.given, *placed])
-    residual = streams.measured(course) - streams.predicted(said)
-    values = np.concatenate([residual[:, :, None].astype(np.float32), moving.values], axis=2)
-    ridge = frame.ridge
+    residual = (streams.measured(course) - streams.predicted(said))[:, :, None].astype(np.float32)
     features = taken_up(course, response, [*setting.given, *placed])
-    beside = frame.beside[:, :, : len(ridge)]
-    clean = evidence.cleaned(values, course.reduced, frame.noise, frame.context, features, frame.errors)
-    found = evidence.summed(np.concatenate([clean, beside], axis=2), course.reduced)
+    cleaner = frame.cleaner(course, features)
+    clean = cleaner.cleaned(residual)
+    found = evidence.summed(clean, course.reduced, frame.nuisances, frame.inner)
+    still = _without(found.gram.sum(axis=0), np.arange(len(frame.ridge)), frame.ridge)
+    return _View(clean, cleaner, _energy(found, still), clean[:, :, 0] - frame.nuisances @ still.astype(np.float32))
+
+
+def _state(setting: Setting, response: Response, placed: list[Placed], frame: Frame, view: _View) -> _State:
+    course, ridge = setting.course, frame.ridge
+    moving = tangents(course, response, placed, setting.given)
+    if not moving.knobs:
+        return _State(moving, np.zeros(0), np.zeros((0, 0)))
+    clean = view.cleaner.cleaned(moving.values)
+    both = np.concatenate([view.clean, clean], axis=2)
+    found = evidence.summed(both, course.reduced, frame.nuisances, frame.inner)
     k = len(moving.knobs)
     rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
     weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
     free = np.full(len(ridge), np.inf)
     low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -free])
     high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), free])
-    every = np.arange(k + len(ridge))
-    total = found.gram.sum(axis=0)
-    best = solve(total, every, weight, low, high)
-    still = np.concatenate([np.zeros(k), _without(total, every[k:], ridge)])
-    left = clean[:, :, 0] - beside @ still[k:].astype(np.float32)
-    return _State(moving, best[:k], _energy(found, still), _covariance(found, best, weight)[:k, :k], left)
+    best = solve(found.gram.sum(axis=0), np.arange(k + len(ridge)), weight, low, high)
+    return _State(moving, best[:k], _covariance(found, best, weight)[:k, :k])
 
 
 def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:

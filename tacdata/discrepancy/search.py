@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from tacdata.discrepancy import evidence
 from tacdata.discrepancy.candidates import Candidate, StandIn
+from tacdata.discrepancy.cleaner import Cleaner
 from tacdata.discrepancy.clusters import Clustered, Lent, clustered, lent
 from tacdata.discrepancy.evidence import Noise
 from tacdata.discrepancy.fit import eliminated, flips, gains, solve, t_value
@@ -190,24 +190,28 @@ def leftovers(problem: Problem) -> Left:
             each = _ridge_gains(problem, gram, columns, strength * scale)
             if each.sum() > best.gain:
                 best = Left(float(each.sum()), t_value(each))
+    residual, remembered = _stream_residual(problem), own_histories(problem)
     for strength in (1e-3, 1e-2, 1e-1, 1.0):
-        each = _stream_gains(problem, strength)
+        each = _stream_gains(problem, residual, remembered, strength)
         if each.sum() > best.gain:
             best = Left(float(each.sum()), t_value(each))
     return best
 
 
-def _stream_gains(problem: Problem, strength: float) -> np.ndarray:
-    """Return held-out gains of histories with weights of their own in every stream, shape (episodes,)."""
-    same, course = problem.frame, problem.setting.course.reduced
-    residual = evidence.leftover(
-        problem.board.values[:, :, 0], course, same.noise, same.context, same.features, same.errors
-    )
+def _stream_residual(problem: Problem) -> np.ndarray:
+    """Return the whitened residual with nuisances fitted, shape (m, streams)."""
+    same = problem.frame
+    residual = same.known.cleaned(problem.board.values[:, :, :1])[:, :, 0]
     if len(problem.nuisances):
         _, values = fitted(problem, [], np.arange(len(problem.folds)))
         weights = values[len(problem.tangent.columns) + len(problem.forms) :].astype(np.float32)
-        residual = residual - same.beside[:, :, : len(weights)] @ weights
-    columns = own_histories(problem)
+        residual = residual - same.nuisances @ weights
+    return residual
+
+
+def _stream_gains(problem: Problem, residual: np.ndarray, columns: np.ndarray, strength: float) -> np.ndarray:
+    """Return held-out gains of histories with weights of their own in every stream, shape (episodes,)."""
+    course = problem.setting.course.reduced
     weight = strength * float(np.mean(np.einsum("ij,ij->j", columns, columns)))
     result = np.zeros(len(problem.folds))
     for fold in np.unique(problem.folds):
@@ -229,7 +233,7 @@ def own_histories(problem: Problem) -> np.ndarray:
     columns = np.column_stack([own * np.minimum(share * 10, 1), own * share])[:, None, :]
     plain = Noise(np.ones(1), same.noise.memory, same.noise.wander)
     none = np.zeros((len(depth), 1, 1))
-    made = evidence.cleaned(columns, course.reduced, plain, same.context, same.features, none)[:, 0].astype(float)
+    made = Cleaner(course.reduced, plain, same.context, same.features, none).cleaned(columns)[:, 0].astype(float)
     return made / np.maximum(np.sqrt(np.mean(made**2, axis=0)), 1e-9)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tacdata.chain import Course, Response, predict
+from tacdata.chain import Chain, Course, Response
 from tacdata.discrepancy.streams import Streams
 from tacdata.effects import Parameter, Placed
 
@@ -86,14 +86,30 @@ def tangents(course: Course, response: Response, placed: Sequence[Placed], given
     knobs = knobs_of(placed, course.channels)
     if not knobs:
         return Tangent([], np.zeros((len(course.read), streams.count, 0), dtype=np.float32), np.zeros(0, dtype=int))
-    now = streams.predicted(predict(course, response, [*given, *placed]))
-    columns = []
-    for knob in knobs:
-        low, high = knob.room(placed)
-        step = STEP if high > STEP else -STEP
-        if not low < step < high:
-            columns.append(np.zeros_like(now))
+    chain = Chain(course, response, [*given, *placed])
+    now = streams.predicted(chain.prediction)
+    values = np.zeros((*now.shape, len(knobs)), dtype=np.float32)
+    for group in _groups(knobs, placed, given):
+        steps, there = {}, list(placed)
+        for k in group:
+            low, high = knobs[k].room(placed)
+            step = STEP if high > STEP else -STEP
+            if low < step < high:
+                steps[k], there = step, knobs[k].moved(there, step)
+        if not steps:
             continue
-        there = streams.predicted(predict(course, response, [*given, *knob.moved(placed, step)]))
-        columns.append((there - now) / step)
-    return Tangent(knobs, np.stack(columns, axis=-1).astype(np.float32), np.arange(len(knobs)))
+        change = streams.predicted(chain.again([*given, *there])) - now
+        for k, step in steps.items():
+            own = slice(None) if len(group) == 1 else knobs[k].channel
+            values[:, own, k] = change[:, own] / step
+    return Tangent(knobs, values, np.arange(len(knobs)))
+
+
+def _groups(knobs: list[Knob], placed: Sequence[Placed], given: Sequence[Placed]) -> list[list[int]]:
+    """Return knobs that are moved at once: a parameter of every channel's own, unless something else mixes channels."""
+    groups: dict[tuple[int, str, int | None], list[int]] = {}
+    for k, knob in enumerate(knobs):
+        others = [*given, *(p for at, p in enumerate(placed) if at != knob.at)]
+        apart = any(p.effect.by_channel for p in others)
+        groups.setdefault((knob.at, knob.parameter.name, knob.channel if apart else None), []).append(k)
+    return list(groups.values())

@@ -31,6 +31,14 @@ def test_play_follows_through_its_dead_band():
     assert back[-1] == pytest.approx(0.1)
 
 
+def test_play_is_its_definition():
+    values, width = np.cumsum(np.random.default_rng(1).normal(size=300)), 0.7
+    expected = [values[0] - width]
+    for u in values[1:]:
+        expected.append(max(u - width, min(u + width, expected[-1])))
+    np.testing.assert_array_equal(play(values, width), expected)
+
+
 def test_play_of_many_columns_is_that_of_each():
     values = np.cumsum(np.random.default_rng(0).normal(size=(200, 5)), axis=0)
     np.testing.assert_array_equal(play(values, 0.7), np.stack([play(c, 0.7) for c in values.T], axis=-1))

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.own_errors import Own, without
+from tacdata.discrepancy.own_errors import Factored, Own
 
 STREAMS, LENGTHS, KINDS, FEATURES, WIDTH = 3, (7, 5, 9), 2, 4, 5
 
@@ -72,5 +72,5 @@ def test_products_are_those_of_generalized_least_squares(prior, features):
         given["moved"].astype(np.float32),
         given["features"].astype(np.float32) if features else None,
     )  # fmt: skip
-    left = without(given["columns"].astype(np.float32), spans, own).reshape(-1, WIDTH)
+    left = Factored(spans, own).without(given["columns"].astype(np.float32)).reshape(-1, WIDTH)
     assert left.T @ left == pytest.approx(expected, rel=2e-4, abs=2e-4 * np.abs(expected).max())

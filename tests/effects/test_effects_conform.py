@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tacdata.chain import STAGES, Course, Response, Tool, predict
+from tacdata.chain import STAGES, Chain, Course, Response, Tool, predict
 from tacdata.effects import Placed, library, load
 
 EFFECTS = library()
@@ -116,3 +116,14 @@ def test_known_but_not_modelled_effects_belong_to_a_group():
     modelled = {number for e in EFFECTS for number in e.catalogue}
     assert len({e["id"] for e in listed}) == len(listed)
     assert {e["id"] for e in listed} - modelled, "some are not modelled"
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_a_chain_that_was_run_says_the_same_with_one_more(effect):
+    course, response = pressed(), Springs()
+    base = [Placed(load(n), values(load(n), 1.0)) for n in ("drift", "relaxation", "backlash", "gain", "z_offset")]
+    more = [*base[:2], Placed(effect, values(effect, 1.0)), *base[2:]]
+    again, afresh = Chain(course, response, base).again(more), predict(course, response, more)
+    assert np.abs(afresh.signal - predict(course, response, base).signal).max() > 0 or effect.moves == ("tag",)
+    for stream in ("signal", "force", "tag", "pose"):
+        np.testing.assert_array_equal(getattr(again, stream), getattr(afresh, stream))

@@ -1,0 +1,153 @@
+"""Takes noise and nuisances out of columns, place by place: what is the same for all columns is factored once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.discrepancy.evidence import Evidence, Noise, whiten
+from tacdata.discrepancy.own_errors import Factored, Own
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Rows of the episodes of one place, with what they err by."""
+
+    rows: np.ndarray
+    episode: np.ndarray
+    offset: np.ndarray
+    seen: Factored
+    tag: Factored | None
+
+
+class Cleaner:
+    """Whitens columns and takes nuisances out of them."""
+
+    def __init__(
+        self, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None, jitter: np.ndarray
+    ) -> None:  # fmt: skip
+        """Factor what is the same for all columns.
+
+        Args:
+            course: Whose rows.
+            noise: Noise model.
+            context: Group of rows that share features, shape (n,); an episode lies in one.
+            features: What the response may take up, shape (n, k); None for nothing but offsets.
+            jitter: What an episode's own errors of pose of one standard deviation change, shape (n, streams, kinds).
+        """
+        self.features = features
+        self._course, self._noise, wander = course, noise, noise.wander
+        streams = len(noise.scale)
+        self._seen = seen = streams - (3 if noise.tag is not None else 0)
+        flat = replace(noise, scale=np.ones(1))
+        one = replace(flat, missing=None)
+        offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
+        moved = whiten(jitter, course, noise)
+        swung = None if noise.swing is None else whiten(noise.swing[:, :, None], course, noise)[:, :, 0]
+        shared = None if features is None else whiten(features[:, None, :], course, one)
+        if wander is not None and shared is not None and features is not None:
+            ones = whiten(np.ones((course.rows, 1, 1)), course, one)[:, :, 0]
+            _follow(shared, ones, course.episode, wander.expected(features[:, None, :]).astype(np.float32))
+        order = np.argsort(context, kind="stable")
+        self._places: list[_Place] = []
+        # A place at a time: columns of all rows together would not stay in a processor's cache.
+        for group in np.split(order, np.flatnonzero(np.diff(context[order])) + 1):
+            local = course.episode[group]
+            rows = np.argsort(local, kind="stable")
+            spans = np.split(rows, np.flatnonzero(np.diff(local[rows])) + 1)
+            free = np.full(len(spans), np.inf)
+            own = Own(
+                _turned(offset[group, :seen]),
+                free if wander is None else wander.spread[[local[span[0]] for span in spans]],
+                None if swung is None else _turned(swung[group, :seen]),
+                _turned(moved[group, :seen]),
+                None if shared is None else _features(shared[group, 0], offset[group, :seen]),
+            )  # fmt: skip
+            tag = None
+            if seen < streams:
+                # A tag knows nothing of the response: it has a free offset for the place, and each episode's own.
+                prior = np.full(len(spans), float(noise.tag or 1.0))
+                tag = Factored(
+                    spans, Own(_turned(offset[group, seen:]), prior, features=_turned(offset[group, seen:, None]))
+                )
+            self._places.append(_Place(group, local, offset[group], Factored(spans, own), tag))
+
+    def parts(self, columns: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Give the rows of each place, and columns there whitened and without nuisances, shape (m, streams, k).
+
+        Args:
+            columns: Shape (n, streams, k).
+        """
+        noise, seen, expected = self._noise, self._seen, None
+        if noise.wander is not None:
+            gone = None if noise.missing is None else noise.missing[:, :seen]
+            expected = noise.wander.expected(columns[:, :seen], gone)
+            expected = (expected / noise.scale[:seen, None]).astype(np.float32)
+        for place in self._places:
+            white = whiten(columns[place.rows], self._course, noise, place.rows)
+            if expected is not None:
+                _follow(white[:, :seen], place.offset, place.episode, expected)
+            part = np.empty_like(white)
+            part[:, :seen] = _turned(place.seen.without(_turned(white[:, :seen])))
+            if place.tag is not None:
+                part[:, seen:] = _turned(place.tag.without(_turned(white[:, seen:])))
+            yield place.rows, part
+
+    def cleaned(self, columns: np.ndarray) -> np.ndarray:
+        """Return columns whitened and without nuisances, shape (n, streams, k)."""
+        result = np.zeros(columns.shape, dtype=np.float32)
+        for rows, part in self.parts(columns):
+            result[rows] = part
+        return result
+
+    def collected(self, columns: np.ndarray, beside: np.ndarray | None = None) -> Evidence:
+        """Reduce columns to `Evidence`.
+
+        Args:
+            columns: Residual first, then effects, shape (n, streams, 1 + columns).
+            beside: Further columns, cleaned before, shape (n, streams, more).
+        """
+        course = self._course
+        width = columns.shape[2] + (0 if beside is None else beside.shape[2])
+        gram, rows = np.zeros((course.episodes, width, width)), np.zeros(course.episodes)
+        for group, part in self.parts(columns):
+            whole = part if beside is None else np.concatenate([part, beside[group]], axis=2)
+            for number in np.unique(course.episode[group]):
+                flat = whole[course.episode[group] == number].reshape(-1, width)
+                gram[number] = flat.T @ flat
+                rows[number] = flat.shape[0]
+        return Evidence(gram, rows)
+
+
+def _follow(white: np.ndarray, offset: np.ndarray, episode: np.ndarray, expected: np.ndarray) -> None:
+    """Take off whitened columns, in place, what the offsets of the episodes before let one expect.
+
+    Args:
+        white: Shape (n, streams, columns).
+        offset: Whitened constants, shape (n, streams or more).
+        episode: Of each row, shape (n,).
+        expected: In noise scales, shape (episodes, streams, columns).
+    """
+    edges = np.flatnonzero(np.diff(episode, prepend=-1))
+    for begin, end in zip(edges, [*edges[1:], len(episode)], strict=True):
+        white[begin:end] -= offset[begin:end, : white.shape[1], None] * expected[episode[begin]]
+
+
+def _turned(values: np.ndarray) -> np.ndarray:
+    """Return values with rows and streams exchanged."""
+    return np.ascontiguousarray(np.swapaxes(values, 0, 1))
+
+
+def _features(shared: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """Return features of each stream, shape (streams, n, p), without those that are nowhere and where nothing was read.
+
+    Args:
+        shared: Whitened features, shape (n, k).
+        offset: Whitened constants, 0 where nothing was read, shape (n, streams).
+    """
+    used = shared[:, np.abs(shared).max(axis=0) > 1e-9]
+    there = (offset != 0).T.astype(np.float32)
+    return there[:, :, None] * used[None]
