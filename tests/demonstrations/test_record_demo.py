@@ -54,7 +54,7 @@ def test_three_boards_and_a_camera_come_into_one_file(recorded):
     assert found.complete and found.task == "grasp" and found.rig.frame == "table"
     assert set(found.taxels) == {"thumb", "index", "middle"} == {view.finger for view in found.views}
     for stream in found.taxels.values():
-        assert 4.5 < (stream.sample_ns[-1] - stream.sample_ns[0]) * 1e-9 < 5.5
+        assert (stream.sample_ns[-1] - stream.sample_ns[0]) * 1e-9 > 4.5, "a busy machine stops late, never early"
         assert (np.diff(stream.counter) == 1).all() and stream.counts.shape[1] == 24
         assert np.median(np.diff(stream.sample_ns)) == pytest.approx(1e9 / 30, rel=1e-3)
     for view in found.views:

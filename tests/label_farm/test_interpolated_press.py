@@ -21,7 +21,7 @@ def test_no_frame_is_further_off_than_a_state_left_out(indenter):
 
     model = SkinModel(default_sensor()).companion
     ladder = np.array(Ladder().depths(1.0))
-    dense = np.sort(np.concatenate([ladder[:8], (ladder[:7] + ladder[1:8]) / 2]))
+    dense = np.sort(np.concatenate([ladder[:6], (ladder[:5] + ladder[1:6]) / 2]))
     depths = (*dense, *dense[-2::-1])
     states = [state for _, state in model.states(PressRequest(indenter, 1.1, -0.7, 0.0, depths))]
     surface = model.figures(depths, states).surface.reshape(len(depths), -1)

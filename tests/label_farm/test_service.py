@@ -131,7 +131,7 @@ def test_a_second_service_on_the_store_is_refused(busy):
 
 def test_a_cancelled_submission_leaves_and_its_finished_labels_stay(tmp_path):
     record(tmp_path, 1, 12)
-    with Service(tmp_path, workers=1, seconds=0.4) as service:
+    with Service(tmp_path, workers=1, seconds=2.0) as service:
         shown = verb("farm", "submit", "session-0", "--url", service.url, "--by", "ann", "--priority", "2")
         assert shown.returncode == 0 and "submission 000001" in shown.stdout, shown.stderr
         service.wait(lambda state: state["submissions"][0]["labelled"] >= 2)

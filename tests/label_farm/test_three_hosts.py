@@ -13,11 +13,11 @@ from farm_examples import HERE
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.timeout(600),
+    pytest.mark.timeout(900),
     pytest.mark.skipif(not hosts.possible(), reason="this machine gives no network namespaces (root, iproute2)"),
 ]
 TOKEN = "0123456789abcdef0123"
-PRESSES = 60
+PRESSES = 48
 
 
 def environment(**more):
@@ -41,11 +41,11 @@ def ask(network, url, path, document=None):
     return json.loads(shown.stdout)
 
 
-def wait(condition, seconds=240.0):
+def wait(condition, seconds=240.0, every=0.5):
     deadline = time.monotonic() + seconds
     while not (found := condition()):
         assert time.monotonic() < deadline, "it did not happen"
-        time.sleep(0.5)
+        time.sleep(every)
     return found
 
 
@@ -96,7 +96,8 @@ def test_a_host_dies_and_another_loses_its_network(tmp_path, engine):
         join("one")
         wait(lambda: labelled() > stuck)
         network.mend("two")
-        ended = wait(lambda: (e := ask(network, url, "/api/submissions/000001"))["state"] == "done" and e)
+        # Asking costs a process: seldom enough not to starve those that work.
+        ended = wait(lambda: (e := ask(network, url, "/api/submissions/000001"))["state"] == "done" and e, 480.0, 3.0)
         assert (ended["labelled"], ended["failed"]) == (PRESSES, 0)
     undisturbed(peace, work, names)
     assert compare(work, peace, names, PRESSES) <= 12, "only what was in work on a lost host is solved again"

@@ -8,7 +8,7 @@ from skin_examples import box_mesh, slab_sensor
 from tacdata.indenters import from_document
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.model import SkinModel
+from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 
 DEPTHS = (0.25, 0.5)
@@ -30,7 +30,8 @@ def punch():
 
 @pytest.fixture(scope="module")
 def model():
-    return SkinModel(slab_sensor(), mesh=box_mesh(slab_sensor(), 8, 8, 4))
+    settings = ModelSettings(error_estimate=False)
+    return SkinModel(slab_sensor(), settings, mesh=box_mesh(slab_sensor(), 8, 8, 4))
 
 
 @pytest.mark.slow

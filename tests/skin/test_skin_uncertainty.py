@@ -37,7 +37,7 @@ def test_one_spread_is_the_derivative_times_it_and_several_add_in_squares(skin):
 
 def test_the_sensor_files_spreads_agree_with_presses_drawn_at_random(skin):
     """64 presses tell a standard deviation to 9 %; two and a half of these, and the press is not quite linear."""
-    samples = sampled_spread(skin, DEEP, SPREADS, 64, seed=1, capacity=8)
+    samples = sampled_spread(skin, DEEP, SPREADS, 64, seed=1, capacity=32)
     for (depth, _, first), (same, drawn) in zip(uncertainties(skin, DEEP), samples, strict=True):
         assert depth == same
         assert drawn.force[2] == pytest.approx(first.force[2], rel=0.22)
@@ -52,7 +52,7 @@ def test_a_place_known_to_the_size_of_the_contact_is_beyond_the_first_order(skin
     """Under the tip depth falls with the square of a shift, x^2 / 2R = 0.04 mm at 0.4 mm, and has no slope."""
     centred, spreads = replace(DEEP, x=0.0, y=0.0, depths=(0.4,)), {"x": 0.4}
     [(_, _, first)] = uncertainties(skin, centred, spreads)
-    [(_, drawn)] = sampled_spread(skin, centred, spreads, 32, capacity=8)
+    [(_, drawn)] = sampled_spread(skin, centred, spreads, 32, capacity=32)
     assert drawn.surface[4, 4] > 0.02
     assert first.surface[4, 4] < 0.5 * drawn.surface[4, 4]
     # On the flanks, whose slope does not go on for 0.4 mm, it says too much.
