@@ -66,6 +66,15 @@ class FittedResponse(Response):
         other._weights, other._designs, other._answers = [*self._weights], [*self._designs], [*self._answers]
         return other
 
+    def of_place(self, context: int, course: Course) -> FittedResponse:
+        """Return what it says of another course, all of it at one of its places and tools."""
+        other = copy.copy(self)
+        other._bases, other._weights = [self._bases[context]], [self._weights[context]]
+        other._air = [self._air[context]]
+        other.context, other._rows = np.zeros(course.rows, dtype=np.int64), [np.arange(course.rows)]
+        other._course, other._read, other._designs, other._answers = course, np.arange(course.rows), [], []
+        return other
+
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return readings above idle, shape (n, channels); rows must be the course's."""
         return self._both(pose)[:, : self._course.channels]

@@ -193,6 +193,6 @@ class _Free:
     def said(self, episode: int, weights: np.ndarray) -> np.ndarray:
         """Return what weights change in an episode, shape (streams, m, k)."""
         errors, joint = self._errors[episode], self._joints[episode]
-        flat = joint.reshape(-1, joint.shape[2])
+        flat = joint.reshape(joint.shape[0] * joint.shape[1], joint.shape[2])
         through = errors.root @ (flat.T @ weights.reshape(len(flat), -1))
         return self._shared[episode] @ weights.astype(np.float32) - errors.said(through)

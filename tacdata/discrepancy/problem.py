@@ -67,15 +67,27 @@ class Frame:
     beside: np.ndarray
     """Columns of nuisances, then those that belong to no effect, whitened and cleaned [1], shape (m, streams, k)."""
     nuisances: np.ndarray
-    """Those of nuisances alone, shape (m, streams, nuisances)."""
+    """Those of nuisances alone [1], shape (m, streams, nuisances)."""
     inner: np.ndarray
-    """Their Gram matrices, shape (episodes, nuisances, nuisances)."""
+    """Their Gram matrices [1], shape (episodes, nuisances, nuisances)."""
     noise: Noise
     """Noise as an over-rich fit leaves it."""
     folds: np.ndarray
     """Fold of each episode, shape (episodes,), int64."""
     known: Cleaner
     """Takes nuisances out of columns, beside the model as it was given."""
+
+    @classmethod
+    def of(
+        cls, reduced: Course, context: np.ndarray, features: np.ndarray | None, errors: np.ndarray, ridge: np.ndarray,
+        beside: np.ndarray, noise: Noise, folds: np.ndarray, known: Cleaner | None = None,
+    ) -> Frame:  # fmt: skip
+        """Return a frame of the rows read, with what follows from its parts."""
+        nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
+        return cls(
+            context, features, errors, ridge, beside, nuisances, evidence.summed(nuisances, reduced).gram, noise, folds,
+            known or Cleaner(reduced, noise, context, features, errors),
+        )  # fmt: skip
 
     def cleaner(self, course: Course, features: np.ndarray | None) -> Cleaner:
         """Return what takes nuisances out of columns beside a response that may take up given features."""
@@ -156,9 +168,8 @@ def frame(setting: Setting) -> Frame:
         known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
     cleaner = Cleaner(reduced, known, context, features, errors)
     beside = cleaner.cleaned(every[:, :, : extra.shape[2] + rich.shape[2]])
-    nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
-    inner = evidence.summed(nuisances, reduced).gram
-    return Frame(context, features, errors, ridge, beside, nuisances, inner, known, fold_of(course.episodes), cleaner)
+    folds = fold_of(course.episodes)
+    return Frame.of(reduced, context, features, errors, ridge, beside, known, folds, cleaner)
 
 
 def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Problem:

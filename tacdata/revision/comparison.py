@@ -69,7 +69,7 @@ class Comparison:
         setting = Comparison(course, self.spec).setting
         rows = ~np.isin(self.course.reduced.episode, left_out)
         left = None if course.episodes == self.course.episodes else kept
-        return refine(setting, placed, _frame_of(self.frame, rows, left), STEPS).placed
+        return refine(setting, placed, _frame_of(self.frame, course, rows, left), STEPS).placed
 
     @cached_property
     def _contexts(self) -> np.ndarray:
@@ -86,11 +86,12 @@ class Comparison:
         return predict(self.course, response, [*self.setting.given, *placed]).signal
 
 
-def _frame_of(whole: Frame, rows: np.ndarray, episodes: np.ndarray | None) -> Frame:
+def _frame_of(whole: Frame, course: Course, rows: np.ndarray, episodes: np.ndarray | None) -> Frame:
     """Return a frame for some of the rows: what weighs readings is known from all of them, what they say is not.
 
     Args:
         whole: Of all rows.
+        course: With the rows that are kept.
         rows: Which are kept, shape (m,), bool.
         episodes: Those that are left, if they are numbered anew.
     """
@@ -98,8 +99,8 @@ def _frame_of(whole: Frame, rows: np.ndarray, episodes: np.ndarray | None) -> Fr
     swing = None if noise.swing is None else noise.swing[rows]
     missing = None if noise.missing is None else noise.missing[rows]
     wander = None if noise.wander is None else noise.wander.of(rows, episodes)
-    return replace(
-        whole, context=whole.context[rows], features=None if whole.features is None else whole.features[rows],
-        errors=whole.errors[rows], beside=whole.beside[rows],
-        noise=replace(noise, swing=swing, missing=missing, wander=wander),
+    return Frame.of(
+        course.reduced, whole.context[rows], None if whole.features is None else whole.features[rows],
+        whole.errors[rows], whole.ridge, whole.beside[rows],
+        replace(noise, swing=swing, missing=missing, wander=wander), whole.folds,
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -149,10 +148,4 @@ def elsewhere(response: Response, course: Course, own: Course, trial: Trial) -> 
     if not isinstance(response, FittedResponse):
         return response
     alike = np.flatnonzero((course.row_site == trial.site) & (course.tool == trial.tool))
-    moved = copy.copy(response)
-    at = int(response.context[alike[0]])
-    moved._bases, moved._weights = [response._bases[at]], [response._weights[at]]
-    moved.context = np.zeros(own.rows, dtype=np.int64)
-    moved._course = own
-    moved._read = np.arange(own.rows)
-    return moved
+    return response.of_place(int(response.context[alike[0]]), own)

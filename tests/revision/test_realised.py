@@ -44,7 +44,7 @@ def test_a_wrong_effect_is_seen_to_make_labels_worse(loose, truth):
     told = tip_error(loose, placed("z_offset", dz=-0.1), truth)
     assert told is not None and told.better == 0
     assert told.constant_after > told.constant_before + 0.09, "no tip was ever so much higher"
-    wrong = tip_error(loose, placed("backlash", b=-PLAY), truth)
+    wrong = tip_error(loose, placed("backlash", b=3 * PLAY), truth)
     assert wrong is not None and wrong.after > 1.1 * wrong.before and wrong.worse == 16
 
 
