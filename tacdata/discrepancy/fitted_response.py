@@ -9,13 +9,11 @@ from scipy.interpolate import BSpline
 
 from tacdata.chain import Course, Response
 
-KNOTS = (5, 9, 14, 22, 34, 50)
-"""Intervals of the splines in depth to choose from, by what they say of episodes left out. They know nothing of
-direction, rate or time, so history stays out however many they are."""
-FINER = 2
-"""Steps beyond the number that predicts best [1]."""
-BETTER = 0.9999
-"""More intervals must lower the error of episodes left out at all (this share or less) [1]."""
+INTERVALS = 50
+"""Most intervals of the splines in depth. They know nothing of direction, rate or time, so history stays out however
+many they are; too few cannot follow how a skin is first touched, and half of that looks like a skin that sticks. (What
+predicts left-out episodes best is no guide: that bias lies far below one reading's noise, and far above what a test of
+all of them sees.)"""
 ROWS_EACH = 12
 """Rows of a place that a spline must have at least."""
 SMOOTH = 1e-5
@@ -36,7 +34,7 @@ class FittedResponse(Response):
 
         Args:
             course: The recordings, without missing readings.
-            knots: Most inner intervals of a spline; chosen by episodes left out, unless given.
+            knots: Most intervals of a spline, `INTERVALS` unless given.
         """
         self._course = course
         self._read = course.read
@@ -51,7 +49,7 @@ class FittedResponse(Response):
             rows, there = np.arange(len(reduced.force)), np.isfinite(reduced.force)
             filled = np.interp(rows, rows[there], reduced.force[there]) if there.any() else np.zeros(len(rows))
             streams = np.column_stack([streams, filled])
-        count = knots or self._chosen(streams)
+        count = knots or INTERVALS
         self._designs: list[tuple[np.ndarray, list[np.ndarray]]] = []
         self._answers: list[tuple[np.ndarray, np.ndarray]] = []
         self._bases = [self._basis(reduced.tip[self._within(k), 2], count) for k in range(self.context.max() + 1)]
@@ -123,36 +121,6 @@ class FittedResponse(Response):
             self._weights[k] = self._weights[k] + self._solve(
                 rows, np.nan_to_num(residual[rows]), features[rows, :count]
             )
-
-    def _chosen(self, streams: np.ndarray) -> int:
-        """Return the number of intervals that says most of episodes left out, the same for all places."""
-        best, chosen = np.inf, KNOTS[1]
-        for count in KNOTS:
-            error = self._left_out(streams / np.maximum(streams.std(axis=0), 1e-12), count)
-            if error < BETTER * best:
-                best, chosen = error, count
-        # What predicts best still bends too little: a bias below the noise of one row is far above that of a test.
-        return KNOTS[min(KNOTS.index(chosen) + FINER, len(KNOTS) - 1)]
-
-    def _left_out(self, streams: np.ndarray, count: int) -> float:
-        """Return the squared error of every other episode of each place, from the rest and around its own mean."""
-        reduced, total = self._course.reduced, 0.0
-        for k in range(self.context.max() + 1):
-            within = self._within(k)
-            numbers = np.unique(reduced.episode[within])
-            if len(numbers) < 2:
-                continue
-            basis = self._basis(reduced.tip[within, 2], count)
-            for part in (numbers[::2], numbers[1::2]):
-                out = within & np.isin(reduced.episode, part)
-                rest = within & ~out
-                weights = self._solve(rest, streams[rest], self._design(basis, reduced.tip[rest, 2]))
-                wrong = streams[out] - self._design(basis, reduced.tip[out, 2]) @ weights
-                for number in part:
-                    own = wrong[reduced.episode[out] == number]
-                    # By absolute value: what is history is large and the same for every count.
-                    total += float(np.abs(own - own.mean(axis=0)).sum())
-        return total
 
     def _fit(self, streams: np.ndarray) -> None:
         depth = self._course.reduced.tip[:, 2]

@@ -11,12 +11,14 @@ from tacdata.errors import SolveError
 from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
+from tacdata.sensor import Adhesion
 from tacdata.skin.conditions import conditions
 from tacdata.skin.elasticity import Elasticity
 from tacdata.skin.mesher import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 from tacdata.skin.rest import SparseRest, rest_solver
+from tacdata.skin.sensitivity import sensitivities
 from tacdata.skin.transfer import contact_transfer
 
 pytestmark = [pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")]
@@ -75,6 +77,41 @@ def test_a_press_that_diverges_leaves_its_neighbours_alone_on_a_card_too():
     found = dict(card.solve_many([crushing, good], 2))
     assert isinstance(found[0], SolveError) and "no equilibrium" in str(found[0])
     close(found[1], cpu.solve(good))
+
+
+def test_a_skin_that_sticks_agrees():
+    """Down onto it and drawn up again, beside a press elsewhere."""
+    slab = slab_sensor(size=4.0, friction=0.2, pixels=9)
+    sensor = replace(slab, contact=replace(slab.contact, adhesion=Adhesion("exponential", 5.0, 0.1)))
+    cpu, card = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
+    requests = [PressRequest(Sphere(2.0), x, 0.0, 0.0, (0.0, 0.1, -0.05)) for x in (0.0, 0.4)]
+    for request, (_, found) in zip(requests, sorted(card.solve_many(requests, 2), key=lambda one: one[0]), strict=True):
+        ours = cpu.solve(request)
+        assert ours.force[-1, 2] < 0.0, "drawn up, it pulls"
+        close(found, ours)
+
+
+def test_an_incompressible_skin_agrees():
+    """Volume changes averaged at the corners."""
+    slab = slab_sensor(size=4.0, friction=0.2, pixels=9)
+    sensor = replace(slab, material=replace(slab.material, poisson_ratio=0.495))
+    cpu, card = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
+    request = PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.2, 0.4))
+    close(card.solve(request), cpu.solve(request))
+
+
+def test_derivatives_agree():
+    """Of a path with friction, and of one parameter asked for alone."""
+    sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
+    cpu, card = pair(sensor, mesh=box_mesh(sensor, 4, 4, 2))
+    request = PressRequest(Sphere(1.5), 0.13, -0.21, 0.0, (0.1, 0.2, 0.15))
+    for names in (["x", "z", "thickness", "friction", "poisson_ratio"], ["tilt_x"]):
+        both = zip(sensitivities(card, request, names), sensitivities(cpu, request, names), strict=True)
+        for (_, _, ours), (_, _, theirs) in both:
+            for k in range(len(names)):
+                assert np.abs(ours.force[k] - theirs.force[k]).max() < 0.01 * np.abs(theirs.force[k]).max() + 1e-6
+                wide = np.abs(theirs.surface[k]).max()
+                assert np.abs(ours.surface[k] - theirs.surface[k]).max() < 0.01 * wide + 1e-6
 
 
 def test_kernels_agree_to_rounding(held):
