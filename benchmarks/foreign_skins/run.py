@@ -45,11 +45,12 @@ def written(folder, skin_name, protocol, effect_name, size, seed):
         noise = rng.normal(0, NOISE, (len(rows), skin.channels))
         for i in range(1, len(noise)):
             noise[i] += 0.4 * noise[i - 1]
-        said = clean[rows] * (1 + rng.normal(0, GAIN)) + wander + noise
+        clean = np.stack([np.interp(at, np.arange(len(clean)), c) for c in clean.T], axis=1)  # at, not before it
+        said = clean * (1 + rng.normal(0, GAIN)) + wander + noise
         said = np.round(said / skin.levels)
         force = 8.0 * loads(trial.site, tip, deepest)[rows].clip(0).sum(axis=1) + rng.normal(0, 0.01, len(rows))
-        parts = [trial.begin + at * STEP, np.full(len(rows), place[trial.site, 0]),
-                 np.full(len(rows), place[trial.site, 1]), np.round(trial.depth[rows], 3)]  # fmt: skip
+        depth = np.round(np.interp(at, np.arange(len(tip)), trial.depth), 3)
+        parts = [trial.begin + at * STEP, *(np.full(len(rows), value) for value in place[trial.site]), depth]
         head = ["time_s", "x_mm", "y_mm", "depth_mm"]
         if gauge:
             parts += [np.round(tip[rows] + rng.normal(0, 0.002, len(rows)), 4), force]

@@ -22,7 +22,8 @@ def answered(folder, method):
     import judge
 
     from tacdata.chain import predict
-    from tacdata.discrepancy.problem import frame, prepare
+    from tacdata.discrepancy.frame import frame
+    from tacdata.discrepancy.problem import prepare
 
     course = judge.course_of(dict(np.load(folder / "recordings.npz")))
     setting = judge.setting_of(folder, course)

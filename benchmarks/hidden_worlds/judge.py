@@ -63,7 +63,7 @@ def setting_of(folder, course, without=(), **switches):
 
     from tacdata.chain.table_response import TableResponse
     from tacdata.discrepancy.fitted_response import FittedResponse
-    from tacdata.discrepancy.problem import Setting
+    from tacdata.discrepancy.setting import Setting
     from tacdata.effects import library
 
     if json.loads((folder / "task.json").read_text())["response"] == "fitted":

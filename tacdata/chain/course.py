@@ -54,6 +54,8 @@ class Course:
     """Measured temperature [degC], shape (n,)."""
     notes: tuple[str, ...] = ()
     """What a person should know of these data, in words."""
+    recording: np.ndarray | None = None
+    """Recording that each episode is a stroke of, from 0, shape (episodes,), int64; None: each is its own."""
     numbers: tuple[int, ...] = ()
     """Each channel's number in the recordings; empty: none was left out."""
 

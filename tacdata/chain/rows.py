@@ -75,7 +75,9 @@ def rows_of(
     order = np.argsort(every, kind="stable")
     filled = np.concatenate([mean, np.full((len(between), values.shape[1]), np.nan)])[order]
     weight = np.concatenate([count, np.zeros(len(between))])[order]
-    return Rows(every[order], tip_at(every[order]), filled, weight)
+    # The mean of readings is that at their mean tip: where the tip turns, it was elsewhere at their mean time.
+    way = np.stack([_mean(group, column) for column in tip.T], axis=-1)
+    return Rows(every[order], np.concatenate([way, tip_at(between)])[order], filled, weight)
 
 
 def _mean(group: np.ndarray, column: np.ndarray) -> np.ndarray:

@@ -89,7 +89,7 @@ def status(found: Judgement) -> str:
     answer = members(found)
     if found.until != "decide":
         return "unknown" if found.gap else "none"
-    quiet = "unknown" if loudness(found) > LOUD else "none"
+    quiet = "unknown" if loudness(found) > LOUD or len(found.problem.frame.odd) else "none"
     if not found.gap and not answer:
         return quiet
     if not answer and found.tested.p_generic > GATE and found.left.t < SURE:

@@ -9,11 +9,15 @@ from scipy.interpolate import BSpline
 
 from tacdata.chain import Course, Response
 
+FEW = 8
+"""So few intervals stay where they are [1]."""
 INTERVALS = 50
 """Most intervals of the splines in depth. They know nothing of direction, rate or time, so history stays out however
 many they are; too few cannot follow how a skin is first touched, and half of that looks like a skin that sticks. (What
 predicts left-out episodes best is no guide: that bias lies far below one reading's noise, and far above what a test of
 all of them sees.)"""
+BENT = 0.5
+"""Share of the intervals that go where the response bends, as a skin's does when it is first touched [1]."""
 ROWS_EACH = 12
 """Rows of a place that a spline must have at least."""
 SMOOTH = 1e-5
@@ -55,8 +59,11 @@ class FittedResponse(Response):
         self._bases = [self._basis(reduced.tip[self._within(k), 2], count) for k in range(self.context.max() + 1)]
         # What they say in the air: that is an offset of the place, which no history should go through.
         self._air = [self._design(basis, basis.t[:1]) for basis in self._bases]
-        self._weights: list[np.ndarray] = []
         self._fit(streams)
+        if count > FEW:
+            self._bases = [self._bent(k, count) for k in range(len(self._bases))]
+            self._air = [self._design(basis, basis.t[:1]) for basis in self._bases]
+            self._fit(streams)
 
     def copied(self) -> FittedResponse:
         """Return the same response, to be corrected by itself."""
@@ -123,10 +130,32 @@ class FittedResponse(Response):
             )
 
     def _fit(self, streams: np.ndarray) -> None:
-        depth = self._course.reduced.tip[:, 2]
+        depth, self._weights = self._course.reduced.tip[:, 2], []
         for k, basis in enumerate(self._bases):
             rows = self._within(k)
             self._weights.append(self._solve(rows, streams[rows], self._design(basis, depth[rows])))
+
+    def _bent(self, k: int, count: int) -> BSpline:
+        """Return a place's splines with knots where the first fit bends (de Boor, Good approximation by splines, 1974).
+
+        Equal shares of the integral of the root of curvature, all streams together, lie between them.
+        """
+        depth = np.sort(self._course.reduced.tip[self._within(k), 2])
+        basis, low, high = self._bases[k], float(self._bases[k].t[0]), float(self._bases[k].t[-1])
+        at = np.linspace(low, high, 8 * count + 1)
+        size = np.maximum(np.abs(self._weights[k]).max(axis=0), 1e-12)
+        bend = BSpline(basis.t, self._weights[k] / size, 3).derivative(2)(at)
+        monitor = np.sqrt(np.sqrt(np.mean(np.square(bend), axis=1)))
+        inner = len(basis.t) - 7
+        share = BENT * monitor / max(float(monitor.mean()), 1e-12) + 1 - BENT
+        whole = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
+        knots = np.interp(np.linspace(0, whole[-1], inner), whole, at)
+        kept = [low]
+        for knot in knots[1:-1]:
+            if np.searchsorted(depth, knot) - np.searchsorted(depth, kept[-1]) >= ROWS_EACH:
+                kept.append(float(knot))
+        ends = np.concatenate([[low] * 3, kept, [high] * 4])
+        return BSpline(ends, np.zeros(len(ends) - 4), 3)
 
     def _within(self, k: int) -> np.ndarray:
         """Return which of the rows read belong to a context, shape (m,), bool."""

@@ -10,11 +10,14 @@ import numpy as np
 from tacdata.discrepancy.candidates import Candidate
 from tacdata.discrepancy.clusters import Lent
 from tacdata.discrepancy.fit import clipped_t, gains
+from tacdata.discrepancy.frame import Frame, frame
 from tacdata.discrepancy.judgement import Judgement, Member
+from tacdata.discrepancy.nuisances import calibrated
 from tacdata.discrepancy.paired import ahead
-from tacdata.discrepancy.problem import Frame, Problem, Setting, frame, prepare
+from tacdata.discrepancy.problem import Problem, prepare
 from tacdata.discrepancy.refine import Refined, refine
 from tacdata.discrepancy.search import Left, Tested, best_shapes, fitted, held_out, leftovers, test
+from tacdata.discrepancy.setting import Setting
 from tacdata.effects import load
 
 ALPHA = 0.01
@@ -142,15 +145,13 @@ def _decoys(setting: Setting, current: Refined, at: int, same: Frame, beaten: di
 
 def _gains(problem: Problem) -> np.ndarray:
     channels = problem.setting.course.channels
-    if not len(problem.nuisances) or "channel_gain" not in problem.setting.nuisance:
+    if not calibrated(problem.setting):
         return np.zeros(channels)
     _, values = fitted(problem, [], np.arange(len(problem.folds)))
     unit, first = load("channel_gain").amplitudes[0].typical, len(problem.tangent.columns) + len(problem.forms)
-    own = np.broadcast_to(values[first : len(values) - channels] * unit, (channels,)).copy()
-    columns = problem.nuisances[: len(values) - channels - first] + 1
-    power = np.diag(problem.evidence.of(np.arange(len(problem.folds))))[columns]
-    told = power > TOLD * problem.ridge[: len(columns)]
-    return np.where(np.broadcast_to(told, (channels,)), own, np.nan)
+    own = values[first : first + channels] * unit
+    power = np.diag(problem.evidence.of(np.arange(len(problem.folds))))[problem.nuisances[:channels] + 1]
+    return np.where(power > TOLD * problem.ridge[:channels], own, np.nan)
 
 
 def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:

@@ -11,8 +11,8 @@ from tacdata.discrepancy import verdict
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.judgement import Judgement
 from tacdata.discrepancy.located import Slice, residual, slices
-from tacdata.discrepancy.problem import Setting
 from tacdata.discrepancy.sealed import chosen, gap, without_readings
+from tacdata.discrepancy.setting import Setting
 from tacdata.discrepancy.spec import Spec
 from tacdata.effects import library
 

@@ -33,6 +33,7 @@ LONG_PAUSE = 36000.0
 class _Stroke:
     name: str
     session: int
+    recording: int
     begin: float
     rows: Rows
     tool: Tool
@@ -76,7 +77,7 @@ def course_of(paths: list[Path]) -> Course:
         views |= {own[k]: v for k, v in second_views([found[k][1] for k in own]).items()}
     parts: list[_Stroke] = []
     for k, (number, episode) in enumerate(found):
-        parts += _strokes_of(episode, number, kept, force, temperature, views.get(k), bool(views))
+        parts += _strokes_of(episode, (number, k), kept, force, temperature, views.get(k), bool(views))
     if not parts:
         raise FormatError("no stretch with enough readings", f"{FEW_ROWS} or more readings a press", "record again")
     if len(parts) > len(found):
@@ -166,8 +167,9 @@ def _measured(episode: Episode, name: str, time_ns: np.ndarray) -> np.ndarray:
 
 
 def _strokes_of(
-    episode: Episode, session: int, kept: np.ndarray, force: str, temperature: str, views: Views | None, tag: bool
-) -> list[_Stroke]:
+    episode: Episode, of: tuple[int, int], kept: np.ndarray, force: str, temperature: str, views: Views | None,
+    tag: bool,
+) -> list[_Stroke]:  # fmt: skip
     time_ns = episode.taxels.sample_ns
     order = np.argsort(time_ns, kind="stable")
     time_ns = time_ns[order]
@@ -192,7 +194,7 @@ def _strokes_of(
         laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, episode.tip, len(kept))
         deepest = laid.tip[np.argmax(laid.tip[:, 2])]
         name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
-        made.append(_Stroke(name, session, float(origin) * 1e-9, laid, tool, deepest[:2]))
+        made.append(_Stroke(name, *of, float(origin) * 1e-9, laid, tool, deepest[:2]))
     return made
 
 
@@ -235,6 +237,7 @@ def _joined(
     centers = example.sensor.taxels.centers
     numbers = {s: k for k, s in enumerate(dict.fromkeys(p.session for p in parts))}
     time = np.concatenate(clock)
+    recording = np.unique([p.recording for p in parts], return_inverse=True)[1]
     return Course(
         time=time - time[0], episode=episode, tip=np.concatenate([p.rows.tip for p in parts]),
         tool=np.array([tools.index(p.tool) for p in parts])[episode], readings=values[:, :channels],
@@ -244,7 +247,8 @@ def _joined(
         centers=centers[kept] if len(centers) > int(kept.max()) else None,
         force=values[:, channels] if force else None,
         temperature=_filled(values[:, channels + force]) if temperature else None, notes=tuple(notes),
-        tag=values[:, channels + force + temperature :] if tag else None, numbers=tuple(int(k) for k in kept),
+        tag=values[:, channels + force + temperature :] if tag else None,
+        recording=recording if recording.max() + 1 < len(parts) else None, numbers=tuple(int(k) for k in kept),
     )  # fmt: skip
 
 

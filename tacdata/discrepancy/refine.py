@@ -13,7 +13,8 @@ from tacdata.discrepancy.cleaner import Cleaner
 from tacdata.discrepancy.evidence import Evidence
 from tacdata.discrepancy.fit import solve
 from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.problem import Frame, Setting
+from tacdata.discrepancy.frame import Frame
+from tacdata.discrepancy.setting import Setting
 from tacdata.discrepancy.spline_response import taken_up
 from tacdata.discrepancy.streams import Streams
 from tacdata.discrepancy.tangent import Tangent, tangents

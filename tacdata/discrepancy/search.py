@@ -20,6 +20,9 @@ from tacdata.effects import Effect
 FLIPS = 999
 NUMERICS = 0.0002
 """What has no memory and explains less, over what presses add to readings, may be rounding of any table [1]..."""
+SPLINES = 0.0005
+"""...columns of no effect that explain less may be a fitted response's own errors: of its slope, by which an episode's
+depth is told, and where it bends more sharply than splines [1]..."""
 LIKE_IT = 3.0
 """...or if it explains less than so many times what it would find in the response's own error [1]."""
 
@@ -102,10 +105,10 @@ def _test_generic(problem: Problem, gram: np.ndarray, seed: int, top: np.ndarray
     table = np.stack([_flipped(gram, total, g, signs) for g in groups], axis=1)
     root = np.cbrt(np.maximum(table, 0.0))  # nearly normal (Wilson & Hilferty, PNAS 17, 1931, 684)
     z = (root - root[1:].mean(axis=0)) / (root[1:].std(axis=0) + 1e-12)
-    if not problem.setting.response.fitted:
-        off = LIKE_IT * np.array([_off(problem, total, g + 1) for g in groups])
-        beyond = 2 * (table[0] - table[1:].mean(axis=0)) > np.maximum(NUMERICS * problem.rise, off) ** 2
-        z[0] = np.where(beyond, z[0], np.minimum(z[0], 0.0))
+    least = SPLINES if problem.setting.response.fitted else NUMERICS
+    off = LIKE_IT * np.array([_off(problem, total, g + 1) for g in groups])
+    beyond = 2 * (table[0] - table[1:].mean(axis=0)) > np.maximum(least * problem.rise, off) ** 2
+    z[0] = np.where(beyond, z[0], np.minimum(z[0], 0.0))
     most = np.maximum(z[1:].max(axis=1), top)
     return float((1 + (most >= z[0].max()).sum()) / (FLIPS + 1))
 

@@ -13,7 +13,7 @@ from tacdata import documents, provenance
 from tacdata.chain import Course, Response
 from tacdata.chain.table_response import TableResponse
 from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.problem import NUISANCE
+from tacdata.discrepancy.setting import NUISANCE
 from tacdata.effects import Placed, load
 from tacdata.errors import FormatError
 

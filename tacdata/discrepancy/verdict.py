@@ -127,6 +127,13 @@ def why(status: str, found: Judgement, answer: list[Member], course: Course) -> 
             f"something is missing; {closest} comes closest and leaves {100 * found.share_left:.0f} % of what could be "
             "explained, so it is not the name, or not all of it"
         )
+    if len(odd := found.problem.frame.odd):
+        names = [course.names[k] for k in odd]
+        told = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
+        return (
+            f"{told}: unlike all other presses of their place, and no effect explains them: was something touched or "
+            "moved? Look at them (`tacdata view`), leave them out or record them again"
+        )
     if not found.gap:
         return (
             f"readings are off by {decide.loudness(found):.1f} times the noise, but no effect is borne out by several "

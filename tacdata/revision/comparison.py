@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from tacdata.chain import Course, Response, predict
-from tacdata.discrepancy.problem import Frame, Setting, frame
+from tacdata.discrepancy.frame import Frame, frame
 from tacdata.discrepancy.refine import Refined, corrected, refine
 from tacdata.discrepancy.sealed import without_readings
+from tacdata.discrepancy.setting import Setting
 from tacdata.discrepancy.spec import Spec
 from tacdata.discrepancy.streams import Streams
 from tacdata.effects import Placed

@@ -49,6 +49,7 @@ def part(course: Course, numbers: np.ndarray) -> Course:
     values = {name: value[rows] for name in fields if (value := getattr(course, name)) is not None}
     return replace(
         course, **values, episode=np.searchsorted(keep, course.episode[rows]), session=course.session[keep],
+        recording=None if course.recording is None else np.unique(course.recording[keep], return_inverse=True)[1],
         site=course.site[keep], names=tuple(course.names[k] for k in keep),
     )  # fmt: skip
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.discrepancy.problem import Setting, prepare
+from tacdata.discrepancy.problem import prepare
 from tacdata.discrepancy.refine import Refined, refine
 from tacdata.discrepancy.search import best_shapes, fitted
+from tacdata.discrepancy.setting import Setting
 from tacdata.effects import Placed, library, load
 from tacdata.revision.comparison import Comparison
 

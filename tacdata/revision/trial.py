@@ -132,7 +132,7 @@ def laid_out(course: Course, trial: Trial) -> Course:
         course, time=time, episode=np.zeros(rows, dtype=np.int64), tip=tip,
         tool=np.full(rows, trial.tool, dtype=np.int64), readings=np.zeros((rows, course.channels)),
         averaged=np.ones(rows), session=np.zeros(1, dtype=np.int64), site=np.array([trial.site]), names=("trial",),
-        force=None, tag=None, temperature=None if course.temperature is None else np.full(
+        recording=None, force=None, tag=None, temperature=None if course.temperature is None else np.full(
             rows, float(np.median(course.temperature))),
     )  # fmt: skip
 

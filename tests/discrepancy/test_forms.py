@@ -10,7 +10,9 @@ from tacdata.chain import predict
 from tacdata.discrepancy import search
 from tacdata.discrepancy.fitted_response import FittedResponse
 from tacdata.discrepancy.forms import forms, modulations
-from tacdata.discrepancy.problem import Setting, frame, prepare
+from tacdata.discrepancy.frame import frame
+from tacdata.discrepancy.problem import prepare
+from tacdata.discrepancy.setting import Setting
 from tacdata.discrepancy.streams import Streams
 from tacdata.effects import Placed, load
 
@@ -18,7 +20,7 @@ from tacdata.effects import Placed, load
 @pytest.fixture(scope="module")
 def pressed():
     made = course(delay=0.05)
-    return made, FittedResponse(made), Placed(load("latency"), {"L": np.array(0.05)})
+    return made, FittedResponse(made, 14), Placed(load("latency"), {"L": np.array(0.05)})
 
 
 def test_modulations_are_of_size_one_and_leave_the_contribution_itself(pressed):

@@ -13,7 +13,7 @@ from tacdata.discrepancy.amiss import amiss
 from tacdata.discrepancy.fitted_response import FittedResponse
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.located import residual, slices
-from tacdata.discrepancy.problem import Setting
+from tacdata.discrepancy.setting import Setting
 from tacdata.effects import load
 
 FEW = ("latency", "low_pass_filter", "relaxation", "backlash", "proportional_hysteresis", "drift", "creep")
@@ -79,7 +79,7 @@ def test_two_presses_unlike_all_others_are_no_effect_and_not_nothing():
     answer = judge(Setting(wrong, FittedResponse(wrong), [load(name) for name in FEW]))
     assert decide.status(answer) == "unknown"
     told = verdict.why("unknown", answer, decide.members(answer), wrong)
-    assert answer.gap or "times the noise" in told
+    assert answer.gap or "press 0, press 1" in told
 
 
 @pytest.mark.parametrize(("gain", "named"), [(0.14, None), (0.18, "named")])

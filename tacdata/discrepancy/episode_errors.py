@@ -1,0 +1,160 @@
+"""How far episodes err by themselves, and how readings scatter, told from a residual beside an over-rich fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.discrepancy import noise
+from tacdata.discrepancy.cleaner import Cleaner
+from tacdata.discrepancy.evidence import Noise
+from tacdata.discrepancy.fit import solve
+from tacdata.discrepancy.wander import wander
+
+LEAST, MOST = 0.1, 10.0
+"""Errors of pose are told to be between these, in standard deviations of the prior [1]."""
+ODD = 6.0
+"""An episode is unlike all others whose errors are larger than theirs by so many standard deviations [1]."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How far episodes err by themselves."""
+
+    sizes: np.ndarray
+    """Standard deviation of each kind of error [its prior's], shape (kinds,)."""
+    odd: np.ndarray
+    """Episodes that err by far more than the others, shape (k,), int64."""
+
+
+@dataclass(frozen=True)
+class EpisodeErrors:
+    """What tells how far episodes err: a residual, and what any response may have besides."""
+
+    residual: np.ndarray
+    """Measured less predicted [each stream's unit], shape (m, streams); NaN where missing."""
+    rich: np.ndarray
+    """Columns that belong to no effect [each stream's unit], shape (m, streams, k)."""
+    course: Course
+    """Of the rows read."""
+    context: np.ndarray
+    """Group of rows that share features, shape (m,), int64."""
+    features: np.ndarray | None
+    """What the response may take up [1], shape (m, k)."""
+
+    def noise(self, errors: np.ndarray) -> Noise:
+        """Return the noise beside errors of pose, shape (m, streams, kinds)."""
+        course, known = self.course, noise.first_guess(self.residual, self.course)
+        columns = np.concatenate([self.residual[:, :, None], self.rich], axis=2)
+        best = np.zeros(self.rich.shape[2])
+        for _ in range(2):
+            best = self._best(columns, known, errors)
+            left = (self.residual - self.rich @ best.astype(np.float32)) / known.scale
+            still = noise.still(known, left.shape[1])
+            cleaner = Cleaner(course, still, self.context, self.features, errors / known.scale[None, :, None])
+            bare = cleaner.cleaned(left[:, :, None])[:, :, 0]
+            bare[~np.isfinite(self.residual)] = np.nan
+            known = noise.refined(bare * known.scale, course, known)
+        rest = self.residual - self.rich @ best.astype(np.float32)
+        kinds = levels(course, self.context, self.features is not None)
+        wandering = wander(rest, course, known.scale, known.memory, kinds)
+        return replace(known, wander=wandering, tag=noise.tag_wander(rest, course, known))
+
+    def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> Sizes:
+        """Return how large episodes' own errors of pose are.
+
+        One episode's error is told by generalized least squares as if it were free, beside all others' and its own of
+        other kinds at the sizes that they have so far: its variance is that of such errors and that of what is known.
+        Told by successive episodes of the same place, as an offset that differs from place to place is no error of an
+        episode's own; by successive ones anywhere where places are not visited again.
+
+        Args:
+            known: Noise.
+            errors: What errors of one standard deviation of their prior change, shape (m, streams, kinds).
+            sizes: Sizes so far [prior's], shape (kinds,).
+        """
+        score, information = self._of_each(known, errors, sizes)
+        there = np.flatnonzero(information.min(axis=1) > 0)  # sealed episodes say nothing
+        place, score, information = self._places()[there], score[there], information[there]
+        order = np.argsort(place, kind="stable")
+        again = np.diff(place[order]) == 0
+        if again.sum() < noise.FEW_GAPS:
+            order, again = np.arange(len(place)), np.ones(max(len(place) - 1, 0), dtype=bool)
+        before, after = order[:-1][again], order[1:][again]
+        if len(before) < noise.FEW_GAPS:
+            return Sizes(np.ones(len(sizes)), np.zeros(0, dtype=np.int64))
+        found, variance = score / information, np.maximum(1 / information - sizes**2, 0.0)
+        spread = [
+            noise.spread_of(found[after, k] - found[before, k], variance[after, k] + variance[before, k])
+            for k in range(len(sizes))
+        ]
+        middle = np.stack([np.median(found[place == p], axis=0) for p in place])
+        told = np.clip(spread, LEAST, MOST)
+        far = np.abs(found - middle) > ODD * np.sqrt(told**2 + variance)
+        return Sizes(told, there[far.any(axis=1)])
+
+    def gains(self, known: Noise, errors: np.ndarray, rise: np.ndarray) -> float:
+        """Return how far an episode's gain of a stream is off the next one's at its place [1].
+
+        Args:
+            known: Noise without own gains.
+            errors: Of pose, shape (m, streams, kinds).
+            rise: What presses add to each stream, shape (m, streams).
+        """
+        local = noise.number_within(self.context, self.course.episode)
+        apart = rise[:, :, None] * (local[:, None, None] == np.arange(local.max() + 1))
+        both = np.concatenate([self._left(known, errors)[:, :, None], apart], axis=2)
+        white = Cleaner(self.course, known, self.context, self.features, errors).cleaned(both)
+        return noise.gain_spread(white[:, :, 0], white[:, :, 1:], self.context)
+
+    def _places(self) -> np.ndarray:
+        place = np.zeros(self.course.episodes, dtype=np.int64)
+        place[self.course.episode] = self.context
+        return place
+
+    def _best(self, columns: np.ndarray, known: Noise, errors: np.ndarray) -> np.ndarray:
+        """Return the weights of the over-rich columns that fit best, shape (k,)."""
+        course, count = self.course, self.rich.shape[2]
+        cleaner = Cleaner(course, known, self.context, self.features, errors)
+        gram = cleaner.collected(columns).of(np.arange(course.episodes))
+        free = np.full(count, np.inf)
+        return solve(gram, np.arange(count), np.ones(count), -free, free)
+
+    def _left(self, known: Noise, errors: np.ndarray) -> np.ndarray:
+        """Return what an over-rich fit leaves of the residual, shape (m, streams)."""
+        columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
+        return self.residual - self.rich @ self._best(columns, known, errors).astype(np.float32)
+
+    def _of_each(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what each episode says of its errors of each kind, and how much it knows, shapes (episodes, kinds)."""
+        course, kinds = self.course, errors.shape[2]
+        left = self._left(known, errors * sizes)[:, :, None].astype(np.float32)
+        cleaner = Cleaner(course, known, self.context, self.features, errors * sizes)
+        if self.features is None:
+            gram = cleaner.collected(np.concatenate([left, errors], axis=2)).gram
+            return gram[:, 0, 1:], np.diagonal(gram[:, 1:, 1:], axis1=1, axis2=2)
+        # Features take up what all episodes of a place have in common: a column for every episode, and sums over all
+        # rows of its place.
+        score, information = np.zeros((course.episodes, kinds)), np.zeros((course.episodes, kinds))
+        local, bare = noise.number_within(self.context, course.episode), cleaner.cleaned(left)
+        for number in range(local.max() + 1):
+            rows = local == number
+            own = cleaner.cleaned(errors * rows[:, None, None])
+            for place in np.unique(self.context[rows]):
+                there = self.context == place
+                episode = course.episode[rows & there][0]
+                score[episode] = np.einsum("nsk,ns->k", own[there], bare[there, :, 0], dtype=np.float64)
+                information[episode] = np.einsum("nsk,nsk->k", own[there], own[there], dtype=np.float64)
+        return score, information
+
+
+def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray]:
+    """Return the kinds of levels that offsets have, each as a number an episode, shape (episodes,).
+
+    A session has a level of its own; where the response is fitted, each of its places has one too.
+    """
+    place = np.zeros(course.episodes, dtype=np.int64)
+    place[course.episode] = context
+    return [course.session, place] if fitted else [course.session]

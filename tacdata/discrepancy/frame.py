@@ -1,0 +1,105 @@
+"""What stays the same while effects come and go: nuisances and noise, of the model as it was given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.chain import Course, predict
+from tacdata.discrepancy import evidence
+from tacdata.discrepancy.cleaner import Cleaner
+from tacdata.discrepancy.episode_errors import EpisodeErrors, Sizes
+from tacdata.discrepancy.evidence import Noise
+from tacdata.discrepancy.fit import fold_of
+from tacdata.discrepancy.fitted_response import contexts
+from tacdata.discrepancy.generic import generic, slow
+from tacdata.discrepancy.nuisances import jitter, nuisance_columns
+from tacdata.discrepancy.setting import Setting
+from tacdata.discrepancy.spline_response import taken_up
+from tacdata.discrepancy.streams import Streams
+
+MODEL = 0.003
+"""What any response is off at least, in each stream of an episode, as a standard deviation of its rise [1]."""
+ROUNDS = 3
+"""How often errors of pose and of gain are told beside each other [1]."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What stays the same while effects come and go: nuisances and noise, of the model as it was given."""
+
+    context: np.ndarray
+    """Group of rows that share features, of the rows read, shape (m,), int64."""
+    features: np.ndarray | None
+    """What the response may take up [1], shape (m, k)."""
+    errors: np.ndarray
+    """What an episode's own errors of pose change [each stream's unit], shape (m, streams, kinds)."""
+    ridge: np.ndarray
+    """Weights of their priors [1], shape (k,)."""
+    beside: np.ndarray
+    """Columns of nuisances, then those that belong to no effect, whitened and cleaned [1], shape (m, streams, k)."""
+    nuisances: np.ndarray
+    """Those of nuisances alone [1], shape (m, streams, nuisances)."""
+    inner: np.ndarray
+    """Their Gram matrices [1], shape (episodes, nuisances, nuisances)."""
+    noise: Noise
+    """Noise as an over-rich fit leaves it."""
+    folds: np.ndarray
+    """Fold of each episode, shape (episodes,), int64."""
+    known: Cleaner
+    """Takes nuisances out of columns, beside the model as it was given."""
+    odd: np.ndarray
+    """Episodes that err by far more than the others, shape (k,), int64."""
+
+    @classmethod
+    def of(
+        cls, reduced: Course, context: np.ndarray, features: np.ndarray | None, errors: np.ndarray, ridge: np.ndarray,
+        beside: np.ndarray, noise: Noise, folds: np.ndarray, known: Cleaner | None = None,
+        odd: np.ndarray | None = None,
+    ) -> Frame:  # fmt: skip
+        """Return a frame of the rows read, with what follows from its parts."""
+        nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
+        return cls(
+            context, features, errors, ridge, beside, nuisances, evidence.summed(nuisances, reduced).gram, noise, folds,
+            known or Cleaner(reduced, noise, context, features, errors),
+            np.zeros(0, dtype=np.int64) if odd is None else odd,
+        )  # fmt: skip
+
+    def cleaner(self, course: Course, features: np.ndarray | None) -> Cleaner:
+        """Return what takes nuisances out of columns beside a response that may take up given features."""
+        before = self.known.features
+        if features is before or (features is not None and before is not None and np.array_equal(features, before)):
+            return self.known
+        return Cleaner(course.reduced, self.noise, self.context, features, self.errors)
+
+
+def frame(setting: Setting) -> Frame:
+    """Return what stays the same, for a model without further effects."""
+    course, response = setting.course, setting.response
+    reduced, streams = course.reduced, Streams.of(course)
+    said = predict(course, response, list(setting.given))
+    context, features = contexts(reduced), taken_up(course, response, setting.given)
+    errors = jitter(setting, setting.given)
+    extra, ridge = nuisance_columns(setting, setting.given)
+    rich = generic(course, response, list(setting.given))
+    residual = streams.measured(course) - streams.predicted(said)
+    every = np.concatenate([extra, rich, slow(course, response, list(setting.given))], axis=2)
+    every = every.astype(np.float32)
+    told = EpisodeErrors(residual, every, reduced, context, features)
+    known = told.noise(errors)
+    rise = streams.predicted(said).astype(np.float32)
+    rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
+    rise[:, course.channels + (course.force is not None) :] = 0.0
+    prior, own = errors, Sizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
+    for _ in range(ROUNDS):
+        # Errors of pose and of gain explain much of the same: each is told beside the other.
+        own = told.poses(known, prior, own.sizes)
+        errors = prior * own.sizes
+        known = replace(known, swing=None)
+        spread = told.gains(known, errors, rise)
+        known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
+    cleaner = Cleaner(reduced, known, context, features, errors)
+    beside = cleaner.cleaned(every[:, :, : extra.shape[2] + rich.shape[2]])
+    folds = fold_of(course.episodes)
+    return Frame.of(reduced, context, features, errors, ridge, beside, known, folds, cleaner, own.odd)
