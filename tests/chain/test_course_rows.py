@@ -47,3 +47,15 @@ def test_slow_motion_read_often_is_averaged_and_fast_motion_is_not():
     assert np.abs(rows.values[slow, 0] - want).max() < 0.02
     few = rows_of(time[::4], values[::4], path_time, path)
     assert (few.averaged[few.time < 5.0] <= 1).all()
+
+
+def test_means_stand_at_their_mean_tip_where_the_path_turns():
+    """Readings that are the depth: whatever is averaged, a row's reading is its depth."""
+    path_time = np.arange(0, 7, 0.001)
+    path = np.column_stack([0 * path_time, 0 * path_time, 1 - np.cos(2 * path_time)])
+    time = np.arange(0, 6.9, 0.01)
+    depth = np.interp(time, path_time, path[:, 2])
+    rows = rows_of(time, np.column_stack([depth, depth]), path_time, path)
+    assert rows.averaged.max() > 2
+    read = rows.averaged > 0
+    np.testing.assert_allclose(rows.values[read, 0], rows.tip[read, 2], atol=1e-12)
