@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -39,6 +40,8 @@ CONNECT_SECONDS = 10
 """How long a scheduler may take to answer."""
 ALONE_SECONDS = 30.0
 """After how long without any worker that is said."""
+FETCH_SECONDS = 15.0
+"""How long a finished result may take to come from its worker, which may have been cut off since."""
 LOOK_SECONDS = 1.0
 """How often at most the scheduler is asked who is there."""
 _models: dict[str, Any] = {}
@@ -125,7 +128,16 @@ class DaskPool(Engine):
         for address, tasks in list(self._given.items()):
             for task in [task for task in tasks if task.future.status == "finished"]:
                 tasks.remove(task)
-                self._take_in(task.future.result(), task, address)
+                try:
+                    answer = task.future.result(timeout=FETCH_SECONDS)
+                except (TimeoutError, CancelledError):
+                    # The result went with its worker. Dask would solve it again there, and wait for ever.
+                    task.future.cancel(force=True)
+                    self._give_back(task, began=False)
+                    self._given.pop(address, None)
+                    self._looked = time.monotonic()
+                    continue
+                self._take_in(answer, task, address)
             for task in [task for task in tasks if task.future.status in ("error", "cancelled", "lost")]:
                 self._give_back(task, began=True)
                 # Nothing more goes there before the scheduler says that it is alive: it would be lost, and blamed.

@@ -11,6 +11,12 @@ from chaos import ROOT
 from farm_examples import HERE
 from session_examples import session
 
+from label_farm.dask_pool import DaskPool, _Task
+from label_farm.job import Job
+from label_farm.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING
+from label_farm.store import Store
+from tacdata.sensor import default_sensor
+
 pytest.importorskip("distributed")
 
 
@@ -74,3 +80,35 @@ def test_what_cannot_be_reached_is_said(tmp_path):
     assert shown.returncode == 4 and "no Dask scheduler answers" in shown.stderr and "Traceback" not in shown.stderr
     shown = label(tmp_path, "--dask", "there")
     assert shown.returncode == 2 and "tcp://HOST:PORT" in shown.stderr
+
+
+class LostResult:
+    """Of a solve that is done, on a worker that was cut off before the result was fetched."""
+
+    status, cancelled = "finished", False
+
+    def result(self, timeout=None):
+        assert timeout is not None, "nobody waits for ever for a worker that is cut off"
+        raise TimeoutError
+
+    def cancel(self, force=False):
+        self.cancelled = force
+
+
+def test_a_result_that_went_with_its_worker_is_asked_for_again(tmp_path, monkeypatch):
+    model = "a" * 64
+    pool = DaskPool(Store(tmp_path / "store"), "fast_model:FastModel", {model: default_sensor()}, 0, 60.0, (), "tcp://h:1")
+    try:
+        monkeypatch.setattr(pool, "_connected", lambda: None)
+        monkeypatch.setattr(pool, "_give_out", lambda client: None)
+        pool._ledger.enqueue([Job("0" * 64, model, {"shape": "sphere", "radius": 2.0}, 0.0, 0.0, 0.0, (0.0, 1.0, 0.0))])
+        for _ in range(MAX_TRIES + 1):
+            leases = pool._ledger.claim("somebody", model)
+            lost = LostResult()
+            pool._given["tcp://two:2"] = [_Task(lost, "somebody", leases)]
+            pool.tend(1)
+            assert lost.cancelled and "tcp://two:2" not in pool._given, "it would be solved there again"
+        assert pool._ledger.counts() == {WAITING: 1, LEASED: 0, DONE: 0, FAILED: 0}, "the press did no harm"
+    finally:
+        pool._given.clear()
+        pool.close()
