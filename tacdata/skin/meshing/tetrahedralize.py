@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import tempfile
 from collections.abc import Callable
 
 import numpy as np
@@ -11,6 +9,7 @@ import trimesh
 
 from tacdata.sensor import Skin
 from tacdata.skin.meshing.background import background
+from tacdata.skin.meshing.ftetwild import ftetwild
 from tacdata.skin.meshing.settings import MeshSettings
 
 
@@ -26,14 +25,9 @@ def tetrahedralize(
         skin: Sizes that the background mesh covers and is graded by.
         settings: Target edge lengths.
         below: Distance of points (n, 3) from the outer face [mm], shape (n,); None: from the plane z = thickness.
-    """
-    import pytetwild
 
+    Raises:
+        SolveError: If it cannot be meshed.
+    """
     points, cells, size = background(skin, settings, below)
-    # fTetWild leaves a file of its own in the working folder.
-    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
-        vertices, tets = pytetwild.tetrahedralize(  # pyright: ignore[reportPrivateImportUsage]
-            hull.vertices, hull.faces.astype(np.int32), edge_length_abs=settings.interior, epsilon=settings.envelope,
-            num_threads=1, bg_vertices=points, bg_tets=cells, bg_values=size,
-        )
-    return np.asarray(vertices, dtype=float), np.asarray(tets, dtype=np.int32)
+    return ftetwild(hull.vertices, hull.faces, (points, cells, size), settings.interior, settings.envelope)

@@ -1,0 +1,53 @@
+"""The mesher is a process of its own: what it does to its process is done to no other."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+
+from tacdata.errors import SolveError
+from tacdata.skin.meshing.ftetwild import ftetwild
+
+BOX = trimesh.creation.box()
+CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+CELLS = np.array([[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]], dtype=np.int32)
+BACKGROUND = CUBE, CELLS, np.full(8, 0.4)
+INTERRUPTED = """
+import os, signal, time
+from test_skin_ftetwild import cube
+cube()
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(5)
+except KeyboardInterrupt:
+    print("files are closed")
+"""
+
+
+def cube():
+    return ftetwild(BOX.vertices, BOX.faces, BACKGROUND, 0.4, 1e-3)
+
+
+def test_a_cube_is_filled(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    vertices, tets = cube()
+    edges = vertices[tets[:, 1:]] - vertices[tets[:, :1]]
+    assert np.abs(np.linalg.det(edges)).sum() / 6 == pytest.approx(1.0, rel=2e-2)
+    assert not list(tmp_path.iterdir()), "files of the mesher's own stay out of the user's folder"
+
+
+def test_ctrl_c_still_closes_files_after_a_skin_was_meshed():
+    """fTetWild sets SIGINT to its default: a process that had loaded it died at once, with files open."""
+    here = os.path.dirname(__file__)
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], cwd=here, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout.strip()) == (0, "files are closed"), done.stderr
+
+
+def test_a_mesher_that_fails_is_told():
+    with pytest.raises(SolveError, match="fTetWild gave no mesh of a surface of 0 triangles"):
+        ftetwild(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32), BACKGROUND, 0.4, 1e-3)
