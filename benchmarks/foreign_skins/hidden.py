@@ -61,8 +61,14 @@ def _compliance(rig, trial, depth):
 
 
 def _relaxation(rig, trial, depth, load):
-    terms = ((0.3, 0.3), (2.0, 0.4), (12.0, 0.3))
-    return load - 0.15 * rig.size * sum(w * _lag(load, tau, np.zeros(load.shape[1])) for tau, w in terms)
+    """Three terms; what a trial left relaxes on between trials."""
+    late = np.zeros_like(load)
+    for tau, share in ((0.3, 0.3), (2.0, 0.4), (12.0, 0.3)):
+        ended, last = rig.kept.get(tau, (trial.begin, np.zeros(load.shape[1])))
+        memory = _lag(load, tau, last * np.exp(-(trial.begin - ended) / tau))
+        rig.kept[tau] = trial.begin + len(load) * STEP, memory[-1]
+        late += share * memory
+    return load - 0.15 * rig.size * late
 
 
 def _friction(rig, trial, depth, load):

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from tacdata.chain import Course, Response, predict
+from tacdata.chain import Course, Prediction, Response, predict
+from tacdata.chain.memory import low_pass
 from tacdata.discrepancy.streams import Streams
 from tacdata.effects import Placed
+
+TIMES = (0.02, 0.05, 0.1, 0.4, 1.5, 6.0, 25.0, 100.0)
+"""Time constants over which a memory may be spread besides its own [s]."""
 
 
 def forms(course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()) -> np.ndarray:
@@ -18,16 +23,31 @@ def forms(course: Course, response: Response, placed: Sequence[Placed], given: S
     no evidence of another one.
     """
     streams, every = Streams.of(course), list(given)
-    columns = []
-    whole = streams.predicted(predict(course, response, [*every, *placed])) if placed else None
-    for at in range(len(placed)):
-        rest = [p for k, p in enumerate(placed) if k != at]
-        own = whole - streams.predicted(predict(course, response, [*every, *rest]))
-        off = placed[at].effect.form_error
-        columns += [off * own * by for by in modulations(course, streams, own)]
-    if not columns:
+    if not placed:
         return np.zeros((len(course.read), streams.count, 0), dtype=np.float32)
+    columns: list[np.ndarray] = []
+    whole = predict(course, response, [*every, *placed])
+    for at in range(len(placed)):
+        rest = predict(course, response, [*every, *(p for k, p in enumerate(placed) if k != at)])
+        own, effect = streams.predicted(whole) - streams.predicted(rest), placed[at].effect
+        columns += [effect.form_error * own * by for by in modulations(course, streams, own)]
+        if effect.memory_error:
+            columns += [effect.memory_error * by for by in _spread(course, streams, whole, rest)]
     return np.stack(columns, axis=-1).astype(np.float32)
+
+
+def _spread(course: Course, streams: Streams, whole: Prediction, rest: Prediction) -> list[np.ndarray]:
+    """Return how a contribution changes where its memory has further time constants, each of shape (n, streams).
+
+    First-order means of differences of first-order means are differences of others: what is left of own - L_tau own are
+    the shares that a spectrum of time constants gives to others.
+    """
+    own = {"signal": whole.signal - rest.signal, "force": whole.force - rest.force, "tag": whole.tag - rest.tag}
+
+    def late(values: np.ndarray, tau: float) -> np.ndarray:
+        return low_pass(values, course.step, tau) - values
+
+    return [streams.predicted(replace(whole, **{k: late(v, tau) for k, v in own.items()})) for tau in TIMES]
 
 
 def modulations(course: Course, streams: Streams, own: np.ndarray) -> list[np.ndarray]:

@@ -52,7 +52,7 @@ def test_a_clock_is_known_better_than_a_law_of_a_material(pressed):
         given = {p.name: np.array(p.default + p.typical) for p in effect.parameters} | value
         placed = Placed(effect, given)
         own = streams.predicted(predict(made, response, [placed])) - streams.predicted(predict(made, response, []))
-        by = np.linalg.norm(forms(made, response, [placed]), axis=(0, 1)) / np.linalg.norm(own)
+        by = np.linalg.norm(forms(made, response, [placed])[:, :, :5], axis=(0, 1)) / np.linalg.norm(own)
         assert by == pytest.approx(np.full(5, share), rel=1e-3)
 
 
@@ -72,3 +72,26 @@ def test_what_a_wrong_form_leaves_is_no_second_effect(pressed, monkeypatch):
     bare = search.test(replace(problem, forms=np.zeros(0, dtype=int)))
     assert bare.gain.max() > 20
     assert slack.gain.max() < 0.3 * bare.gain.max()
+
+
+def test_a_spectrum_of_time_constants_is_no_second_memory():
+    """Relaxation over 0.4 and 10 s beside one time constant of 2 s: other memories are seen in what that leaves."""
+    made = course()
+    response, streams, effect = FittedResponse(made, 14), Streams.of(made), load("relaxation")
+
+    def relaxed(share, tau):
+        return Placed(effect, {"f": np.array(share), "tau": np.array(tau)})
+
+    one = relaxed(0.2, 2.0)
+    truth = predict(made, response, [relaxed(0.1, 0.4), relaxed(0.1, 10.0)])
+    readings = made.readings.copy()
+    apart = streams.predicted(truth) - streams.predicted(predict(made, response, []))
+    readings[made.read] += apart[:, : made.channels]
+    few = [load(name) for name in ("backlash", "creep", "baseline_tracking", "proportional_hysteresis")]
+    setting = Setting(replace(made, readings=readings), response, few)
+    problem = prepare(setting, frame(replace(setting, given=(one,))), [one])
+    narrow = search.test(replace(problem, forms=problem.forms[:5]))
+    spread = search.test(problem)
+    assert narrow.gain.max() > 20
+    assert spread.gain.max() < 0.1 * narrow.gain.max()
+    assert forms(made, response, [replace(one, effect=load("latency"), values={"L": np.array(0.1)})]).shape[2] == 5
