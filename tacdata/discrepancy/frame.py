@@ -88,9 +88,7 @@ def frame(setting: Setting) -> Frame:
     every = every.astype(np.float32)
     told = EpisodeErrors(residual, every, reduced, context, features)
     known = told.noise(errors)
-    rise = streams.predicted(said).astype(np.float32)
-    rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
-    rise[:, course.channels + (course.force is not None) :] = 0.0
+    rise = streams.rise(said, response).astype(np.float32)
     prior, own = errors, Sizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
     for _ in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is told beside the other.

@@ -18,20 +18,14 @@ TIMES = (0.1, 0.4, 1.5, 6.0, 25.0, 100.0)
 def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
     """Return columns, shape (n, streams, k), float32: patterns of the streams times histories of the path."""
     streams = Streams.of(course)
-    prediction = predict(course, response, placed)
-    now = streams.predicted(prediction)
-    rise = now.copy()
-    rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
+    rise = streams.rise(predict(course, response, placed), response)
     slope = depth_slope(course, response, placed)
-    level = np.zeros_like(now)
+    level = np.zeros_like(rise)
     level[:, : course.channels] = np.abs(rise[:, : course.channels]).max()
     own = np.delete(histories(course), CLOCK, axis=1)[streams.rows]
     parts = [rise[:, :, None] * own[:, None, :], slope[:, :, None] * own[:, None, :] * 0.1]
     parts.append(level[:, :, None] * own[:, None, ::2])
-    result = np.concatenate(parts, axis=2)
-    if streams.tag:
-        result[:, -3:] = 0.0
-    return result.astype(np.float32)
+    return np.concatenate(parts, axis=2).astype(np.float32)
 
 
 def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
@@ -40,10 +34,7 @@ def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray
     They tell slow changes from what differs from one visit of a place to the next; they are no evidence themselves.
     """
     streams = Streams.of(course)
-    rise = streams.predicted(predict(course, response, placed))
-    rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
-    if streams.tag:
-        rise[:, -3:] = 0.0
+    rise = streams.rise(predict(course, response, placed), response)
     own = [histories(course)[:, k] for k in CLOCK]
     if course.temperature is not None:
         own.append((course.temperature - course.temperature.mean()) / max(float(np.std(course.temperature)), 1e-9))

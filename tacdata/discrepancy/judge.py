@@ -13,7 +13,7 @@ from tacdata.discrepancy.fit import clipped_t, gains
 from tacdata.discrepancy.frame import Frame, frame
 from tacdata.discrepancy.judgement import Judgement, Member
 from tacdata.discrepancy.nuisances import calibrated
-from tacdata.discrepancy.paired import ahead
+from tacdata.discrepancy.paired import Off, ahead
 from tacdata.discrepancy.problem import Problem, prepare
 from tacdata.discrepancy.refine import Refined, refine
 from tacdata.discrepancy.search import Left, Tested, best_shapes, fitted, held_out, leftovers, test
@@ -290,6 +290,9 @@ def _member(
         first = best[name].placed(values[: len(best[name].columns)], setting.course.channels)
         other = refine(start, [*without.placed, first], problem.frame)
         margins[name] = ahead(current, other, lent)
+        if margins[name] >= RIVAL:
+            # Its equation may be off: what that explains is nothing against it.
+            margins[name] = ahead(current, other, lent, Off.of(start, other, len(without.placed), problem.frame))
         if (
             margins[name] < -AHEAD
             and (better is None or _cost(other) < _cost(better))

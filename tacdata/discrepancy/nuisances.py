@@ -39,8 +39,8 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
     effects = [load(name) for name in setting.nuisance]
     board = build(course, response, placed, effects)
     idle = np.zeros((len(course.read), board.values.shape[1], course.channels), dtype=np.float32)
-    said = predict(course, response, placed).signal[course.read] - response.signal(np.zeros((1, course.channels)))
-    idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * float(np.abs(said).max())
+    rise = Streams.of(course).rise(predict(course, response, placed), response)[:, : course.channels]
+    idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * float(np.abs(rise).max())
     weights = [
         (p.typical / setting.nuisance[c.effect.name]) ** 2
         for c in board.candidates
@@ -78,8 +78,7 @@ def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
     slope = depth_slope(course, response, list(placed))
     if response.fitted:
         # Where the response follows what was read, gains are as much each episode's own as depths.
-        rise = Streams.of(course).predicted(predict(course, response, list(placed)))
-        rise[:, : course.channels] -= response.signal(np.zeros((1, course.channels)))
+        rise = Streams.of(course).rise(predict(course, response, list(placed)), response)
         rise[:, course.channels :] = 0.0
         return np.stack([slope * FITTED_JITTER * course.stroke, rise * FITTED_GAIN], axis=2)
     sideways = build(course, response, placed, [load("xy_offset")])

@@ -9,38 +9,83 @@ however clear they are.)
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from tacdata.chain import Course
+from tacdata.discrepancy import evidence
 from tacdata.discrepancy.clusters import Lent, clustered
+from tacdata.discrepancy.fit import eliminated
+from tacdata.discrepancy.forms import forms
+from tacdata.discrepancy.frame import Frame
 from tacdata.discrepancy.refine import Refined
 from tacdata.discrepancy.search import follows_clock
+from tacdata.discrepancy.setting import Setting
+from tacdata.discrepancy.spline_response import taken_up
 
 TINY = 1e-6
 """Models that differ by less, over all episodes, are the same [noise scales squared]."""
 
 
-def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None]) -> float:
+@dataclass(frozen=True)
+class Off:
+    """What the equation of one of a model's effects may be off about, beside nuisances."""
+
+    columns: np.ndarray
+    """Whitened and cleaned, at one standard deviation [1], shape (m, streams, k), float32."""
+    course: Course
+    """Of the rows that were read."""
+    frame: Frame
+
+    @classmethod
+    def of(cls, setting: Setting, model: Refined, at: int, frame: Frame) -> Off:
+        """Return what a model's effect number ``at`` may be off about."""
+        others = [p for k, p in enumerate(model.placed) if k != at]
+        columns = forms(setting.course, model.response, [model.placed[at]], [*setting.given, *others])
+        features = taken_up(setting.course, model.response, [*setting.given, *model.placed])
+        return cls(frame.cleaner(setting.course, features).cleaned(columns), setting.course.reduced, frame)
+
+    def beside(self, left: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, float]:
+        """Hold two whitened residuals, shape (m, streams), beside these columns.
+
+        Returns:
+            Their Gram matrix of each episode, and by how much half the energy of the first falls [nats].
+        """
+        both = np.concatenate([np.stack([left, apart], axis=2), self.columns], axis=2)
+        gram = evidence.summed(both, self.course, self.frame.nuisances, self.frame.inner).gram
+        ridge = np.concatenate([np.ones(self.columns.shape[2]), self.frame.ridge])
+        total, index = gram.sum(axis=0), np.arange(2, gram.shape[1])
+        matrix = total[np.ix_(index, index)] + np.diag(ridge)
+        matrix = matrix + 1e-9 * np.eye(len(index)) * max(float(np.trace(matrix)) / len(index), 1e-12)
+        fallen = 0.5 * float(total[index, 0] @ np.linalg.solve(matrix, total[index, 0]))
+        return eliminated(gram, index - 1, ridge)[:, :2, :2], fallen
+
+
+def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: Off | None = None) -> float:
     """Return by how many standard errors the first model is borne out against the second [1]; negative: the other way.
 
     Args:
         first: A model at its optimum.
         second: Another one of the same episodes, in the same frame.
         lent: What candidates say of how much scores scatter, for those that follow the clock (True) and others.
+        off: What the second's equations may be off about: only what that does not explain counts against it.
     """
     if first.energy.sum() > second.energy.sum():
         return -ahead(second, first, lent)
-    apart = second.left - first.left
-    episodes = len(first.energy)
-    own = np.bincount(first.episode, np.einsum("ij,ij->i", apart, apart), minlength=episodes)
-    if own.sum() < TINY:
+    apart, loss = second.left - first.left, float((second.energy - first.energy).sum())
+    if off is None:
+        gram = np.zeros((len(first.energy), 2, 2))
+        for i, values in ((0, second.left), (1, apart)):
+            own = np.einsum("ij,ij->i", apart, values)
+            gram[:, i, 1] = gram[:, 1, i] = np.bincount(first.episode, own, minlength=len(gram))
+    else:
+        gram, fallen = off.beside(second.left, apart)
+        loss -= fallen
+    if gram[:, 1, 1].sum() < TINY or loss <= 0:
         return 0.0
-    pull = np.bincount(first.episode, np.einsum("ij,ij->i", apart, second.left), minlength=episodes)
-    gram = np.zeros((episodes, 2, 2))
-    gram[:, 0, 1] = gram[:, 1, 0] = pull
-    gram[:, 1, 1] = own
     clock = any(_differ(first, second))
     told = clustered(gram, np.zeros(1, dtype=np.int64), clock)
-    loss = float((second.energy - first.energy).sum())
     # Two models that are equally wrong pull towards each other: the better one must explain more, too.
     most = float(np.sqrt(2 * loss / max(told.power / told.expected, 1.0)))
     return min(max(told.score(lent.get(clock)), 0.0), most)

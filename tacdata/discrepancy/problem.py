@@ -113,6 +113,5 @@ def _numerics(setting: Setting, placed: Sequence[Placed]) -> np.ndarray | None:
 
 def _rise(setting: Setting, frame: Frame) -> float:
     course = setting.course
-    said = predict(course, setting.response, list(setting.given)).signal[course.read]
-    rise = said - setting.response.signal(np.zeros((1, course.channels)))
-    return float(np.sqrt(np.sum(np.square(rise / frame.noise.scale[: course.channels]))))
+    rise = Streams.of(course).rise(predict(course, setting.response, list(setting.given)), setting.response)
+    return float(np.sqrt(np.sum(np.square((rise / frame.noise.scale)[:, : course.channels]))))

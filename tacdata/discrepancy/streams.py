@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.chain import Course, Prediction
+from tacdata.chain import Course, Prediction, Response
 
 
 @dataclass(frozen=True)
@@ -51,3 +51,12 @@ class Streams:
         if self.tag:
             parts.append(prediction.tag)
         return np.column_stack(parts)[self.rows]
+
+    def rise(self, prediction: Prediction, response: Response) -> np.ndarray:
+        """Return what presses add at the rows that were read, shape (m, streams): readings without what is said in the
+        air, force; 0 for the tag's."""
+        result = self.predicted(prediction)
+        result[:, : self.channels] -= response.signal(np.zeros((1, self.channels)))
+        if self.tag:
+            result[:, -3:] = 0.0
+        return result

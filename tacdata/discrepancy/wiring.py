@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from tacdata.chain import Course, Response, predict
+from tacdata.discrepancy.streams import Streams
 
 FEWEST = 40
 """Readings in contact that are needed."""
@@ -30,7 +31,7 @@ def miswired(course: Course, response: Response) -> list[str]:
     """
     if response.fitted or course.channels < 2:
         return []
-    said = (predict(course, response, []).signal - response.signal(np.zeros((1, course.channels))))[course.read]
+    said = Streams.of(course).rise(predict(course, response, []), response)[:, : course.channels]
     touched = np.abs(said).max(axis=1) > SHARE * np.abs(said).max()
     if touched.sum() < FEWEST:
         return []

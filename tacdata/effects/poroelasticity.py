@@ -5,10 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import erfcinv
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import low_pass
 from tacdata.effects.effect import Effect, Parameter
+
+ROOTS = 6
+"""First-order means in place of the root."""
+_LEVY = 0.25 / np.square(erfcinv((np.arange(ROOTS) + 0.5) / ROOTS))
+SPECTRUM = (*((0.908**2 * float(rate), 0.491 / ROOTS) for rate in _LEVY), (1.679, 0.509))
+"""Rates over 1 / tau, and shares [1]: exp(-c sqrt(t)) is a mixture of exp(-c^2 u t), u following a Levy distribution,
+of density u^-1.5 exp(-1 / (4 u)) / (2 sqrt(pi))."""
 
 
 class Poroelasticity(Effect):
@@ -19,8 +27,11 @@ class Poroelasticity(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "hold time"
-    equation = "q = q_e - f L_tau q_e, tau = R d / D_eff: proportional to the contact radius squared"
-    source = "Hu et al., Appl. Phys. Lett. 96 (2010) 121904"
+    equation = (
+        "q = q_e - f (q_e - g * q_e'), g(t) = 0.491 exp(-0.908 sqrt(t / tau)) + 0.509 exp(-1.679 t / tau), "
+        "tau = R d / D_eff: proportional to the contact radius squared"
+    )
+    source = "Hu et al., Appl. Phys. Lett. 96 (2010) 121904, for a sphere; the root as a mixture of exponentials"
     experiment = (
         "two indenters at the same depth over radius: the time grows with the contact radius squared, that of "
         "relaxation does not"
@@ -41,7 +52,9 @@ class Poroelasticity(Effect):
         for t, radius in enumerate(radii):
             rows = course.tool == t
             tau = float(values["tau"]) * radius / np.median(radii)
-            slow[rows] = low_pass(np.where(rows[:, None], both, 0.0), course.step, tau)[rows]
+            own = np.where(rows[:, None], both, 0.0)
+            late = [share * low_pass(own, course.step, tau / rate) for rate, share in SPECTRUM]
+            slow[rows] = np.sum(late, axis=0)[rows]
         both = both - values["f"] * slow
         return replace(state, load=both[:, :-1], force=both[:, -1])
 

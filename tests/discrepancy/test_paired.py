@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tacdata.discrepancy.noise import spread_of
-from tacdata.discrepancy.paired import ahead
+from tacdata.discrepancy.paired import Off, ahead
 from tacdata.effects import load
 
 EPISODES, ROWS = 48, 40
@@ -73,3 +73,22 @@ def test_a_spread_is_told_from_those_that_know_it(spread):
         told.append(spread_of(rng.normal(size=400) * np.sqrt(2 * spread**2 + known), known))
     assert np.median(told) == pytest.approx(spread, abs=max(0.1 * spread, 3e-4))
     assert np.quantile(told, 0.95) < 1.3 * spread + 2e-3
+
+
+def test_what_an_equation_may_be_off_about_is_nothing_against_it():
+    rng = np.random.default_rng(4)
+    noise, true = rng.normal(size=(EPISODES * ROWS, 1)), signal(9.0, np.arange(48), rng)
+    first, second = model(noise, "relaxation"), model(noise + true, "creep")
+    course = SimpleNamespace(episode=first.episode, episodes=EPISODES)
+    nothing = SimpleNamespace(
+        nuisances=np.zeros((len(noise), 1, 0)), inner=np.zeros((EPISODES, 0, 0)), ridge=np.zeros(0)
+    )
+
+    def against(column):
+        return ahead(first, second, Nothing(), Off(column[:, :, None], course, nothing))
+
+    bare = ahead(first, second, Nothing())
+    assert bare > 4.5
+    assert against(signal(30.0, np.arange(48), rng)) == pytest.approx(bare, abs=0.4), "off about another thing"
+    assert against(3 * true) < 1.0, "it may be off by three times what it is"
+    assert 0.3 * bare < against(0.1 * true) < 0.95 * bare, "it may be off by a tenth of what it is"

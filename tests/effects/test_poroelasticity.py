@@ -1,0 +1,34 @@
+"""Load under a sphere that stays where it is relaxes as Hu et al. (2010) say, slower under a larger one."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tacdata.effects import load
+
+
+@dataclass(frozen=True)
+class Held:
+    load: np.ndarray
+    force: np.ndarray
+    course: object
+
+
+@pytest.mark.parametrize(("tool", "slower"), [(0, 2 / 3), (1, 4 / 3)])
+def test_a_held_load_relaxes_as_a_gel_under_a_sphere(tool, slower):
+    time = np.concatenate([[0.0, 1e-9], np.logspace(-3, 2.5, 400)])  # at once, then held
+    one = np.where(time > 0, 1.0, 0.0)
+    course = SimpleNamespace(
+        tool=np.full(len(time), tool), step=np.diff(time, prepend=0.0),
+        tools=(SimpleNamespace(radius=2.0), SimpleNamespace(radius=4.0)),
+    )  # fmt: skip
+    after = load("poroelasticity").apply(
+        Held(one[:, None], 5 * one, course), {"f": np.array(0.3), "tau": np.array(4.0)}
+    )
+    root = np.sqrt(time / (4.0 * slower))
+    wanted = 1 - 0.3 * (1 - 0.491 * np.exp(-0.908 * root) - 0.509 * np.exp(-1.679 * root**2))
+    assert after.load[2:, 0] == pytest.approx(wanted[2:], abs=0.3 * 0.015)
+    assert after.force == pytest.approx(5 * after.load[:, 0])
+    assert after.load[-1, 0] == pytest.approx(0.7, abs=1e-3)
