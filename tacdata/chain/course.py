@@ -8,6 +8,9 @@ from typing import Self
 
 import numpy as np
 
+FORGOTTEN = 1e9
+"""Longer than any skin remembers [s]."""
+
 
 @dataclass(frozen=True)
 class Tool:
@@ -101,6 +104,12 @@ class Course:
     def step(self) -> np.ndarray:
         """Time since the row before [s], shape (n,); the first is 0."""
         return np.diff(self.time, prepend=self.time[:1])
+
+    def forgetting(self) -> Self:
+        """Return the course with such rests before its episodes that nothing is remembered; clocks go on as they do."""
+        made = replace(self)
+        made.__dict__["step"] = np.where(self.first, FORGOTTEN, self.step)
+        return made
 
     @cached_property
     def first(self) -> np.ndarray:

@@ -111,6 +111,14 @@ class FittedResponse(Response):
         return result
 
     @property
+    def air(self) -> np.ndarray:
+        """What each spline says in the air, at all rows of the course, shape (n, most splines of a place)."""
+        result = np.zeros((len(self.context), self.width))
+        for rows, air in zip(self._rows, self._air, strict=True):
+            result[np.ix_(rows, np.arange(air.shape[1]))] = air
+        return result
+
+    @property
     def width(self) -> int:
         """Splines of the place that has most."""
         return max(len(b.t) - b.k - 1 for b in self._bases)

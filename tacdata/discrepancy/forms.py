@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
-from tacdata.chain import Course, Prediction, Response, predict
-from tacdata.chain.memory import low_pass
+from tacdata.chain import Chain, Course, Response
 from tacdata.discrepancy.streams import Streams
-from tacdata.effects import Placed
+from tacdata.effects import Placed, library
 
-TIMES = (0.02, 0.05, 0.1, 0.4, 1.5, 6.0, 25.0, 100.0)
-"""Time constants over which a memory may be spread besides its own [s]."""
+SPREAD = 3.0
+"""How far a mechanism may be spread over its other forms and shapes, over what one equation is off about [1]."""
+SIZES = (0.25, 0.5, 2.0, 4.0)
+"""Other sizes of what has no shape, whose time constant or width is its size [1]."""
+NOTHING = 1e-9
+"""What changes less than this share of what the effect does is no form of it [1]."""
 
 
 def forms(course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()) -> np.ndarray:
@@ -26,28 +29,50 @@ def forms(course: Course, response: Response, placed: Sequence[Placed], given: S
     if not placed:
         return np.zeros((len(course.read), streams.count, 0), dtype=np.float32)
     columns: list[np.ndarray] = []
-    whole = predict(course, response, [*every, *placed])
-    for at in range(len(placed)):
-        rest = predict(course, response, [*every, *(p for k, p in enumerate(placed) if k != at)])
-        own, effect = streams.predicted(whole) - streams.predicted(rest), placed[at].effect
-        columns += [effect.form_error * own * by for by in modulations(course, streams, own)]
-        if effect.memory_error:
-            columns += [effect.memory_error * by for by in _spread(course, streams, whole, rest)]
+    for at, one in enumerate(placed):
+        rest = [*every, *(p for k, p in enumerate(placed) if k != at)]
+        chain = Chain(course, response, rest)
+        bare = streams.predicted(chain.prediction)
+        own = streams.predicted(chain.again([*rest, one])) - bare
+        columns += [one.effect.form_error * own * by for by in modulations(course, streams, own)]
+        size = float(np.linalg.norm(own))
+        for other in variants(one, course.channels):
+            change = streams.predicted(chain.again([*rest, other])) - bare
+            large = float(np.linalg.norm(change))
+            if large > NOTHING * size:
+                columns.append(SPREAD * one.effect.form_error * size / large * change)
     return np.stack(columns, axis=-1).astype(np.float32)
 
 
-def _spread(course: Course, streams: Streams, whole: Prediction, rest: Prediction) -> list[np.ndarray]:
-    """Return how a contribution changes where its memory has further time constants, each of shape (n, streams).
+def variants(one: Placed, channels: int) -> list[Placed]:
+    """Return a mechanism in its other forms and shapes: no polymer relaxes with one time constant.
 
-    First-order means of differences of first-order means are differences of others: what is left of own - L_tau own are
-    the shares that a spectrum of time constants gives to others.
+    Args:
+        one: An effect with its numbers.
+        channels: How many channels there are.
     """
-    own = {"signal": whole.signal - rest.signal, "force": whole.force - rest.force, "tag": whole.tag - rest.tag}
+    made = []
+    for effect in library():
+        if effect.called != one.effect.called:
+            continue
+        if not effect.shapes and effect.name == one.effect.name:
+            made += [_sized(one, by) for by in SIZES]
+            continue
+        sizes = {
+            p.name: np.full(channels if p.per_channel else (), p.default + p.typical, dtype=float)
+            for p in effect.amplitudes
+        }
+        for shapes in product(*(p.grid for p in effect.shapes)):
+            own = {p.name: np.array(value) for p, value in zip(effect.shapes, shapes, strict=True)}
+            made.append(Placed(effect, sizes | own))
+    return made
 
-    def late(values: np.ndarray, tau: float) -> np.ndarray:
-        return low_pass(values, course.step, tau) - values
 
-    return [streams.predicted(replace(whole, **{k: late(v, tau) for k, v in own.items()})) for tau in TIMES]
+def _sized(one: Placed, by: float) -> Placed:
+    """Return an effect of another size, within its bounds."""
+    return Placed(one.effect, {
+        p.name: np.clip(p.default + by * (one.values[p.name] - p.default), p.low, p.high) for p in one.effect.parameters
+    })  # fmt: skip
 
 
 def modulations(course: Course, streams: Streams, own: np.ndarray) -> list[np.ndarray]:

@@ -22,8 +22,9 @@ class SplineResponse(Response):
         self._response, self._weight = response, weight
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
-        """Return the splines, shape (n, splines)."""
-        return self._weight * self._response.basis(np.broadcast_to(pose, (len(self._response.context), 3)))
+        """Return the splines less what each says in the air, shape (n, splines)."""
+        there = self._response.basis(np.broadcast_to(pose, (len(self._response.context), 3)))
+        return self._weight * (there - self._response.air)
 
     def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return the force of the response as it is, shape (n,)."""
@@ -38,7 +39,8 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
     """Return what a unit of each spline adds to a reading, at the rows read, shape (m, splines).
 
     A model must not be blamed for splines that do not go through its own effects: a delayed response is made of delayed
-    splines. What differs between channels is left out: features are shared by all.
+    splines. What differs between channels is left out: features are shared by all. So is what a press remembers of
+    others: splines of another place would go on in this one, as freedom that the response does not have.
 
     Args:
         course: The recordings.
@@ -48,7 +50,7 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
     acting = [p for p in placed if not p.effect.by_channel]
     if not isinstance(response, FittedResponse) or not acting:
         return response.features(course.reduced)
-    plain = replace(course, readings=np.zeros((course.rows, response.width)), centers=None, force=None)
+    plain = replace(course, readings=np.zeros((course.rows, response.width)), centers=None, force=None).forgetting()
     moved = predict(plain, SplineResponse(response), acting).signal
     alone = predict(plain, SplineResponse(response, 0.0), acting).signal
-    return (moved - alone)[course.read]
+    return (moved - alone + response.air)[course.read]

@@ -22,7 +22,6 @@ class BaselineTracking(Effect):
     equation = "b' = r (s - b), read s - b above idle: long presses decay to zero and undershoot on release"
     source = "NXP AN3891, baseline system of the MPR121"
     experiment = "switch it off; hold long: the plateau is zero, and what is lost comes back negative after release"
-    memory_error = 0.3
     parameters = (Parameter("r", "1/s", "rate", 0.01, 0.0, 3.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

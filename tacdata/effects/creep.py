@@ -25,7 +25,6 @@ class Creep(Effect):
         "a hold of five time constants and as long a recovery, at three rates: a lag that does not shrink "
         "with the rate, and a reading that grows in the hold where relaxation lets it fall"
     )
-    memory_error = 0.3
     parameters = (
         Parameter("f", "1", "late share", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time constant", 2.0, 0.05, 500.0, grid=(0.4, 1.0, 2.5, 6.0, 16.0, 60.0)),

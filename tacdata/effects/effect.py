@@ -72,9 +72,6 @@ class Effect(ABC):
     form_error: ClassVar[float] = 0.1
     """How far its equation may be off, over its contribution, as a standard deviation [1]; less where it is geometry,
     arithmetic or a clock rather than a law of a material."""
-    memory_error: ClassVar[float] = 0.0
-    """How far its memory may be spread over other time constants than its own, over its contribution, as a standard
-    deviation [1]; 0 for what has no time constant."""
     mechanism: ClassVar[str] = ""
     """The name it shares with other functional forms of the same thing; empty: its own."""
 

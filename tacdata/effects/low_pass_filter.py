@@ -22,7 +22,6 @@ class LowPassFilter(Effect):
     equation = "tau s' + s = s_e"
     source = "standard form"
     experiment = "edges: a filter rounds them, a delay keeps their shape; spectrum of noise without contact"
-    memory_error = 0.3
     parameters = (Parameter("tau", "s", "time constant", 0.05, 0.0, 2.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

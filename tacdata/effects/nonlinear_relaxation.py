@@ -22,7 +22,6 @@ class NonlinearRelaxation(Effect):
     equation = "q = q_e - f L_tau (q_e d / D), D the deepest depth"
     source = "quasi-linear form; Fung, Biomechanics, ch. 7"
     experiment = "step and hold at four depths on fresh sites"
-    memory_error = 0.3
     parameters = (
         Parameter("f", "1", "relaxed share at the deepest depth", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time constant", 2.0, 0.05, 500.0, grid=(0.4, 2.5, 16.0, 60.0)),

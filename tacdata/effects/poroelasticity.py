@@ -36,7 +36,6 @@ class Poroelasticity(Effect):
         "two indenters at the same depth over radius: the time grows with the contact radius squared, that of "
         "relaxation does not"
     )
-    memory_error = 0.3
     parameters = (
         Parameter("f", "1", "relaxed share", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time at the median radius", 10.0, 0.5, 500.0, grid=(1.0, 4.0, 16.0, 60.0)),

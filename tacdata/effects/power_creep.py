@@ -25,7 +25,6 @@ class PowerCreep(Effect):
         "a hold of five time constants and as long a recovery, at two depths and three rates: the plateau is "
         "not zero and the relaxed share is the same at every depth"
     )
-    memory_error = 0.3
     parameters = (
         Parameter("f", "1", "relaxed share over the decades", 0.15, 0.0, 0.95),
         Parameter("tau0", "s", "shortest time constant", 0.1, 0.01, 10.0, grid=(0.05, 0.3, 2.0)),

@@ -26,7 +26,6 @@ class Relaxation(Effect):
         "not zero and the relaxed share is the same at every depth; force relaxes with the skin, not with the "
         "taxel's dielectric"
     )
-    memory_error = 0.3
     parameters = (
         Parameter("f", "1", "relaxed share", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time constant", 2.0, 0.05, 500.0, grid=(0.15, 0.4, 1.0, 2.5, 6.0, 16.0, 40.0, 120.0)),

@@ -22,7 +22,6 @@ class ServoLag(Effect):
     equation = "(tau / 2)^2 d'' + tau d' + d = z: critically damped"
     source = "standard form"
     experiment = "other accelerations at the same speed; a tag sees it"
-    memory_error = 0.3
     parameters = (Parameter("tau", "s", "time constant", 0.05, 0.0, 1.0),)
     seen_by_tag = True
 

@@ -3,9 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from pressing import course
 
 from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.discrepancy.frame import frame
+from tacdata.discrepancy.refine import refine
+from tacdata.discrepancy.setting import Setting
+from tacdata.discrepancy.spline_response import taken_up
+from tacdata.effects import Placed, load
 
 
 def test_a_places_own_level_is_no_load():
@@ -27,3 +33,51 @@ def test_the_same_depths_asked_again_are_answered_the_same():
     first = response.load(made.tip, made.tool)
     assert not np.allclose(response.load(deeper, made.tool), first)
     np.testing.assert_array_equal(response.load(made.tip, made.tool), first)
+
+
+def placed(name, share=1.0):
+    effect = load(name)
+    return Placed(
+        effect, {p.name: np.array(p.default + p.typical * (1 if p.grid else share)) for p in effect.parameters}
+    )
+
+
+@pytest.mark.parametrize("name", ["relaxation", "nonlinear_relaxation", "proportional_hysteresis", "baseline_tracking"])
+def test_splines_that_go_through_an_effect_gain_no_freedom(name):
+    """Levels go through nothing, and no press takes up what splines of another place have left in a memory."""
+    made = course()
+    # The second place is pressed half as often: it has fewer splines.
+    few = made.episodes // 2
+    keep = np.isin(made.episode, np.flatnonzero((made.site == 0) | (np.arange(made.episodes) < few // 2)))
+    kept = np.unique(made.episode[keep])
+    part = replace(
+        made, **{n: getattr(made, n)[keep] for n in ("time", "tip", "tool", "readings", "averaged")},
+        episode=np.searchsorted(kept, made.episode[keep]), session=made.session[kept], site=made.site[kept],
+        names=tuple(made.names[k] for k in kept),
+    )  # fmt: skip
+    response = FittedResponse(part)
+    plain = response.features(part.reduced)
+    through = taken_up(part, response, [placed(name)])
+    empty = []
+    for place in range(2):
+        rows = response.context[part.read] == place
+        nowhere = ~plain[rows].any(axis=0)
+        empty.append(nowhere.sum())
+        assert not np.abs(through[rows][:, nowhere]).max(initial=0.0) > 1e-12
+    assert empty[1] > empty[0] + 5
+    assert through.sum(axis=1) == pytest.approx(1.0, abs=1e-9), "together they are a level"
+    assert np.abs(through - plain).max() > 1e-3
+
+
+@pytest.mark.parametrize("name", ["relaxation", "proportional_hysteresis", "baseline_tracking"])
+def test_a_fitted_response_that_is_corrected_leaves_as_much(name, monkeypatch):
+    """What splines can take up counts nowhere: a model's energy hardly depends on how far they have."""
+    made = course(relaxed=0.1)
+    setting = Setting(made, FittedResponse(made), [])
+    same, model = frame(setting), [placed(name, 0.3)]
+    bare = refine(setting, [], same, steps=0).energy.sum()
+    told = [refine(setting, model, same, steps=0).energy.sum()]
+    monkeypatch.setattr(FittedResponse, "correct", lambda *_: None)
+    told.append(refine(setting, model, same, steps=0).energy.sum())
+    assert told[0] < 0.95 * bare
+    assert told[0] == pytest.approx(told[1], abs=1e-3 * bare)

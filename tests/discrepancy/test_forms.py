@@ -9,7 +9,7 @@ from pressing import course
 from tacdata.chain import predict
 from tacdata.discrepancy import search
 from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.forms import forms, modulations
+from tacdata.discrepancy.forms import forms, modulations, variants
 from tacdata.discrepancy.frame import frame
 from tacdata.discrepancy.problem import prepare
 from tacdata.discrepancy.setting import Setting
@@ -38,7 +38,7 @@ def test_columns_are_a_share_of_each_effect(pressed):
     made, response, late = pressed
     assert forms(made, response, []).shape[2] == 0
     one = forms(made, response, [late])
-    assert one.shape == (len(made.read), 3, 5)
+    assert one.shape == (len(made.read), 3, 5 + 4), "modulations, and delays of other sizes"
     twice = forms(made, response, [replace(late, values={"L": np.array(0.1)})])
     size = np.linalg.norm(twice, axis=(0, 1)) / np.linalg.norm(one, axis=(0, 1))
     assert np.all((size > 1.7) & (size < 2.1))
@@ -54,6 +54,23 @@ def test_a_clock_is_known_better_than_a_law_of_a_material(pressed):
         own = streams.predicted(predict(made, response, [placed])) - streams.predicted(predict(made, response, []))
         by = np.linalg.norm(forms(made, response, [placed])[:, :, :5], axis=(0, 1)) / np.linalg.norm(own)
         assert by == pytest.approx(np.full(5, share), rel=1e-3)
+
+
+def test_a_mechanism_may_have_any_of_its_forms_and_shapes(pressed):
+    made = pressed[0]
+    counts = {}
+    for name in ("relaxation", "proportional_hysteresis", "low_pass_filter", "crosstalk"):
+        effect = load(name)
+        given = {p.name: np.array(p.default + p.typical) for p in effect.parameters}
+        found = variants(Placed(effect, given), made.channels)
+        counts[name] = {other.effect.name: 0 for other in found}
+        for other in found:
+            counts[name][other.effect.name] += 1
+    assert counts["relaxation"] == {"relaxation": 8, "power_creep": 3, "nonlinear_relaxation": 4}
+    assert counts["proportional_hysteresis"] == {"proportional_hysteresis": 3, "hysteresis": 1}
+    assert counts["low_pass_filter"] == {"low_pass_filter": 4}
+    wide = Placed(load("low_pass_filter"), {"tau": np.array(1.0)})
+    assert [float(v.values["tau"]) for v in variants(wide, 3)] == [0.25, 0.5, 2.0, 2.0], "within its bounds"
 
 
 def test_what_a_wrong_form_leaves_is_no_second_effect(pressed, monkeypatch):
@@ -94,4 +111,3 @@ def test_a_spectrum_of_time_constants_is_no_second_memory():
     spread = search.test(problem)
     assert narrow.gain.max() > 20
     assert spread.gain.max() < 0.1 * narrow.gain.max()
-    assert forms(made, response, [replace(one, effect=load("latency"), values={"L": np.array(0.1)})]).shape[2] == 5
