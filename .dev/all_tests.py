@@ -15,6 +15,8 @@ COMPUTE = (
     "training",
 )  # fmt: skip
 """Rooms that run beside the others."""
+MOST_THREADS = 4
+"""Tests are small: more threads of one would only wait for the other part's."""
 
 
 def main() -> int:
@@ -22,7 +24,7 @@ def main() -> int:
     pytest, cores = [sys.executable, "-m", "pytest"], os.cpu_count() or 1
     if cores < 2:
         return _status(subprocess.run(pytest, check=False))
-    environment = {**os.environ, "OMP_NUM_THREADS": str(max(cores // 2, 1))}
+    environment = {**os.environ, "OMP_NUM_THREADS": str(min(cores // 2, MOST_THREADS))}
     rooms = [str(TESTS / name) for name in COMPUTE]
     with tempfile.TemporaryFile("w+") as said:
         other = subprocess.Popen(
