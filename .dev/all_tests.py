@@ -1,6 +1,6 @@
-"""Run every test: what only computes beside what takes its time, where there is a second core.
+"""Run every test: what drives devices, hosts and viewers by itself, then what only computes in two parts side by side.
 
-Tests that drive devices and viewers are on the screen; the others' output follows when both are done.
+Arguments go to every pytest.
 """
 
 import os
@@ -11,33 +11,39 @@ from pathlib import Path
 
 TESTS = Path(__file__).parents[1] / "tests"
 COMPUTE = (
-    "benchmarks", "chain", "discrepancy", "effects", "indenters", "label_farm", "revision", "skin", "surrogate",
-    "training",
-)  # fmt: skip
-"""Rooms that run beside the others."""
+    ("indenters", "skin"),
+    ("benchmarks", "chain", "discrepancy", "effects", "revision", "surrogate", "training"),
+)
+"""Rooms of either part."""
 MOST_THREADS = 4
-"""Tests are small: more threads of one would only wait for the other part's."""
+"""Tests are small: more threads of one would only wait for those of the other part."""
+PYTEST = [sys.executable, "-m", "pytest"]
 
 
-def main() -> int:
+def main(arguments: list[str]) -> int:
     """Return the exit status of the first part that failed."""
-    pytest, cores = [sys.executable, "-m", "pytest"], os.cpu_count() or 1
+    parts = [[str(TESTS / name) for name in rooms] for rooms in COMPUTE]
+    alone = subprocess.run(
+        [*PYTEST, *arguments, *(f"--ignore={room}" for rooms in parts for room in rooms)], check=False
+    )
+    cores = os.cpu_count() or 1
     if cores < 2:
-        return _status(subprocess.run(pytest, check=False))
+        rest = subprocess.run([*PYTEST, *arguments, *(room for rooms in parts for room in rooms)], check=False)
+        return _status(alone) or _status(rest)
     environment = {**os.environ, "OMP_NUM_THREADS": str(min(cores // 2, MOST_THREADS))}
-    rooms = [str(TESTS / name) for name in COMPUTE]
     with tempfile.TemporaryFile("w+") as said:
-        other = subprocess.Popen(
-            [*pytest, "-q", "-p", "no:cacheprovider", *rooms], stdout=said, stderr=subprocess.STDOUT, env=environment
-        )
+        second = subprocess.Popen(
+            [*PYTEST, "-p", "no:cacheprovider", *arguments, *parts[1]], stdout=said, stderr=subprocess.STDOUT,
+            env=environment,
+        )  # fmt: skip
         try:
-            own = subprocess.run([*pytest, *(f"--ignore={room}" for room in rooms)], env=environment, check=False)
-            other.wait()
+            first = subprocess.run([*PYTEST, *arguments, *parts[0]], env=environment, check=False)
+            second.wait()
         finally:
-            other.kill()
+            second.kill()
         said.seek(0)
-        print(f"\nbeside them: {' '.join(COMPUTE)}\n{said.read()}", flush=True)
-    return _status(own) or _status(other)
+        print(f"\nbeside them: {' '.join(COMPUTE[1])}\n{said.read()}", flush=True)
+    return _status(alone) or _status(first) or _status(second)
 
 
 def _status(done: "subprocess.CompletedProcess | subprocess.Popen") -> int:
@@ -48,4 +54,4 @@ def _status(done: "subprocess.CompletedProcess | subprocess.Popen") -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -64,7 +64,7 @@ def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
+@pytest.mark.timeout(2400)
 def test_the_whole_job(tmp_path):
     done = subprocess.run(
         [*DEMO, "--out", str(tmp_path / "out"), "--presses", "8", "--epochs", "1"],
