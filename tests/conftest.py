@@ -1,0 +1,49 @@
+"""What drives devices in real time is tried again if it failed while the machine stood still, and only then."""
+
+import os
+import threading
+import time
+
+import pytest
+
+REAL_TIME = (
+    "commands", "demonstrations", "devices", "label_farm", "live", "recording", "registration", "replay", "virtual_rig",
+)  # fmt: skip
+"""Rooms whose tests hold emulated devices against the clock."""
+STILL = 0.02
+"""A thread that wakes so much too late was kept from the machine [s]; an emulated carriage moves 0.2 mm in that time."""
+
+
+class Watch:
+    """A thread that sleeps, and notes how much too late it ever woke."""
+
+    PERIOD = 0.005
+
+    def __init__(self):
+        self.latest = 0.0
+        threading.Thread(target=self._watch, daemon=True, name="machine watch").start()
+
+    def _watch(self):
+        while True:
+            before = time.monotonic()
+            time.sleep(self.PERIOD)
+            self.latest = max(self.latest, time.monotonic() - before - self.PERIOD)
+
+    def stood_still(self):
+        """Return whether the machine was late, or has more to do than it has cores, since the test began."""
+        return self.latest > STILL or os.getloadavg()[0] > (os.cpu_count() or 1)
+
+
+WATCH = Watch()
+
+
+def pytest_collection_modifyitems(items):
+    """Let tests of real time be tried again; what was is told in the summary."""
+    for item in items:
+        if item.path.parent.name in REAL_TIME:
+            item.add_marker(pytest.mark.flaky(reruns=2, condition=WATCH.stood_still))
+
+
+def pytest_runtest_setup():
+    """Watch anew for every test."""
+    WATCH.latest = 0.0
