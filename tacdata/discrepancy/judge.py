@@ -18,7 +18,7 @@ from tacdata.discrepancy.problem import Problem, prepare
 from tacdata.discrepancy.refine import Refined, refine
 from tacdata.discrepancy.search import Left, Tested, best_shapes, fitted, held_out, leftovers, test
 from tacdata.discrepancy.setting import Setting
-from tacdata.effects import load
+from tacdata.effects import Effect, load
 
 ALPHA = 0.01
 """Share of decoys that may do as well, over all candidates together."""
@@ -29,7 +29,7 @@ MOST = 4
 TOP = 8
 """How many effects are tried as members of pairs and as rivals."""
 RIVAL = 2.58
-"""A rival is out when the winner is better by so many standard errors over episodes [1]."""
+"""A rival as likely beforehand is out when the winner is better by so many standard errors over episodes [1]."""
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
 MINOR = 0.3
@@ -289,8 +289,9 @@ def _member(
         _, values = fitted(bare, [best[name]], everything)
         first = best[name].placed(values[: len(best[name].columns)], setting.course.channels)
         other = refine(start, [*without.placed, first], problem.frame)
+        level = out(mine.effect, best[name].effect)
         margins[name] = ahead(current, other, lent)
-        if margins[name] >= RIVAL:
+        if margins[name] >= level:
             # Its equation may be off: what that explains is nothing against it.
             margins[name] = ahead(current, other, lent, Off.of(start, other, len(without.placed), problem.frame))
         if (
@@ -302,11 +303,17 @@ def _member(
             better = other
         losses[name] = float((other.energy - current.energy).sum())
         richer = len(other.tangent.knobs) > len(current.tangent.knobs)
-        if margins[name] < RIVAL and not (richer and _cost(other) > _cost(current) + SIMPLER):
+        if margins[name] < level and not (richer and _cost(other) > _cost(current) + SIMPLER):
             rivals.append(best[name].called)
     error, bound = _errors(current, at)
     chosen = _selected(bare, best, each, mine.effect.called)
     return Member(mine, error, bound, tuple(dict.fromkeys(rivals)), margins, need, losses, chosen), better
+
+
+def out(mine: Effect, rival: Effect) -> float:
+    """Return by how many standard errors an effect must be ahead of a rival: as sure in the end as `RIVAL` makes it where
+    both are as likely beforehand, half the square of a standard error being a nat."""
+    return float(np.sqrt(max(RIVAL**2 + 2 * np.log(rival.odds / mine.odds), 0.0)))
 
 
 def _selected(

@@ -11,7 +11,7 @@ from tacdata import documents
 from tacdata.discrepancy import decide, verdict
 from tacdata.discrepancy.amiss import amiss
 from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.judge import judge
+from tacdata.discrepancy.judge import judge, out
 from tacdata.discrepancy.located import residual, slices
 from tacdata.discrepancy.setting import Setting
 from tacdata.effects import load
@@ -90,6 +90,15 @@ def test_a_channel_is_named_by_what_calibration_leaves_open(gain, named):
     made = decide.calibrated(SimpleNamespace(gains=gains, problem=SimpleNamespace(setting=setting)))
     assert [decide.settled(m) for m in made] == ([named] if named else [])
     assert all(m.needed == decide.BEYOND for m in made)
+
+
+def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():
+    common, rare = load("relaxation"), load("poroelasticity")
+    alike = out(common, load("creep"))
+    assert out(common, rare) < alike < out(rare, common)
+    # A standard error squared is two nats of likelihood: what both levels leave of odds is the same.
+    for level, odds in ((out(common, rare), rare.odds), (out(rare, common), 1 / rare.odds)):
+        assert np.exp(-(level**2) / 2) * odds == pytest.approx(np.exp(-(alike**2) / 2))
 
 
 def test_few_episodes_carry_no_verdict():

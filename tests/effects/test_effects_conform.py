@@ -68,6 +68,7 @@ def test_an_effect_says_what_it_is(effect):
     assert set(effect.moves) <= {"tag", "label", "signal", "force"}
     assert all([effect.title, effect.equation, effect.source, effect.experiment, effect.catalogue])
     assert effect.amplitudes
+    assert 0 < effect.odds <= 1
     for p in effect.parameters:
         assert p.unit
         assert p.meaning
