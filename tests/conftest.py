@@ -11,7 +11,7 @@ REAL_TIME = (
 )  # fmt: skip
 """Rooms whose tests hold emulated devices against the clock."""
 STILL = 0.02
-"""A thread that wakes so much too late was kept from the machine [s]; an emulated carriage moves 0.2 mm in that time."""
+"""A thread that wakes so much too late was kept from the machine [s]; an emulated carriage moves 0.2 mm meanwhile."""
 
 
 class Watch:

@@ -311,8 +311,10 @@ def _member(
 
 
 def out(mine: Effect, rival: Effect) -> float:
-    """Return by how many standard errors an effect must be ahead of a rival: as sure in the end as `RIVAL` makes it where
-    both are as likely beforehand, half the square of a standard error being a nat."""
+    """Return by how many standard errors an effect must be ahead of a rival.
+
+    In the end it is as sure as `RIVAL` makes it where both are as likely beforehand: half a square is a nat.
+    """
     return float(np.sqrt(max(RIVAL**2 + 2 * np.log(rival.odds / mine.odds), 0.0)))
 
 

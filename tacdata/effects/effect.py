@@ -73,8 +73,8 @@ class Effect(ABC):
     """How far its equation may be off, over its contribution, as a standard deviation [1]; less where it is geometry,
     arithmetic or a clock rather than a law of a material."""
     odds: ClassVar[float] = 1.0
-    """How likely it is in a soft skin before any data, over an effect that is not rare [1]; less than 1 only where there is
-    a physical reason."""
+    """How likely it is in a soft skin before any data, over an effect that is not rare [1]; less than 1 only where
+    there is a physical reason."""
     mechanism: ClassVar[str] = ""
     """The name it shares with other functional forms of the same thing; empty: its own."""
 
