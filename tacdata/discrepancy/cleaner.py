@@ -75,6 +75,11 @@ class Cleaner:
                 )
             self._places.append(_Place(group, local, offset[group], Factored(spans, own), tag))
 
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the features, at all places and of all streams [1]."""
+        return sum(place.seen.freedom for place in self._places)
+
     def parts(self, columns: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Give the rows of each place, and columns there whitened and without nuisances, shape (m, streams, k).
 

@@ -65,10 +65,8 @@ def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | 
         rows: Rows of the course, of whole episodes, that ``values`` are of; all, unless given.
     """
     some = slice(None) if rows is None else rows
-    inside = course.step[~course.first]
-    median = float(np.median(inside)) if len(inside) else 1.0
-    decay = noise.memory ** np.clip(course.step / max(median, 1e-9), 0.0, 50.0)
-    decay = np.where(course.first, 0.0, decay)[some]
+    decay, spread = _filter(course, noise)
+    decay, spread = decay[some], spread[some]
     result = values.astype(np.float32)
     if noise.missing is not None:
         missing = noise.missing[some]
@@ -80,10 +78,33 @@ def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | 
         result[gone] = 0.0
     else:
         result[1:] -= decay[1:, None, None].astype(np.float32) * values[:-1].astype(np.float32, copy=False)
-    spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
-    spread = spread / np.sqrt(np.minimum(course.averaged[some], 4.0))
     result /= (spread[:, None] * noise.scale[None]).astype(np.float32)[:, :, None]
     return result
+
+
+def coloured(values: np.ndarray, course: Course, noise: Noise) -> np.ndarray:
+    """Return white noise as readings have it: what `whiten` undoes.
+
+    Args:
+        values: Shape (n, streams, columns).
+        course: Whose rows.
+        noise: Scales and memory.
+    """
+    decay, spread = _filter(course, noise)
+    result = values * spread[:, None, None] * noise.scale[None, :, None]
+    for row in np.flatnonzero(decay):
+        result[row] += decay[row] * result[row - 1]
+    return result
+
+
+def _filter(course: Course, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
+    """Return how much of the reading before each row keeps [1], and its innovation over the scale [1], shape (n,)."""
+    inside = course.step[~course.first]
+    median = float(np.median(inside)) if len(inside) else 1.0
+    decay = noise.memory ** np.clip(course.step / max(median, 1e-9), 0.0, 50.0)
+    decay = np.where(course.first, 0.0, decay)
+    spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
+    return decay, spread / np.sqrt(np.minimum(course.averaged, 4.0))
 
 
 def summed(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from tacdata.discrepancy.streams import Streams
 
 MODEL = 0.003
 """What any response is off at least, in each stream of an episode, as a standard deviation of its rise [1]."""
+DRAWS = 2
+"""Draws of noise by which it is told what two models say differently of noise alone [1]."""
 ROUNDS = 3
 """How often errors of pose and of gain are told beside each other [1]."""
 
@@ -51,6 +53,9 @@ class Frame:
     """Takes nuisances out of columns, beside the model as it was given."""
     odd: np.ndarray
     """Episodes that err by far more than the others, shape (k,), int64."""
+    draws: np.ndarray
+    """Noise as the noise model says it, drawn [each stream's unit], shape (m, streams, draws)."""
+    _shaken: dict[str, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def of(
@@ -59,11 +64,13 @@ class Frame:
         odd: np.ndarray | None = None,
     ) -> Frame:  # fmt: skip
         """Return a frame of the rows read, with what follows from its parts."""
+        white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), DRAWS))
         nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
         return cls(
             context, features, errors, ridge, beside, nuisances, evidence.summed(nuisances, reduced).gram, noise, folds,
             known or Cleaner(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
+            evidence.coloured(white, reduced, noise),
         )  # fmt: skip
 
     def cleaner(self, course: Course, features: np.ndarray | None) -> Cleaner:
@@ -72,6 +79,14 @@ class Frame:
         if features is before or (features is not None and before is not None and np.array_equal(features, before)):
             return self.known
         return Cleaner(course.reduced, self.noise, self.context, features, self.errors)
+
+    def shaken(self, cleaner: Cleaner) -> np.ndarray:
+        """Return what a cleaner leaves of the draws [noise scales], shape (m, streams, draws), float32."""
+        if cleaner is not self.known:
+            return cleaner.cleaned(self.draws)
+        if "known" not in self._shaken:
+            self._shaken["known"] = cleaner.cleaned(self.draws)
+        return self._shaken["known"]
 
 
 def frame(setting: Setting) -> Frame:

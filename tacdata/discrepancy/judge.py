@@ -86,7 +86,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         best, _ = _race(now, current, chosen, verdicts.lent)
         if best is None:
             break
-        more = float((current.energy - best.energy).sum())
+        more = current.loss - best.loss
         if members and more < MINOR * off:
             break
         off += more * float(np.mean([p.effect.form_error**2 for p in best.placed[len(members) :]]))
@@ -101,7 +101,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     if until != "decide":
         bare = [Member(p, *_errors(current, k), (), {}, 0.0) for k, p in enumerate(current.placed)]
         return Judgement(
-            gap, tested, tuple(bare), Left(0.0, 0.0), float((nothing.energy - current.energy).sum()),
+            gap, tested, tuple(bare), Left(0.0, 0.0), nothing.loss - current.loss,
             (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), until,
         )  # fmt: skip
     note("rivals and leftovers")
@@ -120,7 +120,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         now = prepare(replace(setting, response=current.response), same, current.placed)
     left = leftovers(now)
     return Judgement(
-        gap, tested, tuple(found), left, float((nothing.energy - current.energy).sum()),
+        gap, tested, tuple(found), left, nothing.loss - current.loss,
         (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now),
     )  # fmt: skip
 
@@ -301,7 +301,7 @@ def _member(
             and ahead(other, without, lent) > need
         ):
             better = other
-        losses[name] = float((other.energy - current.energy).sum())
+        losses[name] = other.loss - current.loss
         richer = len(other.tangent.knobs) > len(current.tangent.knobs)
         if margins[name] < level and not (richer and _cost(other) > _cost(current) + SIMPLER):
             rivals.append(best[name].called)
@@ -334,7 +334,7 @@ def _selected(
 
 def _cost(model: Refined) -> float:
     """Return half the whitened energy, every episode's say bounded below, with half a log of episodes a number."""
-    return float(model.energy.sum()) + 0.5 * len(model.tangent.knobs) * float(np.log(max(len(model.energy), 2)))
+    return model.loss + 0.5 * len(model.tangent.knobs) * float(np.log(max(len(model.energy), 2)))
 
 
 def _errors(current: Refined, at: int) -> tuple[dict[str, float], tuple[str, ...]]:

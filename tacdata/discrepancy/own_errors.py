@@ -58,6 +58,11 @@ class Factored:
         if self._free is not None:
             self._free.factor()
 
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the features, all streams together [1]."""
+        return 0.0 if self._free is None else self._free.freedom
+
     def without(self, columns: np.ndarray) -> np.ndarray:
         """Return columns as generalized least squares sees them.
 
@@ -168,6 +173,7 @@ class _Free:
         mean = np.einsum("spp->s", self._blocks) / width
         floor = LEAST * np.maximum(mean, 1e-12)[:, None, None] * np.eye(width)
         self._inverse = np.linalg.inv(self._blocks + floor)
+        self.freedom = float(np.einsum("sij,sji->", self._inverse, self._blocks))
         joint = np.concatenate(self._joints, axis=2)
         self._through = self._inverse @ joint
         self._joint = joint.reshape(streams * width, -1)

@@ -5,6 +5,11 @@ difference of both is added as one more column; if the better one is right, its 
 much as the models differ in it, so that an effect that few presses excite is seen as well as one that all do. (Means
 of differences of energy over episodes are blind to that: of 48 episodes 5 cannot reach 2.4 standard errors by them,
 however clear they are.)
+
+Where a response is fitted, models that move the pose, or remember, have it take up different functions, and differ in
+noise alone: by V = |(P2 - P1) n|^2 for projections P1 and P2, told by draws of noise. That is taken off: by chance the
+pull has mean (V + f1 - f2) / 2 for the responses' degrees of freedom f, and the variance |d|^2 - V/2 (d: the difference;
+a quadratic form in normal variables).
 """
 
 from __future__ import annotations
@@ -71,9 +76,9 @@ def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: O
         lent: What candidates say of how much scores scatter, for those that follow the clock (True) and others.
         off: What the second's equations may be off about: only what that does not explain counts against it.
     """
-    if first.energy.sum() > second.energy.sum():
+    if first.loss > second.loss:
         return -ahead(second, first, lent)
-    apart, loss = second.left - first.left, float((second.energy - first.energy).sum())
+    apart, loss = second.left - first.left, second.loss - first.loss
     if off is None:
         gram = np.zeros((len(first.energy), 2, 2))
         for i, values in ((0, second.left), (1, apart)):
@@ -88,7 +93,30 @@ def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: O
     told = clustered(gram, np.zeros(1, dtype=np.int64), clock)
     # Two models that are equally wrong pull towards each other: the better one must explain more, too.
     most = float(np.sqrt(2 * loss / max(told.power / told.expected, 1.0)))
-    return min(max(told.score(lent.get(clock)), 0.0), most)
+    return min(max(told.score(lent.get(clock)), 0.0) * _sound(gram, _noise(first, second), first.freedom - second.freedom), most)
+
+
+def _noise(first: Refined, second: Refined) -> float:
+    """Return what two models say differently of noise alone, squared and summed [noise scales squared]."""
+    if first.shaken is second.shaken:
+        return 0.0
+    return float(np.square(second.shaken - first.shaken).sum()) / first.shaken.shape[2]
+
+
+def _sound(gram: np.ndarray, noise: float, freer: float) -> float:
+    """Return the share of a score that is left when what noise alone makes is taken off [1].
+
+    Args:
+        gram: Products of the second's residual and of the difference, shape (episodes, 2, 2).
+        noise: Their difference in noise alone, squared and summed [noise scales squared].
+        freer: By how many degrees of freedom the first is freer [1].
+    """
+    pull, apart = float(gram[:, 0, 1].sum()), float(gram[:, 1, 1].sum())
+    noise = min(noise, apart)
+    if pull <= 0.0:
+        return 1.0
+    sound = max(pull - 0.5 * (noise + freer), 0.0) / pull
+    return sound * float(np.sqrt(apart / (apart - 0.5 * noise)))
 
 
 def _differ(first: Refined, second: Refined) -> list[bool]:

@@ -40,6 +40,15 @@ class Refined:
     """Whitened residual without nuisances [noise scales], shape (m, streams), float32."""
     episode: np.ndarray
     """Of each of its rows, shape (m,), int64."""
+    shaken: np.ndarray
+    """What it leaves of the frame's draws of noise [noise scales], shape (m, streams, draws), float32."""
+    freedom: float
+    """Degrees of freedom that its response takes up [1]; another response has others where effects move the pose."""
+
+    @property
+    def loss(self) -> float:
+        """Half the whitened energy, with what the response takes of the noise [nats]: models are compared by it."""
+        return float(self.energy.sum()) + 0.5 * self.freedom
 
 
 def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int = STEPS) -> Refined:
@@ -78,8 +87,9 @@ def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int 
         if gained < SMALL:
             break
     return Refined(
-        tuple(now), response, state.tangent, view.energy, state.covariance, view.left, setting.course.reduced.episode
-    )
+        tuple(now), response, state.tangent, view.energy, state.covariance, view.left, setting.course.reduced.episode,
+        frame.shaken(view.cleaner), view.cleaner.freedom,
+    )  # fmt: skip
 
 
 def _own(response: Response) -> Response:

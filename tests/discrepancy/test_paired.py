@@ -19,11 +19,16 @@ class Nothing:
         return None
 
 
+UNSHAKEN = np.zeros((EPISODES * ROWS, 1, 2))
+
+
 def model(left, *names):
     episode = np.repeat(np.arange(EPISODES), ROWS)
     energy = 0.5 * np.bincount(episode, np.square(left).sum(axis=1))
     placed = tuple(SimpleNamespace(effect=load(name)) for name in names)
-    return SimpleNamespace(left=left, episode=episode, energy=energy, placed=placed)
+    return SimpleNamespace(
+        left=left, episode=episode, energy=energy, placed=placed, loss=energy.sum(), freedom=0.0, shaken=UNSHAKEN
+    )
 
 
 def signal(size, episodes, rng):
