@@ -8,8 +8,8 @@ however clear they are.)
 
 Where a response is fitted, models that move the pose, or remember, have it take up different functions, and differ in
 noise alone: by V = |(P2 - P1) n|^2 for projections P1 and P2, told by draws of noise. That is taken off: by chance the
-pull has mean (V + f1 - f2) / 2 for the responses' degrees of freedom f, and the variance |d|^2 - V/2 (d: the difference;
-a quadratic form in normal variables).
+pull has mean (V + f1 - f2) / 2 for the responses' degrees of freedom f, and the variance |d|^2 - V/2, d being the
+difference (a quadratic form in normal variables).
 """
 
 from __future__ import annotations
@@ -93,7 +93,10 @@ def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: O
     told = clustered(gram, np.zeros(1, dtype=np.int64), clock)
     # Two models that are equally wrong pull towards each other: the better one must explain more, too.
     most = float(np.sqrt(2 * loss / max(told.power / told.expected, 1.0)))
-    return min(max(told.score(lent.get(clock)), 0.0) * _sound(gram, _noise(first, second), first.freedom - second.freedom), most)
+    return min(
+        max(told.score(lent.get(clock)), 0.0) * _sound(gram, _noise(first, second), first.freedom - second.freedom),
+        most,
+    )
 
 
 def _noise(first: Refined, second: Refined) -> float:

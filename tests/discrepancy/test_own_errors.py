@@ -74,3 +74,19 @@ def test_products_are_those_of_generalized_least_squares(prior, features):
     )  # fmt: skip
     left = Factored(spans, own).without(given["columns"].astype(np.float32)).reshape(-1, WIDTH)
     assert left.T @ left == pytest.approx(expected, rel=2e-4, abs=2e-4 * np.abs(expected).max())
+
+
+def test_freedom_is_what_features_take_of_noise():
+    rng = np.random.default_rng(4)
+    given, edges = made(rng), np.cumsum((0, *LENGTHS))
+    spans, count = [np.arange(a, b) for a, b in pairwise(edges)], sum(LENGTHS)
+    twice = np.concatenate([given["features"], given["features"][:, :, :1]], axis=2).astype(np.float32)
+    offset, free = given["offset"].astype(np.float32), np.full(len(spans), np.inf)
+    white = rng.normal(size=(STREAMS, count, 4000)).astype(np.float32)
+    without = Factored(spans, Own(offset, free))
+    beside = Factored(spans, Own(offset, free, features=twice))
+    taken = np.square(without.without(white)).sum(axis=(0, 1)) - np.square(beside.without(white)).sum(axis=(0, 1))
+    assert without.freedom == 0.0
+    # What is there twice takes no more than once.
+    assert beside.freedom == pytest.approx(STREAMS * FEATURES, abs=0.01)
+    assert taken.mean() == pytest.approx(beside.freedom, abs=0.3)

@@ -97,3 +97,28 @@ def test_what_an_equation_may_be_off_about_is_nothing_against_it():
     assert against(signal(30.0, np.arange(48), rng)) == pytest.approx(bare, abs=0.4), "off about another thing"
     assert against(3 * true) < 1.0, "it may be off by three times what it is"
     assert 0.3 * bare < against(0.1 * true) < 0.95 * bare, "it may be off by a tenth of what it is"
+
+
+def test_responses_that_follow_noise_differently_are_level():
+    """Two models that lack nothing, whose responses take up other functions, and one of them more of them."""
+    rows, freer = EPISODES * ROWS, 60
+    rng = np.random.default_rng(7)
+    common = rng.normal(size=(rows, 100))
+    designs = [np.hstack([common, rng.normal(size=(rows, width))]) for width in (40, 40 + freer)]
+    bases = [np.linalg.qr(design)[0] for design in designs]
+    draws, told = rng.normal(size=(rows, 2)), []
+
+    def fitted_by(basis, values, name):
+        left = values - basis @ (basis.T @ values)
+        made = model(left, name)
+        made.shaken = (draws - basis @ (basis.T @ draws))[:, None, :]
+        made.freedom = float(basis.shape[1])
+        made.loss = made.energy.sum() + 0.5 * made.freedom
+        return made
+
+    for _ in range(200):
+        noise = rng.normal(size=(rows, 1))
+        told.append(ahead(fitted_by(bases[0], noise, "backlash"), fitted_by(bases[1], noise, "creep"), Nothing()))
+    assert abs(np.mean(told)) < 0.25, "neither is ahead on average"
+    assert np.mean(np.abs(told) > 2.33) < 0.05
+    assert np.std(told) > 0.5, "they are compared, though"
