@@ -8,8 +8,7 @@ from __future__ import annotations
 import numpy as np
 import warp as wp  # noqa: TID253 - kernels; imported when a history is run, never with an effect
 
-wp.config.log_level = wp.LOG_ERROR
-wp.init()
+import tacdata.warp_runtime  # noqa: F401 - starts Warp
 
 
 @wp.kernel(module="unique", enable_backward=False)

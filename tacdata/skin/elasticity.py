@@ -14,14 +14,12 @@ import numpy as np
 import torch
 import warp as wp
 
+import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.skin.averaged_volume import AveragedVolume
 from tacdata.skin.conditions import Conditions
 from tacdata.skin.element_functions import element_functions
 from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
-
-wp.config.log_level = wp.LOG_ERROR
-wp.init()
 
 REAL = {torch.float32: wp.float32, torch.float64: wp.float64}
 """Warp's name of a scalar type."""
