@@ -2,14 +2,15 @@
 
     python benchmarks/discrepancy_confidence.py FOLDER [--write]
 
-FOLDER holds JSON files of development seeds with ``verdict`` (as `tacdata discrepancy` writes it) and ``truth`` (an
-object by mechanisms that were hidden, or one that holds it as ``effects``). Every effect that a verdict names counts
-once. With ``--write`` the map goes into tacdata/discrepancy/confidence.json; without, only how well it does is printed:
-Brier score and calibration error, each world judged by a map fitted without it.
+FOLDER holds JSON files of development seeds with ``verdict`` (as `tacdata discrepancy` writes it), ``truth`` (an object
+by mechanisms that were hidden, or one that holds it as ``effects``) and, for the record, ``engine`` and ``block``. Every
+effect that a verdict names counts once. With ``--write`` the map goes into tacdata/discrepancy/confidence.json; without,
+only how well it does is printed: Brier score and calibration error, each world judged by a map fitted without it.
 """
 
 import json
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,12 @@ def names(folder):
     return rows, right
 
 
+def counted(folder, key):
+    """Return how many files say what of a key."""
+    told = (json.loads(path.read_text()).get(key) for path in sorted(folder.glob("*.json")))
+    return dict(sorted(Counter(value for value in told if value).items()))
+
+
 def said(given, row):
     """Return the probability that a map gives."""
     score = given["intercept"] + sum(weight * row[name] for name, weight in given["weights"].items())
@@ -60,7 +67,10 @@ def main(folder, write):
     brier = np.mean((told - truth) ** 2)
     print(f"left out: Brier {brier:.3f} (constant {truth.var():.3f}), calibration error {error:.3f}")
     if write:
-        given = {**fit(rows, right), "command": "python benchmarks/discrepancy_confidence.py FOLDER --write"}
+        given = {
+            **fit(rows, right), "command": "python benchmarks/discrepancy_confidence.py FOLDER --write",
+            "worlds": counted(folder, "block"), "engines": counted(folder, "engine"),
+        }  # fmt: skip
         target = Path(__file__).parents[1] / "tacdata" / "discrepancy" / FILE
         target.write_text(json.dumps(given, indent=1) + "\n")
         print(f"written: {target}")

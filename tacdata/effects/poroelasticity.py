@@ -36,7 +36,7 @@ class Poroelasticity(Effect):
         "two indenters at the same depth over radius: the time grows with the contact radius squared, that of "
         "relaxation does not"
     )
-    odds = 0.1  # silicone is a dry rubber, which relaxes; fluid moves in gels, foams and wet covers
+    odds = 0.04  # silicone is a dry rubber, which relaxes; fluid moves in gels, foams and wet covers
     parameters = (
         Parameter("f", "1", "relaxed share", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time at the median radius", 10.0, 0.5, 500.0, grid=(1.0, 4.0, 16.0, 60.0)),
