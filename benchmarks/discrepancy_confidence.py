@@ -27,7 +27,7 @@ def names(folder):
     rows, right = [], []
     for path in sorted(folder.glob("*.json")):
         given = json.loads(path.read_text())
-        truth = given["truth"].get("effects", given["truth"])
+        truth = given["truth"]
         for effect in given["verdict"]["effects"]:
             if (
                 effect["status"] == "named"

@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 from scoring import curves, gathered, tables
+from scoring.outcome import accepted
 
 
 def main(out, label, beside, dump):
@@ -24,8 +25,11 @@ def main(out, label, beside, dump):
         for r in rows:
             answer = json.loads((out / "verdicts" / label / f"{r['id']}.json").read_text())
             truth = json.loads((out / "truth" / f"{r['id']}.json").read_text())
-            both = {"verdict": answer["verdict"], "truth": truth, "block": r["block"], "outcome": r["outcome"]}
-            (dump / f"{r['id']}.json").write_text(json.dumps({**both, "engine": answer["engine"]}))
+            if answer["verdict"] is None:
+                continue
+            right = sorted(set().union(*(accepted(name) for name in truth["effects"])))
+            both = {"verdict": answer["verdict"], "truth": right, "block": r["block"], "outcome": r["outcome"]}
+            (dump / f"{r['id']}.json").write_text(json.dumps({**both, "engine": answer["engine"]["commit"]}))
     print(text, end="")
 
 
@@ -34,6 +38,7 @@ if __name__ == "__main__":
     parser.add_argument("out", type=Path)
     parser.add_argument("--label", default="workflow")
     parser.add_argument("--beside", nargs="*", default=[], help="other labels: baselines, ablations")
-    parser.add_argument("--dump", type=Path, default=None, help="also write each verdict with its truth to this folder")
+    help_dump = "also write each verdict with the names that were right to this folder"
+    parser.add_argument("--dump", type=Path, default=None, help=help_dump)
     chosen = parser.parse_args()
     main(chosen.out, chosen.label, chosen.beside, chosen.dump)
