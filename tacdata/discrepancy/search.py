@@ -18,6 +18,8 @@ from tacdata.discrepancy.problem import Problem
 from tacdata.effects import Effect
 
 FLIPS = 999
+SHOWS = 2.0
+"""A candidate beyond so many standard errors may be there: others lend beside it [1]."""
 NUMERICS = 0.0002
 """What has no memory and explains less, over what presses add to readings, may be rounding of any table [1]..."""
 SPLINES = 0.0005
@@ -53,8 +55,17 @@ def test(problem: Problem, seed: int = 0) -> Tested:
     normal = np.random.default_rng([seed, 13]).normal(size=(FLIPS, len(gram)))
     scores = [clustered(gram, c.columns, follows_clock(c.effect)) for c in problem.candidates]
     clock = [follows_clock(c.effect) for c in problem.candidates]
-    kinds = {kind: lent(_by_effect(problem, scores, clock, kind)) for kind in (False, True)}
+    kinds = _lent(problem, scores, clock, "")
     z = np.array([s.score(kinds[own]) for s, own in zip(scores, clock, strict=True)])
+    if z.max(initial=0.0) > SHOWS:
+        # What is there makes the scores of all that look a little like it scatter: they lend beside it.
+        best = problem.candidates[int(np.argmax(z))]
+        beside = np.concatenate([problem.fixed, best.columns]).astype(int)
+        without = np.concatenate([problem.fixed_ridge(0.0), np.zeros(len(best.columns))])
+        rest = eliminated(problem.evidence.gram, beside, without)
+        others = [clustered(rest, c.columns, own) for c, own in zip(problem.candidates, clock, strict=True)]
+        kinds = _lent(problem, others, clock, best.called)
+        z = np.array([s.score(kinds[own]) for s, own in zip(scores, clock, strict=True)])
     # The same numbers for all, so that candidates that look alike do so by chance as well.
     chance = np.stack([s.by_chance(normal) for s in scores], axis=1) if scores else np.zeros((FLIPS, 1))
     top = chance.max(axis=1)
@@ -64,14 +75,13 @@ def test(problem: Problem, seed: int = 0) -> Tested:
     return Tested(z, p, gain, _test_generic(problem, gram, seed, top), kinds)
 
 
-def _by_effect(
-    problem: Problem, scores: list[Clustered], clock: list[bool], kind: bool
-) -> dict[str, list[Clustered]]:  # fmt: skip
-    result: dict[str, list[Clustered]] = {}
+def _lent(problem: Problem, scores: list[Clustered], clock: list[bool], but: str) -> dict[bool, Lent | None]:
+    """Return what effects that follow the clock (True), and others, lend each other; one mechanism does not."""
+    told: dict[bool, dict[str, list[Clustered]]] = {False: {}, True: {}}
     for candidate, score, own in zip(problem.candidates, scores, clock, strict=True):
-        if own == kind:
-            result.setdefault(candidate.effect.name, []).append(score)
-    return result
+        if candidate.called != but:
+            told[own].setdefault(candidate.effect.name, []).append(score)
+    return {kind: lent(effects) for kind, effects in told.items()}
 
 
 def _numerics(problem: Problem, gram: np.ndarray, candidate: Candidate) -> bool:
