@@ -14,7 +14,7 @@ from tacdata.skin.pivot_kernel import ROWS, invert_in_place
 from tacdata.skin.sweep_kernels import sweep_kernels
 
 _STRIP = 256
-"""Columns that are brought up to date by one product: the wider, the more of them are above the diagonal, for nothing."""
+"""Columns that are brought up to date by one product: the wider, the more are above the diagonal, for nothing."""
 
 
 def inverse(matrices: torch.Tensor) -> torch.Tensor:
@@ -28,7 +28,10 @@ def inverse(matrices: torch.Tensor) -> torch.Tensor:
     return whole
 
 
-def inverse_of_sum(first: torch.Tensor, second: torch.Tensor, row: torch.Tensor, whole: torch.Tensor) -> None:
+def inverse_of_sum(
+    first: torch.Tensor, second: torch.Tensor, row: torch.Tensor, whole: torch.Tensor, lead: int | None = None,
+    reach: int = 0,
+) -> None:
     """Compute (first^-1 + second)^-1 in double precision, of symmetric positive definite matrices.
 
     Args:
@@ -36,24 +39,34 @@ def inverse_of_sum(first: torch.Tensor, second: torch.Tensor, row: torch.Tensor,
         second: The same.
         row: Where in ``whole`` each goes, shape (g,), int64.
         whole: Receives the results, shape (b, m or more, same); rows and columns beyond m are left as they are.
+        lead: So many rows of ``first`` may be coupled in any way; None: all.
+        reach: Its rows that follow are coupled only with others less far from them than this.
     """
     count, rows, _ = first.shape
     a = _room(count, rows, torch.float64, first.device)
     total = torch.empty_like(a)
     _launch("widen", a, first, tuple(a.shape), first, rows, a)
-    _sweep(a)
+    _sweep(a, lead, reach)
     _launch("unfold_onto", a, second, tuple(a.shape), a, second, rows, total)
     _sweep(total)
     _launch("unfold", total, whole, tuple(first.shape), total, row, whole)
 
 
-def _sweep(a: torch.Tensor) -> None:
-    """Make the lower triangles of matrices, shape (b, s, s), those of their negative inverses."""
-    count, size, _ = a.shape
-    column = torch.empty(count, size, ROWS, dtype=a.dtype, device=a.device)
-    pivot = torch.empty(count, ROWS, ROWS, dtype=a.dtype, device=a.device)
-    for start in range(0, size, ROWS):
-        end = start + ROWS
+def _sweep(whole: torch.Tensor, lead: int | None = None, reach: int = 0) -> None:
+    """Make the lower triangles of matrices, shape (b, s, s), those of their negative inverses.
+
+    ``lead`` and ``reach``: see `inverse_of_sum`; what is not coupled is not looked at.
+    """
+    count, whole_size, _ = whole.shape
+    lead, aside = whole_size if lead is None else lead, _blocks(reach)
+    pivot = torch.empty(count, ROWS, ROWS, dtype=whole.dtype, device=whole.device)
+    for here in range(0, whole_size, ROWS):
+        low, high = max(here - aside, 0), min(here + ROWS + aside, whole_size)
+        if here < lead:
+            low, high = 0, min(max(high, _blocks(lead + reach)), whole_size)
+        a = whole[:, low:high, low:high]
+        size, start, end = a.shape[1], here - low, here - low + ROWS
+        column = torch.empty(count, size, ROWS, dtype=a.dtype, device=a.device)
         _launch("take", a, a, tuple(column.shape), a, start, end, column, pivot)
         _invert(pivot)
         swept = column @ pivot
@@ -74,8 +87,11 @@ def _invert(pivot: torch.Tensor) -> None:
 
 
 def _room(count: int, rows: int, dtype: torch.dtype, device: torch.device) -> torch.Tensor:
-    size = -(-rows // ROWS) * ROWS
-    return torch.empty(count, size, size, dtype=dtype, device=device)
+    return torch.empty(count, _blocks(rows), _blocks(rows), dtype=dtype, device=device)
+
+
+def _blocks(rows: int) -> int:
+    return -(-rows // ROWS) * ROWS
 
 
 def _launch(name: str, kept: torch.Tensor, other: torch.Tensor, dim: tuple[int, ...], *values: object) -> None:

@@ -3,7 +3,8 @@
 # pyright: reportAssignmentType=false
 """Kernels of `tacdata.skin.card_gradients`: what conjugate gradients do to fields, each field read and written once.
 
-Fields are (3n, batch); ``order`` says for which degree of freedom each row of the rest state's inverse stands. A thread does `STRIP` rows of one member, so that its sums go to memory once.
+Fields are (3n, batch); ``order`` says for which degree of freedom each row of the rest state's inverse stands.
+A thread does `STRIP` rows of one member, so that its sums go to memory once.
 """
 
 import warp as wp
@@ -85,7 +86,7 @@ def advance(
     going: wp.array(dtype=wp.int32), first: wp.array(dtype=wp.int32), order: wp.array(dtype=wp.int32),
     scale: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
 ):
-    """X += alpha p, r -= alpha q, h = r scaled; where the tangent is indefinite at first, x = p."""
+    """Let x += alpha p, r -= alpha q, h = r scaled; where the tangent is indefinite at first, x = p."""
     k, b = wp.tid()
     if going[b] == 1:
         n = order[k]

@@ -17,13 +17,18 @@ from tacdata.skin.batched_inverse import inverse_of_sum
 class Transfer(Protocol):
     """The prepared operator, one for each member; a member that was never put answers nothing."""
 
-    def put(self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor) -> None:
+    def put(
+        self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor, lead: int | None = None,
+        reach: int = 0,
+    ) -> None:
         """Prepare (I + S G)^-1 S of some members anew.
 
         Args:
             member: Their columns, shape (g,), int64.
             stiffness: S [N/mm], symmetric, positive semidefinite, shape (g, m, m), float32.
             compliance: G [mm/N], symmetric, positive definite, shape (g, m, m), float32.
+            lead: So many rows that S may couple with each other in any way; None: all.
+            reach: Rows that follow are coupled only with others less far from them than this.
         """
         ...
 
@@ -47,7 +52,10 @@ class FactoredTransfer:
         """Prepare for so many members."""
         self._parts: list[tuple[sp.csr_matrix, tuple] | None] = [None] * batch
 
-    def put(self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor) -> None:
+    def put(
+        self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor, lead: int | None = None,
+        reach: int = 0,
+    ) -> None:
         """Factorize, as `Transfer`."""
         for column, s, g in zip(
             member.tolist(), stiffness.double().numpy(), compliance.double().numpy(), strict=True
@@ -91,7 +99,10 @@ class DenseTransfer:
         self.matrix = torch.zeros(batch, 0, 0, dtype=torch.float32, device=device)
         """The operator of every member, shape (b, m, m), zero beyond a member's own rows."""
 
-    def put(self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor) -> None:
+    def put(
+        self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor, lead: int | None = None,
+        reach: int = 0,
+    ) -> None:
         """Invert, as `Transfer`."""
         size = stiffness.shape[1]
         self.matrix = self.matrix.to(stiffness.dtype)
@@ -101,7 +112,7 @@ class DenseTransfer:
         self.matrix[member] = 0.0
         held = stiffness.clone()
         held.diagonal(dim1=1, dim2=2).add_(self._FAINT / compliance.diagonal(dim1=1, dim2=2))
-        inverse_of_sum(held, compliance, member, self.matrix)
+        inverse_of_sum(held, compliance, member, self.matrix, lead, reach)
 
     def times(self, displacement: torch.Tensor) -> torch.Tensor:
         """Return the forces, as `Transfer`."""

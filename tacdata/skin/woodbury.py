@@ -13,6 +13,7 @@ from typing import Any
 import torch
 
 from tacdata.skin.contact import Contact
+from tacdata.skin.patches import coupling
 from tacdata.skin.rest import RestSolver
 from tacdata.skin.transfer import contact_transfer
 
@@ -77,6 +78,7 @@ class ContactPreconditioner:
         axes = torch.arange(3, device=device)
         self._numbers = [number[(3 * c.faces.long()[:, :, None] + axes).reshape(-1, 18)] for c in contacts]
         """Number among the loadable of each face's degrees of freedom, shape (f, 18)."""
+        self._first, self._reach = coupling([numbers.cpu().numpy() for numbers in self._numbers], count)
         self._scale = torch.empty(0)
         self._transfer = contact_transfer(0, "cpu")
         self._which = torch.empty(0, 0, dtype=torch.int64, device=device)
@@ -101,13 +103,15 @@ class ContactPreconditioner:
         touched[:, count] = False
         members = stale.nonzero()[:, 0]
         counts, order = touched[members].sum(dim=1).sort()
-        sizes, members = counts.cpu().tolist(), members[order]
+        members = members[order]
+        leads = touched[members, : self._first].sum(dim=1)
+        sizes, leads = torch.stack([counts, leads]).tolist()
         self._widen(sizes[-1])
         for start in range(0, len(sizes), _GROUP):
             member = members[start : start + _GROUP]
             most = sizes[min(start + _GROUP, len(sizes)) - 1]
             self._which[member] = count
-            self._prepare(member, most, touched[member], pairs)
+            self._prepare(member, most, max(leads[start : start + _GROUP]), touched[member], pairs)
 
     def _stale(self, stiffness: list[torch.Tensor], batch: int) -> torch.Tensor:
         """Return which members' share no longer fits, shape (b,), and remember what they are prepared from now."""
@@ -134,9 +138,11 @@ class ContactPreconditioner:
             self._which = torch.nn.functional.pad(self._which, (0, more), value=len(self._dof) - 1)
 
     def _prepare(
-        self, member: torch.Tensor, most: int, touched: torch.Tensor, pairs: list[tuple[torch.Tensor, ...]]
+        self, member: torch.Tensor, most: int, lead: int, touched: torch.Tensor,
+        pairs: list[tuple[torch.Tensor, ...]],
     ) -> None:
-        """Prepare members that touch at most ``most`` degrees of freedom; ``touched``: shape (g, count + 1)."""
+        """Prepare members that touch at most ``most`` degrees of freedom, ``lead`` of them among the `_first`;
+        ``touched``: shape (g, count + 1)."""
         count, device, size = len(self._dof) - 1, member.device, len(member)
         # Each member's own slots: its touched degrees of freedom in order; one spare slot takes what belongs to none.
         slot = torch.where(touched, torch.cumsum(touched, dim=1) - 1, most)
@@ -159,7 +165,8 @@ class ContactPreconditioner:
         # A slot that stands for nothing must not make the compliance singular.
         compliance.diagonal(dim1=1, dim2=2).add_((which == count).to(torch.float32))
         self._which[member, :most] = which
-        self._transfer.put(member, stiffness[:, :most, :most].contiguous(), compliance)
+        whole = stiffness[:, :most, :most].contiguous()
+        self._transfer.put(member, whole, compliance, lead, self._reach)
 
     def share(self) -> Share:
         """Return what `update` prepared, on a card."""
