@@ -6,6 +6,8 @@ leave the batch once enough of them are, so that the others do not pay for them.
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 import warp as wp
 
@@ -138,11 +140,11 @@ class CardGradients:
         rest = self._preconditioner.rest
         self._launch(kernels.turn, tuple(w.shape), w, rest.order, rest.scale, now.softness, now.size, now.beta, now.p)
 
-    def _sum(self, kernel: wp.Kernel, now: Lane, *inputs: torch.Tensor) -> None:
+    def _sum(self, kernel: Any, now: Lane, *inputs: torch.Tensor) -> None:
         rows = len(self._preconditioner.rest.order)
         self._launch(kernel, (-(-rows // int(kernels.STRIP)), now.width), *inputs)
 
-    def _launch(self, kernel: wp.Kernel, dim: tuple[int, ...] | int, *inputs: object) -> None:
+    def _launch(self, kernel: Any, dim: tuple[int, ...] | int, *inputs: object) -> None:
         device = str(self._preconditioner.rest.order.device)
         wp.launch(kernel, dim=dim, inputs=[*map(handed, inputs)], device=device)
 

@@ -1,5 +1,6 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportGeneralTypeIssues=false
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Many small symmetric positive definite matrices inverted at once on a card, each by one block of threads.
 
 A matrix stays in the registers of its block's 256 threads, eight rows by eight columns each; by sweeps (Goodnight 1979,

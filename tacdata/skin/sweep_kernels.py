@@ -1,5 +1,6 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportGeneralTypeIssues=false
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Kernels of `tacdata.skin.batched_inverse`, which keeps of symmetric matrices the lower triangle alone."""
 
 from functools import cache

@@ -15,7 +15,7 @@ import torch
 from tacdata.skin.contact import Contact
 from tacdata.skin.patches import coupling
 from tacdata.skin.rest import RestSolver
-from tacdata.skin.transfer import contact_transfer
+from tacdata.skin.transfer import DenseTransfer, contact_transfer
 
 _GROUP = 128
 """Members whose small systems are padded to one size: those of similar size go together."""
@@ -170,6 +170,8 @@ class ContactPreconditioner:
 
     def share(self) -> Share:
         """Return what `update` prepared, on a card."""
+        if not isinstance(self._transfer, DenseTransfer):
+            raise TypeError("the CPU's shares are factors, not tensors")
         own = (self._which < len(self._dof) - 1).sum(dim=1).to(torch.int32)
         return Share(self._scale, self._which, own, self._transfer.matrix)
 
