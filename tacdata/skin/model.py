@@ -47,7 +47,6 @@ _TIP = 0.4
 """Height of a protrusion's tip region, over its radius, that the preconditioner knows as possible contact [1]. Contact
 beyond costs iterations, not accuracy."""
 
-
 _FIRST = 0.3
 """Longest first load step over the smallest radius of curvature of the shape [1]."""
 
@@ -134,11 +133,7 @@ class SkinModel:
             bumps = np.unique(self.mesh.protrusions)
             tips = bumps[self.mesh.nodes[bumps, 2] < (_TIP - 1) * self.sensor.skin.protrusion_radius]
             dofs = np.concatenate([dofs, 3 * tips[~self._fixed[tips]] + 2])
-        dofs = np.unique(dofs)
-        # The card's contact shares are the cheaper the nearer coupled ones stand; the CPU's are sparse anyway.
-        if self.device == "cpu":
-            return dofs
-        return in_order(dofs, self.mesh.outer, self.mesh.protrusions, len(self.mesh.nodes))
+        return np.unique(dofs) if self.device == "cpu" else in_order(np.unique(dofs), self.mesh)
 
     @cached_property
     def _rest(self) -> RestSolver:
@@ -192,18 +187,13 @@ class SkinModel:
             request.depths, self.settings.step, f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm",
             _FIRST * request.indenter.sharpest, _LIFT * adhesion.range if adhesion else math.inf,
         )
-        own = self._skin.pressed_by(request.indenter)
-        return Press(number, walk, touch(self.sensor, self._face, request), rotation(request), own)
+        place, own = touch(self.sensor, self._face, request), self._skin.pressed_by(request.indenter)
+        return Press(number, walk, place, rotation(request), own)
 
     @cached_property
     def _skin(self) -> Conditions:
         """The skin of one member, under nothing."""
         return conditions(self.sensor.material, self.sensor.contact.friction, device=self.device)
-
-    def _steps(self, request: PressRequest) -> float:
-        """Return about how many load steps a press takes."""
-        ways = np.abs(np.diff(request.depths, prepend=0.0))
-        return float(np.ceil(ways / self.settings.step).sum())
 
     @property
     def _solver(self) -> SolverSettings:
@@ -221,8 +211,7 @@ class SkinModel:
         size, modulus = 3 * len(self.mesh.nodes), self.sensor.material.youngs_modulus
         preconditioner = ContactPreconditioner(self._rest, contacts, loadable, size, modulus)
         newton = Newton(self._body, contacts, fixed, preconditioner, self._solver)
-        idle = self._skin.pressed_by(request.indenter)
-        floor = -self.sensor.skin.protrusion_tip
+        idle, floor = self._skin.pressed_by(request.indenter), -self.sensor.skin.protrusion_tip
         return Batch(newton, idle, len(self.mesh.nodes), capacity, floor), contacts
 
     def walk(
@@ -238,7 +227,7 @@ class SkinModel:
         Yields:
             The press's index, the depth [mm] and the state, as found; or, in its place, why the press was given up.
         """
-        possible: list[tuple[int, PressRequest]] = []
+        possible = list[tuple[int, PressRequest]]()
         for number, request in enumerate(requests):
             try:
                 request.check(self.sensor)
@@ -248,9 +237,8 @@ class SkinModel:
         if not possible:
             return
         batch, contacts = self._batch(possible[0][1], min(capacity, len(possible)))
-        if self.device != "cpu":
-            # A card pays for columns that fall idle at the end: so the longest paths are begun first.
-            possible.sort(key=lambda one: -self._steps(one[1]))
+        if self.device != "cpu":  # A card pays for columns that fall idle at the end: the longest paths come first.
+            possible.sort(key=lambda one: -one[1].steps(self.settings.step))
 
         def collect(members: Members) -> list[State]:
             return self._gauge.states(members, contacts, with_displacement)

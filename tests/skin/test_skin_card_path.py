@@ -35,10 +35,7 @@ def as_on_a_card(monkeypatch):
             )
 
         loadable = SkinModel._loadable.func
-        ordered = property(
-            lambda own: in_order(loadable(own), own.mesh.outer, own.mesh.protrusions, len(own.mesh.nodes))
-        )
-        monkeypatch.setattr(SkinModel, "_loadable", ordered)
+        monkeypatch.setattr(SkinModel, "_loadable", property(lambda own: in_order(loadable(own), own.mesh)))
         monkeypatch.setattr(Newton, "__init__", newton)
         monkeypatch.setattr(model, "rest_solver", rest)
         monkeypatch.setattr(woodbury, "contact_transfer", lambda members, device: DenseTransfer(members))
