@@ -19,6 +19,7 @@ from tacdata.skin.adhesions import load_adhesion_law
 from tacdata.skin.conditions import Conditions
 from tacdata.skin.contact import Contact, ContactState, Parameters
 from tacdata.skin.elasticity import REAL
+from tacdata.skin.handed import handed
 from tacdata.skin.pose import Pose
 
 _PER_MM = 1e-3
@@ -112,6 +113,9 @@ def _product(real: type):
 class AdhesiveContact(Contact):
     """Contact of the outer face with a shape that it sticks to."""
 
+    _STIFF = (*Contact._STIFF, "_pull_stiffness")
+    _FOUND = (*Contact._FOUND, "_pull_stiffness", "energy")
+
     def __init__(
         self, nodes: torch.Tensor, faces: torch.Tensor, distance: wp.Function, rough: bool, penalty: float,
         stick: float, adhesion: Adhesion,
@@ -147,8 +151,8 @@ class AdhesiveContact(Contact):
             pose.turn, *self._numbers, self.sharp,
         ]
         wp.launch(
-            self._pull, dim=(*self.weights.shape, batch), inputs=[_view(value) for value in inputs],
-            outputs=[_view(value) for value in (nodal, self._pull_stiffness, self.energy)], device=str(u.device),
+            self._pull, dim=(*self.weights.shape, batch), inputs=[handed(value) for value in inputs],
+            outputs=[handed(value) for value in (nodal, self._pull_stiffness, self.energy)], device=str(u.device),
         )
         self.force = self.force + nodal.sum(dim=0)
         force += nodal
@@ -159,11 +163,6 @@ class AdhesiveContact(Contact):
         shapes, weights = self._rule[p.dtype]
         wp.launch(
             _product(REAL[p.dtype]), dim=(*weights.shape, p.shape[2]),
-            inputs=[_view(value) for value in (p, self.faces, shapes, weights, self._pull_stiffness)],
-            outputs=[_view(result)], device=str(p.device),
+            inputs=[handed(value) for value in (p, self.faces, shapes, weights, self._pull_stiffness)],
+            outputs=[handed(result)], device=str(p.device),
         )
-
-
-def _view(value: torch.Tensor | float) -> wp.array | float:
-    """Hand a tensor to Warp without copying."""
-    return wp.from_torch(value) if isinstance(value, torch.Tensor) else value

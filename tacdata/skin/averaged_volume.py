@@ -24,6 +24,7 @@ import warp as wp
 from tacdata.skin import elements
 from tacdata.skin.averaged_kernels import averaged_kernels
 from tacdata.skin.conditions import Conditions
+from tacdata.skin.handed import handed
 from tacdata.skin.mesh import SkinMesh
 
 _CORRECTIONS = 3
@@ -92,11 +93,19 @@ class AveragedVolume:
         own = conditions.to(u.dtype)
         self._launch("force", u, (), own, own.law, self._average_at(u, own), smallest, force)
 
-    def add_product(self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor) -> None:
-        """Add K(u) p [N]; all of shape (n, 3, b) and of one precision."""
+    def average(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor:
+        """Return the averaged J - 1 at the corners [1], shape (c, b)."""
+        return self._average_at(u, conditions.to(u.dtype))
+
+    def add_product(
+        self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor,
+        average: torch.Tensor | None = None,
+    ) -> None:
+        """Add K(u) p [N]; all of shape (n, 3, b) and of one precision; ``average``: that at ``u``, if known."""
         own = conditions.to(u.dtype)
         change = self._average(self._sums("swelling_change", u, (p,), own), own)
-        self._launch("product", u, (p,), own, own.law, self._kept(u, own), change, own.modulus, product)
+        known = self._kept(u, own) if average is None else average
+        self._launch("product", u, (p,), own, own.law, known, change, own.modulus, product)
 
     def add_energy(self, u: torch.Tensor, conditions: Conditions, total: torch.Tensor) -> None:
         """Add the strain energy [N mm], shape (b,)."""
@@ -127,8 +136,8 @@ class AveragedVolume:
             after = torch.empty_like(sums)
             wp.launch(
                 _mass_kernel(_REAL[sums.dtype]), dim=tuple(sums.shape),
-                inputs=[*self._indices[3:], *numbers[3:], *map(wp.from_torch, (own.thickness, sums, average))],
-                outputs=[wp.from_torch(after)], device=self._device,
+                inputs=[*self._indices[3:], *numbers[3:], *map(handed, (own.thickness, sums, average))],
+                outputs=[handed(after)], device=self._device,
             )
             average = after
         return average
@@ -141,8 +150,8 @@ class AveragedVolume:
         wp.launch(
             getattr(averaged_kernels(self._law, _REAL[u.dtype]), name), dim=(self._elements, u.shape[2]),
             inputs=[
-                *map(wp.from_torch, (u, *more)), tets, corners, *self._numbers[u.dtype][:3], slab,
-                *map(wp.from_torch, (own.thickness, *rest)),
+                *map(handed, (u, *more)), tets, corners, *self._numbers[u.dtype][:3], slab,
+                *map(handed, (own.thickness, *rest)),
             ],
             device=self._device,
         )

@@ -112,14 +112,15 @@ class Batch:
             yield from self._retreat(verdicts)
             if failed.any() or self._mask(verdicts, "found").any():
                 yield from self._fill(waiting)
-                self._start(failed | self._mask(verdicts, "found"))
-                now = self._balance()
+                changed = failed | self._mask(verdicts, "found")
+                self._start(changed)
+                now = self._rebalance(now, changed)
             augment = self._mask(verdicts, "augment")
             if augment.any():
                 which = self._tensor(augment)
                 for contact, state in zip(self._newton.contacts, self._states, strict=True):
                     contact.augment(state, which)
-                now = self._balance()
+                now = self._rebalance(now, augment)
             self._step(now)
 
     def _settled(self) -> Balance:
@@ -129,15 +130,20 @@ class Batch:
         for _ in range(_HALVINGS):
             # After a start there is no step to shorten.
             bad = self._newton.is_bad(self._before, now) & torch.isfinite(self._before)
-            if not bool(bad.any()):
+            marks = bad.cpu().numpy()
+            if not marks.any():
                 break
             step = torch.where(bad, step / _SHORTER, step)
             self._u = torch.where(bad, self._base + step, self._u)
-            now = self._balance()
+            now = self._rebalance(now, marks)
         return now
 
     def _balance(self) -> Balance:
         return self._newton.balance(self._u, self._poses, self._states, self._conditions)
+
+    def _rebalance(self, now: Balance, changed: np.ndarray) -> Balance:
+        which = torch.as_tensor(changed.nonzero()[0], device=self._u.device)
+        return self._newton.rebalance(now, self._u, self._poses, self._states, self._conditions, which)
 
     def _judge(self, now: Balance) -> list[str]:
         figures = torch.stack([now.error, now.penetration, now.mean_penetration, now.volume]).cpu().numpy()
@@ -178,10 +184,9 @@ class Batch:
                 press = self._press(column)
                 press.walk.spent = 0
                 yield press.number, press.walk.depth, state
-        for column, walk in walks.items():
-            if walk.finished:
-                self._release(column)
-            else:
+        self._release([column for column, walk in walks.items() if walk.finished])
+        for walk in walks.values():
+            if not walk.finished:
                 walk.go_on()
 
     def _retreat(self, verdicts: list[str]) -> Iterator[tuple[int, float, SolveError]]:
@@ -197,34 +202,37 @@ class Batch:
             try:
                 press.walk.halve()
             except SolveError as error:
-                self._release(column)
+                self._release([column])
                 yield press.number, press.walk.depth, error
 
     def _fill(self, waiting: Iterator[Press]) -> Iterator[tuple[int, float, SolveError]]:
         """Put waiting presses into idle columns, the indenter just touching."""
-        new = np.zeros(len(self._presses), dtype=bool)
+        taken: dict[int, Press] = {}
         for column, press in enumerate(self._presses):
-            if press is None and (taken := next(waiting, None)) is not None:
-                self._presses[column] = taken
-                self._conditions.put(column, taken.conditions)
-                self._poses[0].place[:, column] = self._row(taken.touch)[:, 0]
-                self._poses[0].turn[:, :, column] = torch.as_tensor(taken.turn, device=self._u.device)
-                new[column] = True
-        if new.any():
-            which = self._tensor(new)
+            if press is None and (one := next(waiting, None)) is not None:
+                self._presses[column] = taken[column] = one
+        if taken:
+            new, device = np.isin(np.arange(len(self._presses)), list(taken)), self._u.device
+            which = torch.as_tensor(list(taken), device=device)
+            self._conditions.put_all(which, [press.conditions for press in taken.values()])
+            touch, turn = ([getattr(press, name) for press in taken.values()] for name in ("touch", "turn"))
+            self._poses[0].place[:, which] = torch.as_tensor(np.stack(touch, axis=-1), device=device).double()
+            self._poses[0].turn[:, :, which] = torch.as_tensor(np.stack(turn, axis=-1), device=device).double()
             for field in (self._u, self._base, self._accepted, self._rate):
-                field[:, :, which] = 0.0
-            self._passed.forget(which)
-            scratch = torch.zeros_like(self._u)
+                field.index_fill_(-1, which, 0.0)
+            self._passed.forget(self._tensor(new))
+            own, flat = self._conditions.take(which), self._u[:, :, which]
             for contact, state, pose, kept in zip(
                 self._newton.contacts, self._states, self._poses, self._multipliers, strict=True
             ):
-                sharp = contact.sharp
-                state.put(which, contact.start(pose))
-                contact.sharp = torch.where(which, 0.0, sharp)
-                contact.add_force(self._u, pose, state, self._conditions, scratch)
-                contact.accept(state, pose, which)
-                kept.copy_(torch.where(which, 0.0, kept))
+                contact.sharp = contact.sharp.index_fill(0, which, 0.0)
+                here = pose.take(which)
+                twin = contact.twin(here, which)
+                first = twin.start(here)
+                twin.add_force(flat, here, first, own, torch.zeros_like(flat))
+                twin.accept(first, here, torch.ones_like(which, dtype=torch.bool))
+                state.set(which, first)
+                kept.index_fill_(-1, which, 0.0)
             self._start(new)
         yield from ()
 
@@ -234,14 +242,19 @@ class Batch:
         which = self._tensor(changed)
         depth = self._values({column: press.walk.depth for column, press in busy.items()})
         attempt = self._values({column: press.walk.attempt for column, press in busy.items()})
-        for column, press in busy.items():
-            self._poses[0].place[2, column] = float(press.touch[2]) - press.walk.attempt
-        onward = self._accepted + self._rate * (attempt - depth)
-        back = self._passed.at(attempt) + (self._accepted - self._passed.at(depth))
-        guess = torch.where(attempt >= self._passed.deepest, onward, back)
-        volume = self._newton.body.internal_force(guess, self._conditions)[1]
-        guess = torch.where(volume < _WILD, self._accepted, guess)
-        self._u = torch.where(which, guess, self._u)
+        heights = self._values({c: float(press.touch[2]) - press.walk.attempt for c, press in busy.items()})
+        moved, place = self._values(dict.fromkeys(busy, 1.0)) > 0, self._poses[0].place
+        place[2] = torch.where(moved, heights, place[2])
+        guess = self._accepted + self._rate * (attempt - depth)
+        beyond = attempt >= self._passed.deepest
+        if not bool((beyond | ~which).all()):
+            back = self._passed.at(attempt) + (self._accepted - self._passed.at(depth))
+            guess = torch.where(beyond, guess, back)
+        columns = which.nonzero()[:, 0]
+        chosen = guess.index_select(-1, columns)
+        volume = self._newton.body.internal_force(chosen, self._conditions.take(columns))[1]
+        chosen = torch.where(volume < _WILD, self._accepted.index_select(-1, columns), chosen)
+        self._u = self._u.index_copy(-1, columns, chosen)
         self._before = torch.where(which, torch.inf, self._before)
 
     def _step(self, now: Balance) -> None:
@@ -255,15 +268,19 @@ class Batch:
         self._base, self._before = self._u, now.size
         self._u = self._u + step
 
-    def _release(self, column: int) -> None:
-        """Make a column idle."""
-        self._presses[column] = None
-        self._poses[0].place[2, column] = _AWAY
+    def _release(self, columns: list[int]) -> None:
+        """Make columns idle."""
+        if not columns:
+            return
+        for column in columns:
+            self._presses[column] = None
+        which = torch.as_tensor(columns, device=self._u.device)
+        self._poses[0].place[2, which] = _AWAY
         for state, kept in zip(self._states, self._multipliers, strict=True):
-            state.multiplier[:, :, column] = 0.0
-            kept[:, :, column] = 0.0
+            state.multiplier.index_fill_(-1, which, 0.0)
+            kept.index_fill_(-1, which, 0.0)
         for field in (self._u, self._base, self._accepted, self._rate):
-            field[:, :, column] = 0.0
+            field.index_fill_(-1, which, 0.0)
 
     def _press(self, column: int) -> Press:
         press = self._presses[column]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,6 +11,9 @@ import torch
 from tacdata.indenters import Indenter
 from tacdata.sensor import Material
 from tacdata.skin.materials import load_law
+
+NAMES = ("law", "modulus", "thickness", "friction", "indenter")
+"""The tensors of `Conditions`."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +45,25 @@ class Conditions:
 
     def put(self, column: int, other: Conditions) -> None:
         """Make the single member of ``other`` this batch's member ``column``."""
-        for name in ("law", "modulus", "thickness", "friction", "indenter"):
+        for name in NAMES:
             getattr(self, name)[..., column] = getattr(other, name)[..., 0]
         self._other.clear()
+
+    def put_all(self, columns: torch.Tensor, others: Sequence[Conditions]) -> None:
+        """Make single members this batch's members of the given indices, shape (k,)."""
+        for name in NAMES:
+            getattr(self, name)[..., columns] = torch.cat([getattr(other, name) for other in others], dim=-1)
+        self._other.clear()
+
+    def retake(self, other: Conditions, which: torch.Tensor) -> None:
+        """Take members of another batch, by index, into the tensors that this one has."""
+        for name in NAMES:
+            torch.index_select(getattr(other, name), -1, which, out=getattr(self, name))
+
+    def pressed_by(self, indenter: Indenter) -> Conditions:
+        """Return the same under a shape."""
+        device = str(self.law.device)
+        return replace(self, indenter=_column(indenter.device_parameters(device), device), _other={})
 
     def repeat(self, count: int) -> Conditions:
         """Return ``count`` equal members made of a single one."""

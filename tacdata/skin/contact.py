@@ -11,6 +11,7 @@ the tangent, without the derivative of the disc's radius, so that the stiffness 
 Tractions are per undeformed area. Arrays of points are laid out (faces, points, ..., batch).
 """
 
+from copy import copy
 from dataclasses import dataclass, fields
 from functools import cache
 
@@ -20,6 +21,7 @@ import warp as wp
 from tacdata.skin import elements
 from tacdata.skin.conditions import Conditions
 from tacdata.skin.elasticity import REAL
+from tacdata.skin.handed import handed
 from tacdata.skin.pose import Pose
 
 Parameters = wp.types.vector(length=8, dtype=wp.float64)
@@ -198,6 +200,15 @@ class ContactState:
         """Return a copy that shares nothing."""
         return ContactState(*(getattr(self, f.name).clone() for f in fields(self)))
 
+    def take(self, which: torch.Tensor) -> "ContactState":
+        """Return some members, by index."""
+        return ContactState(*(getattr(self, f.name).index_select(-1, which) for f in fields(self)))
+
+    def set(self, which: torch.Tensor, other: "ContactState") -> None:
+        """Take another state's members as those of the columns ``which``."""
+        for f in fields(self):
+            getattr(self, f.name).index_copy_(-1, which, getattr(other, f.name))
+
     def put(self, which: torch.Tensor, other: "ContactState") -> None:
         """Take the members marked in ``which``, shape (b,), bool, from another state."""
         for f in fields(self):
@@ -207,6 +218,12 @@ class ContactState:
 
 class Contact:
     """A set of faces against one rigid shape, for every member of a batch."""
+
+    _STIFF: tuple[str, ...] = ("pressure", "stiffness", "touched")
+    """What `add_product` reads."""
+
+    _FOUND: tuple[str, ...] = (*_STIFF, "gap", "shear", "local", "force")
+    """What `add_force` finds, one column a member."""
 
     def __init__(
         self, nodes: torch.Tensor, faces: torch.Tensor, subdivisions: int, distance: wp.Function, rough: bool,
@@ -270,8 +287,8 @@ class Contact:
         nodal = torch.zeros_like(force)
         outputs = [nodal, self.gap, self.pressure, self.shear, self.local, self.stiffness]
         wp.launch(
-            self._traction, dim=(f, k, u.shape[2]), inputs=[_view(value) for value in inputs],
-            outputs=[_view(value) for value in outputs], device=str(u.device),
+            self._traction, dim=(f, k, u.shape[2]), inputs=[handed(value) for value in inputs],
+            outputs=[handed(value) for value in outputs], device=str(u.device),
         )
         self.touched = (self.pressure > 0).any(dim=1)
         self.force = nodal.sum(dim=0)
@@ -284,9 +301,33 @@ class Contact:
             p, self.faces, shapes, weights, weights.shape[1], self.pressure, self.stiffness, self.touched,
         ]
         wp.launch(
-            _product(REAL[p.dtype]), dim=(len(self.faces), p.shape[2]), inputs=[_view(value) for value in inputs],
-            outputs=[_view(result)], device=str(p.device),
+            _product(REAL[p.dtype]), dim=(len(self.faces), p.shape[2]), inputs=[handed(value) for value in inputs],
+            outputs=[handed(result)], device=str(p.device),
         )
+
+    def take(self, which: torch.Tensor) -> "Contact":
+        """Return a twin that knows the stiffness of some members alone, by index: for `add_product`."""
+        twin = copy(self)
+        for name in self._STIFF:
+            setattr(twin, name, getattr(self, name).index_select(-1, which))
+        return twin
+
+    def retake(self, other: "Contact", which: torch.Tensor) -> None:
+        """Do what ``other.take(which)`` does, into the tensors that this twin has."""
+        for name in self._STIFF:
+            torch.index_select(getattr(other, name), -1, which, out=getattr(self, name))
+
+    def twin(self, pose: Pose, which: torch.Tensor) -> "Contact":
+        """Return a contact for some members alone, by index, not evaluated yet; ``pose`` is theirs."""
+        twin = copy(self)
+        twin.start(pose)
+        twin.sharp = self.sharp[which]
+        return twin
+
+    def join(self, twin: "Contact", which: torch.Tensor) -> None:
+        """Take what a `twin` found for its members."""
+        for name in self._FOUND:
+            getattr(self, name).index_copy_(-1, which, getattr(twin, name))
 
     def face_stiffness(self, face: torch.Tensor, member: torch.Tensor) -> torch.Tensor:
         """Return nodal stiffness of some faces [N/mm] at the state last evaluated, shape (pairs, 18, 18).
@@ -344,8 +385,3 @@ def face_quadrature(nodes: torch.Tensor, faces: torch.Tensor, subdivisions: int)
     area = torch.linalg.norm(torch.cross(tangents[..., 0], tangents[..., 1], dim=-1), dim=-1)
     shapes = torch.as_tensor(elements.triangle_shapes(points), device=nodes.device)
     return (area * torch.as_tensor(weights, device=nodes.device)).contiguous(), shapes.contiguous()
-
-
-def _view(value: torch.Tensor | float | int) -> wp.array | float | int:
-    """Hand a tensor to Warp without copying."""
-    return wp.from_torch(value) if isinstance(value, torch.Tensor) else value

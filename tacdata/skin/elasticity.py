@@ -18,6 +18,7 @@ import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.skin.averaged_volume import AveragedVolume
 from tacdata.skin.conditions import Conditions
 from tacdata.skin.element_functions import element_functions
+from tacdata.skin.handed import handed
 from tacdata.skin.materials import load_law
 from tacdata.skin.mesh import SkinMesh
 
@@ -118,12 +119,20 @@ class Elasticity:
             self._launch("internal_force", u, (), conditions, force, ratio)
         return force, ratio
 
+    def swelling(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor | None:
+        """Return what many `tangent_product` at one state have in common, shape (c, b), if there is anything."""
+        return self._averaged.average(u, conditions) if self._averaged else None
+
     def tangent_product(
-        self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor
+        self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor,
+        swelling: torch.Tensor | None = None,
     ) -> None:
-        """Add K(u) p [N] to ``product``; all of shape (n, 3, b) and of one precision."""
+        """Add K(u) p [N] to ``product``; all of shape (n, 3, b) and of one precision.
+
+        ``swelling``, if given, is what `swelling` returned for that state.
+        """
         if self._averaged:
-            self._averaged.add_product(u, p, conditions, product)
+            self._averaged.add_product(u, p, conditions, product, swelling)
         else:
             self._launch("tangent_product", u, (p,), conditions, product)
 
@@ -145,8 +154,8 @@ class Elasticity:
         wp.launch(
             kernel, dim=(len(self.mesh.tets), u.shape[2]),
             inputs=[
-                wp.from_torch(u), *map(wp.from_torch, more), self._tets, slopes, weights, self._slab,
-                wp.from_torch(own.thickness), wp.from_torch(own.law),
+                *map(handed, (u, *more)), self._tets, slopes, weights, self._slab,
+                *map(handed, (own.thickness, own.law)),
             ],
-            outputs=[wp.from_torch(tensor) for tensor in out], device=self.device,
+            outputs=[*map(handed, out)], device=self.device,
         )

@@ -22,7 +22,7 @@ from tacdata.skin.adhesions import load_adhesion_law
 from tacdata.skin.attraction import AdhesiveContact
 from tacdata.skin.batch import Batch, Members, Press
 from tacdata.skin.companion import CoarsePress, blind_spot, companion_mesh, edge_ratio, press_coarsely
-from tacdata.skin.conditions import conditions
+from tacdata.skin.conditions import Conditions, conditions
 from tacdata.skin.contact import Contact, board_distance
 from tacdata.skin.elasticity import Elasticity
 from tacdata.skin.materials import load_law
@@ -30,6 +30,7 @@ from tacdata.skin.mesh import SkinMesh
 from tacdata.skin.mesher import MeshSettings, build_mesh
 from tacdata.skin.newton import Newton, SolverSettings
 from tacdata.skin.numerical_error import Figures, NumericalError, estimate
+from tacdata.skin.patches import in_order
 from tacdata.skin.press import PressRequest
 from tacdata.skin.raster import OuterFace
 from tacdata.skin.rest import RestSolver, rest_solver
@@ -45,7 +46,6 @@ _ROWS = ("surface", "taxel_force", "taxel_closure", "force", "residual", "penetr
 _TIP = 0.4
 """Height of a protrusion's tip region, over its radius, that the preconditioner knows as possible contact [1]. Contact
 beyond costs iterations, not accuracy."""
-
 
 _FIRST = 0.3
 """Longest first load step over the smallest radius of curvature of the shape [1]."""
@@ -133,7 +133,7 @@ class SkinModel:
             bumps = np.unique(self.mesh.protrusions)
             tips = bumps[self.mesh.nodes[bumps, 2] < (_TIP - 1) * self.sensor.skin.protrusion_radius]
             dofs = np.concatenate([dofs, 3 * tips[~self._fixed[tips]] + 2])
-        return np.unique(dofs)
+        return np.unique(dofs) if self.device == "cpu" else in_order(np.unique(dofs), self.mesh)
 
     @cached_property
     def _rest(self) -> RestSolver:
@@ -187,10 +187,13 @@ class SkinModel:
             request.depths, self.settings.step, f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm",
             _FIRST * request.indenter.sharpest, _LIFT * adhesion.range if adhesion else math.inf,
         )
-        own = conditions(
-            self.sensor.material, self.sensor.contact.friction, request.indenter, device=self.device
-        )
-        return Press(number, walk, touch(self.sensor, self._face, request), rotation(request), own)
+        place, own = touch(self.sensor, self._face, request), self._skin.pressed_by(request.indenter)
+        return Press(number, walk, place, rotation(request), own)
+
+    @cached_property
+    def _skin(self) -> Conditions:
+        """The skin of one member, under nothing."""
+        return conditions(self.sensor.material, self.sensor.contact.friction, device=self.device)
 
     @property
     def _solver(self) -> SolverSettings:
@@ -208,8 +211,7 @@ class SkinModel:
         size, modulus = 3 * len(self.mesh.nodes), self.sensor.material.youngs_modulus
         preconditioner = ContactPreconditioner(self._rest, contacts, loadable, size, modulus)
         newton = Newton(self._body, contacts, fixed, preconditioner, self._solver)
-        idle = conditions(self.sensor.material, self.sensor.contact.friction, request.indenter, device=self.device)
-        floor = -self.sensor.skin.protrusion_tip
+        idle, floor = self._skin.pressed_by(request.indenter), -self.sensor.skin.protrusion_tip
         return Batch(newton, idle, len(self.mesh.nodes), capacity, floor), contacts
 
     def walk(
@@ -225,7 +227,7 @@ class SkinModel:
         Yields:
             The press's index, the depth [mm] and the state, as found; or, in its place, why the press was given up.
         """
-        possible: list[tuple[int, PressRequest]] = []
+        possible = list[tuple[int, PressRequest]]()
         for number, request in enumerate(requests):
             try:
                 request.check(self.sensor)
@@ -235,6 +237,8 @@ class SkinModel:
         if not possible:
             return
         batch, contacts = self._batch(possible[0][1], min(capacity, len(possible)))
+        if self.device != "cpu":  # A card pays for columns that fall idle at the end: the longest paths come first.
+            possible.sort(key=lambda one: -one[1].steps(self.settings.step))
 
         def collect(members: Members) -> list[State]:
             return self._gauge.states(members, contacts, with_displacement)

@@ -6,10 +6,11 @@ its neighbours along.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 
+from tacdata.skin.card_gradients import CardGradients
 from tacdata.skin.conditions import Conditions
 from tacdata.skin.contact import Contact, ContactState
 from tacdata.skin.elasticity import Elasticity
@@ -80,8 +81,7 @@ class Newton:
         self.body, self.contacts, self.preconditioner, self.settings = body, contacts, preconditioner, settings
         self._free = (~fixed).to(torch.float64)[:, None, None]
         self._free_work = self._free.to(_WORK)
-        # A card is asked whether all have finished only now and then, so that it never waits for the host.
-        self._stride = 1 if fixed.device.type == "cpu" else 2
+        self._card = None if fixed.device.type == "cpu" else CardGradients(body, contacts, preconditioner)
 
     def balance(
         self, u: torch.Tensor, poses: list[Pose], states: list[ContactState], conditions: Conditions
@@ -98,6 +98,39 @@ class Newton:
         largest, mean = zip(*(contact.misfit() for contact in self.contacts), strict=True)
         penetration, mean = torch.stack(largest).amax(dim=0), torch.stack(mean).amax(dim=0)
         return Balance(residual, size, size / scale, volume, penetration, mean)
+
+    def rebalance(
+        self, now: Balance, u: torch.Tensor, poses: list[Pose], states: list[ContactState], conditions: Conditions,
+        which: torch.Tensor,
+    ) -> Balance:
+        """Evaluate anew where something has changed.
+
+        Args:
+            now: What was evaluated last; it may be changed.
+            u: Displacements [mm], shape (n, 3, b).
+            poses: Of the contacts' shapes.
+            states: Of the contacts.
+            conditions: Of all members.
+            which: Members of which something has changed, by index, shape (k,).
+
+        Returns:
+            The forces of all members.
+        """
+        if self._card is None or 2 * len(which) > u.shape[2]:
+            return self.balance(u, poses, states, conditions)
+        everyone, few = self.contacts, [pose.take(which) for pose in poses]
+        self.contacts = [contact.twin(pose, which) for contact, pose in zip(everyone, few, strict=True)]
+        try:
+            part = self.balance(
+                u.index_select(-1, which), few, [state.take(which) for state in states], conditions.take(which)
+            )
+            for contact, twin in zip(everyone, self.contacts, strict=True):
+                contact.join(twin, which)
+        finally:
+            self.contacts = everyone
+        for field in fields(now):
+            getattr(now, field.name).index_copy_(-1, which, getattr(part, field.name))
+        return now
 
     def sharpen(self, error: torch.Tensor) -> None:
         """Choose friction's stiffness for the next evaluation: the tangent only where Newton's method is at home."""
@@ -125,7 +158,12 @@ class Newton:
         self.preconditioner.update(conditions.modulus)
         size = torch.linalg.vector_norm(residual, dim=(0, 1)).clamp_min(1e-30)
         r = torch.where(wanted, residual / size, 0.0).to(_WORK)
-        x, used = self._conjugate_gradients(u.to(_WORK), r, conditions.to(_WORK), self.settings.forcing)
+        u, conditions, tolerance = u.to(_WORK), conditions.to(_WORK), self.settings.forcing
+        if self._card:
+            limit = self.settings.cg_limit
+            x, used = self._card.solve(u, r, conditions, wanted, tolerance, limit, _STRAGGLERS, _LONG)
+        else:
+            x, used = self._conjugate_gradients(u, r, conditions, tolerance)
         return x.to(torch.float64) * size, used
 
     def product(self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions) -> torch.Tensor:
@@ -163,10 +201,9 @@ class Newton:
             z = self.preconditioner.apply(r)
             rho_new = _dot(r, z)
             going = going & (rho_new > goal)
-            if iteration % self._stride == 0:
-                left = int(going.sum())
-                if not left or (iteration >= _LONG and left <= patient):
-                    break
+            left = int(going.sum())
+            if not left or (iteration >= _LONG and left <= patient):
+                break
             p = z + torch.where(going, rho_new / rho, 0.0) * p
             rho = rho_new
         return x, iteration

@@ -21,6 +21,10 @@ class Pose:
         self.place.copy_(torch.where(which, other.place, self.place))
         self.turn.copy_(torch.where(which, other.turn, self.turn))
 
+    def take(self, which: torch.Tensor) -> Pose:
+        """Return some members, by index."""
+        return Pose(self.place.index_select(-1, which), self.turn.index_select(-1, which))
+
     def copy(self) -> Pose:
         """Return a copy that shares nothing."""
         return Pose(self.place.clone(), self.turn.clone())

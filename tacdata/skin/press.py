@@ -37,6 +37,10 @@ class PressRequest:
     tilt_y: float = 0.0
     """How far its axis leans about the sensor's y [deg], after the yaw."""
 
+    def steps(self, longest: float) -> float:
+        """Return about how many load steps of at most ``longest`` [mm] the press takes."""
+        return float(np.ceil(np.abs(np.diff(self.depths, prepend=0.0)) / longest).sum())
+
     def check(self, sensor: Sensor) -> None:
         """Refuse a press that misses the skin or goes through it.
 

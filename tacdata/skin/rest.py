@@ -156,7 +156,8 @@ class DenseRest:
 
     def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, loadable: np.ndarray, device: str) -> None:
         """Invert; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
-        need, have = 2 * 8 * len(free) ** 2, torch.cuda.mem_get_info(device)[0]
+        need = 2 * 8 * len(free) ** 2
+        have = need if device == "cpu" else torch.cuda.mem_get_info(device)[0]
         if need > have:
             raise SolveError(
                 f"a mesh with {len(free)} degrees of freedom, whose inverse takes {need / 2**30:.0f} GiB on {device}",
@@ -172,13 +173,17 @@ class DenseRest:
         scale = inverse.diagonal().sqrt()
         inverse /= scale[:, None]
         inverse /= scale
-        self._count, self._order = len(loadable), torch.as_tensor(order, device=device)
-        self._scale = scale.to(torch.float32)[:, None]
+        self.count, self._order = len(loadable), torch.as_tensor(order, device=device)
+        self.order = self._order.to(torch.int32)
+        """Degree of freedom of every row, the loadable ones' first, shape (k,); so many are ``count``."""
+        self.scale = scale.to(torch.float32)
+        """By which a right-hand side is multiplied, and then the product, shape (k,)."""
+        self._scale = self.scale[:, None]
         inverse.diagonal().add_(self._SHIFT)
         self._inverse = inverse.to(torch.float16)
         del inverse
-        part = self._inverse[: self._count, : self._count].to(torch.float32)
-        part *= self._scale[: self._count] * self._scale[: self._count].T
+        part = self._inverse[: self.count, : self.count].to(torch.float32)
+        part *= self._scale[: self.count] * self._scale[: self.count].T
         self._table = torch.nn.functional.pad(part, (0, 1, 0, 1))
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
@@ -189,7 +194,7 @@ class DenseRest:
 
     def loadable(self, residual: torch.Tensor) -> torch.Tensor:
         """Return `apply` at the loadable degrees of freedom only, shape (m, b)."""
-        return self._times(self._inverse[: self._count], residual) * self._scale[: self._count]
+        return self._times(self._inverse[: self.count], residual) * self._scale[: self.count]
 
     def compliance(self, which: torch.Tensor) -> torch.Tensor:
         """Return K0^-1 [mm/N] between loadable degrees of freedom, as in `RestSolver`."""
@@ -198,4 +203,13 @@ class DenseRest:
     def _times(self, matrix: torch.Tensor, residual: torch.Tensor) -> torch.Tensor:
         scaled = residual[self._order] * self._scale
         size = scaled.abs().amax(dim=0).clamp_min(1e-30) / self._LARGEST
-        return torch.mm(matrix, (scaled / size).to(torch.float16), out_dtype=torch.float32) * size
+        return _product(matrix, (scaled / size).to(torch.float16)) * size
+
+    def times(self, scaled: torch.Tensor, rows: int | None = None) -> torch.Tensor:
+        """Return the first rows of the inverse, scaled to a unit diagonal, times ``scaled``, shape (k, b), float16."""
+        return _product(self._inverse[:rows], scaled)
+
+
+def _product(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    """Return a product of matrices in half precision, its sums and result in single."""
+    return torch.mm(a, b, out_dtype=torch.float32) if a.is_cuda else a.float() @ b.float()

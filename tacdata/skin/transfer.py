@@ -11,19 +11,24 @@ import scipy.linalg
 import scipy.sparse as sp
 import torch
 
-from tacdata.skin.batched_inverse import inverse
+from tacdata.skin.batched_inverse import inverse_of_sum
 
 
 class Transfer(Protocol):
     """The prepared operator, one for each member; a member that was never put answers nothing."""
 
-    def put(self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor) -> None:
+    def put(
+        self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor, lead: int | None = None,
+        reach: int = 0,
+    ) -> None:
         """Prepare (I + S G)^-1 S of some members anew.
 
         Args:
             member: Their columns, shape (g,), int64.
             stiffness: S [N/mm], symmetric, positive semidefinite, shape (g, m, m), float32.
             compliance: G [mm/N], symmetric, positive definite, shape (g, m, m), float32.
+            lead: So many rows that S may couple with each other in any way; None: all.
+            reach: Rows that follow are coupled only with others less far from them than this.
         """
         ...
 
@@ -47,7 +52,10 @@ class FactoredTransfer:
         """Prepare for so many members."""
         self._parts: list[tuple[sp.csr_matrix, tuple] | None] = [None] * batch
 
-    def put(self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor) -> None:
+    def put(
+        self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor, lead: int | None = None,
+        reach: int = 0,
+    ) -> None:
         """Factorize, as `Transfer`."""
         for column, s, g in zip(
             member.tolist(), stiffness.double().numpy(), compliance.double().numpy(), strict=True
@@ -76,29 +84,40 @@ class FactoredTransfer:
 
 
 class DenseTransfer:
-    """P - P (P + S)^-1 P with P = G^-1: all that is inverted is symmetric and positive, so no pivoting is needed."""
+    """(S^-1 + G)^-1: both that are inverted are symmetric and positive, so no pivoting is needed.
 
-    _BLOCK = 64
+    What is touched but carries no load makes S singular; it is given a stiffness that the body does not feel. Its
+    inverse is then large, so all is done in double precision, in which a card multiplies matrices as fast as in single.
+    """
+
+    _BLOCK = 256
+    _FAINT = 1e-3
+    """That stiffness, over the body's at the same degree of freedom [1]."""
 
     def __init__(self, batch: int, device: str = "cpu") -> None:
         """Prepare for so many members."""
-        self._matrix = torch.zeros(batch, 0, 0, dtype=torch.float32, device=device)
+        self.matrix = torch.zeros(batch, 0, 0, dtype=torch.float32, device=device)
+        """The operator of every member, shape (b, m, m), zero beyond a member's own rows."""
 
-    def put(self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor) -> None:
+    def put(
+        self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor, lead: int | None = None,
+        reach: int = 0,
+    ) -> None:
         """Invert, as `Transfer`."""
         size = stiffness.shape[1]
-        self._matrix = self._matrix.to(stiffness.dtype)
-        if size > self._matrix.shape[1]:
-            more = -(-size // self._BLOCK) * self._BLOCK - self._matrix.shape[1]
-            self._matrix = torch.nn.functional.pad(self._matrix, (0, more, 0, more))
-        self._matrix[member] = 0.0
-        held = inverse(compliance)
-        self._matrix[member, :size, :size] = torch.baddbmm(held, held, inverse(held + stiffness) @ held, alpha=-1.0)
+        self.matrix = self.matrix.to(stiffness.dtype)
+        if size > self.matrix.shape[1]:
+            more = -(-size // self._BLOCK) * self._BLOCK - self.matrix.shape[1]
+            self.matrix = torch.nn.functional.pad(self.matrix, (0, more, 0, more))
+        self.matrix[member] = 0.0
+        held = stiffness.clone()
+        held.diagonal(dim1=1, dim2=2).add_(self._FAINT / compliance.diagonal(dim1=1, dim2=2))
+        inverse_of_sum(held, compliance, member, self.matrix, lead, reach)
 
     def times(self, displacement: torch.Tensor) -> torch.Tensor:
         """Return the forces, as `Transfer`."""
-        size = self._matrix.shape[1]
+        size = self.matrix.shape[1]
         own = torch.nn.functional.pad(displacement, (0, max(size - displacement.shape[1], 0)))[:, :size]
-        forces = (self._matrix @ own[:, :, None])[:, :, 0]
+        forces = (self.matrix @ own[:, :, None])[:, :, 0]
         wide = torch.nn.functional.pad(forces, (0, max(displacement.shape[1] - size, 0)))
         return wide[:, : displacement.shape[1]]

@@ -7,18 +7,50 @@ conjugate-gradient iterations.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import torch
 
 from tacdata.skin.contact import Contact
+from tacdata.skin.patches import coupling
 from tacdata.skin.rest import RestSolver
-from tacdata.skin.transfer import contact_transfer
+from tacdata.skin.transfer import DenseTransfer, contact_transfer
 
 _GROUP = 128
 """Members whose small systems are padded to one size: those of similar size go together."""
 
+_STEP = 256
+"""Rows by which the room for members' touched degrees of freedom grows."""
+
 _STALE = {"cpu": 0.1, "cuda": 0.3}
 """Change of a member's contact stiffness, over its norm, from which on its share is prepared anew [1]; on a card that
 costs more than the conjugate gradients it saves."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """The contact's share as tensors, a row a member, for `tacdata.skin.card_gradients`."""
+
+    softness: torch.Tensor
+    """Nominal modulus over the member's [1], shape (b,), float32."""
+    which: torch.Tensor
+    """Numbers among the loadable degrees of freedom that members touch, shape (b, k), int64."""
+    own: torch.Tensor
+    """How many of them are each member's own, shape (b,), int32."""
+    transfer: torch.Tensor
+    """Contact forces against displacements of the free body [N/mm], symmetric, shape (b, k or more, same)."""
+
+    @classmethod
+    def none(cls, device: torch.device) -> Share:
+        """Return that of no member."""
+        nothing = torch.empty(0, 0, dtype=torch.int64, device=device)
+        return cls(torch.empty(0), nothing, torch.empty(0), torch.empty(0, 0, 0, device=device))
+
+    @property
+    def place(self) -> tuple[object, ...]:
+        """Where the large tensors are: the same while they are the same."""
+        return self.which.data_ptr(), self.which.shape, self.transfer.data_ptr(), self.transfer.shape
 
 
 class ContactPreconditioner:
@@ -36,6 +68,8 @@ class ContactPreconditioner:
             size: Number of degrees of freedom, 3n.
             modulus: Young's modulus [MPa] of the nominal material.
         """
+        self.rest: Any = rest
+        """K0^-1, as it was given."""
         self._rest, self._contacts, self._modulus, self._size = rest, contacts, modulus, size
         count, device = len(loadable), loadable.device
         self._dof = torch.cat([loadable, torch.tensor([size], device=device)])
@@ -44,6 +78,7 @@ class ContactPreconditioner:
         axes = torch.arange(3, device=device)
         self._numbers = [number[(3 * c.faces.long()[:, :, None] + axes).reshape(-1, 18)] for c in contacts]
         """Number among the loadable of each face's degrees of freedom, shape (f, 18)."""
+        self._first, self._reach = coupling([numbers.cpu().numpy() for numbers in self._numbers], count)
         self._scale = torch.empty(0)
         self._transfer = contact_transfer(0, "cpu")
         self._which = torch.empty(0, 0, dtype=torch.int64, device=device)
@@ -68,13 +103,15 @@ class ContactPreconditioner:
         touched[:, count] = False
         members = stale.nonzero()[:, 0]
         counts, order = touched[members].sum(dim=1).sort()
-        sizes, members = counts.cpu().tolist(), members[order]
+        members = members[order]
+        leads = touched[members, : self._first].sum(dim=1)
+        sizes, leads = torch.stack([counts, leads]).tolist()
         self._widen(sizes[-1])
         for start in range(0, len(sizes), _GROUP):
             member = members[start : start + _GROUP]
             most = sizes[min(start + _GROUP, len(sizes)) - 1]
             self._which[member] = count
-            self._prepare(member, most, touched[member], pairs)
+            self._prepare(member, most, max(leads[start : start + _GROUP]), touched[member], pairs)
 
     def _stale(self, stiffness: list[torch.Tensor], batch: int) -> torch.Tensor:
         """Return which members' share no longer fits, shape (b,), and remember what they are prepared from now."""
@@ -96,13 +133,16 @@ class ContactPreconditioner:
     def _widen(self, most: int) -> None:
         """Make room for members that touch ``most`` degrees of freedom."""
         if most > self._which.shape[1]:
-            more = most - self._which.shape[1]
+            # In steps, as what is recorded of a card's iterations must be recorded anew.
+            more = -(-most // _STEP) * _STEP - self._which.shape[1]
             self._which = torch.nn.functional.pad(self._which, (0, more), value=len(self._dof) - 1)
 
     def _prepare(
-        self, member: torch.Tensor, most: int, touched: torch.Tensor, pairs: list[tuple[torch.Tensor, ...]]
+        self, member: torch.Tensor, most: int, lead: int, touched: torch.Tensor,
+        pairs: list[tuple[torch.Tensor, ...]],
     ) -> None:
-        """Prepare members that touch at most ``most`` degrees of freedom; ``touched``: shape (g, count + 1)."""
+        """Prepare members that touch at most ``most`` degrees of freedom, ``lead`` of them among the `_first`;
+        ``touched``: shape (g, count + 1)."""
         count, device, size = len(self._dof) - 1, member.device, len(member)
         # Each member's own slots: its touched degrees of freedom in order; one spare slot takes what belongs to none.
         slot = torch.where(touched, torch.cumsum(touched, dim=1) - 1, most)
@@ -118,15 +158,22 @@ class ContactPreconditioner:
             face, owner = face[mine], owner[mine]
             row = row_of[owner]
             place = slot[row[:, None], numbers[face]]
-            stiffness.index_put_(
-                (row[:, None, None], place[:, :, None], place[:, None, :]), contact.face_stiffness(face, owner),
-                accumulate=True,
-            )
+            # By flat index: sums over several indices are sorted first, which takes a card milliseconds.
+            flat = (row[:, None, None] * (most + 1) + place[:, :, None]) * (most + 1) + place[:, None, :]
+            stiffness.view(-1).scatter_add_(0, flat.flatten(), contact.face_stiffness(face, owner).flatten())
         compliance = self._rest.compliance(which) * self._scale[member][:, None, None]
         # A slot that stands for nothing must not make the compliance singular.
         compliance.diagonal(dim1=1, dim2=2).add_((which == count).to(torch.float32))
         self._which[member, :most] = which
-        self._transfer.put(member, stiffness[:, :most, :most].contiguous(), compliance)
+        whole = stiffness[:, :most, :most].contiguous()
+        self._transfer.put(member, whole, compliance, lead, self._reach)
+
+    def share(self) -> Share:
+        """Return what `update` prepared, on a card."""
+        if not isinstance(self._transfer, DenseTransfer):
+            raise TypeError("the CPU's shares are factors, not tensors")
+        own = (self._which < len(self._dof) - 1).sum(dim=1).to(torch.int32)
+        return Share(self._scale, self._which, own, self._transfer.matrix)
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
         """Return the approximate solution for residuals of shape (n, 3, b), float32."""

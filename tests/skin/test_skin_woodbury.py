@@ -1,6 +1,7 @@
 """The contact's share of the preconditioner by the Woodbury identity, and the batched inverse under it."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,9 +9,10 @@ import torch
 from skin_examples import MATERIAL, HeldSlab, batch, joined
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.batched_inverse import inverse
+from tacdata.skin.batched_inverse import inverse, inverse_of_sum
 from tacdata.skin.conditions import conditions
 from tacdata.skin.contact import Contact
+from tacdata.skin.patches import coupling
 from tacdata.skin.pose import Pose
 from tacdata.skin.rest import rest_solver
 from tacdata.skin.transfer import DenseTransfer, FactoredTransfer
@@ -104,9 +106,9 @@ def spd(rows, members, condition, seed=0):
     return torch.as_tensor(np.stack(made))
 
 
-@pytest.mark.parametrize("rows", [1, 63, 64, 65, 200])
+@pytest.mark.parametrize("rows", [1, 127, 128, 129, 200, 400])
 def test_the_inverse_by_blocks_is_the_inverse(rows):
-    """At any size beside the blocks' 64."""
+    """At any size beside the blocks' 128."""
     matrices = spd(rows, 3, 100.0)
     found = inverse(matrices)
     assert found.shape == matrices.shape
@@ -135,21 +137,49 @@ def test_a_member_put_anew_leaves_its_neighbours_as_they_are(make):
 
 @pytest.mark.parametrize("rows", [40, 130])
 def test_both_formulas_for_the_contact_transfer_agree(rows):
-    """(I + S G)^-1 S, as the CPU has it, is P - P (P + S)^-1 P with P = G^-1, as a card has it."""
+    """(I + S G)^-1 S, as the CPU has it, is (S^-1 + G)^-1, as a card has it, with a faint stiffness added to S."""
     compliance, stiffness = spd(rows, 2, 50.0, seed=1), spd(rows, 2, 30.0, seed=2)
     stiffness[:, : rows // 2] = 0.0  # Most points of a face do not touch.
     stiffness[:, :, : rows // 2] = 0.0
     moved = torch.as_tensor(np.random.default_rng(3).normal(size=(2, rows)))
-    expected = torch.linalg.inv(torch.eye(rows, dtype=torch.float64) + stiffness @ compliance) @ stiffness
-    expected = (expected @ moved[:, :, None])[:, :, 0]
-    both = torch.arange(2)
-    for make in (FactoredTransfer, DenseTransfer):
+    both, unit = torch.arange(2), torch.eye(rows, dtype=torch.float64)
+    faint = DenseTransfer._FAINT * unit / compliance.diagonal(dim1=1, dim2=2)[:, None]
+    for make, known in ((FactoredTransfer, stiffness), (DenseTransfer, stiffness + faint)):
+        expected = torch.linalg.inv(unit + known @ compliance) @ known
+        expected = (expected @ moved[:, :, None])[:, :, 0]
         transfer = make(2)
         transfer.put(both, stiffness, compliance)
         found = transfer.times(moved)
-        assert (found - expected).abs().max() < 1e-10 * expected.abs().max()
+        assert (found - expected).abs().max() < 1e-8 * expected.abs().max()
         transfer = make(2)
         transfer.put(both, stiffness.float(), compliance.float())
         single = transfer.times(moved.float())
         assert single.dtype == torch.float32
         assert (single - expected).abs().max() < 1e-4 * expected.abs().max()
+
+
+@pytest.mark.parametrize("lead", [0, 100, 300])
+def test_what_is_not_coupled_need_not_be_looked_at(lead):
+    """Some rows coupled in any way, then blocks of 40; two members whose blocks stand elsewhere."""
+    random, rows = np.random.default_rng(5), 620
+    first = torch.zeros(2, rows, rows, dtype=torch.float64)
+    for member, own in enumerate((lead, max(lead - 70, 0))):
+        edges = [0, *range(own, rows, 40), rows]
+        for low, high in pairwise(edges):
+            root = torch.as_tensor(random.normal(size=(high - low, high - low)))
+            first[member, low:high, low:high] = root @ root.T + torch.eye(high - low)
+    second = spd(rows, 2, 30.0, seed=6)
+    found, row = torch.zeros(3, rows, rows, dtype=torch.float64), torch.tensor([2, 0])
+    inverse_of_sum(first, second, row, found, lead, 40)
+    expected = torch.linalg.inv(torch.linalg.inv(first) + second)
+    assert (found[row] - expected).abs().max() < 1e-9 * expected.abs().max()
+    assert found[1].abs().max() == 0
+
+
+def test_coupled_degrees_of_freedom_are_found():
+    """The first contact's come first; the second's faces make parts of which the widest spans 5."""
+    first, second = np.array([[0, 1, 2], [2, 3, 9]]), np.array([[4, 5, 20], [5, 8, 4], [10, 11, 12], [20, 20, 20]])
+    assert coupling([first, second], 20) == (10, 0) or coupling([first, second], 20)[0] == 20
+    first[1, 2] = 3
+    assert coupling([first, second], 20) == (4, 5)
+    assert coupling([first], 20) == (4, 0)
