@@ -97,7 +97,8 @@ def _effect(member: Member, verdict: str, told: dict[str, float]) -> dict[str, A
         "moves": list(effect.moves), "status": status, "alternatives": list(member.rivals),
         "parameters": parameters, "margins": {k: float(np.clip(v, -99, 99)) for k, v in member.margins.items()},
         "necessity": float(np.clip(member.necessity, -99, 99)), "at_bound": list(member.at_bound),
-        "experiment": effect.experiment, "features": told, "confidence": confidence(told),
+        "experiment": effect.experiment, "features": told,
+        "confidence": confidence(told) if status == "named" else None,
     }  # fmt: skip
 
 
