@@ -2,9 +2,9 @@
 
     python benchmarks/discrepancy_confidence.py FOLDER [--write]
 
-FOLDER holds JSON files of development seeds with ``verdict`` (as `tacdata discrepancy` writes it), ``truth`` (an
-object by mechanisms that were hidden, or one that holds it as ``effects``) and, for the record, ``engine`` and
-``block``. Every effect that a verdict names counts once. With ``--write`` the map goes into
+FOLDER holds JSON files of development seeds with ``verdict`` (as `tacdata discrepancy` writes it), ``truth`` (the
+mechanisms that may rightly be named) and, for the record, ``engine`` and ``block``: `hidden_worlds/score.py --dump`
+writes them. Every effect that a verdict names counts once. With ``--write`` the map goes into
 tacdata/discrepancy/confidence.json; without, only how well it does is printed: Brier score and calibration error, each
 world judged by a map fitted without it.
 """

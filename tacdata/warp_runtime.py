@@ -15,6 +15,9 @@ NO_CARD = b"Could not find or load the NVIDIA CUDA driver"
 def start() -> None:
     """Start Warp; whatever else its native library says is passed on."""
     wp.config.log_level = wp.LOG_ERROR
+    if sys.stderr is None:  # a service without one
+        wp.init()
+        return
     sys.stderr.flush()
     with tempfile.TemporaryFile() as said:
         kept = os.dup(2)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -55,7 +56,6 @@ class Frame:
     """Episodes that err by far more than the others, shape (k,), int64."""
     draws: np.ndarray
     """Noise as the noise model says it, drawn [each stream's unit], shape (m, streams, draws)."""
-    _shaken: dict[str, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def of(
@@ -82,11 +82,11 @@ class Frame:
 
     def shaken(self, cleaner: Cleaner) -> np.ndarray:
         """Return what a cleaner leaves of the draws [noise scales], shape (m, streams, draws), float32."""
-        if cleaner is not self.known:
-            return cleaner.cleaned(self.draws)
-        if "known" not in self._shaken:
-            self._shaken["known"] = cleaner.cleaned(self.draws)
-        return self._shaken["known"]
+        return self._shaken if cleaner is self.known else cleaner.cleaned(self.draws)
+
+    @cached_property
+    def _shaken(self) -> np.ndarray:
+        return self.known.cleaned(self.draws)
 
 
 def frame(setting: Setting) -> Frame:
