@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LEAST = 1e-8
+LEAST = 1e-7
 """Weight of what no row excites, of the mean of what rows do [1]."""
 
 
@@ -162,7 +162,8 @@ class _Free:
 
     def take(self, shared: np.ndarray, errors: _Errors) -> None:
         """Take an episode's features (streams, m, p) in."""
-        self._blocks += np.ascontiguousarray(shared.transpose(0, 2, 1)) @ shared
+        exact = shared.astype(np.float64)  # splines of few rows are nearly alike: single precision loses their rank
+        self._blocks += exact.transpose(0, 2, 1) @ exact
         self._shared.append(shared)
         self._joints.append(errors.joint(shared))
         self._errors.append(errors)

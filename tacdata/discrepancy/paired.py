@@ -9,7 +9,9 @@ however clear they are.)
 Where a response is fitted, models that move the pose, or remember, have it take up different functions, and differ in
 noise alone: by V = |(P2 - P1) n|^2 for projections P1 and P2, told by draws of noise. That is taken off: by chance the
 pull has mean (V + f1 - f2) / 2 for the responses' degrees of freedom f, and the variance |d|^2 - V/2, d being the
-difference (a quadratic form in normal variables).
+difference (a quadratic form in normal variables). A model's own amplitudes follow noise as well: all but the first of
+those that the other has not count in V and in f (the first is what a test of one column pays for; that the test rejects
+too often by the others: Godfrey & Pesaran, J. Econometrics 21, 1983, 133).
 """
 
 from __future__ import annotations
@@ -76,9 +78,11 @@ def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: O
         lent: What candidates say of how much scores scatter, for those that follow the clock (True) and others.
         off: What the second's equations may be off about: only what that does not explain counts against it.
     """
-    if first.loss > second.loss:
+    more, less = _beyond(first, second), _beyond(second, first)
+    loss = second.loss - first.loss - 0.5 * (more - less)
+    if loss < 0:
         return -ahead(second, first, lent)
-    apart, loss = second.left - first.left, second.loss - first.loss
+    apart = second.left - first.left
     if off is None:
         gram = np.zeros((len(first.energy), 2, 2))
         for i, values in ((0, second.left), (1, apart)):
@@ -91,12 +95,17 @@ def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: O
         return 0.0
     clock = any(_differ(first, second))
     told = clustered(gram, np.zeros(1, dtype=np.int64), clock)
+    noise, freer = _noise(first, second) + more + less, first.freedom - second.freedom + more - less
     # Two models that are equally wrong pull towards each other: the better one must explain more, too.
     most = float(np.sqrt(2 * loss / max(told.power / told.expected, 1.0)))
-    return min(
-        max(told.score(lent.get(clock)), 0.0) * _sound(gram, _noise(first, second), first.freedom - second.freedom),
-        most,
-    )
+    return min(max(told.score(lent.get(clock)), 0.0) * _sound(gram, noise, freer), most)
+
+
+def _beyond(model: Refined, other: Refined) -> int:
+    """Return how many amplitudes, beyond the first, a model has that another has not."""
+    taken = {p.effect.name for p in other.placed}
+    own = [k for k in model.tangent.knobs if not k.shape and model.placed[k.at].effect.name not in taken]
+    return max(len(own) - 1, 0)
 
 
 def _noise(first: Refined, second: Refined) -> float:

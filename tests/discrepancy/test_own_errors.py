@@ -90,3 +90,17 @@ def test_freedom_is_what_features_take_of_noise():
     # What is there twice takes no more than once.
     assert beside.freedom == pytest.approx(STREAMS * FEATURES, abs=0.01)
     assert taken.mean() == pytest.approx(beside.freedom, abs=0.3)
+
+
+def test_freedom_is_the_rank_of_splines_that_are_nearly_alike():
+    """Splines of which few rows tell, in single precision: those too near to be told apart count once, not 1.6 times."""
+    rng = np.random.default_rng(3)
+    rows, width = 400, 12
+    features = rng.normal(size=(1, rows, width))
+    for k in range(4):
+        features[0, :, k] = features[0, :, 11 - k] + 2e-5 * rng.normal(size=rows)
+    features = np.repeat(features, 24, axis=0).astype(np.float32)
+    spans = np.split(np.arange(rows), 8)
+    own = Own(np.ones((24, rows), dtype=np.float32), np.full(8, np.inf), features=features)
+    freedom = Factored(spans, own).freedom
+    assert 24 * (width - 4) <= freedom <= 24 * (width - 4) + 2

@@ -27,8 +27,9 @@ def model(left, *names):
     energy = 0.5 * np.bincount(episode, np.square(left).sum(axis=1))
     placed = tuple(SimpleNamespace(effect=load(name)) for name in names)
     return SimpleNamespace(
-        left=left, episode=episode, energy=energy, placed=placed, loss=energy.sum(), freedom=0.0, shaken=UNSHAKEN
-    )
+        left=left, episode=episode, energy=energy, placed=placed, loss=energy.sum(), freedom=0.0, shaken=UNSHAKEN,
+        tangent=SimpleNamespace(knobs=[]),
+    )  # fmt: skip
 
 
 def signal(size, episodes, rng):
@@ -122,3 +123,18 @@ def test_responses_that_follow_noise_differently_are_level():
     assert abs(np.mean(told)) < 0.25, "neither is ahead on average"
     assert np.mean(np.abs(told) > 2.33) < 0.05
     assert np.std(told) > 0.5, "they are compared, though"
+
+
+def test_numbers_of_its_own_do_not_bring_a_model_ahead():
+    """A model lacks nothing; another has 24 amplitudes more (drift of every channel), fitted to noise."""
+    rows, told = EPISODES * ROWS, []
+    rng = np.random.default_rng(5)
+    knobs = [SimpleNamespace(at=1, shape=False) for _ in range(24)]
+    basis = np.linalg.qr(rng.normal(size=(rows, 24)))[0]
+    for _ in range(200):
+        noise = rng.normal(size=(rows, 1))
+        richer = model(noise - basis @ (basis.T @ noise), "relaxation", "drift")
+        richer.tangent = SimpleNamespace(knobs=knobs)
+        told.append(ahead(richer, model(noise, "relaxation"), Nothing()))
+    assert np.mean(np.array(told) > 2.33) < 0.03, "by 3.5 on average if they are not counted"
+    assert abs(np.mean(told)) < 0.7
