@@ -101,6 +101,30 @@ class Cleaner:
                 part[:, seen:] = _turned(place.tag.without(_turned(white[:, seen:])))
             yield place.rows, part
 
+    def told(self, residual: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a residual says of columns that each stand in one stream of one episode, and how much it knows.
+
+        Args:
+            residual: Shape (n, streams).
+            alone: The columns of all streams and episodes, shape (n, streams).
+
+        Returns:
+            Scores and information [1], shapes (episodes, streams); 0 where nothing is known.
+        """
+        score, known = np.zeros((2, self._course.episodes, residual.shape[1]))
+        white = whiten(alone[:, : self._seen, None], self._course, self._of_seen())[:, :, 0]
+        for place, (rows, part) in zip(self._places, self.parts(residual[:, :, None]), strict=True):
+            episodes = np.unique(place.episode)
+            left = np.ascontiguousarray(part[:, : self._seen, 0].T)
+            own = place.seen.told(left, np.ascontiguousarray(white[rows].T))
+            score[episodes, : self._seen], known[episodes, : self._seen] = own
+        return score, np.maximum(known, 0.0)
+
+    def _of_seen(self) -> Noise:
+        noise, seen = self._noise, self._seen
+        missing = None if noise.missing is None else noise.missing[:, :seen]
+        return replace(noise, scale=noise.scale[:seen], missing=missing)
+
     def cleaned(self, columns: np.ndarray) -> np.ndarray:
         """Return columns whitened and without nuisances, shape (n, streams, k)."""
         result = np.zeros(columns.shape, dtype=np.float32)

@@ -103,11 +103,9 @@ class EpisodeErrors:
             errors: Of pose, shape (m, streams, kinds).
             rise: What presses add to each stream, shape (m, streams).
         """
-        local = noise.number_within(self.context, self.course.episode)
-        apart = rise[:, :, None] * (local[:, None, None] == np.arange(local.max() + 1))
-        both = np.concatenate([self._left(known, errors)[:, :, None], apart], axis=2)
-        white = Cleaner(self.course, known, self.context, self.features, errors).cleaned(both)
-        return noise.gain_spread(white[:, :, 0], white[:, :, 1:], self.context)
+        cleaner = Cleaner(self.course, known, self.context, self.features, errors)
+        score, information = cleaner.told(self._left(known, errors).astype(np.float32), rise)
+        return noise.gain_spread(score, information, self._places())
 
     def _places(self) -> np.ndarray:
         place = np.zeros(self.course.episodes, dtype=np.int64)

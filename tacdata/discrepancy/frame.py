@@ -25,7 +25,9 @@ MODEL = 0.003
 DRAWS = 2
 """Draws of noise by which it is told what two models say differently of noise alone [1]."""
 ROUNDS = 3
-"""How often errors of pose and of gain are told beside each other [1]."""
+"""How often errors of pose and of gain are told beside each other, at most [1]..."""
+SETTLED = 0.1
+"""...until none changes by more than this share [1]."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,7 @@ def frame(setting: Setting) -> Frame:
     known = told.noise(errors)
     rise = streams.rise(said, response).astype(np.float32)
     prior, own = errors, Sizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
+    before = np.zeros(errors.shape[2] + 1)
     for _ in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is told beside the other.
         own = told.poses(known, prior, own.sizes)
@@ -112,6 +115,10 @@ def frame(setting: Setting) -> Frame:
         known = replace(known, swing=None)
         spread = told.gains(known, errors, rise)
         known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
+        now = np.array([*own.sizes, max(spread, MODEL)])
+        if np.all(np.abs(now - before) <= SETTLED * now):
+            break
+        before = now
     cleaner = Cleaner(reduced, known, context, features, errors)
     beside = cleaner.cleaned(every[:, :, : extra.shape[2] + rich.shape[2]])
     folds = fold_of(course.episodes)

@@ -56,25 +56,25 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
     return replace(before, scale=mixed * np.sqrt(max(1 - memory**2, 0.02)), memory=memory)
 
 
-def gain_spread(residual: np.ndarray, rises: np.ndarray, context: np.ndarray) -> float:
+def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -> float:
     """Return how far an episode's gain of a stream is off the next one's at its place, as a standard deviation [1].
 
     Presses that miss their place by a little read a little more here and less there: random to every model without
     a gradient.
 
     Args:
-        residual: Whitened and without nuisances, shape (n, streams).
-        rises: What the response says above idle in the rows of one episode of each place, alike, shape (n, streams, k).
-        context: Place of each row, shape (n,).
+        score: What the residual says of each episode's gain of each stream, shape (episodes, streams).
+        information: How much it knows of it, shape (episodes, streams).
+        place: Of each episode, shape (episodes,).
     """
     gaps, known = [], []
-    for key in np.unique(context):
-        rows = context == key
-        power = np.square(rises[rows]).sum(axis=0)
-        gain = np.einsum("nsk,ns->sk", rises[rows], residual[rows]) / np.maximum(power, 1e-9)
-        both = (power[:, 1:] > 1.0) & (power[:, :-1] > 1.0)
-        gaps.append(np.diff(gain, axis=1)[both])
-        known.append((1 / np.maximum(power[:, 1:], 1e-9) + 1 / np.maximum(power[:, :-1], 1e-9))[both])
+    said = information.max(axis=1) > 0  # sealed episodes say nothing
+    for key in np.unique(place[said]):
+        power = information[said & (place == key)]
+        gain = score[said & (place == key)] / np.maximum(power, 1e-9)
+        both = (power[1:] > 1.0) & (power[:-1] > 1.0)
+        gaps.append(np.diff(gain, axis=0)[both])
+        known.append((1 / np.maximum(power[1:], 1e-9) + 1 / np.maximum(power[:-1], 1e-9))[both])
     return spread_of(np.concatenate(gaps), np.concatenate(known))
 
 

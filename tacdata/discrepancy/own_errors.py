@@ -79,6 +79,31 @@ class Factored:
         return result
 
 
+    def told(self, left: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a residual says of columns that each stand in one stream of one episode, and how much it knows.
+
+        Like the products with what `without` makes of such columns, but for streams times episodes of them at once.
+        Streams must not have gains of their own beside.
+
+        Args:
+            left: A residual, as `without` returns it, shape (streams, n).
+            alone: The columns of all streams and episodes, whitened, shape (streams, n).
+
+        Returns:
+            Scores and information, shapes (episodes, streams).
+        """
+        scores, known = [], []
+        for k, (rows, offsets, errors) in enumerate(self._episodes):
+            own, rest = offsets.off(alone[:, rows, None])[:, :, 0], left[:, rows]
+            moved = errors.of_each(own)
+            pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
+            turned = moved @ np.linalg.inv(np.eye(len(errors.gram)) + errors.gram)
+            scores.append(np.einsum("sm,sm->s", own, rest) - moved @ pulled)
+            power = np.einsum("sm,sm->s", own, own) - np.einsum("sk,sk->s", turned, moved)
+            known.append(power if self._free is None else power - self._free.taken(k, own, turned))
+        return np.array(scores), np.array(known)
+
+
 class _Offsets:
     """One episode's own offset of every stream."""
 
@@ -127,6 +152,10 @@ class _Errors:
             each = (self._swing.transpose(0, 2, 1) @ block)[:, 0].astype(np.float64)
             parts.append(each - self._mean[:, None] * each.sum(axis=0))
         return np.concatenate(parts)
+
+    def of_each(self, own: np.ndarray) -> np.ndarray:
+        """Return T' of columns that each stand in one stream alone, shape (streams, m): shape (streams, kinds)."""
+        return np.einsum("smk,sm->sk", self._pose.reshape(*self._shape, self._pose.shape[1]), own, dtype=np.float64)
 
     def joint(self, shared: np.ndarray) -> np.ndarray:
         """Return T' of columns (streams, m, p), each in one stream alone, shape (streams, p, kinds + streams)."""
@@ -196,6 +225,24 @@ class _Free:
             return alone
         pulled = self._joint.T @ alone.reshape(len(self._joint), -1)
         return alone + self._through @ (self._inner @ pulled)
+
+    def taken(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
+        """Return how much of columns in one stream of an episode features take up, shape (streams,).
+
+        Args:
+            episode: Its number.
+            own: The columns, shape (streams, m).
+            turned: (1 + T'T)^-1 T' of each, shape (streams, kinds).
+        """
+        joint = self._joints[episode]
+        alone = np.einsum("smp,sm->sp", self._shared[episode], own, dtype=np.float64)
+        through = np.einsum("sp,spt->st", alone, self._through)
+        inside = np.einsum("sp,spq,sq->s", alone, self._inverse, alone)
+        inside += np.einsum("st,tu,su->s", through, self._inner, through)
+        pose = self._inverse @ joint
+        pose += self._through @ (self._inner @ np.einsum("spt,spk->tk", self._through, joint))
+        inside -= 2 * np.einsum("sp,spk,sk->s", alone, pose, turned)
+        return inside + np.einsum("sk,kl,sl->s", turned, np.einsum("spk,spl->kl", joint, pose), turned)
 
     def said(self, episode: int, weights: np.ndarray) -> np.ndarray:
         """Return what weights change in an episode, shape (streams, m, k)."""

@@ -104,3 +104,25 @@ def test_freedom_is_the_rank_of_splines_that_are_nearly_alike():
     own = Own(np.ones((24, rows), dtype=np.float32), np.full(8, np.inf), features=features)
     freedom = Factored(spans, own).freedom
     assert 24 * (width - 4) <= freedom <= 24 * (width - 4) + 2
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_columns_in_one_stream_of_an_episode_are_told_like_any_others(free):
+    """Scores and information of all of them at once, against products with each made by itself."""
+    rng = np.random.default_rng(0)
+    parts = made(rng)
+    spans = np.split(np.arange(sum(LENGTHS)), np.cumsum(LENGTHS)[:-1])
+    own = Own(
+        parts["offset"], np.array([np.inf, 0.5, np.inf]), moved=parts["moved"],
+        features=parts["features"] if free else None,
+    )  # fmt: skip
+    factored, alone = Factored(spans, own), parts["swing"]
+    left = factored.without(parts["columns"])[:, :, 0]
+    score, information = factored.told(left, alone)
+    for e, rows in enumerate(spans):
+        for s in range(STREAMS):
+            column = np.zeros((*alone.shape, 1))
+            column[s, rows, 0] = alone[s, rows]
+            white = factored.without(column)[:, :, 0]
+            assert score[e, s] == pytest.approx(np.sum(white * left), rel=1e-4, abs=1e-6)
+            assert information[e, s] == pytest.approx(np.sum(white * white), rel=1e-4)
