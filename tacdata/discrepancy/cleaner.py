@@ -115,10 +115,32 @@ class Cleaner:
         white = whiten(alone[:, : self._seen, None], self._course, self._of_seen())[:, :, 0]
         for place, (rows, part) in zip(self._places, self.parts(residual[:, :, None]), strict=True):
             episodes = np.unique(place.episode)
-            left = np.ascontiguousarray(part[:, : self._seen, 0].T)
-            own = place.seen.told(left, np.ascontiguousarray(white[rows].T))
+            own = place.seen.told(_turned(part[:, : self._seen, 0]), _turned(white[rows]))
             score[episodes, : self._seen], known[episodes, : self._seen] = own
         return score, np.maximum(known, 0.0)
+
+    def moved(self, residual: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a residual says of columns in each episode by itself, and how much it knows.
+
+        Args:
+            residual: Shape (n, streams).
+            columns: Shape (n, streams, k).
+
+        Returns:
+            Scores and information [1], shapes (episodes, k); 0 where nothing is known.
+        """
+        score, known = np.zeros((2, self._course.episodes, columns.shape[2]))
+        white = whiten(columns, self._course, self._noise)
+        for place, (rows, part) in zip(self._places, self.parts(residual[:, :, None]), strict=True):
+            episodes, own = np.unique(place.episode), white[rows]
+            score[episodes], known[episodes] = place.seen.moved(
+                _turned(part[:, : self._seen, 0]), _turned(own[:, : self._seen])
+            )
+            if place.tag is not None:
+                more = place.tag.moved(_turned(part[:, self._seen :, 0]), _turned(own[:, self._seen :]))
+                score[episodes] += more[0]
+                known[episodes] += more[1]
+        return score, known
 
     def _of_seen(self) -> Noise:
         noise, seen = self._noise, self._seen

@@ -50,7 +50,7 @@ class EpisodeErrors:
         columns = np.concatenate([self.residual[:, :, None], self.rich], axis=2)
         best = np.zeros(self.rich.shape[2])
         for _ in range(2):
-            best = self._best(columns, known, errors)
+            best = self._best(columns, Cleaner(course, known, self.context, self.features, errors))
             left = (self.residual - self.rich @ best.astype(np.float32)) / known.scale
             still = noise.still(known, left.shape[1])
             cleaner = Cleaner(course, still, self.context, self.features, errors / known.scale[None, :, None])
@@ -75,7 +75,8 @@ class EpisodeErrors:
             errors: What errors of one standard deviation of their prior change, shape (m, streams, kinds).
             sizes: Sizes so far [prior's], shape (kinds,).
         """
-        score, information = self._of_each(known, errors, sizes)
+        cleaner = Cleaner(self.course, known, self.context, self.features, errors * sizes)
+        score, information = cleaner.moved(self._left(cleaner), errors)
         there = np.flatnonzero(information.min(axis=1) > 0)  # sealed episodes say nothing
         place, score, information = self._places()[there], score[there], information[there]
         order = np.argsort(place, kind="stable")
@@ -104,7 +105,7 @@ class EpisodeErrors:
             rise: What presses add to each stream, shape (m, streams).
         """
         cleaner = Cleaner(self.course, known, self.context, self.features, errors)
-        score, information = cleaner.told(self._left(known, errors).astype(np.float32), rise)
+        score, information = cleaner.told(self._left(cleaner), rise)
         return noise.gain_spread(score, information, self._places())
 
     def _places(self) -> np.ndarray:
@@ -112,40 +113,17 @@ class EpisodeErrors:
         place[self.course.episode] = self.context
         return place
 
-    def _best(self, columns: np.ndarray, known: Noise, errors: np.ndarray) -> np.ndarray:
+    def _best(self, columns: np.ndarray, cleaner: Cleaner) -> np.ndarray:
         """Return the weights of the over-rich columns that fit best, shape (k,)."""
-        course, count = self.course, self.rich.shape[2]
-        cleaner = Cleaner(course, known, self.context, self.features, errors)
-        gram = cleaner.collected(columns).of(np.arange(course.episodes))
+        count = self.rich.shape[2]
+        gram = cleaner.collected(columns).of(np.arange(self.course.episodes))
         free = np.full(count, np.inf)
         return solve(gram, np.arange(count), np.ones(count), -free, free)
 
-    def _left(self, known: Noise, errors: np.ndarray) -> np.ndarray:
-        """Return what an over-rich fit leaves of the residual, shape (m, streams)."""
+    def _left(self, cleaner: Cleaner) -> np.ndarray:
+        """Return what an over-rich fit leaves of the residual, shape (m, streams), float32."""
         columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
-        return self.residual - self.rich @ self._best(columns, known, errors).astype(np.float32)
-
-    def _of_each(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what each episode says of its errors of each kind, and how much it knows, shapes (episodes, kinds)."""
-        course, kinds = self.course, errors.shape[2]
-        left = self._left(known, errors * sizes)[:, :, None].astype(np.float32)
-        cleaner = Cleaner(course, known, self.context, self.features, errors * sizes)
-        if self.features is None:
-            gram = cleaner.collected(np.concatenate([left, errors], axis=2)).gram
-            return gram[:, 0, 1:], np.diagonal(gram[:, 1:, 1:], axis1=1, axis2=2)
-        # Features take up what all episodes of a place have in common: a column for every episode, and sums over all
-        # rows of its place.
-        score, information = np.zeros((course.episodes, kinds)), np.zeros((course.episodes, kinds))
-        local, bare = noise.number_within(self.context, course.episode), cleaner.cleaned(left)
-        for number in range(local.max() + 1):
-            rows = local == number
-            own = cleaner.cleaned(errors * rows[:, None, None])
-            for place in np.unique(self.context[rows]):
-                there = self.context == place
-                episode = course.episode[rows & there][0]
-                score[episode] = np.einsum("nsk,ns->k", own[there], bare[there, :, 0], dtype=np.float64)
-                information[episode] = np.einsum("nsk,nsk->k", own[there], own[there], dtype=np.float64)
-        return score, information
+        return (self.residual - self.rich @ self._best(columns, cleaner).astype(np.float32)).astype(np.float32)
 
 
 def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray]:

@@ -79,6 +79,27 @@ class Factored:
         return result
 
 
+    def moved(self, left: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a residual says of columns in each episode by itself, and how much it knows.
+
+        Args:
+            left: A residual, as `without` returns it, shape (streams, n).
+            columns: Whitened, shape (streams, n, k).
+
+        Returns:
+            Scores and information, shapes (episodes, k).
+        """
+        scores, known = [], []
+        for k, (rows, offsets, errors) in enumerate(self._episodes):
+            own, rest = offsets.off(columns[:, rows]), left[:, rows]
+            inner = errors.inner(own)
+            turned = np.linalg.solve(np.eye(len(errors.gram)) + errors.gram, inner)
+            pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
+            scores.append(np.einsum("smk,sm->k", own, rest, dtype=np.float64) - inner.T @ pulled)
+            power = np.einsum("smk,smk->k", own, own, dtype=np.float64) - np.sum(inner * turned, axis=0)
+            known.append(power if self._free is None else power - self._free.taken_of_all(k, own, turned))
+        return np.array(scores), np.array(known)
+
     def told(self, left: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what a residual says of columns that each stand in one stream of one episode, and how much it knows.
 
@@ -220,11 +241,20 @@ class _Free:
         right = 0.0
         for shared, joint, errors, own in zip(self._shared, self._joints, self._errors, left, strict=True):
             right += (shared.transpose(0, 2, 1) @ own).astype(np.float64) - joint @ (errors.root @ errors.inner(own))
+        return self._solved(right)
+
+    def _solved(self, right: np.ndarray) -> np.ndarray:
+        """Return the solution of the normal equations, shape (streams, p, k)."""
         alone = self._inverse @ right
         if not self._joint.shape[1]:
             return alone
         pulled = self._joint.T @ alone.reshape(len(self._joint), -1)
         return alone + self._through @ (self._inner @ pulled)
+
+    def taken_of_all(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
+        """Return how much of columns (streams, m, k) of an episode features take up, shape (k,); ``turned`` (T, k)."""
+        right = (self._shared[episode].transpose(0, 2, 1) @ own).astype(np.float64) - self._joints[episode] @ turned
+        return np.einsum("spk,spk->k", right, self._solved(right))
 
     def taken(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
         """Return how much of columns in one stream of an episode features take up, shape (streams,).

@@ -93,7 +93,7 @@ def test_freedom_is_what_features_take_of_noise():
 
 
 def test_freedom_is_the_rank_of_splines_that_are_nearly_alike():
-    """Splines of which few rows tell, in single precision: those too near to be told apart count once, not 1.6 times."""
+    """Splines of few rows, in single precision: those too near to be told apart count once, not 1.6 times."""
     rng = np.random.default_rng(3)
     rows, width = 400, 12
     features = rng.normal(size=(1, rows, width))
@@ -119,7 +119,13 @@ def test_columns_in_one_stream_of_an_episode_are_told_like_any_others(free):
     factored, alone = Factored(spans, own), parts["swing"]
     left = factored.without(parts["columns"])[:, :, 0]
     score, information = factored.told(left, alone)
+    joint = factored.moved(left, parts["columns"][:, :, :2])
     for e, rows in enumerate(spans):
+        of_all = np.zeros((STREAMS, sum(LENGTHS), 2))
+        of_all[:, rows] = parts["columns"][:, rows, :2]
+        white = factored.without(of_all)
+        assert joint[0][e] == pytest.approx(np.einsum("snk,sn->k", white, left), rel=1e-4, abs=1e-6)
+        assert joint[1][e] == pytest.approx(np.square(white).sum(axis=(0, 1)), rel=1e-4)
         for s in range(STREAMS):
             column = np.zeros((*alone.shape, 1))
             column[s, rows, 0] = alone[s, rows]
