@@ -78,7 +78,6 @@ class Factored:
                 result[:, rows] -= self._free.said(k, weights)
         return result
 
-
     def moved(self, left: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what a residual says of columns in each episode by itself, and how much it knows.
 
