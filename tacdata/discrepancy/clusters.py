@@ -108,6 +108,17 @@ def lent(effects: dict[str, list[Clustered]]) -> Lent | None:
     return Lent(float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2))), freedom)
 
 
+def of_kinds(others: Lent | None, clock: Lent | None) -> dict[bool, Lent | None]:
+    """Return what effects that follow the clock (True), and others, are lent.
+
+    Few effects follow the clock, and lend each other little. Where they scatter no more than all others do, the larger
+    excess of those counts, and all that they know; where something wanders, only their own.
+    """
+    if others is not None and clock is not None and others.excess >= clock.excess:
+        clock = others
+    return {False: others, True: clock}
+
+
 def _trigamma_inverse(value: float) -> float:
     """Return x with trigamma(x) = value > 0, by Newton's method on its inverse (Smyth 2004, appendix)."""
     x = 0.5 + 1 / value

@@ -237,7 +237,7 @@ class _Free:
 
     def weights(self, left: list[np.ndarray]) -> np.ndarray:
         """Return the weights that fit best, shape (streams, p, k), to the columns of each episode (streams, m, k)."""
-        right = 0.0
+        right = np.zeros((*self._blocks.shape[:2], left[0].shape[2]))
         for shared, joint, errors, own in zip(self._shared, self._joints, self._errors, left, strict=True):
             right += (shared.transpose(0, 2, 1) @ own).astype(np.float64) - joint @ (errors.root @ errors.inner(own))
         return self._solved(right)

@@ -8,15 +8,16 @@ however clear they are.)
 
 Where a response is fitted, models that move the pose, or remember, have it take up different functions, and differ in
 noise alone: by V = |(P2 - P1) n|^2 for projections P1 and P2, told by draws of noise. That is taken off: by chance the
-pull has mean (V + f1 - f2) / 2 for the responses' degrees of freedom f, and the variance |d|^2 - V/2, d being the
-difference (a quadratic form in normal variables). A model's own amplitudes follow noise as well: all but the first of
+pull has mean (V + f1 - f2) / 2 for the responses' degrees of freedom f, and a variance that the draws tell as well (it
+is a quadratic form in normal variables), beside the |d|^2 - V of what truly differs, d being the difference. A model's
+own amplitudes follow noise as well: all but the first of
 those that the other has not count in V and in f (the first is what a test of one column pays for; that the test rejects
 too often by the others: Godfrey & Pesaran, J. Econometrics 21, 1983, 133).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,6 +70,49 @@ class Off:
         return eliminated(gram, index - 1, ridge)[:, :2, :2], fallen
 
 
+@dataclass(frozen=True)
+class Chance:
+    """What noise alone makes of the difference of two models, and of how it pulls at the second."""
+
+    apart: float
+    """V, the difference squared and summed [noise scales squared]."""
+    freer: float
+    """By how many degrees of freedom the first is freer [1]."""
+    variance: float
+    """Of the pull [1]."""
+
+    @classmethod
+    def of(cls, first: Refined, second: Refined) -> Chance:
+        """Return what the draws of noise say.
+
+        Places and streams are nearly independent. The variance is V / 2 for responses that are much alike, and V with
+        what the first is freer by for those that have nothing in common.
+        """
+        if first.shaken is second.shaken:
+            return cls(0.0, 0.0, 0.0)
+        apart = second.shaken - first.shaken
+        draws, freer = apart.shape[2], first.freedom - second.freedom
+        noise = float(np.square(apart).sum()) / draws
+        pull = np.zeros((int(first.place.max()) + 1, *apart.shape[1:]))
+        np.add.at(pull, first.place, second.shaken * apart)
+        groups = int(np.count_nonzero(np.any(pull, axis=2)))
+        told = float(np.var(pull, axis=2, ddof=1).sum()) * (1 + 2 * np.sqrt(2 / max(groups * (draws - 1), 1)))
+        return cls(noise, freer, float(np.clip(told, 0.5 * noise, noise + max(freer, 0.0))))
+
+    def beside(self, more: int, less: int) -> Chance:
+        """Return the same with amplitudes that only the first (``more``) or only the second (``less``) has."""
+        return Chance(self.apart + more + less, self.freer + more - less, self.variance + 2 * more)
+
+    def share(self, gram: np.ndarray) -> float:
+        """Return the share of a pull that noise does not make [1]; products of episodes as in `ahead`."""
+        pull, apart = float(gram[:, 0, 1].sum()), float(gram[:, 1, 1].sum())
+        return max(pull - 0.5 * (min(self.apart, apart) + self.freer), 0.0) / pull if pull > 0 else 1.0
+
+    def spread(self, apart: float) -> float:
+        """Return the variance of a pull over what it is where noise makes nothing, the difference squared [1]."""
+        return (max(apart - self.apart, 0.0) + self.variance) / apart
+
+
 def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: Off | None = None) -> float:
     """Return by how many standard errors the first model is borne out against the second [1]; negative: the other way.
 
@@ -95,10 +139,14 @@ def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: O
         return 0.0
     clock = any(_differ(first, second))
     told = clustered(gram, np.zeros(1, dtype=np.int64), clock)
-    noise, freer = _noise(first, second) + more + less, first.freedom - second.freedom + more - less
     # Two models that are equally wrong pull towards each other: the better one must explain more, too.
     most = float(np.sqrt(2 * loss / max(told.power / told.expected, 1.0)))
-    return min(max(told.score(lent.get(clock)), 0.0) * _sound(gram, noise, freer), most)
+    # Before few stretches are paid for: a large score shrinks more by that than what is sound of it.
+    chance = Chance.of(first, second).beside(more, less)
+    sound = replace(
+        told, pull=told.pull * chance.share(gram), expected=told.expected * chance.spread(float(gram[:, 1, 1].sum()))
+    )
+    return min(max(sound.score(lent.get(clock)), 0.0), most)
 
 
 def _beyond(model: Refined, other: Refined) -> int:
@@ -106,29 +154,6 @@ def _beyond(model: Refined, other: Refined) -> int:
     taken = {p.effect.name for p in other.placed}
     own = [k for k in model.tangent.knobs if not k.shape and model.placed[k.at].effect.name not in taken]
     return max(len(own) - 1, 0)
-
-
-def _noise(first: Refined, second: Refined) -> float:
-    """Return what two models say differently of noise alone, squared and summed [noise scales squared]."""
-    if first.shaken is second.shaken:
-        return 0.0
-    return float(np.square(second.shaken - first.shaken).sum()) / first.shaken.shape[2]
-
-
-def _sound(gram: np.ndarray, noise: float, freer: float) -> float:
-    """Return the share of a score that is left when what noise alone makes is taken off [1].
-
-    Args:
-        gram: Products of the second's residual and of the difference, shape (episodes, 2, 2).
-        noise: Their difference in noise alone, squared and summed [noise scales squared].
-        freer: By how many degrees of freedom the first is freer [1].
-    """
-    pull, apart = float(gram[:, 0, 1].sum()), float(gram[:, 1, 1].sum())
-    noise = min(noise, apart)
-    if pull <= 0.0:
-        return 1.0
-    sound = max(pull - 0.5 * (noise + freer), 0.0) / pull
-    return sound * float(np.sqrt(apart / (apart - 0.5 * noise)))
 
 
 def _differ(first: Refined, second: Refined) -> list[bool]:

@@ -40,6 +40,8 @@ class Refined:
     """Whitened residual without nuisances [noise scales], shape (m, streams), float32."""
     episode: np.ndarray
     """Of each of its rows, shape (m,), int64."""
+    place: np.ndarray
+    """Group of rows that share a response's features, shape (m,), int64."""
     shaken: np.ndarray
     """What it leaves of the frame's draws of noise [noise scales], shape (m, streams, draws), float32."""
     freedom: float
@@ -88,7 +90,7 @@ def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int 
             break
     return Refined(
         tuple(now), response, state.tangent, view.energy, state.covariance, view.left, setting.course.reduced.episode,
-        frame.shaken(view.cleaner), view.cleaner.freedom,
+        frame.context, frame.shaken(view.cleaner), view.cleaner.freedom,
     )  # fmt: skip
 
 

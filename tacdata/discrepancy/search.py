@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from tacdata.discrepancy.candidates import Candidate, StandIn
 from tacdata.discrepancy.cleaner import Cleaner
-from tacdata.discrepancy.clusters import Clustered, Lent, clustered, lent
+from tacdata.discrepancy.clusters import Clustered, Lent, clustered, lent, of_kinds
 from tacdata.discrepancy.evidence import Noise
 from tacdata.discrepancy.fit import eliminated, flips, gains, solve, t_value
 from tacdata.discrepancy.generic import histories
@@ -81,7 +81,7 @@ def _lent(problem: Problem, scores: list[Clustered], clock: list[bool], but: str
     for candidate, score, own in zip(problem.candidates, scores, clock, strict=True):
         if candidate.called != but:
             told[own].setdefault(candidate.effect.name, []).append(score)
-    return {kind: lent(effects) for kind, effects in told.items()}
+    return of_kinds(lent(told[False]), lent(told[True]))
 
 
 def _numerics(problem: Problem, gram: np.ndarray, candidate: Candidate) -> bool:

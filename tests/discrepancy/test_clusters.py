@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from tacdata.discrepancy.clusters import Clustered, clustered, lent
+from tacdata.discrepancy.clusters import Clustered, Lent, clustered, lent, of_kinds
 
 
 def gram_of(rng, episodes, tails):
@@ -44,3 +44,12 @@ def test_what_is_lent_steadies_a_score_of_few_episodes():
     assert few.score() < 1.6
     assert few.score(given) > 3.0
     assert lent({"alone": effects["0"]}) is None
+
+
+def test_effects_that_follow_the_clock_are_lent_by_all_where_nothing_wanders():
+    others, quiet, wandering = Lent(1.2, 38.0), Lent(0.9, 6.0), Lent(3.0, 6.0)
+    assert of_kinds(others, quiet) == {False: others, True: others}
+    assert of_kinds(others, wandering) == {False: others, True: wandering}
+    assert of_kinds(None, quiet)[True] is quiet
+    few = Clustered(np.array([6.0]), np.ones((4, 1)) / 2, np.arange(4), (1.0, 4.0), 1.0)
+    assert few.score(others) > few.score(quiet) > few.score(wandering)

@@ -28,7 +28,7 @@ def model(left, *names):
     placed = tuple(SimpleNamespace(effect=load(name)) for name in names)
     return SimpleNamespace(
         left=left, episode=episode, energy=energy, placed=placed, loss=energy.sum(), freedom=0.0, shaken=UNSHAKEN,
-        tangent=SimpleNamespace(knobs=[]),
+        tangent=SimpleNamespace(knobs=[]), place=episode // 4,
     )  # fmt: skip
 
 
@@ -100,26 +100,36 @@ def test_what_an_equation_may_be_off_about_is_nothing_against_it():
     assert 0.3 * bare < against(0.1 * true) < 0.95 * bare, "it may be off by a tenth of what it is"
 
 
-def test_responses_that_follow_noise_differently_are_level():
-    """Two models that lack nothing, whose responses take up other functions, and one of them more of them."""
-    rows, freer = EPISODES * ROWS, 60
-    rng = np.random.default_rng(7)
-    common = rng.normal(size=(rows, 100))
-    designs = [np.hstack([common, rng.normal(size=(rows, width))]) for width in (40, 40 + freer)]
-    bases = [np.linalg.qr(design)[0] for design in designs]
+@pytest.mark.parametrize("turned", [1.0, 0.3])
+def test_responses_that_follow_noise_differently_are_level(turned):
+    """Two models that lack nothing, whose responses take up other functions, and one of them more of them.
+
+    Every place of four presses has its own: they have nothing in common beside ten, or are those of the other turned.
+    """
+    rows, places, freer = EPISODES * ROWS, EPISODES // 4, 5
+    rng, each = np.random.default_rng(7), EPISODES * ROWS // (EPISODES // 4)
+    bases = []
+    for _ in range(places):
+        common, own = rng.normal(size=(each, 10)), rng.normal(size=(each, 4))
+        other = np.hstack([own + turned * rng.normal(size=own.shape), rng.normal(size=(each, freer))])
+        pair = [np.linalg.qr(np.hstack([common, more]))[0] for more in (own, other)]
+        bases.append(pair)
     draws, told = rng.normal(size=(rows, 2)), []
 
-    def fitted_by(basis, values, name):
-        left = values - basis @ (basis.T @ values)
-        made = model(left, name)
-        made.shaken = (draws - basis @ (basis.T @ draws))[:, None, :]
-        made.freedom = float(basis.shape[1])
+    def without(values, which):
+        parts = np.split(values, places)
+        return np.concatenate([p - b[which] @ (b[which].T @ p) for p, b in zip(parts, bases, strict=True)])
+
+    def fitted_by(which, values, name):
+        made = model(without(values, which), name)
+        made.shaken = without(draws, which)[:, None, :]
+        made.freedom = float(sum(pair[which].shape[1] for pair in bases))
         made.loss = made.energy.sum() + 0.5 * made.freedom
         return made
 
-    for _ in range(200):
+    for _ in range(300):
         noise = rng.normal(size=(rows, 1))
-        told.append(ahead(fitted_by(bases[0], noise, "backlash"), fitted_by(bases[1], noise, "creep"), Nothing()))
+        told.append(ahead(fitted_by(0, noise, "backlash"), fitted_by(1, noise, "creep"), Nothing()))
     assert abs(np.mean(told)) < 0.25, "neither is ahead on average"
     assert np.mean(np.abs(told) > 2.33) < 0.05
     assert np.std(told) > 0.5, "they are compared, though"
