@@ -15,6 +15,11 @@ class Response(ABC):
     fitted = False
     """Whether it was fitted to the recordings that are judged; then only what has memory can be judged."""
 
+    @property
+    def spacing(self) -> float | None:
+        """Largest distance between successive depths that were solved [mm]; None where none were."""
+        return None
+
     @abstractmethod
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return the load on each channel, shape (n, channels); 0 without contact.

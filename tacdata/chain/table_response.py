@@ -57,6 +57,11 @@ class TableResponse(Response):
         self._nodes = [np.pad(table, ((1, 2), (1, 2), (1, 2), (0, 0)), mode="reflect") for table in both]
         self._kept: dict[int, _Answer] = {}
 
+    @property
+    def spacing(self) -> float:
+        """Largest distance between successive depths [mm]."""
+        return float(np.diff(self.depth).max())
+
     def rougher(self) -> TableResponse:
         """Return the same table read by polynomials through four nodes: off the splines by about the splines' error."""
         other = copy.copy(self)

@@ -15,6 +15,8 @@ SPREAD = 3.0
 """How far a mechanism may be spread over its other forms and shapes, over what one equation is off about [1]."""
 SIZES = (0.25, 0.5, 2.0, 4.0)
 """Other sizes of what has no shape, whose time constant or width is its size [1]."""
+NEAR = (0.5, 2.0)
+"""Shapes beside an effect's own: what goes with a period has harmonics, what relaxes has times on either side [1]."""
 NOTHING = 1e-9
 """What changes less than this share of what the effect does is no form of it [1]."""
 
@@ -58,13 +60,21 @@ def variants(one: Placed, channels: int) -> list[Placed]:
         if not effect.shapes and effect.name == one.effect.name:
             made += [_sized(one, by) for by in SIZES]
             continue
-        sizes = {
-            p.name: np.full(channels if p.per_channel else (), p.default + p.typical, dtype=float)
-            for p in effect.amplitudes
-        }
-        for shapes in product(*(p.grid for p in effect.shapes)):
-            own = {p.name: np.array(value) for p, value in zip(effect.shapes, shapes, strict=True)}
-            made.append(Placed(effect, sizes | own))
+        sizes = [
+            {
+                p.name: np.full(channels if p.per_channel else (), p.default + p.typical * (p is own), dtype=float)
+                for p in effect.amplitudes
+            }
+            for own in effect.amplitudes
+        ]
+        every = list(product(*(p.grid for p in effect.shapes)))
+        if effect.name == one.effect.name:
+            now = [float(one.values[p.name]) for p in effect.shapes]
+            beside = [(k, by * value) for k, value in enumerate(now) for by in NEAR]
+            every += [(*now[:k], value, *now[k + 1 :]) for k, value in beside]
+        for shapes in every:
+            own = {p.name: np.clip(value, p.low, p.high) for p, value in zip(effect.shapes, shapes, strict=True)}
+            made += [Placed(effect, alone | own) for alone in sizes]
     return made
 
 

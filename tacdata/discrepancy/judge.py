@@ -231,7 +231,7 @@ def _race(
             at += len(candidate.columns)
         tried.append(refine(problem.setting, [*problem.placed, *first], problem.frame))
     tried.sort(key=_cost)
-    if not tried or ahead(tried[0], current, lent) < KEPT:
+    if not tried or _needed(problem.setting, tried[0], current, problem.frame, lent) < KEPT:
         return None, tried
     return tried[0], tried[1:]
 
@@ -245,7 +245,7 @@ def _members(
     while len(placed) > 1:
         start = replace(setting, response=current.response)
         without = {k: refine(start, placed[:k] + placed[k + 1 :], problem.frame, 3) for k in range(len(placed))}
-        need = {k: ahead(current, r, lent) for k, r in without.items()}
+        need = {k: _needed(start, current, r, problem.frame, lent) for k, r in without.items()}
         weakest = min(need, key=lambda k: need[k])
         if need[weakest] >= KEPT:
             break
@@ -261,6 +261,12 @@ def _members(
             return _members(setting, better, problem, lent, swaps - 1)
         made.append(member)
     return made, current
+
+
+def _needed(setting: Setting, model: Refined, without: Refined, frame: Frame, lent: dict[bool, Lent | None]) -> float:
+    """Return by how much a model is ahead of one with fewer effects: what their equations leave asks for no others."""
+    need = ahead(model, without, lent)
+    return need if need < KEPT or not without.placed else ahead(model, without, lent, Off.of(setting, without, frame))
 
 
 def _member(
@@ -283,7 +289,7 @@ def _member(
     close = [n for n in close if score[n] > BEHIND * top or clipped_t(first - each[n]) < FAR]
     close = sorted(close, key=lambda n: -score[n])[:TOP]
     margins, losses, rivals = {}, {}, []
-    need = ahead(current, without, lent)
+    need = _needed(setting, current, without, problem.frame, lent)
     better: Refined | None = None
     for name in close:
         _, values = fitted(bare, [best[name]], everything)
@@ -293,7 +299,7 @@ def _member(
         margins[name] = ahead(current, other, lent)
         if margins[name] >= level:
             # Its equation may be off: what that explains is nothing against it.
-            margins[name] = ahead(current, other, lent, Off.of(start, other, len(without.placed), problem.frame))
+            margins[name] = ahead(current, other, lent, Off.of(start, other, problem.frame, len(without.placed)))
         if (
             margins[name] < -AHEAD
             and (better is None or _cost(other) < _cost(better))

@@ -38,7 +38,7 @@ TINY = 1e-6
 
 @dataclass(frozen=True)
 class Off:
-    """What the equation of one of a model's effects may be off about, beside nuisances."""
+    """What the equations of a model's effects may be off about, beside nuisances."""
 
     columns: np.ndarray
     """Whitened and cleaned, at one standard deviation [1], shape (m, streams, k), float32."""
@@ -47,10 +47,11 @@ class Off:
     frame: Frame
 
     @classmethod
-    def of(cls, setting: Setting, model: Refined, at: int, frame: Frame) -> Off:
-        """Return what a model's effect number ``at`` may be off about."""
-        others = [p for k, p in enumerate(model.placed) if k != at]
-        columns = forms(setting.course, model.response, [model.placed[at]], [*setting.given, *others])
+    def of(cls, setting: Setting, model: Refined, frame: Frame, at: int | None = None) -> Off:
+        """Return what a model's effect number ``at`` may be off about; all of them, unless given."""
+        own = [p for k, p in enumerate(model.placed) if at is None or k == at]
+        others = [p for p in model.placed if p not in own]
+        columns = forms(setting.course, model.response, own, [*setting.given, *others])
         features = taken_up(setting.course, model.response, [*setting.given, *model.placed])
         return cls(frame.cleaner(setting.course, features).cleaned(columns), setting.course.reduced, frame)
 

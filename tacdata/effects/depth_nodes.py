@@ -9,6 +9,9 @@ import numpy as np
 from tacdata.chain import Course, Response, State
 from tacdata.effects.effect import Effect, Parameter
 
+CLOSE = 0.2
+"""Smooth curves through depths that stand closer, over the deepest press, follow any contact [1]."""
+
 
 class DepthNodes(Effect):
     """The simulation is interpolated between solved depths."""
@@ -18,6 +21,7 @@ class DepthNodes(Effect):
     stage = "simulator"
     moves = ("label", "signal")
     group = "simulator"
+    form_error = 0.02
     equation = "s = s + s sin(2 pi d / p) a sin-cos pair, p the spacing of solved depths"
     source = "standard form"
     experiment = "solve between the nodes: no recording is needed"
@@ -36,4 +40,7 @@ class DepthNodes(Effect):
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         """Return why such recordings cannot tell of it; empty if they may."""
+        apart = response.spacing
+        if apart is not None and apart < CLOSE * course.span:
+            return f"depths were solved {apart:.2g} mm apart or closer: what is read between them is off by far less"
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

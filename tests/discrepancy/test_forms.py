@@ -66,8 +66,9 @@ def test_a_mechanism_may_have_any_of_its_forms_and_shapes(pressed):
         counts[name] = {other.effect.name: 0 for other in found}
         for other in found:
             counts[name][other.effect.name] += 1
-    assert counts["relaxation"] == {"relaxation": 8, "power_creep": 3, "nonlinear_relaxation": 4}
-    assert counts["proportional_hysteresis"] == {"proportional_hysteresis": 3, "hysteresis": 1}
+    # Beside the grid, half and twice its own time constant.
+    assert counts["relaxation"] == {"relaxation": 10, "power_creep": 3, "nonlinear_relaxation": 4}
+    assert counts["proportional_hysteresis"] == {"proportional_hysteresis": 5, "hysteresis": 1}
     assert counts["low_pass_filter"] == {"low_pass_filter": 4}
     wide = Placed(load("low_pass_filter"), {"tau": np.array(1.0)})
     assert [float(v.values["tau"]) for v in variants(wide, 3)] == [0.25, 0.5, 2.0, 2.0], "within its bounds"
@@ -111,3 +112,10 @@ def test_a_spectrum_of_time_constants_is_no_second_memory():
     spread = search.test(problem)
     assert narrow.gain.max() > 20
     assert spread.gain.max() < 0.1 * narrow.gain.max()
+
+
+def test_a_period_has_harmonics_of_any_phase():
+    """A screw's second harmonic is its own, and no second effect; sine and cosine are varied each by itself."""
+    screw = Placed(load("screw_error"), {"s": np.array(0.01), "c": np.array(0.0), "p": np.array(0.8)})
+    half = [v.values for v in variants(screw, 3) if float(v.values["p"]) == 0.4]
+    assert sorted((float(v["s"] > 0), float(v["c"] > 0)) for v in half) == [(0.0, 1.0), (1.0, 0.0)]
