@@ -110,17 +110,16 @@ class Batch:
             yield from self._collect(verdicts, now, collect)
             failed = self._mask(verdicts, "failed")
             yield from self._retreat(verdicts)
-            if failed.any() or self._mask(verdicts, "found").any():
+            changed, augment = failed | self._mask(verdicts, "found"), self._mask(verdicts, "augment")
+            if changed.any():
                 yield from self._fill(waiting)
-                changed = failed | self._mask(verdicts, "found")
                 self._start(changed)
-                now = self._rebalance(now, changed)
-            augment = self._mask(verdicts, "augment")
             if augment.any():
                 which = self._tensor(augment)
                 for contact, state in zip(self._newton.contacts, self._states, strict=True):
                     contact.augment(state, which)
-                now = self._rebalance(now, augment)
+            if (changed | augment).any():
+                now = self._rebalance(now, changed | augment)
             self._step(now)
 
     def _settled(self) -> Balance:

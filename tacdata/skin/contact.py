@@ -344,6 +344,12 @@ class Contact:
         full = six[:, :, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(-1, 6, 6, 3, 3)
         return full.permute(0, 1, 3, 2, 4).reshape(-1, 18, 18)
 
+    def face_diagonal(self, face: torch.Tensor, member: torch.Tensor) -> torch.Tensor:
+        """Return the diagonals of `face_stiffness` [N/mm], shape (pairs, 18)."""
+        packed = self.stiffness[face, :, :3, member] * self.weights[face][:, :, None]
+        packed = torch.where((self.pressure[face, :, member] > 0)[..., None], packed, 0.0).to(torch.float32)
+        return torch.einsum("ka,pkc->pac", self.shapes.to(torch.float32).square(), packed).reshape(-1, 18)
+
     def weighted_stiffness(self) -> torch.Tensor:
         """Return the stiffness of every point that carries load [N/mm], shape (f, k, 6, b), float32."""
         loaded = (self.pressure > 0)[:, :, None]

@@ -6,6 +6,7 @@ down to the lowest point of the shape as it is turned. For an upright shape on a
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,8 +26,13 @@ _SAMPLES, _ZOOMS, _NARROWER = 65, 8, 8.0
 
 def rotation(request: PressRequest) -> np.ndarray:
     """Return the rotation from the indenter's frame to the sensor's [1], shape (3, 3)."""
-    angles = [torch.tensor([np.radians(angle)]) for angle in (request.yaw, request.tilt_x, request.tilt_y)]
-    return turned(*angles)[:, :, 0].numpy()
+    return _rotation(request.yaw, request.tilt_x, request.tilt_y).copy()
+
+
+@lru_cache(maxsize=1024)
+def _rotation(*degrees: float) -> np.ndarray:
+    """Every press asks three times, and many share their angles."""
+    return turned(*(torch.tensor([np.radians(angle)]) for angle in degrees))[:, :, 0].numpy()
 
 
 def rise(indenter: Indenter, turn: np.ndarray) -> float:

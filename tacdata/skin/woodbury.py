@@ -27,6 +27,11 @@ _STALE = {"cpu": 0.1, "cuda": 0.3}
 """Change of a member's contact stiffness, over its norm, from which on its share is prepared anew [1]; on a card that
 costs more than the conjugate gradients it saves."""
 
+_WEAK = {"cpu": 0.0, "cuda": 0.1}
+"""Contact stiffness of a degree of freedom times its compliance in the free body from which on a share knows it [1]. At
+the contact's edge are many that hardly feel it: conjugate gradients bear them, while a card's inversions grow with the
+cube of their number."""
+
 
 @dataclass(frozen=True)
 class Share:
@@ -83,6 +88,8 @@ class ContactPreconditioner:
         self._transfer = contact_transfer(0, "cpu")
         self._which = torch.empty(0, 0, dtype=torch.int64, device=device)
         """Numbers among the loadable degrees of freedom that each member touches; the count of all stands for none."""
+        self._own = torch.empty(0)
+        """Compliance of every loadable degree of freedom with itself [mm/N], shape (m + 1,), once asked for."""
         self._prepared: list[torch.Tensor] = []
         """Contact stiffness that each member's share was prepared from, by contact."""
 
@@ -101,6 +108,8 @@ class ContactPreconditioner:
         for numbers, (face, member) in zip(self._numbers, pairs, strict=True):
             touched[member[:, None], numbers[face]] = True
         touched[:, count] = False
+        if _WEAK[device.type]:
+            touched &= self._weight(pairs, batch) > _WEAK[device.type]
         members = stale.nonzero()[:, 0]
         counts, order = touched[members].sum(dim=1).sort()
         members = members[order]
@@ -112,6 +121,18 @@ class ContactPreconditioner:
             most = sizes[min(start + _GROUP, len(sizes)) - 1]
             self._which[member] = count
             self._prepare(member, most, max(leads[start : start + _GROUP]), touched[member], pairs)
+
+    def _weight(self, pairs: list[tuple[torch.Tensor, ...]], batch: int) -> torch.Tensor:
+        """Return the contact stiffness of degrees of freedom times their compliance [1], shape (b, count + 1)."""
+        count, device = len(self._dof) - 1, self._dof.device
+        if not len(self._own):
+            own = self._rest.compliance(torch.arange(count, device=device)[:, None])[:, 0, 0]
+            self._own = torch.cat([own, torch.zeros(1, device=device)])
+        weight = torch.zeros(batch, count + 1, device=device)
+        for contact, numbers, (face, member) in zip(self._contacts, self._numbers, pairs, strict=True):
+            flat = member[:, None] * (count + 1) + numbers[face]
+            weight.view(-1).scatter_add_(0, flat.flatten(), contact.face_diagonal(face, member).flatten())
+        return weight * self._own * self._scale[:, None]
 
     def _stale(self, stiffness: list[torch.Tensor], batch: int) -> torch.Tensor:
         """Return which members' share no longer fits, shape (b,), and remember what they are prepared from now."""

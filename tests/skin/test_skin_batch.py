@@ -11,6 +11,7 @@ from tacdata.errors import SolveError
 from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
+from tacdata.skin.batch import Batch
 from tacdata.skin.conditions import conditions
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.newton import SolverSettings
@@ -77,6 +78,32 @@ def test_states_come_in_the_order_of_the_path(model):
         depths[number].append(depth)
     assert [tuple(d) for d in depths.values()] == [request.depths for request in PRESSES[:3]]
     assert model.last_run["ticks"] > 0 and model.last_run["cg"] > model.last_run["ticks"]
+
+
+def test_what_has_changed_is_evaluated_once_an_iteration(model, monkeypatch):
+    """Whether members were sent on, or their multipliers brought up to date: in one iteration both happen."""
+    changed, most, mixed = [], 0, False
+    judge, again = Batch._judge, Batch._rebalance
+    monkeypatch.setattr(Batch, "_rebalance", lambda own, now, who: changed.append(who) or again(own, now, who))
+
+    def judged(own, now):
+        nonlocal mixed
+        changed.clear()
+        verdicts = judge(own, now)
+        mixed = mixed or {"found", "augment"} <= set(verdicts)
+        return verdicts
+
+    step = Batch._step
+
+    def stepped(own, now):
+        nonlocal most
+        most = max(most, len(changed))
+        step(own, now)
+
+    monkeypatch.setattr(Batch, "_judge", judged)
+    monkeypatch.setattr(Batch, "_step", stepped)
+    list(model.walk([PressRequest(Sphere(1.5), x, 0.1, 0.0, (0.2, 0.4)) for x in (-0.4, -0.1, 0.2, 0.5)], 4))
+    assert mixed and most == 1
 
 
 def test_displacements_are_left_out_where_not_wanted(model):

@@ -39,6 +39,7 @@ def as_on_a_card(monkeypatch):
         monkeypatch.setattr(Newton, "__init__", newton)
         monkeypatch.setattr(model, "rest_solver", rest)
         monkeypatch.setattr(woodbury, "contact_transfer", lambda members, device: DenseTransfer(members))
+        monkeypatch.setitem(woodbury._WEAK, "cpu", woodbury._WEAK["cuda"])
 
     return switch
 

@@ -15,6 +15,7 @@ from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.ring import Ring
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor.sensor import Contact, Skin
+from tacdata.skin import touch as touching
 from tacdata.skin.case import read_case
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
@@ -44,6 +45,16 @@ def punch_distance(points):
     """Signed distance of the punch [mm], written anew: a disc at height e, of radius r - e, thickened by e."""
     out = np.maximum(np.hypot(points[:, 0], points[:, 1]) - 0.7, 0.0)
     return np.where(points[:, 2] < 0.5, np.hypot(out, points[:, 2] - 0.5), out) - 0.5
+
+
+def test_a_rotation_is_made_once_and_is_each_callers_own(monkeypatch):
+    made, turned = [], touching.turned
+    monkeypatch.setattr(touching, "turned", lambda *angles: made.append(angles) or turned(*angles))
+    first = rotation(press(Sphere(1.0), 0.3, tilt_x=7.25, yaw=11.5))
+    first[0, 0] = 9.0
+    second = rotation(press(Sphere(2.0), 0.5, tilt_x=7.25, yaw=11.5))
+    assert len(made) == 1
+    assert np.allclose(second @ second.T, np.eye(3), atol=1e-12)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 3.0, 12.0, 30.0])
