@@ -38,6 +38,24 @@ def play(values: np.ndarray, width: float) -> np.ndarray:
     return played(_wide(values), width).reshape(values.shape)
 
 
+def slipping(values: np.ndarray, width: float, first: np.ndarray) -> np.ndarray:
+    """Return z of dz = (1 - z sgn du) du / w: -1 to 1 as an input rises by far more than ``width``, shape (n,).
+
+    Exact between rows, as u is monotone there: z_i = s + (z_{i-1} - s) exp(-|du| / w), s the sign of du.
+
+    Args:
+        values: Input u, shape (n,).
+        width: Of the turn, in the input's unit, above 0.
+        first: Rows at which z begins anew at -1, shape (n,), bool.
+    """
+    from tacdata.chain.memory_kernels import filtered
+
+    change = np.where(first, 0.0, np.diff(values, prepend=values[:1]))
+    keep = np.where(first, 0.0, np.exp(-np.abs(change) / width))
+    toward = np.where(first, -1.0, np.sign(change))
+    return filtered(_wide(toward + 1.0), keep, keep).reshape(values.shape) - 1.0
+
+
 def _wide(values: np.ndarray) -> np.ndarray:
     """Return values as floats of shape (n, k)."""
     return np.asarray(values, dtype=float).reshape(len(values), -1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.chain.memory import delayed, low_pass, play, running_max
+from tacdata.chain.memory import delayed, low_pass, play, running_max, slipping
 
 
 @pytest.mark.parametrize("tau", [0.02, 0.3, 5.0, 400.0])
@@ -57,3 +57,18 @@ def test_delay_shifts_within_an_episode_only():
 def test_largest_so_far_is_kept_for_each_place():
     result = running_max(np.array([1.0, 5.0, 2.0, 3.0, 1.0]), np.array([0, 1, 0, 0, 1]))
     np.testing.assert_allclose(result, [1, 5, 2, 3, 5])
+
+
+def test_friction_slips_gradually_and_begins_anew():
+    """Against small steps of the equation, up, down and up again; another stroke starts from rest."""
+    turns = np.concatenate([np.linspace(0, 1, 41), np.linspace(1, 0.4, 21)[1:], np.linspace(0.4, 0.9, 13)[1:]])
+    fine = np.interp(np.linspace(0, len(turns) - 1, 200 * (len(turns) - 1) + 1), np.arange(len(turns)), turns)
+    z, stepped = -1.0, [-1.0]
+    for step in np.diff(fine):
+        z += (step - abs(step) * z) / 0.2
+        stepped.append(z)
+    first = np.zeros(2 * len(turns), dtype=bool)
+    first[[0, len(turns)]] = True
+    found = slipping(np.concatenate([turns, turns]), 0.2, first)
+    np.testing.assert_allclose(found[: len(turns)], stepped[::200], atol=2e-3)
+    np.testing.assert_array_equal(found[len(turns) :], found[: len(turns)])
