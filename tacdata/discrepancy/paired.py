@@ -59,7 +59,8 @@ class Off:
         """Hold two whitened residuals, shape (m, streams), beside these columns.
 
         Returns:
-            Their Gram matrix of each episode, and by how much half the energy of the first falls [nats].
+            Their Gram matrix of each episode, and by how much more half the energy of the first falls than that of the
+            first less the second [nats]: what both models miss is nothing to either.
         """
         both = np.concatenate([np.stack([left, apart], axis=2), self.columns], axis=2)
         gram = evidence.summed(both, self.course, self.frame.nuisances, self.frame.inner).gram
@@ -67,7 +68,9 @@ class Off:
         total, index = gram.sum(axis=0), np.arange(2, gram.shape[1])
         matrix = total[np.ix_(index, index)] + np.diag(ridge)
         matrix = matrix + 1e-9 * np.eye(len(index)) * max(float(np.trace(matrix)) / len(index), 1e-12)
-        fallen = 0.5 * float(total[index, 0] @ np.linalg.solve(matrix, total[index, 0]))
+        pulls = np.stack([total[index, 0], total[index, 0] - total[index, 1]])
+        falls = 0.5 * np.einsum("ki,ik->k", pulls, np.linalg.solve(matrix, pulls.T))
+        fallen = max(float(falls[0] - falls[1]), 0.0)
         return eliminated(gram, index - 1, ridge)[:, :2, :2], fallen
 
 
