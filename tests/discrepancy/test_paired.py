@@ -103,7 +103,7 @@ def test_what_an_equation_may_be_off_about_is_nothing_against_it():
 def test_what_both_models_miss_is_nothing_to_either():
     """An episode unlike all others, along what the second's equation may be off about, is missed by both."""
     rng = np.random.default_rng(6)
-    noise, true = rng.normal(size=(EPISODES * ROWS, 1)), signal(6.0, np.arange(48), rng)
+    noise, true = rng.normal(size=(EPISODES * ROWS, 1)), signal(6.0, np.delete(np.arange(48), 11), rng)
     odd = signal(40.0, np.array([11]), rng)
     first, second = model(noise + odd, "relaxation"), model(noise + odd + true, "creep")
     course = SimpleNamespace(episode=first.episode, episodes=EPISODES)
@@ -111,7 +111,7 @@ def test_what_both_models_miss_is_nothing_to_either():
         nuisances=np.zeros((len(noise), 1, 0)), inner=np.zeros((EPISODES, 0, 0)), ridge=np.zeros(0)
     )
     off = Off(odd[:, :, None] + signal(2.0, np.arange(48), rng)[:, :, None], course, nothing)
-    assert ahead(first, second, Nothing(), off) > 3.5
+    assert ahead(first, second, Nothing(), off) > 0.8 * ahead(first, second, Nothing()) > 1.5
 
 
 @pytest.mark.parametrize("turned", [1.0, 0.3])
