@@ -70,10 +70,12 @@ def _rivals(axis: Any, found: Judgement) -> None:
     order = sorted(best, key=lambda name: -best[name])[:12]
     chosen = {m.placed.effect.name for m in found.members}
     colors = ["tab:blue" if name in chosen else "0.6" for name in order]
-    axis.barh(order, [max(best[name], 0.1) for name in order], color=colors)
+    axis.barh(order, [best[name] for name in order], color=colors)
     axis.invert_yaxis()
     axis.tick_params(axis="y", labelsize=7)
-    axis.set(xscale="log", xlabel="gain of each effect alone, to first order [nats]", title="candidates")
+    axis.set(xlabel="gain of each effect alone, to first order [nats]", title="candidates")
+    axis.locator_params(axis="x", nbins=5)
+    axis.ticklabel_format(axis="x", style="sci", scilimits=(-1, 4))
 
 
 def _episodes(axis: Any, found: Judgement) -> None:
