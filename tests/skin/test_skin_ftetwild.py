@@ -18,6 +18,7 @@ BACKGROUND = CUBE, CELLS, np.full(8, 0.4)
 INTERRUPTED = """
 import os, signal, time
 from test_skin_ftetwild import cube
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it for what runs in the background
 cube()
 try:
     os.kill(os.getpid(), signal.SIGINT)
