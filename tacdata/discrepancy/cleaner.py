@@ -46,11 +46,14 @@ class Cleaner:
         one = replace(flat, missing=None)
         offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
         moved = whiten(jitter, course, noise)
+        roam = None
+        if noise.roam is not None:
+            each = np.broadcast_to(noise.roam[:, None, :], (course.rows, streams, noise.roam.shape[1]))
+            roam = whiten(each, course, flat)
         swung = None if noise.swing is None else whiten(noise.swing[:, :, None], course, noise)[:, :, 0]
-        shared = None if features is None else whiten(features[:, None, :], course, one)
-        if wander is not None and shared is not None and features is not None:
-            ones = whiten(np.ones((course.rows, 1, 1)), course, one)[:, :, 0]
-            _follow(shared, ones, course.episode, wander.expected(features[:, None, :]).astype(np.float32))
+        ahead = None
+        if wander is not None and features is not None:
+            ahead = wander.expected(features[:, None, :]).astype(np.float32)
         order = np.argsort(context, kind="stable")
         self._places: list[_Place] = []
         # A place at a time: columns of all rows together would not stay in a processor's cache.
@@ -59,12 +62,22 @@ class Cleaner:
             rows = np.argsort(local, kind="stable")
             spans = np.split(rows, np.flatnonzero(np.diff(local[rows])) + 1)
             free = np.full(len(spans), np.inf)
+            shared = None
+            if features is not None:
+                used = features[group][:, None, np.abs(features[group]).max(axis=0) > 1e-9]
+                # Where noise is not alike in all streams, whitened features are not.
+                shared = whiten(used, course, one, group)
+                if ahead is not None:
+                    ones = whiten(np.ones((len(group), 1, 1)), course, one, group)[:, :, 0]
+                    expected = ahead[:, :, np.abs(features[group]).max(axis=0) > 1e-9]
+                    _follow(shared, ones, local, expected)
             own = Own(
                 _turned(offset[group, :seen]),
                 free if wander is None else wander.spread[[local[span[0]] for span in spans]],
                 None if swung is None else _turned(swung[group, :seen]),
                 _turned(moved[group, :seen]),
-                None if shared is None else _features(shared[group, 0], offset[group, :seen]),
+                None if shared is None else _features(shared, offset[group, :seen]),
+                None if roam is None else _turned(roam[group, :seen]),
             )  # fmt: skip
             tag = None
             if seen < streams:
@@ -145,13 +158,25 @@ class Cleaner:
     def _of_seen(self) -> Noise:
         noise, seen = self._noise, self._seen
         missing = None if noise.missing is None else noise.missing[:, :seen]
-        return replace(noise, scale=noise.scale[:seen], missing=missing)
+        louder = None if noise.loud is None else noise.loud[:, :seen]
+        return replace(noise, scale=noise.scale[:seen], missing=missing, loud=louder)
 
     def cleaned(self, columns: np.ndarray) -> np.ndarray:
         """Return columns whitened and without nuisances, shape (n, streams, k)."""
         result = np.zeros(columns.shape, dtype=np.float32)
         for rows, part in self.parts(columns):
             result[rows] = part
+        return result
+
+    def projected(self, white: np.ndarray) -> np.ndarray:
+        """Return what is left of noise, drawn white, shape (n, streams, draws): features take up some of it."""
+        result = np.zeros(white.shape, dtype=np.float32)
+        for place in self._places:
+            own = white[place.rows].astype(np.float32) * (place.offset != 0)[:, :, None]
+            own[:, : self._seen] = _turned(place.seen.projected(_turned(own[:, : self._seen])))
+            if place.tag is not None:
+                own[:, self._seen :] = _turned(place.tag.projected(_turned(own[:, self._seen :])))
+            result[place.rows] = own
         return result
 
     def collected(self, columns: np.ndarray, beside: np.ndarray | None = None) -> Evidence:
@@ -193,12 +218,11 @@ def _turned(values: np.ndarray) -> np.ndarray:
 
 
 def _features(shared: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """Return features of each stream, shape (streams, n, p), without those that are nowhere and where nothing was read.
+    """Return features of each stream, shape (streams, n, p), 0 where nothing was read.
 
     Args:
-        shared: Whitened features, shape (n, k).
+        shared: Whitened features, shape (n, streams or 1, p).
         offset: Whitened constants, 0 where nothing was read, shape (n, streams).
     """
-    used = shared[:, np.abs(shared).max(axis=0) > 1e-9]
     there = (offset != 0).T.astype(np.float32)
-    return there[:, :, None] * used[None]
+    return there[:, :, None] * np.swapaxes(shared[:, : len(there)], 0, 1)

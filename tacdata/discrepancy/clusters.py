@@ -22,14 +22,14 @@ EACH = 5
 FEWEST, MOST = 10, 24
 """Least (if there are so many episodes) and most stretches."""
 ALIKE = 1.64
-"""Successive episodes have something in common beyond so many standard errors of their correlation [1]..."""
-CLOCKWISE = 0.0
-"""...for candidates that follow the clock, beyond so many."""
+"""Successive episodes have something in common beyond so many standard errors of their correlation [1]."""
 LEVERAGE = 0.6
 """A candidate of which one stretch holds a larger share of all information is not judged [1]."""
 FLOOR = 1e-300
 LENT = 1.0
 """Most degrees of freedom that effects lend each other, of their number: many look alike [1]."""
+UNLIKE = 0.05
+"""One that scatters more than so many of its kind would by chance is lent the less, the fewer would [1]."""
 LENDERS = 5
 """Fewer effects of a kind lend nothing [1]."""
 
@@ -60,9 +60,18 @@ class Clustered:
         """Return the standard normal score of the pull [1], with what other candidates lend."""
         power, (first, second) = self.power, self.freedom
         if lent is not None:
-            power = (second * power + lent.freedom * lent.excess * self.expected) / (second + lent.freedom)
-            second = second + lent.freedom
+            more = lent.freedom * self._of_a_kind(lent)
+            power = (second * power + more * lent.excess * self.expected) / (second + more)
+            second = second + more
         return float(_normal(np.array([np.sum(np.square(self.pull)) / power]), first, second)[0])
+
+    def _of_a_kind(self, lent: Lent) -> float:
+        """Return how much of what others lend applies [1]: little to one that scatters far more than they do.
+
+        (Robust empirical Bayes: Phipson et al., Ann. Appl. Stat. 10, 2016, 946.)
+        """
+        ratio = self.power / max(lent.excess * self.expected, 1e-12)
+        return float(min(fdtrc(self.freedom[1], max(lent.freedom, 1.0), ratio) / UNLIKE, 1.0))
 
     def by_chance(self, normal: np.ndarray) -> np.ndarray:
         """Return the scores that scatter alone gives, shape (draws,).
@@ -131,13 +140,12 @@ def _trigamma_inverse(value: float) -> float:
     return x
 
 
-def clustered(gram: np.ndarray, columns: np.ndarray, clock: bool) -> Clustered:
+def clustered(gram: np.ndarray, columns: np.ndarray) -> Clustered:
     """Return a candidate's score.
 
     Args:
         gram: One Gram matrix an episode, residual first, nuisances eliminated, shape (episodes, 1 + p, 1 + p).
         columns: The candidate's, counted from 0 without the residual, shape (k,).
-        clock: Whether it is told from how episodes follow each other.
     """
     index = columns + 1
     information = gram[:, index][:, :, index]
@@ -154,7 +162,7 @@ def clustered(gram: np.ndarray, columns: np.ndarray, clock: bool) -> Clustered:
     bare = white - inside @ pull
     leverage = np.einsum("ejj->ej", inside)
     of = np.arange(len(gram))
-    if _alike(bare, leverage, CLOCKWISE if clock else ALIKE):
+    if _alike(bare, leverage):
         count = int(np.clip(len(gram) // EACH, min(FEWEST, len(gram)), MOST))
         of = of * count // len(gram)
     together = np.zeros((of.max() + 1, len(index)))
@@ -181,14 +189,14 @@ def _unit(total: np.ndarray) -> np.ndarray:
     return (vectors[:, good] / np.sqrt(values[good])) @ vectors[:, good].T
 
 
-def _alike(bare: np.ndarray, leverage: np.ndarray, beyond: float) -> bool:
+def _alike(bare: np.ndarray, leverage: np.ndarray) -> bool:
     sized = bare / np.sqrt(np.maximum(leverage, 1e-9))
     sized = np.where(leverage > 0.05 * np.median(leverage), sized, 0.0)
     power = np.sum(np.square(sized), axis=0)
     common = float(np.sum(sized[1:] * sized[:-1])) / max(float(power.sum()), 1e-12)
     freedom = float(power.sum()) ** 2 / max(float(np.sum(power**2)), 1e-12)
     # An episode's own mean taken off makes successive ones differ by 1/n on average.
-    return (common + 1 / len(bare)) * np.sqrt(len(bare) * freedom) > beyond
+    return (common + 1 / len(bare)) * np.sqrt(len(bare) * freedom) > ALIKE
 
 
 def _freedom(scatter: np.ndarray, heavy: np.ndarray) -> tuple[float, tuple[float, float]]:

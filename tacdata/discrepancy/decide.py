@@ -27,6 +27,8 @@ OUTLYING = 4.0
 """... or, where all together scatter little, of what the others scatter by [1]."""
 WIDE = 2.0
 """Gains scatter more than calibration leaves open beyond so many of its standard deviations [1]."""
+RARE = 0.003
+"""What so few decoys do as well as is needed, whatever the two models' own episodes make of it [1]."""
 COMMON = ("modulus", "thickness")
 """What a common gain cannot be told from without a force reading."""
 
@@ -101,5 +103,5 @@ def status(found: Judgement) -> str:
 
 def settled(member: Member) -> str:
     """Return whether one effect may be named: named or ambiguous."""
-    doubt = member.rivals or member.at_bound or member.decoys > DECOYS or member.necessity < member.needed
-    return "ambiguous" if doubt else "named"
+    chance = member.decoys > DECOYS or (member.necessity < member.needed and member.decoys > RARE)
+    return "ambiguous" if member.rivals or member.at_bound or chance else "named"

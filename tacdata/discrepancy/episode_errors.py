@@ -11,6 +11,7 @@ from tacdata.discrepancy import noise
 from tacdata.discrepancy.cleaner import Cleaner
 from tacdata.discrepancy.evidence import Noise
 from tacdata.discrepancy.fit import solve
+from tacdata.discrepancy.roam import roam
 from tacdata.discrepancy.wander import wander
 
 LEAST, MOST = 0.1, 10.0
@@ -43,10 +44,13 @@ class EpisodeErrors:
     """Group of rows that share features, shape (m,), int64."""
     features: np.ndarray | None
     """What the response may take up [1], shape (m, k)."""
+    rise: np.ndarray
+    """What presses add to each stream [its unit], shape (m, streams)."""
 
     def noise(self, errors: np.ndarray) -> Noise:
         """Return the noise beside errors of pose, shape (m, streams, kinds)."""
-        course, known = self.course, noise.first_guess(self.residual, self.course)
+        course, louder = self.course, noise.loud(self.residual, self.rise, self.course)
+        known = noise.first_guess(self.residual, course, louder)
         columns = np.concatenate([self.residual[:, :, None], self.rich], axis=2)
         best = np.zeros(self.rich.shape[2])
         for _ in range(2):
@@ -60,7 +64,8 @@ class EpisodeErrors:
         rest = self.residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
         wandering = wander(rest, course, known.scale, known.memory, kinds)
-        return replace(known, wander=wandering, tag=noise.tag_wander(rest, course, known))
+        roaming = roam(rest, course, known.scale, known.memory, self._places())
+        return replace(known, wander=wandering, roam=roaming, tag=noise.tag_wander(rest, course, known))
 
     def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> Sizes:
         """Return how large episodes' own errors of pose are.
@@ -96,16 +101,15 @@ class EpisodeErrors:
         far = np.abs(found - middle) > ODD * np.sqrt(told**2 + variance)
         return Sizes(told, there[far.any(axis=1)])
 
-    def gains(self, known: Noise, errors: np.ndarray, rise: np.ndarray) -> float:
+    def gains(self, known: Noise, errors: np.ndarray) -> float:
         """Return how far an episode's gain of a stream is off the next one's at its place [1].
 
         Args:
             known: Noise without own gains.
             errors: Of pose, shape (m, streams, kinds).
-            rise: What presses add to each stream, shape (m, streams).
         """
         cleaner = Cleaner(self.course, known, self.context, self.features, errors)
-        score, information = cleaner.told(self._left(cleaner), rise)
+        score, information = cleaner.told(self._left(cleaner), self.rise)
         return noise.gain_spread(score, information, self._places())
 
     def _places(self) -> np.ndarray:

@@ -32,6 +32,11 @@ class Noise:
     """What one standard deviation of an episode's own gain of a stream changes [its unit], shape (n, streams)."""
     missing: np.ndarray | None = None
     """Which values were not read, shape (n, streams), bool; None: all were."""
+    roam: np.ndarray | None = None
+    """What one standard deviation of each mode of a stream's wander within an episode changes [noise scales], shape
+    (n, modes); None: it does not wander there."""
+    loud: np.ndarray | None = None
+    """How much larger noise is in each value than without load [1], shape (n, streams); None: it is not."""
     tag: float | None = None
     """Standard deviation of an episode's own offset of the tag's streams (the last three), in noise scales [1]; they
     have a free offset for each place and know nothing of the response. None: there is no tag."""
@@ -56,7 +61,7 @@ class Evidence:
 
 
 def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | None = None) -> np.ndarray:
-    """Filter by e_i - phi^(dt / median dt) e_{i-1} within episodes and divide by the innovations' scale.
+    """Divide by how loud noise is, filter by e_i - phi^(dt / median dt) e_{i-1} within episodes, divide by its scale.
 
     Args:
         values: Shape (n, streams, columns).
@@ -68,32 +73,18 @@ def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | 
     decay, spread = _filter(course, noise)
     decay, spread = decay[some], spread[some]
     result = values.astype(np.float32)
+    if noise.loud is not None:
+        result = result / noise.loud[some][:, :, None]
     if noise.missing is not None:
         missing = noise.missing[some]
         result[missing] = 0.0
-        before = result[:-1].copy()
-        result[1:] -= decay[1:, None, None].astype(np.float32) * before
+        result[1:] -= decay[1:, None, None].astype(np.float32) * result[:-1]
         gone = missing.copy()
         gone[1:] |= missing[:-1] & ~course.first[some][1:, None]
         result[gone] = 0.0
     else:
-        result[1:] -= decay[1:, None, None].astype(np.float32) * values[:-1].astype(np.float32, copy=False)
+        result[1:] -= decay[1:, None, None].astype(np.float32) * result[:-1]
     result /= (spread[:, None] * noise.scale[None]).astype(np.float32)[:, :, None]
-    return result
-
-
-def coloured(values: np.ndarray, course: Course, noise: Noise) -> np.ndarray:
-    """Return white noise as readings have it: what `whiten` undoes.
-
-    Args:
-        values: Shape (n, streams, columns).
-        course: Whose rows.
-        noise: Scales and memory.
-    """
-    decay, spread = _filter(course, noise)
-    result = values * spread[:, None, None] * noise.scale[None, :, None]
-    for row in np.flatnonzero(decay):
-        result[row] += decay[row] * result[row - 1]
     return result
 
 

@@ -57,7 +57,7 @@ class Frame:
     odd: np.ndarray
     """Episodes that err by far more than the others, shape (k,), int64."""
     draws: np.ndarray
-    """Noise as the noise model says it, drawn [each stream's unit], shape (m, streams, draws)."""
+    """White noise, drawn [noise scales], shape (m, streams, draws)."""
 
     @classmethod
     def of(
@@ -72,7 +72,7 @@ class Frame:
             context, features, errors, ridge, beside, nuisances, evidence.summed(nuisances, reduced).gram, noise, folds,
             known or Cleaner(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
-            evidence.coloured(white, reduced, noise),
+            white,
         )  # fmt: skip
 
     def cleaner(self, course: Course, features: np.ndarray | None) -> Cleaner:
@@ -84,11 +84,11 @@ class Frame:
 
     def shaken(self, cleaner: Cleaner) -> np.ndarray:
         """Return what a cleaner leaves of the draws [noise scales], shape (m, streams, draws), float32."""
-        return self._shaken if cleaner is self.known else cleaner.cleaned(self.draws)
+        return self._shaken if cleaner is self.known else cleaner.projected(self.draws)
 
     @cached_property
     def _shaken(self) -> np.ndarray:
-        return self.known.cleaned(self.draws)
+        return self.known.projected(self.draws)
 
 
 def frame(setting: Setting) -> Frame:
@@ -103,9 +103,9 @@ def frame(setting: Setting) -> Frame:
     residual = streams.measured(course) - streams.predicted(said)
     every = np.concatenate([extra, rich, slow(course, response, list(setting.given))], axis=2)
     every = every.astype(np.float32)
-    told = EpisodeErrors(residual, every, reduced, context, features)
-    known = told.noise(errors)
     rise = streams.rise(said, response).astype(np.float32)
+    told = EpisodeErrors(residual, every, reduced, context, features, rise)
+    known = told.noise(errors)
     prior, own = errors, Sizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
     before = np.zeros(errors.shape[2] + 1)
     for _ in range(ROUNDS):
@@ -113,7 +113,7 @@ def frame(setting: Setting) -> Frame:
         own = told.poses(known, prior, own.sizes)
         errors = prior * own.sizes
         known = replace(known, swing=None)
-        spread = told.gains(known, errors, rise)
+        spread = told.gains(known, errors)
         known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
         now = np.array([*own.sizes, max(spread, MODEL)])
         if np.all(np.abs(now - before) <= SETTLED * now):

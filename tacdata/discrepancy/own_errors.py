@@ -33,6 +33,8 @@ class Own:
     """What one standard deviation of each error of pose changes [1], shape (streams, n, kinds)."""
     features: np.ndarray | None = None
     """What all episodes may take up together, each stream by itself [1], shape (streams, n, p)."""
+    roam: np.ndarray | None = None
+    """What one standard deviation of each mode of a stream's own wander changes [1], shape (streams, n, modes)."""
 
 
 class Factored:
@@ -48,7 +50,8 @@ class Factored:
         self._free = None if own.features is None else _Free(len(own.offset), own.features.shape[2])
         self._episodes: list[tuple[np.ndarray, _Offsets, _Errors]] = []
         for rows, prior in zip(spans, own.prior, strict=True):
-            offsets, rest = _Offsets(own.offset[:, rows, None], float(prior)), {}
+            modes = None if own.roam is None else own.roam[:, rows]
+            offsets, rest = _Offsets(own.offset[:, rows, None], float(prior), modes), {}
             if stacked is not None:
                 rest = dict(zip(given, np.split(offsets.off(stacked[:, rows]), edges, axis=2), strict=True))
             errors = _Errors(len(own.offset), len(rows), rest.get("moved"), rest.get("swing"))
@@ -76,6 +79,16 @@ class Factored:
             weights = self._free.weights([result[:, rows] for rows, _, _ in self._episodes])
             for k, (rows, _, _) in enumerate(self._episodes):
                 result[:, rows] -= self._free.said(k, weights)
+        return result
+
+    def projected(self, white: np.ndarray) -> np.ndarray:
+        """Return what features leave of noise as generalized least squares sees it: white, shape (streams, n, k)."""
+        if self._free is None:
+            return white
+        result = white.copy()
+        weights = self._free.weights([white[:, rows] for rows, _, _ in self._episodes])
+        for k, (rows, _, _) in enumerate(self._episodes):
+            result[:, rows] -= self._free.said(k, weights)
         return result
 
     def moved(self, left: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -125,18 +138,39 @@ class Factored:
 
 
 class _Offsets:
-    """One episode's own offset of every stream."""
+    """One episode's own offset of every stream, and how it goes on within the episode."""
 
-    def __init__(self, offset: np.ndarray, prior: float) -> None:
-        """Take a constant (streams, m, 1) and its standard deviation."""
-        power = np.maximum(np.square(offset).sum(axis=(1, 2)), 1e-12)[:, None, None]
-        share = 1 / power if np.isinf(prior) else prior**2 * _root(prior**2 * power)
-        self._offset = offset
-        self._pull = np.ascontiguousarray((offset * share.astype(np.float32)).transpose(0, 2, 1))
+    def __init__(self, offset: np.ndarray, prior: float, roam: np.ndarray | None = None) -> None:
+        """Take a constant (streams, m, 1), its standard deviation, and modes of a wander (streams, m, k)."""
+        self._columns = offset if roam is None else np.concatenate([offset, roam], axis=2)
+        exact = self._columns.astype(np.float64)
+        gram = exact.transpose(0, 2, 1) @ exact
+        precision = np.ones(gram.shape[1])
+        precision[0] = 1 / prior**2
+        self._pull = (_half(gram, precision) @ exact.transpose(0, 2, 1)).astype(np.float32)
 
     def off(self, block: np.ndarray) -> np.ndarray:
         """Return columns (streams, m, k) with it accounted for."""
-        return block - self._offset * (self._pull @ block)
+        return block - self._columns @ (self._pull @ block)
+
+
+def _half(gram: np.ndarray, precision: np.ndarray) -> np.ndarray:
+    """Return M of 1 - O M O', the root of the inverse of 1 + O D O', for O'O, shape (..., k, k), and 1 / D, shape (k,).
+
+    A precision of 0, for what is free, is no exception: the inverse is told by Woodbury's formula.
+    """
+    values, vectors = np.linalg.eigh(gram)
+    good = values > 1e-12 * np.maximum(values[..., -1:], 1e-12)
+    size = np.sqrt(np.where(good, values, 1.0))
+    there = np.where(good, size, 0.0)[..., None, :]
+    wide = (vectors * there) @ np.swapaxes(vectors, -1, -2)
+    back = (vectors / size[..., None, :] * good[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    unit = np.eye(len(precision))
+    floor = 1e-12 * np.trace(gram, axis1=-2, axis2=-1)[..., None, None] * unit + 1e-30 * unit
+    known = unit - wide @ np.linalg.solve(gram + np.diag(precision) + floor, wide)
+    parts, turned = np.linalg.eigh(0.5 * (known + np.swapaxes(known, -1, -2)))
+    root = (turned * np.sqrt(np.clip(parts, 0.0, 1.0))[..., None, :]) @ np.swapaxes(turned, -1, -2)
+    return back @ (unit - root) @ back
 
 
 def _root(gram: np.ndarray) -> np.ndarray:

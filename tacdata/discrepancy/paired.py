@@ -142,7 +142,7 @@ def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: O
     if gram[:, 1, 1].sum() < TINY or loss <= 0:
         return 0.0
     clock = any(_differ(first, second))
-    told = clustered(gram, np.zeros(1, dtype=np.int64), clock)
+    told = clustered(gram, np.zeros(1, dtype=np.int64))
     # Two models that are equally wrong pull towards each other: the better one must explain more, too.
     most = float(np.sqrt(2 * loss / max(told.power / told.expected, 1.0)))
     # Before few stretches are paid for: a large score shrinks more by that than what is sound of it.

@@ -53,7 +53,7 @@ def test(problem: Problem, seed: int = 0) -> Tested:
     """
     gram = eliminated(problem.evidence.gram, problem.fixed, problem.fixed_ridge(0.0))
     normal = np.random.default_rng([seed, 13]).normal(size=(FLIPS, len(gram)))
-    scores = [clustered(gram, c.columns, follows_clock(c.effect)) for c in problem.candidates]
+    scores = [clustered(gram, c.columns) for c in problem.candidates]
     clock = [follows_clock(c.effect) for c in problem.candidates]
     kinds = _lent(problem, scores, clock, "")
     z = np.array([s.score(kinds[own]) for s, own in zip(scores, clock, strict=True)])
@@ -63,7 +63,7 @@ def test(problem: Problem, seed: int = 0) -> Tested:
         beside = np.concatenate([problem.fixed, best.columns]).astype(int)
         without = np.concatenate([problem.fixed_ridge(0.0), np.zeros(len(best.columns))])
         rest = eliminated(problem.evidence.gram, beside, without)
-        others = [clustered(rest, c.columns, own) for c, own in zip(problem.candidates, clock, strict=True)]
+        others = [clustered(rest, c.columns) for c in problem.candidates]
         kinds = _lent(problem, others, clock, best.called)
         z = np.array([s.score(kinds[own]) for s, own in zip(scores, clock, strict=True)])
     # The same numbers for all, so that candidates that look alike do so by chance as well.

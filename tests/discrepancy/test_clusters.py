@@ -21,14 +21,14 @@ def gram_of(rng, episodes, tails):
 @pytest.mark.parametrize("tails", [False, True])
 def test_scores_without_an_effect_are_no_larger_than_normal_ones(episodes, tails):
     rng = np.random.default_rng(3)
-    z = np.array([clustered(gram_of(rng, episodes, tails), np.array([0]), False).score() for _ in range(2000)])
+    z = np.array([clustered(gram_of(rng, episodes, tails), np.array([0])).score() for _ in range(2000)])
     for level, normal in ((0.05, 1.645), (0.01, 2.326)):
         assert np.mean(z > normal) < 1.6 * level
 
 
 def test_decoys_of_few_episodes_reach_as_far_as_chance_does():
     rng = np.random.default_rng(4)
-    scores = clustered(gram_of(rng, 9, False), np.array([0]), False)
+    scores = clustered(gram_of(rng, 9, False), np.array([0]))
     z = scores.by_chance(rng.normal(size=(4000, 9)))
     # Of k = 1 direction, one-sided in the square: the score of a squared normal number is normal.
     assert kstest(z, "norm").statistic < 0.04
@@ -37,7 +37,7 @@ def test_decoys_of_few_episodes_reach_as_far_as_chance_does():
 
 def test_what_is_lent_steadies_a_score_of_few_episodes():
     rng = np.random.default_rng(5)
-    effects = {str(k): [clustered(gram_of(rng, 40, False), np.array([0]), False)] for k in range(12)}
+    effects = {str(k): [clustered(gram_of(rng, 40, False), np.array([0]))] for k in range(12)}
     given = lent(effects)
     assert given is not None and given.excess == pytest.approx(1.0, abs=0.25) and given.freedom > 4
     few = Clustered(np.array([6.0]), np.array([[1.0], [0.2]]), np.array([0, 1]), (1.0, 1.2), 1.0)
@@ -53,3 +53,12 @@ def test_effects_that_follow_the_clock_are_lent_by_all_where_nothing_wanders():
     assert of_kinds(None, quiet)[True] is quiet
     few = Clustered(np.array([6.0]), np.ones((4, 1)) / 2, np.arange(4), (1.0, 4.0), 1.0)
     assert few.score(others) > few.score(quiet) > few.score(wandering)
+
+
+def test_one_that_scatters_far_more_than_its_kind_is_lent_little():
+    given, own = Lent(1.0, 40.0), np.sqrt(8.0 / 13) * np.ones((13, 1))
+    wild = Clustered(np.array([8.0]), own, np.arange(13), (1.0, 12.0), 1.0)
+    assert wild.power == pytest.approx(8.0)
+    assert wild.score(given) == pytest.approx(wild.score(), abs=0.05), "8 of 12 degrees of freedom beside 1 of 40"
+    like = Clustered(np.array([8.0]), own / np.sqrt(6), np.arange(13), (1.0, 12.0), 1.0)
+    assert like.score(given) > like.score() + 0.5

@@ -4,15 +4,31 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.evidence import Noise, coloured, whiten
+from tacdata.discrepancy.evidence import Noise, whiten
 
 
-def test_whitening_undoes_colour():
+def coloured(white, reduced, noise):
+    """Return noise as readings have it: each row keeps a share of the one before; an average scatters less."""
+    made, step = white * noise.scale[None, :, None], reduced.step[~reduced.first]
+    for row in range(reduced.rows):
+        keep = 0.0 if reduced.first[row] else noise.memory ** (reduced.step[row] / np.median(step))
+        made[row] *= np.sqrt((1 - keep**2) / (1 - noise.memory**2) / min(reduced.averaged[row], 4))
+        if keep:
+            made[row] += keep * made[row - 1]
+    return made if noise.loud is None else made * noise.loud[:, :, None]
+
+
+@pytest.mark.parametrize("louder", [False, True])
+def test_whitening_undoes_colour(louder):
     reduced = course(episodes=4).reduced
-    noise = Noise(np.array([2.0, 1.0, 0.5]), 0.6)
-    white = np.random.default_rng(1).normal(size=(reduced.rows, 3, 2))
-    drawn = coloured(white, reduced, noise)
-    assert whiten(drawn, reduced, noise) == pytest.approx(white, abs=1e-4)
+    rng = np.random.default_rng(1)
+    white = rng.normal(size=(reduced.rows, 3, 2))
+    noise = Noise(np.array([2.0, 1.0, 0.5]), 0.6, loud=rng.uniform(1, 3, (reduced.rows, 3)) if louder else None)
+    assert whiten(coloured(white.copy(), reduced, noise), reduced, noise) == pytest.approx(white, abs=1e-4)
+
+
+def test_successive_readings_have_in_common_what_the_noise_says():
+    reduced = course(episodes=4).reduced
+    drawn = coloured(np.random.default_rng(1).normal(size=(reduced.rows, 3, 2)), reduced, Noise(np.ones(3), 0.6))
     moving = np.flatnonzero(~reduced.first & (reduced.averaged == 1) & (np.roll(reduced.averaged, 1) == 1))
-    together = np.mean(drawn[moving, 0] * drawn[moving - 1, 0]) / np.mean(drawn[moving, 0] ** 2)
-    assert together == pytest.approx(0.6, abs=0.1), "successive readings have so much in common"
+    assert np.mean(drawn[moving] * drawn[moving - 1]) / np.mean(drawn[moving] ** 2) == pytest.approx(0.6, abs=0.1)

@@ -18,10 +18,11 @@ def made(rng):
         "swing": 3 * rng.normal(size=(STREAMS, count)),
         "moved": 2 * rng.normal(size=(STREAMS, count, KINDS)),
         "features": rng.normal(size=(STREAMS, count, FEATURES)),
+        "roam": 0.8 * rng.normal(size=(STREAMS, count, 2)),
     }
 
 
-def dense(columns, spans, prior, offset, swing, moved, features):
+def dense(columns, spans, prior, offset, swing, moved, features, roam):
     """Return the products of columns under the covariance written out, free directions taken out."""
     streams, count, width = columns.shape
     cov, free = np.eye(streams * count), []
@@ -32,8 +33,13 @@ def dense(columns, spans, prior, offset, swing, moved, features):
         constant = 1e9 if np.isinf(prior) else prior**2
         power = np.zeros(streams)
         for s in range(streams):
-            one, gain = offset[s, rows], swing[s, rows]
-            power[s] = gain @ gain - constant * (one @ gain) ** 2 / (1 + constant * one @ one)
+            one, gain, modes = offset[s, rows], swing[s, rows], roam[s, rows]
+            shaking = np.eye(len(one)) + constant * np.outer(one, one) + modes @ modes.T
+            power[s] = gain @ np.linalg.solve(shaking, gain)
+            for mode in modes.T:
+                whole = np.zeros((streams, count))
+                whole[s, rows] = mode
+                cov += np.outer(whole, whole)
             own = np.zeros((streams, count))
             own[s, rows] = one
             if np.isinf(prior):
@@ -61,16 +67,19 @@ def dense(columns, spans, prior, offset, swing, moved, features):
 
 @pytest.mark.parametrize("prior", [0.7, np.inf])
 @pytest.mark.parametrize("features", [0, FEATURES])
-def test_products_are_those_of_generalized_least_squares(prior, features):
+@pytest.mark.parametrize("modes", [0, 2])
+def test_products_are_those_of_generalized_least_squares(prior, features, modes):
     given = made(np.random.default_rng(3))
-    given["features"] = given["features"][:, :, :features]
+    given["features"], given["roam"] = given["features"][:, :, :features], given["roam"][:, :, :modes]
     edges = np.cumsum((0, *LENGTHS))
     spans = [np.arange(a, b) for a, b in pairwise(edges)]
-    expected = dense(given["columns"], spans, prior, given["offset"], given["swing"], given["moved"], given["features"])
+    expected = dense(given["columns"], spans, prior, given["offset"], given["swing"], given["moved"], given["features"],
+                     given["roam"])  # fmt: skip
     own = Own(
         given["offset"].astype(np.float32), np.full(len(spans), prior), given["swing"].astype(np.float32),
         given["moved"].astype(np.float32),
         given["features"].astype(np.float32) if features else None,
+        given["roam"].astype(np.float32) if modes else None,
     )  # fmt: skip
     left = Factored(spans, own).without(given["columns"].astype(np.float32)).reshape(-1, WIDTH)
     assert left.T @ left == pytest.approx(expected, rel=2e-4, abs=2e-4 * np.abs(expected).max())
@@ -132,3 +141,22 @@ def test_columns_in_one_stream_of_an_episode_are_told_like_any_others(free):
             white = factored.without(column)[:, :, 0]
             assert score[e, s] == pytest.approx(np.sum(white * left), rel=1e-4, abs=1e-6)
             assert information[e, s] == pytest.approx(np.sum(white * white), rel=1e-4)
+
+
+def test_what_features_leave_of_noise_that_is_white_to_it():
+    """White noise projected is noise of the whole covariance, drawn and cleaned: the same mean products."""
+    rng = np.random.default_rng(6)
+    parts = made(rng)
+    spans = np.split(np.arange(sum(LENGTHS)), np.cumsum(LENGTHS)[:-1])
+    own = Own(parts["offset"], np.full(3, 0.7), moved=parts["moved"], features=parts["features"], roam=parts["roam"])
+    factored, count, draws = Factored(spans, own), sum(LENGTHS), 20000
+    white = rng.normal(size=(STREAMS, count, draws)).astype(np.float32)
+    shaken = white.copy()
+    for rows in spans:
+        shaken[:, rows] += 0.7 * parts["offset"][:, rows, None] * rng.normal(size=(STREAMS, 1, draws))
+        shaken[:, rows] += parts["roam"][:, rows] @ rng.normal(size=(STREAMS, 2, draws))
+        shaken[:, rows] += parts["moved"][:, rows] @ rng.normal(size=(KINDS, draws))
+    projected, cleaned = (v.reshape(-1, draws) for v in (factored.projected(white), factored.without(shaken)))
+    products = projected @ projected.T / draws
+    assert cleaned @ cleaned.T / draws == pytest.approx(products, abs=0.06)
+    assert np.trace(products) == pytest.approx(STREAMS * (count - FEATURES), rel=0.01)

@@ -17,7 +17,7 @@ def freedom_of(problem):
     gram, told = eliminated(problem.evidence.gram, problem.fixed, problem.fixed_ridge(0.0)), {}
     for c in problem.candidates:
         if not search.follows_clock(c.effect):
-            told.setdefault(c.effect.name, []).append(clustered(gram, c.columns, False))
+            told.setdefault(c.effect.name, []).append(clustered(gram, c.columns))
     return lent(told).freedom
 
 

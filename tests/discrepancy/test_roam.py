@@ -1,0 +1,82 @@
+"""Offsets that wander within a press are told, and what they look like is no effect."""
+
+import numpy as np
+import pytest
+from pressing import course
+
+from tacdata.discrepancy import noise, roam
+from tacdata.discrepancy.cleaner import Cleaner
+from tacdata.discrepancy.evidence import Noise
+
+RATE = 0.05  # noise scales squared a second
+
+
+def brownian(reduced, rng, rate):
+    """Return a Brownian motion of each channel that begins anew with every episode."""
+    steps = rng.normal(size=(reduced.rows, 3)) * np.sqrt(rate * np.maximum(reduced.step, 0))[:, None]
+    steps[reduced.first] = 0.0
+    walk = np.cumsum(steps, axis=0)
+    begin = np.flatnonzero(reduced.first)
+    return walk - walk[begin][np.cumsum(reduced.first) - 1]
+
+
+def shaken(seed, rate, episodes=60):
+    rng = np.random.default_rng(seed)
+    reduced = course(seed=seed, episodes=episodes).reduced
+    white = rng.normal(size=(reduced.rows, 3)) / np.sqrt(np.minimum(reduced.averaged, 4))[:, None]
+    return reduced, white + brownian(reduced, rng, rate)
+
+
+def test_the_rate_is_told_where_nothing_presses():
+    told = [roam.told(rest, r, np.ones(3), 0.0, r.site) for r, rest in (shaken(k, RATE) for k in range(4))]
+    assert np.mean(told) == pytest.approx(RATE, rel=0.3)
+
+
+def test_white_noise_does_not_wander():
+    reduced, rest = shaken(5, 0.0)
+    assert roam.told(rest, reduced, np.ones(3), 0.0, reduced.site) < 0.1 * RATE
+
+
+def test_modes_add_up_to_a_brownian_motion_about_its_mean():
+    rng = np.random.default_rng(2)
+    reduced, rest = shaken(2, 3.0, 12)
+    modes = roam.roam(rest, reduced, np.ones(3), 0.0, reduced.site)
+    rate = roam.told(rest, reduced, np.ones(3), 0.0, reduced.site)
+    rows = np.flatnonzero(reduced.episode == 0)
+    # Evenly in time: the mean over an episode is one over time, not over rows.
+    walk = np.cumsum(rng.normal(size=(4000, 400)) * np.sqrt(rate * np.ptp(reduced.time[rows]) / 400), axis=1)
+    walk -= walk.mean(axis=1, keepdims=True)
+    at = (reduced.time[rows] - reduced.time[rows[0]]) / np.ptp(reduced.time[rows])
+    expected = np.mean(walk**2, axis=0)[np.minimum((at * 400).astype(int), 399)]
+    assert np.square(modes[rows]).sum(axis=1) == pytest.approx(expected, rel=0.2, abs=0.05 * expected.max())
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_what_is_slow_within_a_press_scatters_as_the_noise_says(told):
+    """A column that grows while pressed: its scores scatter by what they know, unless the wander is not told."""
+    reduced, rest = shaken(7, 0.5)
+    modes = roam.roam(rest, reduced, np.ones(3), 0.0, reduced.site) if told else None
+    none = np.zeros((reduced.rows, 1), dtype=np.int64)[:, 0]
+    cleaner = Cleaner(reduced, Noise(np.ones(3), 0.0, roam=modes), none, None, np.zeros((reduced.rows, 3, 1)))
+    begin = reduced.time[np.flatnonzero(reduced.first)][np.cumsum(reduced.first) - 1]
+    slow = np.broadcast_to((reduced.time - begin)[:, None, None], (reduced.rows, 3, 1))
+    gram = cleaner.collected(np.concatenate([rest[:, :, None], slow], axis=2)).gram
+    excess = np.mean(gram[:, 1, 0] ** 2 / gram[:, 1, 1])
+    assert excess < 1.4 if told else excess > 5
+
+
+def test_means_of_a_hum_say_more_than_its_rows_let_one_think():
+    reduced, rest = shaken(8, RATE)
+    rest = rest + 2 * np.sin(2 * np.pi * 6.7 * reduced.time)[:, None] / np.minimum(reduced.averaged, 4)[:, None]
+    assert 0.25 < roam.told(rest, reduced, np.full(3, 1.7), 0.0, reduced.site) / (RATE / 1.7**2) < 1.6
+
+
+def test_noise_that_grows_with_the_load_is_told():
+    rng, reduced = np.random.default_rng(9), course(episodes=60).reduced
+    rise = np.maximum(reduced.tip[:, 2:], 0) * np.array([1.0, 0.6, 0.3])
+    true = 1 + 2 * rise / rise.max()
+    rest = rng.normal(size=true.shape) * true
+    told = noise.loud(rest, rise, reduced)
+    deep = rise > 0.6 * rise.max()
+    assert told[deep].mean() == pytest.approx(true[deep].mean(), rel=0.1)
+    assert noise.loud(rng.normal(size=true.shape), rise, reduced) is None
