@@ -31,6 +31,8 @@ TOP = 8
 RIVAL = 2.33
 """A rival as likely beforehand is out when the winner is better by so many standard errors over episodes: one in a
 hundred, one-sided [1]."""
+LIKELIER = 1.0
+"""A rival is out by no fewer standard errors, however rare it is [1]."""
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
 MINOR = 0.3
@@ -323,9 +325,10 @@ def _member(
 def out(mine: Effect, rival: Effect) -> float:
     """Return by how many standard errors an effect must be ahead of a rival.
 
-    In the end it is as sure as `RIVAL` makes it where both are as likely beforehand: half a square is a nat.
+    In the end it is as sure as `RIVAL` makes it where both are as likely beforehand: half a square is a nat. Nothing
+    is so much likelier that the episodes need not be on its side.
     """
-    return float(np.sqrt(max(RIVAL**2 + 2 * np.log(rival.odds / mine.odds), 0.0)))
+    return float(np.sqrt(max(RIVAL**2 + 2 * np.log(rival.odds / mine.odds), LIKELIER**2)))
 
 
 def _selected(
