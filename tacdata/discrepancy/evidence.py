@@ -9,7 +9,7 @@ an episode, so that every fit, fold, bootstrap and sign flip afterwards is a sma
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -40,6 +40,12 @@ class Noise:
     tag: float | None = None
     """Standard deviation of an episode's own offset of the tag's streams (the last three), in noise scales [1]; they
     have a free offset for each place and know nothing of the response. None: there is no tag."""
+
+    def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> Noise:
+        """Return the noise of some rows, shape (n,), bool; ``episodes`` are those left, if they are numbered anew."""
+        each = {name: getattr(self, name) for name in ("swing", "missing", "roam", "loud")}
+        kept = {name: None if value is None else value[rows] for name, value in each.items()}
+        return replace(self, **kept, wander=None if self.wander is None else self.wander.of(rows, episodes))
 
 
 @dataclass(frozen=True)

@@ -96,12 +96,7 @@ def _frame_of(whole: Frame, course: Course, rows: np.ndarray, episodes: np.ndarr
         rows: Which are kept, shape (m,), bool.
         episodes: Those that are left, if they are numbered anew.
     """
-    noise = whole.noise
-    swing = None if noise.swing is None else noise.swing[rows]
-    missing = None if noise.missing is None else noise.missing[rows]
-    wander = None if noise.wander is None else noise.wander.of(rows, episodes)
     return Frame.of(
         course.reduced, whole.context[rows], None if whole.features is None else whole.features[rows],
-        whole.errors[rows], whole.ridge, whole.beside[rows],
-        replace(noise, swing=swing, missing=missing, wander=wander), whole.folds,
+        whole.errors[rows], whole.ridge, whole.beside[rows], whole.noise.of(rows, episodes), whole.folds,
     )  # fmt: skip

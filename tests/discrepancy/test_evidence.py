@@ -32,3 +32,15 @@ def test_successive_readings_have_in_common_what_the_noise_says():
     drawn = coloured(np.random.default_rng(1).normal(size=(reduced.rows, 3, 2)), reduced, Noise(np.ones(3), 0.6))
     moving = np.flatnonzero(~reduced.first & (reduced.averaged == 1) & (np.roll(reduced.averaged, 1) == 1))
     assert np.mean(drawn[moving] * drawn[moving - 1]) / np.mean(drawn[moving] ** 2) == pytest.approx(0.6, abs=0.1)
+
+
+def test_noise_of_some_rows_keeps_what_belongs_to_them():
+    rng, rows = np.random.default_rng(2), np.arange(10) % 3 > 0
+    whole = Noise(
+        np.ones(2), 0.3, swing=rng.normal(size=(10, 2)), missing=rng.random((10, 2)) > 0.5,
+        roam=rng.normal(size=(10, 4)), loud=1 + rng.random((10, 2)),
+    )  # fmt: skip
+    some = whole.of(rows)
+    for name in ("swing", "missing", "roam", "loud"):
+        assert np.array_equal(getattr(some, name), getattr(whole, name)[rows]), name
+    assert some.memory == 0.3 and some.wander is None
