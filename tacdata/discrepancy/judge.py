@@ -37,8 +37,6 @@ AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
 MINOR = 0.3
 """A further effect must explain so much of what the equations of the others may be off about, in energy [1]."""
-FIRST = 2.0
-"""The first effect, which stands out against decoys, must on the chain be needed by so many standard errors [1]."""
 KEPT = 2.8
 """An effect stays in the answer if that is worse by so many standard errors without it [1]."""
 SWAPS = 2
@@ -236,8 +234,7 @@ def _race(
             at += len(candidate.columns)
         tried.append(refine(problem.setting, [*problem.placed, *first], problem.frame))
     tried.sort(key=_cost)
-    least = KEPT if problem.placed else FIRST
-    if not tried or _needed(problem.setting, tried[0], current, problem.frame, lent) < least:
+    if not tried or _needed(problem.setting, tried[0], current, problem.frame, lent) < KEPT:
         return None, tried
     return tried[0], tried[1:]
 
