@@ -18,10 +18,13 @@ class Bulge(Effect):
     stage = "mechanics"
     moves = ("label", "signal")
     group = "lateral spread"
-    equation = "q_i = q_i - k sum_j w_ij q_j over the second neighbours, w by distance"
-    source = "standard form"
+    equation = "q_i = q_i - k sum_j w_ij q_j, w = exp(-((r_ij / p - l) / (0.35 l))^2), p the least pitch"
+    source = "a bonded layer that keeps its volume rises at about its thickness: Johnson, Contact Mechanics, sec. 5.8"
     experiment = "flat punch against sphere: the sign of far neighbours"
-    parameters = (Parameter("k", "1", "share taken from far neighbours", 0.03, -0.5, 0.5),)
+    parameters = (
+        Parameter("k", "1", "share taken from far neighbours", 0.03, -0.5, 0.5),
+        Parameter("l", "pitches", "how far away", 2.0, 1.0, 4.0, grid=(1.5, 2.0, 2.7)),
+    )
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
@@ -30,7 +33,7 @@ class Bulge(Effect):
             return state
         distance = np.linalg.norm(centers[:, None] - centers, axis=-1)
         pitch = np.where(distance > 1e-9, distance, np.inf).min()
-        ring = ((distance > 1.5 * pitch) & (distance < 3.2 * pitch)).astype(float)
+        ring = np.exp(-np.square((distance / pitch / values["l"] - 1) / 0.35))
         return replace(state, load=state.load - values["k"] * state.load @ ring)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
