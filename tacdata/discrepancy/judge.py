@@ -44,7 +44,7 @@ SWAPS = 2
 AHEAD = 1.0
 """By how many standard errors over episodes it must be ahead [1]."""
 SIMPLER = RIVAL**2 / 2
-"""A rival with more numbers is out, too, if it does not pay for them but for so much [nats]: as much as `RIVAL` asks."""
+"""A rival with more numbers is out, too, if it does not pay for them but for so much [nats]: what `RIVAL` asks."""
 BEAM = 5
 """Sets that a search for pairs keeps [1]."""
 SURE_PAIR = 3.0
