@@ -46,10 +46,10 @@ class Cleaner:
         one = replace(flat, missing=None)
         offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
         moved = whiten(jitter, course, noise)
-        roam = None
-        if noise.roam is not None:
-            each = np.broadcast_to(noise.roam[:, None, :], (course.rows, streams, noise.roam.shape[1]))
-            roam = whiten(each, course, flat)
+        random_walk = None
+        if noise.random_walk is not None:
+            each = np.broadcast_to(noise.random_walk[:, None, :], (course.rows, streams, noise.random_walk.shape[1]))
+            random_walk = whiten(each, course, flat)
         swung = None if noise.swing is None else whiten(noise.swing[:, :, None], course, noise)[:, :, 0]
         ahead = None
         if wander is not None and features is not None:
@@ -64,20 +64,19 @@ class Cleaner:
             free = np.full(len(spans), np.inf)
             shared = None
             if features is not None:
-                used = features[group][:, None, np.abs(features[group]).max(axis=0) > 1e-9]
+                used = np.abs(features[group]).max(axis=0) > 1e-9
                 # Where noise is not alike in all streams, whitened features are not.
-                shared = whiten(used, course, one, group)
+                shared = whiten(features[group][:, None, used], course, one, group)
                 if ahead is not None:
                     ones = whiten(np.ones((len(group), 1, 1)), course, one, group)[:, :, 0]
-                    expected = ahead[:, :, np.abs(features[group]).max(axis=0) > 1e-9]
-                    _follow(shared, ones, local, expected)
+                    _follow(shared, ones, local, ahead[:, :, used])
             own = Own(
                 _turned(offset[group, :seen]),
                 free if wander is None else wander.spread[[local[span[0]] for span in spans]],
                 None if swung is None else _turned(swung[group, :seen]),
                 _turned(moved[group, :seen]),
                 None if shared is None else _features(shared, offset[group, :seen]),
-                None if roam is None else _turned(roam[group, :seen]),
+                None if random_walk is None else _turned(random_walk[group, :seen]),
             )  # fmt: skip
             tag = None
             if seen < streams:
@@ -158,8 +157,8 @@ class Cleaner:
     def _of_seen(self) -> Noise:
         noise, seen = self._noise, self._seen
         missing = None if noise.missing is None else noise.missing[:, :seen]
-        louder = None if noise.loud is None else noise.loud[:, :seen]
-        return replace(noise, scale=noise.scale[:seen], missing=missing, loud=louder)
+        relative = None if noise.relative_scale is None else noise.relative_scale[:, :seen]
+        return replace(noise, scale=noise.scale[:seen], missing=missing, relative_scale=relative)
 
     def cleaned(self, columns: np.ndarray) -> np.ndarray:
         """Return columns whitened and without nuisances, shape (n, streams, k)."""

@@ -30,7 +30,7 @@ def features(found: Judgement, member: Member, members: int) -> dict[str, float]
         "margin": float(np.clip(margin, 0, MOST)) / MOST,
         "need": float(np.clip(member.necessity, 0, MOST)) / MOST,
         "selected": member.selected,
-        "decoys": float(np.clip(-np.log10(max(member.decoys, 1e-3)) / 3, 0, 1)),
+        "decoys": 1.0 if member.decoys is None else float(np.clip(-np.log10(max(member.decoys, 1e-3)) / 3, 0, 1)),
         "explained": 1 - float(np.clip(found.share_left, 0, 1)),
         "left": float(np.clip(found.left.t, 0, MOST)) / MOST,
         "others": (members - 1) / 3,

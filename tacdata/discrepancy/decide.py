@@ -103,5 +103,7 @@ def status(found: Judgement) -> str:
 
 def settled(member: Member) -> str:
     """Return whether one effect may be named: named or ambiguous."""
-    chance = member.decoys > DECOYS or (member.necessity < member.needed and member.decoys > RARE)
-    return "ambiguous" if member.rivals or member.at_bound or chance else "named"
+    needed = member.necessity >= member.needed
+    if member.decoys is not None:
+        needed = member.decoys <= (DECOYS if needed else RARE)
+    return "named" if needed and not member.rivals and not member.at_bound else "ambiguous"

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy import noise
+from tacdata.discrepancy import noise, random_walk
 from tacdata.discrepancy.cleaner import Cleaner
 from tacdata.discrepancy.evidence import Noise
 from tacdata.discrepancy.fit import solve
-from tacdata.discrepancy.roam import roam
 from tacdata.discrepancy.wander import wander
 
 LEAST, MOST = 0.1, 10.0
@@ -49,8 +48,8 @@ class EpisodeErrors:
 
     def noise(self, errors: np.ndarray) -> Noise:
         """Return the noise beside errors of pose, shape (m, streams, kinds)."""
-        course, louder = self.course, noise.loud(self.residual, self.rise, self.course)
-        known = noise.first_guess(self.residual, course, louder)
+        course, relative = self.course, noise.relative_scale(self.residual, self.rise, self.course)
+        known = noise.first_guess(self.residual, course, relative)
         columns = np.concatenate([self.residual[:, :, None], self.rich], axis=2)
         best = np.zeros(self.rich.shape[2])
         for _ in range(2):
@@ -64,8 +63,8 @@ class EpisodeErrors:
         rest = self.residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
         wandering = wander(rest, course, known.scale, known.memory, kinds)
-        roaming = roam(rest, course, known.scale, known.memory, self._places())
-        return replace(known, wander=wandering, roam=roaming, tag=noise.tag_wander(rest, course, known))
+        walk = random_walk.modes(rest, course, known.scale, known.memory, self._places())
+        return replace(known, wander=wandering, random_walk=walk, tag=noise.tag_wander(rest, course, known))
 
     def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> Sizes:
         """Return how large episodes' own errors of pose are.

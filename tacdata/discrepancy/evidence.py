@@ -32,10 +32,10 @@ class Noise:
     """What one standard deviation of an episode's own gain of a stream changes [its unit], shape (n, streams)."""
     missing: np.ndarray | None = None
     """Which values were not read, shape (n, streams), bool; None: all were."""
-    roam: np.ndarray | None = None
+    random_walk: np.ndarray | None = None
     """What one standard deviation of each mode of a stream's wander within an episode changes [noise scales], shape
     (n, modes); None: it does not wander there."""
-    loud: np.ndarray | None = None
+    relative_scale: np.ndarray | None = None
     """How much larger noise is in each value than without load [1], shape (n, streams); None: it is not."""
     tag: float | None = None
     """Standard deviation of an episode's own offset of the tag's streams (the last three), in noise scales [1]; they
@@ -43,7 +43,7 @@ class Noise:
 
     def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> Noise:
         """Return the noise of some rows, shape (n,), bool; ``episodes`` are those left, if they are numbered anew."""
-        each = {name: getattr(self, name) for name in ("swing", "missing", "roam", "loud")}
+        each = {name: getattr(self, name) for name in ("swing", "missing", "random_walk", "relative_scale")}
         kept = {name: None if value is None else value[rows] for name, value in each.items()}
         return replace(self, **kept, wander=None if self.wander is None else self.wander.of(rows, episodes))
 
@@ -67,7 +67,7 @@ class Evidence:
 
 
 def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | None = None) -> np.ndarray:
-    """Divide by how loud noise is, filter by e_i - phi^(dt / median dt) e_{i-1} within episodes, divide by its scale.
+    """Divide by the relative scale, filter by e_i - phi^(dt / median dt) e_{i-1} within episodes, divide by the scale.
 
     Args:
         values: Shape (n, streams, columns).
@@ -79,8 +79,8 @@ def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | 
     decay, spread = _filter(course, noise)
     decay, spread = decay[some], spread[some]
     result = values.astype(np.float32)
-    if noise.loud is not None:
-        result = result / noise.loud[some][:, :, None]
+    if noise.relative_scale is not None:
+        result = result / noise.relative_scale[some][:, :, None]
     if noise.missing is not None:
         missing = noise.missing[some]
         result[missing] = 0.0

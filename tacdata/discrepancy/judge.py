@@ -111,14 +111,15 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     if members:
         problem = prepare(setting, same)
     found, current = _members(setting, current, problem, verdicts.lent)
-    found = [replace(m, decoys=_decoys(setting, current, k, same, beaten)) for k, m in enumerate(found)]
-    while len(found) > 1 and max(m.decoys for m in found) > DECOYS:
+    chance = [_decoys(setting, current, k, same, beaten) for k in range(len(found))]
+    while len(found) > 1 and max(chance) > DECOYS:
         # Held-out episodes lie between others: a slow wander helps there, and is no effect.
-        weakest = max(range(len(found)), key=lambda k: found[k].decoys)
+        weakest = int(np.argmax(chance))
         rest = [p for k, p in enumerate(current.placed) if k != weakest]
         current = refine(replace(setting, response=current.response), rest, same, AGAIN)
         found, current = _members(setting, current, problem, verdicts.lent)
-        found = [replace(m, decoys=_decoys(setting, current, k, same, beaten)) for k, m in enumerate(found)]
+        chance = [_decoys(setting, current, k, same, beaten) for k in range(len(found))]
+    found = [replace(m, decoys=share) for m, share in zip(found, chance, strict=True)]
     if found and [p.effect.name for p in current.placed] != [p.effect.name for p in now.placed]:
         now = prepare(replace(setting, response=current.response), same, current.placed)
     left = leftovers(now)

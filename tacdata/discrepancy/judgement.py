@@ -36,8 +36,8 @@ class Member:
     """Rival effect -> by how much half the whitened energy is larger with it [nats]."""
     selected: float = 1.0
     """Share of resamplings of the episodes in which its mechanism explains most [1]."""
-    decoys: float = 0.0
-    """Share of decoys, all effects with chance scores, that do as well [1]."""
+    decoys: float | None = None
+    """Share of decoys, all effects with chance scores, that do as well [1]; None for what did not race them."""
     needed: float = NEEDED
     """From which necessity on it is named [1]."""
 

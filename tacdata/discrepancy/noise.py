@@ -10,17 +10,17 @@ import numpy as np
 from tacdata.chain import Course
 from tacdata.discrepancy.evidence import Noise
 
-LOUD = (0.0, 0.03, 0.1, 0.25, 0.5, 0.75, 1.0)
+SHARES = (0.0, 0.03, 0.1, 0.25, 0.5, 0.75, 1.0)
 """Edges of the shares of the largest rise in which noise is told apart [1]."""
-LOUDER = 1.2
+SAME = 1.2
 """Noise that is nowhere larger than so many times what it is without load is the same everywhere [1]."""
-LOUDEST = 5.0
+LARGEST = 5.0
 """It is told to be no larger than so many times that [1]."""
 ENOUGH = 400
 """Fewer values tell no spread."""
 
 
-def loud(residual: np.ndarray, rise: np.ndarray, course: Course) -> np.ndarray | None:
+def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np.ndarray | None:
     """Return how much larger noise is in each value than without load [1], shape (n, streams); None: it is not.
 
     Told by second differences, which what a model lacks hardly touches.
@@ -33,21 +33,22 @@ def loud(residual: np.ndarray, rise: np.ndarray, course: Course) -> np.ndarray |
     own = np.abs(rise[:, : course.channels])
     share = own / max(float(own.max(initial=0.0)), 1e-12)
     second, inside = _second(residual[:, : course.channels], course)
-    at = share[1:-1][inside]
-    quiet = np.where(at <= LOUD[1], second, np.nan)
-    if np.isfinite(quiet).sum() < ENOUGH:
+    at, read = share[1:-1][inside], np.isfinite(second)
+    quiet = read & (at <= SHARES[1])
+    count, power = quiet.sum(axis=0), np.sum(np.square(second), axis=0, where=quiet)
+    # A stream that mostly stands still without load, or was not read, tells nothing.
+    told = np.sum(quiet & (second != 0), axis=0) > 0.5 * count
+    if count[told].sum() < ENOUGH:
         return None
-    with np.errstate(invalid="ignore"):
-        second = second / np.sqrt(np.nanmean(np.square(quiet), axis=0))
-    known = np.isfinite(second)
-    nodes, levels = [0.0], [_spread(second[known & (at <= LOUD[1])])]
-    for low, high in itertools.pairwise(LOUD[1:]):
+    second, at, known = second[:, told] / np.sqrt(power[told] / count[told]), at[:, told], read[:, told]
+    nodes, levels = [0.0], [_spread(second[known & (at <= SHARES[1])])]
+    for low, high in itertools.pairwise(SHARES[1:]):
         inside = known & (at > low) & (at <= high)
         if inside.sum() >= ENOUGH:
             nodes.append(float(np.mean(at[inside])))
             levels.append(_spread(second[inside]))
-    size = np.clip(np.array(levels) / max(levels[0], 1e-12), 1.0, LOUDEST)
-    if size.max() < LOUDER:
+    size = np.clip(np.array(levels) / max(levels[0], 1e-12), 1.0, LARGEST)
+    if size.max() < SAME:
         return None
     result = np.ones(residual.shape, dtype=np.float32)
     result[:, : course.channels] = np.interp(share, nodes, size)
@@ -65,15 +66,15 @@ def _second(residual: np.ndarray, course: Course) -> tuple[np.ndarray, np.ndarra
     return (residual[1:-1] - 0.5 * (residual[:-2] + residual[2:]))[inner], inner
 
 
-def first_guess(residual: np.ndarray, course: Course, loudness: np.ndarray | None = None) -> Noise:
+def first_guess(residual: np.ndarray, course: Course, relative: np.ndarray | None = None) -> Noise:
     """Return white noise by second differences.
 
     Args:
         residual: Shape (n, streams).
         course: Whose rows.
-        loudness: How much larger it is in each value than without load [1], shape (n, streams).
+        relative: How much larger it is in each value than without load [1], shape (n, streams).
     """
-    residual = residual if loudness is None else residual / loudness
+    residual = residual if relative is None else residual / relative
     second, _ = _second(residual, course)
     seen = np.isfinite(residual).any(axis=0)  # a gauge sees the depth alone
     whole = np.ones(residual.shape[1])
@@ -85,7 +86,7 @@ def first_guess(residual: np.ndarray, course: Course, loudness: np.ndarray | Non
     missing = ~np.isfinite(residual)
     tag = np.inf if course.tag is not None else None
     found = np.maximum(scale, 1e-3 * whole + 1e-12)
-    return Noise(found, 0.0, missing=missing if missing.any() else None, tag=tag, loud=loudness)
+    return Noise(found, 0.0, missing=missing if missing.any() else None, tag=tag, relative_scale=relative)
 
 
 def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:

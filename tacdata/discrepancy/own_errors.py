@@ -33,7 +33,7 @@ class Own:
     """What one standard deviation of each error of pose changes [1], shape (streams, n, kinds)."""
     features: np.ndarray | None = None
     """What all episodes may take up together, each stream by itself [1], shape (streams, n, p)."""
-    roam: np.ndarray | None = None
+    random_walk: np.ndarray | None = None
     """What one standard deviation of each mode of a stream's own wander changes [1], shape (streams, n, modes)."""
 
 
@@ -50,7 +50,7 @@ class Factored:
         self._free = None if own.features is None else _Free(len(own.offset), own.features.shape[2])
         self._episodes: list[tuple[np.ndarray, _Offsets, _Errors]] = []
         for rows, prior in zip(spans, own.prior, strict=True):
-            modes = None if own.roam is None else own.roam[:, rows]
+            modes = None if own.random_walk is None else own.random_walk[:, rows]
             offsets, rest = _Offsets(own.offset[:, rows, None], float(prior), modes), {}
             if stacked is not None:
                 rest = dict(zip(given, np.split(offsets.off(stacked[:, rows]), edges, axis=2), strict=True))
@@ -140,37 +140,25 @@ class Factored:
 class _Offsets:
     """One episode's own offset of every stream, and how it goes on within the episode."""
 
-    def __init__(self, offset: np.ndarray, prior: float, roam: np.ndarray | None = None) -> None:
+    def __init__(self, offset: np.ndarray, prior: float, random_walk: np.ndarray | None = None) -> None:
         """Take a constant (streams, m, 1), its standard deviation, and modes of a wander (streams, m, k)."""
-        self._columns = offset if roam is None else np.concatenate([offset, roam], axis=2)
-        exact = self._columns.astype(np.float64)
-        gram = exact.transpose(0, 2, 1) @ exact
-        precision = np.ones(gram.shape[1])
-        precision[0] = 1 / prior**2
-        self._pull = (_half(gram, precision) @ exact.transpose(0, 2, 1)).astype(np.float32)
+        modes = offset[:, :, :0] if random_walk is None else random_walk
+        if np.isinf(prior):
+            constant = offset / np.sqrt(np.maximum(np.square(offset).sum(axis=1, keepdims=True), 1e-12))
+            modes = modes - constant @ (constant.transpose(0, 2, 1) @ modes)
+        else:
+            constant = prior * offset
+        self._columns = np.concatenate([constant, modes], axis=2)
+        turned = self._columns.transpose(0, 2, 1)
+        root = _root(turned.astype(np.float64) @ self._columns)
+        if np.isinf(prior):  # what is free is taken out whole
+            root[:, 0], root[:, :, 0] = 0.0, 0.0
+            root[:, 0, 0] = 1.0
+        self._pull = (root @ turned).astype(np.float32)
 
     def off(self, block: np.ndarray) -> np.ndarray:
         """Return columns (streams, m, k) with it accounted for."""
         return block - self._columns @ (self._pull @ block)
-
-
-def _half(gram: np.ndarray, precision: np.ndarray) -> np.ndarray:
-    """Return M of 1 - O M O', the root of the inverse of 1 + O D O', for O'O, shape (..., k, k), and 1 / D, shape (k,).
-
-    A precision of 0, for what is free, is no exception: the inverse is told by Woodbury's formula.
-    """
-    values, vectors = np.linalg.eigh(gram)
-    good = values > 1e-12 * np.maximum(values[..., -1:], 1e-12)
-    size = np.sqrt(np.where(good, values, 1.0))
-    there = np.where(good, size, 0.0)[..., None, :]
-    wide = (vectors * there) @ np.swapaxes(vectors, -1, -2)
-    back = (vectors / size[..., None, :] * good[..., None, :]) @ np.swapaxes(vectors, -1, -2)
-    unit = np.eye(len(precision))
-    floor = 1e-12 * np.trace(gram, axis1=-2, axis2=-1)[..., None, None] * unit + 1e-30 * unit
-    known = unit - wide @ np.linalg.solve(gram + np.diag(precision) + floor, wide)
-    parts, turned = np.linalg.eigh(0.5 * (known + np.swapaxes(known, -1, -2)))
-    root = (turned * np.sqrt(np.clip(parts, 0.0, 1.0))[..., None, :]) @ np.swapaxes(turned, -1, -2)
-    return back @ (unit - root) @ back
 
 
 def _root(gram: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ def coloured(white, reduced, noise):
         made[row] *= np.sqrt((1 - keep**2) / (1 - noise.memory**2) / min(reduced.averaged[row], 4))
         if keep:
             made[row] += keep * made[row - 1]
-    return made if noise.loud is None else made * noise.loud[:, :, None]
+    return made if noise.relative_scale is None else made * noise.relative_scale[:, :, None]
 
 
 @pytest.mark.parametrize("louder", [False, True])
@@ -23,7 +23,8 @@ def test_whitening_undoes_colour(louder):
     reduced = course(episodes=4).reduced
     rng = np.random.default_rng(1)
     white = rng.normal(size=(reduced.rows, 3, 2))
-    noise = Noise(np.array([2.0, 1.0, 0.5]), 0.6, loud=rng.uniform(1, 3, (reduced.rows, 3)) if louder else None)
+    relative = rng.uniform(1, 3, (reduced.rows, 3)) if louder else None
+    noise = Noise(np.array([2.0, 1.0, 0.5]), 0.6, relative_scale=relative)
     assert whiten(coloured(white.copy(), reduced, noise), reduced, noise) == pytest.approx(white, abs=1e-4)
 
 
@@ -38,9 +39,9 @@ def test_noise_of_some_rows_keeps_what_belongs_to_them():
     rng, rows = np.random.default_rng(2), np.arange(10) % 3 > 0
     whole = Noise(
         np.ones(2), 0.3, swing=rng.normal(size=(10, 2)), missing=rng.random((10, 2)) > 0.5,
-        roam=rng.normal(size=(10, 4)), loud=1 + rng.random((10, 2)),
+        random_walk=rng.normal(size=(10, 4)), relative_scale=1 + rng.random((10, 2)),
     )  # fmt: skip
     some = whole.of(rows)
-    for name in ("swing", "missing", "roam", "loud"):
+    for name in ("swing", "missing", "random_walk", "relative_scale"):
         assert np.array_equal(getattr(some, name), getattr(whole, name)[rows]), name
     assert some.memory == 0.3 and some.wander is None

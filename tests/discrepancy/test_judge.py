@@ -12,6 +12,7 @@ from tacdata.discrepancy import decide, verdict
 from tacdata.discrepancy.amiss import amiss
 from tacdata.discrepancy.fitted_response import FittedResponse
 from tacdata.discrepancy.judge import judge, out
+from tacdata.discrepancy.judgement import Member
 from tacdata.discrepancy.located import residual, slices
 from tacdata.discrepancy.setting import Setting
 from tacdata.effects import load
@@ -90,6 +91,15 @@ def test_a_channel_is_named_by_what_calibration_leaves_open(gain, named):
     made = decide.calibrated(SimpleNamespace(gains=gains, problem=SimpleNamespace(setting=setting)))
     assert [decide.settled(m) for m in made] == ([named] if named else [])
     assert all(m.needed == decide.BEYOND for m in made)
+
+
+@pytest.mark.parametrize(
+    ("necessity", "decoys", "named"),
+    [(2.9, None, False), (3.1, None, True), (2.9, 0.002, True), (2.9, 0.004, False), (3.1, 0.04, True), (9, 0.06, False)],
+)
+def test_what_did_not_race_is_named_by_its_necessity_alone(necessity, decoys, named):
+    member = Member(None, {}, (), (), {}, necessity, decoys=decoys, needed=decide.BEYOND)
+    assert (decide.settled(member) == "named") == named
 
 
 def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():

@@ -18,11 +18,11 @@ def made(rng):
         "swing": 3 * rng.normal(size=(STREAMS, count)),
         "moved": 2 * rng.normal(size=(STREAMS, count, KINDS)),
         "features": rng.normal(size=(STREAMS, count, FEATURES)),
-        "roam": 0.8 * rng.normal(size=(STREAMS, count, 2)),
+        "random_walk": 0.8 * rng.normal(size=(STREAMS, count, 2)),
     }
 
 
-def dense(columns, spans, prior, offset, swing, moved, features, roam):
+def dense(columns, spans, prior, offset, swing, moved, features, random_walk):
     """Return the products of columns under the covariance written out, free directions taken out."""
     streams, count, width = columns.shape
     cov, free = np.eye(streams * count), []
@@ -33,7 +33,7 @@ def dense(columns, spans, prior, offset, swing, moved, features, roam):
         constant = 1e9 if np.isinf(prior) else prior**2
         power = np.zeros(streams)
         for s in range(streams):
-            one, gain, modes = offset[s, rows], swing[s, rows], roam[s, rows]
+            one, gain, modes = offset[s, rows], swing[s, rows], random_walk[s, rows]
             shaking = np.eye(len(one)) + constant * np.outer(one, one) + modes @ modes.T
             power[s] = gain @ np.linalg.solve(shaking, gain)
             for mode in modes.T:
@@ -70,16 +70,16 @@ def dense(columns, spans, prior, offset, swing, moved, features, roam):
 @pytest.mark.parametrize("modes", [0, 2])
 def test_products_are_those_of_generalized_least_squares(prior, features, modes):
     given = made(np.random.default_rng(3))
-    given["features"], given["roam"] = given["features"][:, :, :features], given["roam"][:, :, :modes]
+    given["features"], given["random_walk"] = given["features"][:, :, :features], given["random_walk"][:, :, :modes]
     edges = np.cumsum((0, *LENGTHS))
     spans = [np.arange(a, b) for a, b in pairwise(edges)]
     expected = dense(given["columns"], spans, prior, given["offset"], given["swing"], given["moved"], given["features"],
-                     given["roam"])  # fmt: skip
+                     given["random_walk"])  # fmt: skip
     own = Own(
         given["offset"].astype(np.float32), np.full(len(spans), prior), given["swing"].astype(np.float32),
         given["moved"].astype(np.float32),
         given["features"].astype(np.float32) if features else None,
-        given["roam"].astype(np.float32) if modes else None,
+        given["random_walk"].astype(np.float32) if modes else None,
     )  # fmt: skip
     left = Factored(spans, own).without(given["columns"].astype(np.float32)).reshape(-1, WIDTH)
     assert left.T @ left == pytest.approx(expected, rel=2e-4, abs=2e-4 * np.abs(expected).max())
@@ -148,13 +148,14 @@ def test_what_features_leave_of_noise_that_is_white_to_it():
     rng = np.random.default_rng(6)
     parts = made(rng)
     spans = np.split(np.arange(sum(LENGTHS)), np.cumsum(LENGTHS)[:-1])
-    own = Own(parts["offset"], np.full(3, 0.7), moved=parts["moved"], features=parts["features"], roam=parts["roam"])
+    named = {name: parts[name] for name in ("moved", "features", "random_walk")}
+    own = Own(parts["offset"], np.full(3, 0.7), **named)
     factored, count, draws = Factored(spans, own), sum(LENGTHS), 20000
     white = rng.normal(size=(STREAMS, count, draws)).astype(np.float32)
     shaken = white.copy()
     for rows in spans:
         shaken[:, rows] += 0.7 * parts["offset"][:, rows, None] * rng.normal(size=(STREAMS, 1, draws))
-        shaken[:, rows] += parts["roam"][:, rows] @ rng.normal(size=(STREAMS, 2, draws))
+        shaken[:, rows] += parts["random_walk"][:, rows] @ rng.normal(size=(STREAMS, 2, draws))
         shaken[:, rows] += parts["moved"][:, rows] @ rng.normal(size=(KINDS, draws))
     projected, cleaned = (v.reshape(-1, draws) for v in (factored.projected(white), factored.without(shaken)))
     products = projected @ projected.T / draws

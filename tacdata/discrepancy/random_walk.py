@@ -25,7 +25,7 @@ AT_LEAST = 3
 """Quiet rows that an offset before or after a press is read from."""
 
 
-def roam(
+def modes(
     rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray
 ) -> np.ndarray | None:  # fmt: skip
     """Return what one standard deviation of each mode changes [noise scales], shape (m, modes); None for none.
@@ -49,16 +49,16 @@ def roam(
     variance = 2 * rate * length[:, None] / (np.pi * number) ** 2
     known = 0.5 * count[:, None] * (1 - memory) ** 2
     shown = np.median((variance * known)[there], axis=0) > SHOWS
-    modes = int(np.argmin(shown)) if not shown.all() else MOST
-    if not modes:
+    most = int(np.argmin(shown)) if not shown.all() else MOST
+    if not most:
         return None
     share = (course.time - begin[course.episode]) / np.maximum(length, 1e-9)[course.episode]
-    size = np.sqrt(variance[:, :modes])[course.episode]
-    return (size * np.cos(np.pi * number[:modes] * share[:, None])).astype(np.float32)
+    size = np.sqrt(variance[:, :most])[course.episode]
+    return (size * np.cos(np.pi * number[:most] * share[:, None])).astype(np.float32)
 
 
 def told(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray) -> float:
-    """Return the rate of the wander [noise scales squared a second], 0 where it cannot be told; as for `roam`."""
+    """Return the rate of the wander [noise scales squared a second], 0 where it cannot be told; as for `modes`."""
     quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
     streams = rest[:, : course.channels] / scale[: course.channels]
     quiet &= np.isfinite(streams).all(axis=1)
