@@ -95,7 +95,7 @@ def test_a_channel_is_named_by_what_calibration_leaves_open(gain, named):
 
 @pytest.mark.parametrize(
     ("necessity", "decoys", "named"),
-    [(2.9, None, False), (3.1, None, True), (2.9, 0.002, True), (2.9, 0.004, False), (3.1, 0.04, True), (9, 0.06, False)],
+    [(2.9, None, False), (3.1, None, True), (2.9, 0.002, True), (2.9, 0.004, False), (4, 0.04, True), (9, 0.06, False)],
 )
 def test_what_did_not_race_is_named_by_its_necessity_alone(necessity, decoys, named):
     member = Member(None, {}, (), (), {}, necessity, decoys=decoys, needed=decide.BEYOND)
