@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from tacdata.chain import Response, predict
 from tacdata.discrepancy import evidence
@@ -24,6 +25,9 @@ STEPS = 5
 SMALL = 0.2
 """Gain in half the whitened energy below which no further step is made [nats]."""
 
+HEAVIEST = 0.9
+"""No episode is taken to hold a larger share of what is known of a number [1]."""
+
 
 @dataclass(frozen=True)
 class Refined:
@@ -35,7 +39,7 @@ class Refined:
     energy: np.ndarray
     """Half the whitened energy of each episode, nuisances fitted [nats], shape (episodes,)."""
     covariance: np.ndarray
-    """Of the knobs [their steps], robust to what episodes have in common, shape (knobs, knobs)."""
+    """Of the knobs [their steps], as episodes scatter; 1.645 standard errors hold 90 %, shape (knobs, knobs)."""
     left: np.ndarray
     """Whitened residual without nuisances [noise scales], shape (m, streams), float32."""
     episode: np.ndarray
@@ -156,7 +160,7 @@ def _state(setting: Setting, response: Response, placed: list[Placed], frame: Fr
     low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -free])
     high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), free])
     best = solve(found.gram.sum(axis=0), np.arange(k + len(ridge)), weight, low, high)
-    return _State(moving, best[:k], _covariance(found, best, weight)[:k, :k])
+    return _State(moving, best[:k], _covariance(found, best, weight, k))
 
 
 def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:
@@ -169,16 +173,33 @@ def _energy(found: Evidence, values: np.ndarray) -> np.ndarray:
     return 0.5 * np.einsum("i,eij,j->e", whole, found.gram, whole)
 
 
-def _covariance(found: Evidence, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Sandwich over episodes: errors within an episode may depend on each other in any way."""
-    total = found.gram.sum(axis=0)[1:, 1:] + np.diag(weight)
-    if not len(total):
+def _covariance(found: Evidence, values: np.ndarray, weight: np.ndarray, knobs: int) -> np.ndarray:
+    """Return the covariance of the first ``knobs`` numbers: a sandwich over episodes, beside the others.
+
+    Errors within an episode may depend on each other in any way. Each episode's score is that of a fit without it (CR3,
+    the jackknife: Bell & McCaffrey, Survey Methodology 28, 2002, 169). Few episodes tell their scatter badly: errors
+    are larger by Student's t over the normal quantile, with the degrees of freedom that the episodes' shares of the
+    information leave, so that 1.645 of them hold 90 %.
+    """
+    if not knobs:
         return np.zeros((0, 0))
-    inverse = np.linalg.pinv(total, hermitian=True)
-    scores = found.gram[:, 1:, 0] - np.einsum("eij,j->ei", found.gram[:, 1:, 1:], values)
-    count = len(scores)
-    middle = scores.T @ scores * (count / max(count - 1, 1))
-    return inverse @ np.maximum(middle, 0) @ inverse if count < 2 else inverse @ middle @ inverse
+    total = found.gram.sum(axis=0)[1:, 1:] + np.diag(weight)
+    through = np.linalg.pinv(total[knobs:, knobs:], hermitian=True) @ total[knobs:, :knobs]
+    beside = np.concatenate([np.eye(knobs), -through])
+    scores = (found.gram[:, 1:, 0] - np.einsum("eij,j->ei", found.gram[:, 1:, 1:], values)) @ beside
+    each = beside.T @ found.gram[:, 1:, 1:] @ beside
+    size, vectors = np.linalg.eigh(beside.T @ total @ beside)
+    good = size > 1e-12 * max(float(size[-1]), 1e-300)
+    root = (vectors[:, good] / np.sqrt(size[good])) @ vectors[:, good].T
+    heavy, axes = np.linalg.eigh(root @ each @ root)
+    left = np.einsum("eji,ej->ei", axes, scores @ root) / (1 - np.minimum(heavy, HEAVIEST))
+    left = np.einsum("eij,ej->ei", axes, left)
+    count, inverse = len(scores), root @ root
+    share = np.einsum("ki,eij,kj->ek", inverse, each, inverse)
+    share = np.maximum(share, 0.0) / np.maximum(share.sum(axis=0), 1e-300)
+    freedom = np.maximum(1 / np.maximum(np.sum(share**2, axis=0), 1e-12) - 1, 1.0)
+    wider = stdtrit(freedom, 0.95) / ndtri(0.95)
+    return root @ (left.T @ left) @ root * np.outer(wider, wider) * ((count - 1) / count if count > 1 else 1.0)
 
 
 def _correct(response: FittedResponse, setting: Setting, placed: Sequence[Placed]) -> None:

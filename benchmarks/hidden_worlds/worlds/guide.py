@@ -37,7 +37,7 @@ def lateral_backlash(w, s):
 def lost_steps(w, s):
     """Steps are lost once, from a moment on."""
     w.carriage[w.episode > 0.45 * w.episode.max(), 2] -= 0.05 * s
-    w.tell("lost_steps", dz=0.05 * s)
+    w.tell("lost_steps", dz=-0.05 * s)
 
 
 @hidden("guide", "lag", fitted=True, most=4)
