@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ from tacdata.discrepancy.located import Slice, residual
 MOST_ROWS = 1200
 """Rows drawn of the worst episodes."""
 
+WIDEST = 120
+"""Characters in a line of the title: more do not fit."""
+
 
 def draw(found: Judgement, before: list[Slice], after: list[Slice], verdict: dict[str, Any], path: Path) -> None:
     """Draw the page into a PNG file."""
@@ -22,7 +26,8 @@ def draw(found: Judgement, before: list[Slice], after: list[Slice], verdict: dic
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(12, 8), constrained_layout=True)
-    figure.suptitle(f"{verdict['status']}: {verdict['why']}", fontsize=11, wrap=True)
+    said = textwrap.fill(f"{verdict['status']}: {verdict['why']}", WIDEST)
+    figure.suptitle(said, fontsize=11)
     _streams(axes[0, 0], found)
     _slices(axes[0, 1], before, after)
     _rivals(axes[1, 0], found)
