@@ -139,9 +139,10 @@ class Cleaner:
             columns: Shape (n, streams, k).
 
         Returns:
-            Scores and information [1], shapes (episodes, k); 0 where nothing is known.
+            Scores, shape (episodes, k), and information, shape (episodes, k, k) [1]; 0 where nothing is known.
         """
-        score, known = np.zeros((2, self._course.episodes, columns.shape[2]))
+        count = columns.shape[2]
+        score, known = np.zeros((self._course.episodes, count)), np.zeros((self._course.episodes, count, count))
         white = whiten(columns, self._course, self._noise)
         for place, (rows, part) in zip(self._places, self.parts(residual[:, :, None]), strict=True):
             episodes, own = np.unique(place.episode), white[rows]

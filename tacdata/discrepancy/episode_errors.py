@@ -11,10 +11,13 @@ from tacdata.discrepancy import noise, random_walk
 from tacdata.discrepancy.cleaner import Cleaner
 from tacdata.discrepancy.evidence import Noise
 from tacdata.discrepancy.fit import solve
+from tacdata.discrepancy.spreads import positive, spreads
 from tacdata.discrepancy.wander import wander
 
 LEAST, MOST = 0.1, 10.0
 """Errors of pose are told to be between these, in standard deviations of the prior [1]."""
+UNTOLD = 1e-4
+"""Information added to what an episode tells of its errors: what it tells nothing of is not known, not nil [1]."""
 ODD = 6.0
 """An episode is unlike all others whose errors are larger than theirs by so many standard deviations [1]."""
 
@@ -69,8 +72,8 @@ class EpisodeErrors:
     def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> Sizes:
         """Return how large episodes' own errors of pose are.
 
-        One episode's error is told by generalized least squares as if it were free, beside all others' and its own of
-        other kinds at the sizes that they have so far: its variance is that of such errors and that of what is known.
+        An episode's errors are told by generalized least squares as if they were free, all kinds together, beside all
+        others' at the sizes that they have so far: their covariance is that of such errors and that of what is known.
         Told by successive episodes of the same place, as an offset that differs from place to place is no error of an
         episode's own; by successive ones anywhere where places are not visited again.
 
@@ -81,7 +84,8 @@ class EpisodeErrors:
         """
         cleaner = Cleaner(self.course, known, self.context, self.features, errors * sizes)
         score, information = cleaner.moved(self._left(cleaner), errors)
-        there = np.flatnonzero(information.min(axis=1) > 0)  # sealed episodes say nothing
+        # Sealed episodes say nothing.
+        there = np.flatnonzero(np.diagonal(information, axis1=1, axis2=2).min(axis=1) > 0)
         place, score, information = self._places()[there], score[there], information[there]
         order = np.argsort(place, kind="stable")
         again = np.diff(place[order]) == 0
@@ -90,15 +94,14 @@ class EpisodeErrors:
         before, after = order[:-1][again], order[1:][again]
         if len(before) < noise.FEW_GAPS:
             return Sizes(np.ones(len(sizes)), np.zeros(0, dtype=np.int64))
-        found, variance = score / information, np.maximum(1 / information - sizes**2, 0.0)
-        spread = [
-            noise.spread_of(found[after, k] - found[before, k], variance[after, k] + variance[before, k])
-            for k in range(len(sizes))
-        ]
+        unsure = np.linalg.inv(information + UNTOLD * np.eye(len(sizes)))
+        found = np.einsum("ekl,el->ek", unsure, score)
+        unsure = positive(unsure - np.diag(np.square(sizes)))
+        told = spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST, MOST)
         middle = np.stack([np.median(found[place == p], axis=0) for p in place])
-        told = np.clip(spread, LEAST, MOST)
-        far = np.abs(found - middle) > ODD * np.sqrt(told**2 + variance)
-        return Sizes(told, there[far.any(axis=1)])
+        off = found - middle
+        far = np.einsum("ek,ek->e", off, np.linalg.solve(unsure + np.diag(np.square(told)), off[:, :, None])[:, :, 0])
+        return Sizes(told, there[far > ODD**2])
 
     def gains(self, known: Noise, errors: np.ndarray) -> float:
         """Return how far an episode's gain of a stream is off the next one's at its place [1].

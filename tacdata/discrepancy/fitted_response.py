@@ -24,6 +24,12 @@ SMOOTH = 1e-5
 """Weight of the splines' bending, over the mean diagonal: what no row decides goes on straight."""
 RIDGE = 1e-8
 """Share of the mean diagonal added to it."""
+BLOCK = 4
+"""Rows of a mean by which noise is told: what successive readings have in common counts [1]."""
+STEPS = 30
+"""Steps to the weight of bending [1]."""
+STIFF = 1e9
+"""Largest weight of bending [1]."""
 KEPT = 3
 """Answers remembered: most effects leave the pose alone."""
 
@@ -53,12 +59,15 @@ class FittedResponse(Response):
             rows, there = np.arange(len(reduced.force)), np.isfinite(reduced.force)
             filled = np.interp(rows, rows[there], reduced.force[there]) if there.any() else np.zeros(len(rows))
             streams = np.column_stack([streams, filled])
+        self._shaken = np.zeros(streams.shape[1])
         count = knots or INTERVALS
         self._designs: list[tuple[np.ndarray, list[np.ndarray]]] = []
         self._answers: list[tuple[np.ndarray, np.ndarray]] = []
         self._bases = [self._basis(reduced.tip[self._within(k), 2], count) for k in range(self.context.max() + 1)]
         # What they say in the air: that is an offset of the place, which no history should go through.
         self._air = [self._design(basis, basis.t[:1]) for basis in self._bases]
+        self._fit(streams)  # as it comes: what that leaves tells the noise, without which nothing is smooth
+        self._shaken = _shaken(streams - self._followed(), reduced)
         self._fit(streams)
         if count > FEW:
             self._bases = [self._bent(k, count) for k in range(len(self._bases))]
@@ -133,15 +142,27 @@ class FittedResponse(Response):
         self._answers = []
         for k, basis in enumerate(self._bases):
             rows, count = self._within(k), len(basis.t) - basis.k - 1
-            self._weights[k] = self._weights[k] + self._solve(
-                rows, np.nan_to_num(residual[rows]), features[rows, :count]
+            more, _ = self._solve(
+                rows, np.nan_to_num(residual[rows]), features[rows, :count], self._smooth[k], self._weights[k]
             )
+            self._weights[k] = self._weights[k] + more
 
     def _fit(self, streams: np.ndarray) -> None:
-        depth, self._weights = self._course.reduced.tip[:, 2], []
+        depth, self._weights, self._smooth = self._course.reduced.tip[:, 2], [], []
         for k, basis in enumerate(self._bases):
             rows = self._within(k)
-            self._weights.append(self._solve(rows, streams[rows], self._design(basis, depth[rows])))
+            weights, smooth = self._solve(rows, streams[rows], self._design(basis, depth[rows]))
+            self._weights.append(weights)
+            self._smooth.append(smooth)
+
+    def _followed(self) -> np.ndarray:
+        """Return what the splines say at the rows read, shape (m, streams)."""
+        depth = self._course.reduced.tip[:, 2]
+        result = np.zeros((len(depth), self._weights[0].shape[1]))
+        for k, (basis, weights) in enumerate(zip(self._bases, self._weights, strict=True)):
+            rows = self._within(k)
+            result[rows] = self._design(basis, depth[rows]) @ weights
+        return result
 
     def _bent(self, k: int, count: int) -> BSpline:
         """Return a place's splines with knots where the first fit bends (de Boor, Good approximation by splines, 1974).
@@ -169,21 +190,43 @@ class FittedResponse(Response):
         """Return which of the rows read belong to a context, shape (m,), bool."""
         return self.context[self._read] == k
 
-    def _solve(self, rows: np.ndarray, values: np.ndarray, design: np.ndarray) -> np.ndarray:
-        """Return spline weights, with an offset for every episode fitted beside and left out."""
-        reduced = self._course.reduced
+    def _solve(
+        self, rows: np.ndarray, values: np.ndarray, design: np.ndarray, smooth: np.ndarray | None = None,
+        before: np.ndarray | float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Return spline weights, with an offset for every episode fitted beside and left out, and how smooth they are.
+
+        Args:
+            rows: Which of the rows read, shape (m,), bool.
+            values: Of them, shape (k, streams).
+            design: Splines there, shape (k, splines).
+            smooth: Weight of bending, shape (streams,); told by restricted maximum likelihood, unless given.
+            before: Weights that those returned are added to: together they should bend little.
+        """
+        reduced, count = self._course.reduced, design.shape[1]
         episode = reduced.episode[rows]
         own = (episode[:, None] == np.unique(episode)[None]).astype(float)
         matrix = np.column_stack([design, own])
         gram = matrix.T @ matrix
         scale = float(np.mean(np.diag(gram)))
         penalty = np.full(len(gram), RIDGE * scale)
-        penalty[design.shape[1] :] = 1e-2 * scale  # offsets are small: the spline takes what they share
-        bend = np.zeros((max(design.shape[1] - 2, 0), len(gram)))
+        penalty[count:] = 1e-2 * scale  # offsets are small: the spline takes what they share
+        bend = np.zeros((max(count - 2, 0), len(gram)))
         for k in range(len(bend)):
             bend[k, k : k + 3] = 1.0, -2.0, 1.0
-        gram = gram + np.diag(penalty) + SMOOTH * scale * bend.T @ bend
-        return np.linalg.solve(gram, matrix.T @ values)[: design.shape[1]]
+        rough = bend.T @ bend
+        # Both matrices are diagonal in these: one factorization for all weights of bending.
+        inner = np.linalg.inv(np.linalg.cholesky(gram + np.diag(penalty) + SMOOTH * scale * rough)).T
+        size, turn = np.linalg.eigh(inner.T @ rough @ inner)
+        size, basis = np.maximum(size, 0.0), inner @ turn
+        target = basis.T @ (matrix.T @ values)
+        already = np.zeros((len(gram), values.shape[1]))
+        already[:count] = before
+        bent = basis.T @ (rough @ already)
+        if smooth is None:
+            smooth = _smoothness(size, target, self._shaken**2)
+        weights = basis @ ((target - smooth * bent) / (1 + size[:, None] * smooth))
+        return weights[:count], smooth
 
     def _both(self, pose: np.ndarray) -> np.ndarray:
         if len(pose) != len(self.context):
@@ -235,6 +278,41 @@ class FittedResponse(Response):
             near = BSpline.design_matrix(np.full(len(depth), high - step), basis.t, 3).toarray()
             design = design + (design - near) * (beyond / step)[:, None]
         return design
+
+
+def _smoothness(size: np.ndarray, target: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Return the weight of bending of each stream by restricted maximum likelihood, shape (streams,).
+
+    By the fixed point of Fellner and Schall (Wood & Fasiolo, Biometrics 73, 2017, 1071), the noise known.
+
+    Args:
+        size: How much each direction bends, shape (k,).
+        target: What the readings say of each direction, shape (k, streams).
+        noise: Variance of a reading, shape (streams,).
+    """
+    bends = (size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300))[:, None]
+    smooth = np.ones(target.shape[1])
+    for _ in range(STEPS):
+        kept = 1 / (1 + size[:, None] * smooth)
+        bending = np.sum(size[:, None] * np.square(target * kept), axis=0)
+        smooth = np.clip(noise * np.sum(bends * kept, axis=0) / np.maximum(bending, 1e-300), 0.0, STIFF)
+    return smooth
+
+
+def _shaken(left: np.ndarray, course: Course) -> np.ndarray:
+    """Return the noise of means of rows times the root of their number [each stream's unit], shape (streams,).
+
+    Told by second differences of successive means of what a response leaves; 0 where there are none.
+    """
+    found = np.zeros((0, left.shape[1]))
+    for rows in np.split(np.arange(len(left)), np.flatnonzero(np.diff(course.episode)) + 1):
+        whole = len(rows) // BLOCK
+        if whole >= 3:
+            means = left[rows[: whole * BLOCK]].reshape(whole, BLOCK, -1).mean(axis=1)
+            found = np.concatenate([found, means[2:] - 2 * means[1:-1] + means[:-2]])
+    if not len(found):
+        return np.zeros(left.shape[1])
+    return 1.4826 * np.median(np.abs(found), axis=0) * np.sqrt(BLOCK / 6)
 
 
 def contexts(course: Course) -> np.ndarray:

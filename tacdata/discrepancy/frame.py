@@ -110,11 +110,11 @@ def frame(setting: Setting) -> Frame:
     before = np.zeros(errors.shape[2] + 1)
     for _ in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is told beside the other.
-        own = told.poses(known, prior, own.sizes)
-        errors = prior * own.sizes
         known = replace(known, swing=None)
         spread = told.gains(known, errors)
         known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
+        own = told.poses(known, prior, own.sizes)
+        errors = prior * own.sizes
         now = np.array([*own.sizes, max(spread, MODEL)])
         if np.all(np.abs(now - before) <= SETTLED * now):
             break

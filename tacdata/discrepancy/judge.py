@@ -172,10 +172,18 @@ def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:
     if order:
         alone = max((held[c.effect.name] for c in order), key=lambda h: h.sum())
         better = pair and clipped_t(held_out(problem, pair) - alone) > RIVAL
-        return [[c] for c in order[:3]] + ([pair] if better else [])
+        return [[c] for c in _tried(order)] + ([pair] if better else [])
     if tested.p_generic <= ALPHA and pair and clipped_t(held_out(problem, pair)) > SURE_PAIR:
         return [pair[:1], pair]
     return []
+
+
+def _tried(order: list[Candidate]) -> list[Candidate]:
+    """Return which of some candidates, best first, are tried: the best form of three mechanisms, two of the best."""
+    forms: dict[str, list[Candidate]] = {}
+    for candidate in order:
+        forms.setdefault(candidate.called, []).append(candidate)
+    return [form for k, same in enumerate(list(forms.values())[:3]) for form in same[: 2 if k == 0 else 1]]
 
 
 def _gain(problem: Problem, chosen: list[Candidate]) -> float:

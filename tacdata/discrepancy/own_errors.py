@@ -99,7 +99,7 @@ class Factored:
             columns: Whitened, shape (streams, n, k).
 
         Returns:
-            Scores and information, shapes (episodes, k).
+            Scores, shape (episodes, k), and information, shape (episodes, k, k).
         """
         scores, known = [], []
         for k, (rows, offsets, errors) in enumerate(self._episodes):
@@ -108,7 +108,8 @@ class Factored:
             turned = np.linalg.solve(np.eye(len(errors.gram)) + errors.gram, inner)
             pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
             scores.append(np.einsum("smk,sm->k", own, rest, dtype=np.float64) - inner.T @ pulled)
-            power = np.einsum("smk,smk->k", own, own, dtype=np.float64) - np.sum(inner * turned, axis=0)
+            flat = own.reshape(-1, own.shape[2]).astype(np.float64)
+            power = flat.T @ flat - inner.T @ turned
             known.append(power if self._free is None else power - self._free.taken_of_all(k, own, turned))
         return np.array(scores), np.array(known)
 
@@ -273,9 +274,9 @@ class _Free:
         return alone + self._through @ (self._inner @ pulled)
 
     def taken_of_all(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
-        """Return how much of columns (streams, m, k) of an episode features take up, shape (k,); ``turned`` (T, k)."""
+        """Return how much of columns (streams, m, k) of an episode features take up, (k, k); ``turned`` (T, k)."""
         right = (self._shared[episode].transpose(0, 2, 1) @ own).astype(np.float64) - self._joints[episode] @ turned
-        return np.einsum("spk,spk->k", right, self._solved(right))
+        return np.einsum("spk,spl->kl", right, self._solved(right))
 
     def taken(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
         """Return how much of columns in one stream of an episode features take up, shape (streams,).

@@ -9,6 +9,7 @@ import numpy as np
 
 from tacdata.chain import Course, Tool
 from tacdata.chain.rows import Rows, rows_of
+from tacdata.discrepancy.path_noise import resolved, without_noise
 from tacdata.discrepancy.second_view import Views, second_views
 from tacdata.discrepancy.strokes import strokes
 from tacdata.errors import FormatError, UsageError
@@ -184,23 +185,26 @@ def _strokes_of(
         return []
     tool = _tool(episode)
     made = []
-    spans = _to_the_end(strokes(episode.tip_ns, episode.tip[:, 2]), episode, time_ns)
+    tip, _ = without_noise(episode.tip_ns, episode.tip)
+    known = resolved(episode.tip_ns, tip[:, 2], time_ns)
+    spans = _to_the_end(strokes(episode.tip_ns, tip[:, 2]), episode.tip_ns, tip[:, 2], time_ns)
     for number, (first, last) in enumerate(spans):
-        rows = (time_ns >= first) & (time_ns < last)
+        rows = known & (time_ns >= first) & (time_ns < last)
         if rows.sum() < FEW_ROWS:
             continue
         origin = time_ns[0]
         path_time = (episode.tip_ns - origin) * 1e-9
-        laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, episode.tip, len(kept))
+        laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, tip, len(kept))
         deepest = laid.tip[np.argmax(laid.tip[:, 2])]
         name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
         made.append(_Stroke(name, *of, float(origin) * 1e-9, laid, tool, deepest[:2]))
     return made
 
 
-def _to_the_end(spans: list[tuple[int, int]], episode: Episode, time_ns: np.ndarray) -> list[tuple[int, int]]:
+def _to_the_end(
+    spans: list[tuple[int, int]], tip_ns: np.ndarray, depth: np.ndarray, time_ns: np.ndarray
+) -> list[tuple[int, int]]:
     """Return spans with what was read before the tip began to move and after it came to rest, off the skin."""
-    depth = episode.tip[:, 2]
     away = depth <= max(0.0, float(depth.min()) + 0.05 * float(np.ptp(depth)))
     if away[0]:
         spans = [(min(spans[0][0], int(time_ns[0])), spans[0][1]), *spans[1:]]

@@ -8,8 +8,10 @@ from tacdata.chain.rows import rows_of
 FINE = 200
 
 
-def course(seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5):
-    """Return presses of three channels at two places; sizes in s, s, share, mm."""
+def course(
+    seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5, pulls=True
+):  # fmt: skip
+    """Return presses of three channels at two places; sizes in s, s, share, mm; a tool that pulls sticks."""
     rng = np.random.default_rng(seed)
     parts, clock, slow, late = [], 0.0, np.zeros(3), np.zeros(3)
     for k in range(episodes):
@@ -27,7 +29,7 @@ def course(seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0,
             follower = min(max(follower, z - 0.0), z + play)
             load = weights * max(follower + jitter, 0.0) ** 1.5
             slow += (load - slow) / (FINE * 2.0)
-            now = load - relaxed * slow
+            now = load - relaxed * slow if pulls else np.maximum(load - relaxed * slow, 0.0)
             late = late + (now - late) / (FINE * lag) if lag > 0 else now
             read[i] = 5000 + 800 * late
         pick = np.arange(rng.integers(6), len(time), 6)

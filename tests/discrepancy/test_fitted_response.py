@@ -35,6 +35,18 @@ def test_the_same_depths_asked_again_are_answered_the_same():
     np.testing.assert_array_equal(response.load(made.tip, made.tool), first)
 
 
+def test_slopes_are_told_through_the_noise():
+    """What moves the tip shows by slopes: those of splines that follow the noise are mostly noise in the air."""
+    made = course(noise=4.0)
+    response, step = FittedResponse(made), np.array([0.0, 0.0, 0.005])
+    slope = (response.load(made.tip + step, made.tool) - response.load(made.tip - step, made.tool)) / 0.01
+    weights = np.array([[1.0, 0.5, 0.2], [0.2, 0.6, 1.0]])[made.row_site]
+    true = 800 * 1.5 * weights * np.sqrt(np.maximum(made.tip[:, 2:], 0.0))
+    air = made.tip[:, 2] < -0.05
+    assert np.sqrt(np.mean(np.square(slope - true)[~air])) < 0.1 * np.sqrt(np.mean(np.square(true)[~air]))
+    assert np.sqrt(np.mean(np.square(slope)[air])) < 0.02 * np.abs(true).max()
+
+
 def placed(name, share=1.0):
     effect = load(name)
     return Placed(

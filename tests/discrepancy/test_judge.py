@@ -49,6 +49,14 @@ def test_relaxation_is_named_and_measured():
     assert answer.members[0].placed.values["f"] == pytest.approx(0.15, rel=0.2)
 
 
+def test_relaxation_of_a_skin_that_the_tool_leaves_is_named_and_measured():
+    """A free tool cannot pull: readings are idle at once where a skin that sticks would read less than that."""
+    answer = found(effects=(*FEW, "relaxation_let_go"), relaxed=0.15, hold=4.0, pulls=False)
+    assert names(answer) == {"relaxation"} and decide.status(answer) == "named"
+    assert answer.members[0].placed.effect.name == "relaxation_let_go"
+    assert answer.members[0].placed.values["f"] == pytest.approx(0.15, rel=0.1)
+
+
 def test_one_rate_names_no_lag():
     answer = found(delay=0.05, rates=(1.0,))
     assert decide.status(answer) in ("ambiguous", "unknown")

@@ -21,6 +21,13 @@ def three_branch_relaxation(w, s):
     w.load = w.load - 0.10 * s * sum(g * late(w.load, w, tau) for g, tau in ((0.4, 0.2), (0.35, 2.0), (0.25, 20.0)))
 
 
+@hidden("skin", "hold time", called=("relaxation",), fitted=True, most=6)
+def leaving_relaxation(w, s):
+    """Two branches a factor 20 apart; the tool leaves the skin before it would pull."""
+    left = w.load - 0.10 * s * sum(g * late(w.load, w, tau) for g, tau in ((0.5, 0.4), (0.5, 8.0)))
+    w.load = np.where(left[:, -1:] > 0, left, 0.0)
+
+
 @hidden("skin", "loading and unloading", called=("hysteresis",), fitted=True, most=6)
 def dahl_hysteresis(w, s):
     """Dahl friction on depth: z' = d' (1 - sgn(d') z)^2 over 0.08 mm."""

@@ -1,0 +1,107 @@
+"""Where a tip was, told from a position that was measured with noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+WINDOWS = (2, 4, 8, 16, 32, 64)
+"""Rows on either side that a straight line is laid through [1]."""
+SURE = 2.0
+"""Estimates of different windows agree if no farther apart than so many of their standard errors [1]."""
+LEAST = 1e-5
+"""Less noise is none [mm]."""
+CORNER = 0.02
+"""Where a path turns by more between its positions than this share of its stroke, nobody knows how it turned [1]."""
+
+FEW = 20
+"""Fewer positions tell no noise."""
+REGULAR = 0.9
+"""Share of the steps of a sampled path that are no longer than twice the median [1]."""
+
+
+def without_noise(time_ns: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a path as it was, as well as it can be told, and the noise that it was measured with.
+
+    A position that dithers where the tool rests looks like play, which the readings do not follow. Every position is
+    told by a straight line through its neighbours, as many as agree with fewer: the intersection of their confidence
+    intervals (Goldenshluger & Nemirovski, Math. Methods Stat. 6, 1997, 135). Commands have no noise and stay, and so
+    does a path that is given by its corners.
+
+    Args:
+        time_ns: Of each position [ns], increasing, shape (n,).
+        path: Positions [mm], shape (n, 3).
+
+    Returns:
+        Positions [mm], shape (n, 3), and the standard deviation of their noise [mm], shape (3,).
+    """
+    if len(path) < FEW or not _sampled(time_ns):
+        return path, np.zeros(3)
+    time = (time_ns - time_ns[0]) * 1e-9
+    noise = np.array([_noise(time, axis) for axis in path.T])
+    axes = [_told(time, axis, s) if s > LEAST else axis for axis, s in zip(path.T, noise, strict=True)]
+    return np.column_stack(axes), np.where(noise > LEAST, noise, 0.0)
+
+
+def resolved(tip_ns: np.ndarray, depth: np.ndarray, time_ns: np.ndarray) -> np.ndarray:
+    """Return at which times the depth is known, shape (m,), bool: not beside corners that positions leave out.
+
+    A straight line through positions before and after a corner is off it by up to a quarter of how far the corner is
+    off a straight line: of a fast ramp sampled seldom that is far more than any reading's noise. A path that is given
+    by its corners, not sampled at a rate, is known everywhere.
+
+    Args:
+        tip_ns: Of each position [ns], shape (n,).
+        depth: Positions [mm], shape (n,).
+        time_ns: Times asked for [ns], shape (m,).
+    """
+    if len(tip_ns) < FEW or not _sampled(tip_ns):
+        return np.ones(len(time_ns), dtype=bool)
+    step = np.maximum(np.diff(tip_ns) * 1e-9, 1e-12)
+    speed = np.diff(depth) / step
+    turned = np.abs(np.diff(speed)) * np.minimum(step[1:], step[:-1])
+    corner = np.concatenate([[False], turned > CORNER * max(float(np.ptp(depth)), 1e-12), [False]])
+    beside = corner[1:] | corner[:-1]  # of each stretch between positions
+    at = np.clip(np.searchsorted(tip_ns, time_ns, side="right") - 1, 0, len(beside) - 1)
+    return ~beside[at]
+
+
+def _sampled(time_ns: np.ndarray) -> bool:
+    """Return whether positions were sampled at a rate, rather than given where a path has its corners."""
+    step = np.diff(time_ns)
+    return bool(np.quantile(step, REGULAR) <= 2 * np.median(step))
+
+
+def _noise(time: np.ndarray, values: np.ndarray) -> float:
+    """Return the noise of values by how far each is off the line between its neighbours; 0 if half are not off.
+
+    By second differences of that: a path bends alike from one position to the next, its noise does not.
+    """
+    share = (time[1:-1] - time[:-2]) / np.maximum(time[2:] - time[:-2], 1e-12)
+    off = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
+    fourth = off[:-2] - 2 * off[1:-1] + off[2:]
+    return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(17.5))
+
+
+def _told(time: np.ndarray, values: np.ndarray, noise: float) -> np.ndarray:
+    """Return values as the widest windows tell them that agree with all narrower ones, shape (n,)."""
+    count = len(values)
+    middle, mean = time.mean(), values.mean()
+    t, y = time - middle, values - mean
+    sums = [np.concatenate([[0.0], np.cumsum(s)]) for s in (np.ones(count), t, y, t * t, t * y)]
+    result = y.copy()
+    low, high = y - SURE * noise, y + SURE * noise
+    open_ = np.ones(count, dtype=bool)
+    for width in WINDOWS:
+        at = np.arange(count)
+        reach = np.minimum(np.minimum(at, count - 1 - at), width)
+        first, last = at - reach, at + reach + 1
+        n, st, sy, stt, sty = (s[last] - s[first] for s in sums)
+        spread = np.maximum(stt - st * st / n, 1e-12)
+        slope = (sty - st * sy / n) / spread
+        away = t - st / n
+        line = sy / n + slope * away
+        error = SURE * noise * np.sqrt(1 / n + away * away / spread)
+        low, high = np.maximum(low, line - error), np.minimum(high, line + error)
+        open_ &= (low <= high) & (reach == width)
+        result[open_] = line[open_]
+    return result + mean
