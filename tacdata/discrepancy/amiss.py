@@ -94,8 +94,9 @@ def stuck(course: Course) -> list[str]:
     for channel in np.flatnonzero(still.any(axis=0) & ~still.all(axis=0)):
         count = int(still[:, channel].sum())
         if count > 0.1 * len(episodes) and still[:, channel].mean() > 2 * np.median(still.mean(axis=0)):
-            told.append(f"channel {channel}: the same reading throughout {count} of {len(episodes)} episodes: stuck at "
-                        "times; mend its contact, or leave it out")  # fmt: skip
+            called = course.channel_names[channel]
+            told.append(f"{called}: the same reading throughout {count} of {len(episodes)} episodes: stuck at times; "
+                        "mend its contact, or leave it out")  # fmt: skip
     for name, values in (("force", course.force), ("tag", None if course.tag is None else course.tag[:, 2])):
         if values is not None and np.isfinite(values[course.read]).mean() < 0.5:
             share = 100 * (1 - np.isfinite(values[course.read]).mean())

@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata.discrepancy.judgement import Judgement
 from tacdata.discrepancy.located import Slice, residual
+from tacdata.discrepancy.streams import Streams
 
 MOST_ROWS = 1200
 """Rows drawn of the worst episodes."""
@@ -52,7 +53,8 @@ def _streams(axis: Any, found: Judgement) -> None:
         axis.plot(time, first[rows, stream], color="tab:red", lw=0.8, label="before" if not number else None)
         axis.plot(time, last[rows, stream], color="tab:blue", lw=0.8, label="after" if not number else None)
     axis.axhspan(-2, 2, color="0.9", zorder=0)
-    axis.set(title=f"stream {stream} in the three worst episodes", xlabel="time [s]", ylabel="residual / noise")
+    called = Streams.of(course).names(course)[stream]
+    axis.set(title=f"{called} in the three worst episodes", xlabel="time [s]", ylabel="residual / noise")
     axis.legend()
 
 

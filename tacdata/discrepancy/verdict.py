@@ -176,6 +176,7 @@ def data(course: Course) -> dict[str, Any]:
     """Return what was judged, in numbers."""
     return {
         "episodes": course.episodes, "rows": len(course.read), "channels": course.channels,
+        "channel_numbers": list(course.numbers or range(course.channels)),
         "places": len(np.unique(course.site)), "tools": [t.name for t in course.tools],
         "sessions": len(np.unique(course.session)), "force": course.force is not None, "tag": course.tag is not None,
         "temperature": course.temperature is not None, "seconds": float(course.time[-1]),
