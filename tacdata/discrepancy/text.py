@@ -76,7 +76,7 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
     else:
         lines = [f"residual: {left['before']:.3f} before, {left['after']:.3f} after; 1 is the noise floor"]
         lines.append(f"left of what could be explained: {100 * left['share']:.1f} % ({left['t']:.1f} standard errors)")
-    unit = "mean squares over the noise; what differs from press to press (contact, gain) is taken off the residual"
+    unit = "mean squares over the noise; the residual is without what differs from press to press"
     if not sealed["episodes"]:
         return [*lines, f"  ({unit})"]
     head = f"{sealed['episodes']} sealed episodes: "
@@ -85,7 +85,7 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
         lines.append(f"{head}{sealed['before']:.3f}{by_path if sealed['ceiling'] < 0.9 * sealed['before'] else ''}")
     else:
         lines.append(f"{head}{sealed['before']:.3f} before, {sealed['after']:.3f} after{_closed(sealed)}")
-    return [*lines, f"  ({unit}, and is in the sealed episodes' numbers, which do not compare with it)"]
+    return [*lines, f"  ({unit}, the sealed episodes with it: they do not compare)"]
 
 
 def _closed(sealed: dict[str, Any]) -> str:

@@ -126,8 +126,7 @@ def why(status: str, found: Judgement, answer: list[Member], course: Course, sho
         return f"{names}: nothing else explains the episodes as well{more}"
     if status == "ambiguous":
         bounds = [m.placed.effect.called for m in answer if m.at_bound]
-        told = "these recordings do not say which effect it is: " if any(m.rivals for m in answer) else ""
-        told += _best(answer)
+        told = _best(answer)
         weak = [m.placed.effect.called for m in answer if m.necessity < m.needed]
         told += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
         return told + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
@@ -166,21 +165,27 @@ def _closest(answer: list[Member], share: float, shown: Gap | None) -> str:
 
 
 def _best(answer: list[Member]) -> str:
-    """Return which effects fit best and which may stand in their place; effects of one group are told of together."""
+    """Return what is found, and where that is open what fits best and what may stand in for it."""
+    clear = list(dict.fromkeys(m.placed.effect.called for m in answer if not m.rivals))
     groups: dict[frozenset[str], list[Member]] = {}
     for m in answer:
-        groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
-    told = []
-    for own in groups.values():
-        names = list(dict.fromkeys(m.placed.effect.called for m in own))
-        others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in names]
-        words = f"{names[0]} fits best" if len(names) == 1 else f"{_listed(names, 'and')} together fit best"
-        if others:
-            words += f", but {_listed(others, 'or')} may stand in for {'it' if len(names) == 1 else 'any of them'}"
-        elif len(names) > 1 and own[0].rivals:
-            words += ", but one may stand in for another"
-        told.append(words)
-    return "; ".join(told)
+        if m.rivals:
+            groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
+    told = "; ".join(_open(own) for own in groups.values())
+    if not told:
+        return _listed(clear, "and")
+    begins = f"{_listed(clear, 'and')}, and something else: " if clear else ""
+    return f"{begins}these recordings do not say which effect it is: {told}"
+
+
+def _open(own: list[Member]) -> str:
+    """Return effects of the answer with the same rivals, and those."""
+    names = list(dict.fromkeys(m.placed.effect.called for m in own))
+    others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in names]
+    words = f"{names[0]} fits best" if len(names) == 1 else f"{_listed(names, 'and')} together fit best"
+    if others:
+        return f"{words}, but {_listed(others, 'or')} may stand in for {'it' if len(names) == 1 else 'any of them'}"
+    return f"{words}, but one may stand in for another"
 
 
 def _listed(names: list[str], last: str) -> str:

@@ -98,6 +98,9 @@ def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
     assert said("ambiguous", [member("low_pass_filter", "latency", "creep")]).endswith(
         "low_pass_filter fits best, but latency or creep may stand in for it"
     )
+    assert said("ambiguous", [member("drift"), member("backlash", "creep")]).startswith(
+        "drift, and something else: these recordings do not say which effect it is: backlash fits best, but creep may"
+    )
     pair = [member("backlash", "hysteresis"), member("bouc_wen", "backlash")]
     assert said("ambiguous", pair).endswith("and hysteresis together fit best, but one may stand in for another")
 
