@@ -123,7 +123,7 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
 def in_source(recordings: Sequence[Recording], channels: int) -> list[str]:
     """Return in words which columns of the source the channels are; nothing where names say no more than numbers."""
     known = {tuple(recording.board.get("names", ()))[:channels] for recording in recordings}
-    names = next(iter(known)) if len(known) == 1 else ()
+    names = list(next(iter(known))) if len(known) == 1 else []
     parts = [re.fullmatch(r"(.*?)(\d+)", name) for name in names]
     if len(names) != channels or all(p and int(p[2]) == k for k, p in enumerate(parts)):
         return []

@@ -81,7 +81,8 @@ def course_of(paths: list[Path]) -> Course:
     if not parts:
         raise FormatError("no stretch with enough readings", f"{FEW_ROWS} or more readings a press", "record again")
     if len(parts) > len(found):
-        notes.append(f"{len(found)} recordings hold {len(parts)} strokes; each counts as an episode")
+        held = "one recording holds" if len(found) == 1 else f"{len(found)} recordings hold"
+        notes.append(f"{held} {len(parts)} strokes; each counts as an episode")
     if any(e.tags for _, e in found) and not views:
         notes.append("the tag was seen too seldom to tell of the guide: let it be in view during the presses")
     return _joined(parts, kept, found[0][1], (bool(force), bool(temperature), bool(views)), notes)

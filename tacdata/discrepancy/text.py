@@ -45,9 +45,9 @@ def answered(verdict: dict[str, Any]) -> set[str]:
 
 
 def _effect(told: dict[str, Any]) -> list[str]:
-    sure = told["confidence"] is not None and told["status"] == "named"
-    sure_words = f", {100 * told['confidence']:.0f} % sure" if sure else ""
-    lines = [f"  {told['mechanism']} ({told['effect']}, {told['stage']}): {told['status']}{sure_words}"]
+    sure = told["confidence"] if told["status"] == "named" else None
+    words = "" if sure is None else f", {100 * sure:.0f} % sure"
+    lines = [f"  {told['mechanism']} ({told['effect']}, {told['stage']}): {told['status']}{words}"]
     for name, p in told["parameters"].items():
         if isinstance(p["value"], list):
             lines.append(f"    {name}: {min(p['value']):.4g} to {max(p['value']):.4g} {p['unit']} over the channels")
