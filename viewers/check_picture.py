@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.recording.check import Report
+from tacdata.recording.check_imported import is_imported
 from tacdata.recording.episode import Episode
 
 
@@ -26,16 +27,17 @@ def draw(report: Report, path: Path) -> None:
     axes = figure.subplots(2, 3)
     episodes = [entry.recording.episode for entry in report.episodes]
     deepest = max(episodes, key=lambda episode: episode.press.depth)
-    _signals(axes[0, 0], deepest)
-    _responses(axes[0, 1], report)
+    unit = report.episodes[0].document["taxels"]["unit"]
+    _signals(axes[0, 0], deepest, unit)
+    _responses(axes[0, 1], report, unit)
     _sites(axes[0, 2], episodes)
-    _noise(axes[1, 0], report)
+    _noise(axes[1, 0], report, unit)
     _lag(axes[1, 1], report)
     _words(axes[1, 2], report)
     figure.savefig(path, dpi=110)
 
 
-def _signals(axes, episode: Episode) -> None:
+def _signals(axes, episode: Episode, unit: str) -> None:
     if len(episode.taxels.sample_ns):
         time = (episode.taxels.sample_ns - episode.taxels.sample_ns[0]) / 1e9
         axes.plot(time, episode.taxels.counts - np.median(episode.taxels.counts[:5], axis=0), linewidth=0.7)
@@ -43,14 +45,14 @@ def _signals(axes, episode: Episode) -> None:
             begin = (phase.start_ns - episode.taxels.sample_ns[0]) / 1e9
             axes.axvline(begin, color="0.7", linewidth=0.6)
             axes.text(begin, 1.0, phase.name, transform=axes.get_xaxis_transform(), fontsize=7, rotation=30)
-    axes.set(xlabel="time [s]", ylabel="change [counts]")
+    axes.set(xlabel="time [s]", ylabel=f"change [{unit}]")
     axes.text(0.98, 0.02, episode.path.name, transform=axes.transAxes, fontsize=7, ha="right")
 
 
-def _responses(axes, report: Report) -> None:
+def _responses(axes, report: Report, unit: str) -> None:
     table = np.array([_numbers(entry.document["taxels"]["response"]) for entry in report.episodes])
     image = axes.imshow(table, aspect="auto", interpolation="nearest", cmap="viridis")
-    axes.figure.colorbar(image, ax=axes, label="rest to hold [counts]")
+    axes.figure.colorbar(image, ax=axes, label=f"rest to hold [{unit}]")
     axes.set(xlabel="channel", ylabel="recording", title="answer of each channel")
 
 
@@ -67,18 +69,23 @@ def _sites(axes, episodes: list[Episode]) -> None:
     )  # fmt: skip
 
 
-def _noise(axes, report: Report) -> None:
+def _noise(axes, report: Report, unit: str) -> None:
     table = np.array([_numbers(entry.document["taxels"]["idle_noise"]) for entry in report.episodes])
     known = ~np.isnan(table).all(axis=0)
     channels = np.arange(table.shape[1])[known]
     bad = {k for entry in report.episodes for key in ("stuck", "saturated") for k in entry.document["taxels"][key]}
     colors = ["tab:red" if k in bad else "tab:blue" for k in channels]
     axes.bar(channels, np.nanmedian(table[:, known], axis=0), color=colors)
-    axes.set(xlabel="channel (red: stuck or at a limit)", ylabel="[counts]", title="noise without contact")
+    axes.set(xlabel="channel (red: stuck or at a limit)", ylabel=f"[{unit}]", title="noise without contact")
 
 
 def _lag(axes, report: Report) -> None:
     lag = np.concatenate([entry.lag for entry in report.episodes])
+    if is_imported(report.episodes[0].recording.episode):  # a source has one time: when it says it read
+        every = [np.diff(entry.recording.episode.taxels.sample_ns) / 1e6 for entry in report.episodes]
+        axes.hist(np.concatenate(every), bins=60, color="tab:blue")
+        axes.set(yscale="log", xlabel="between two readings [ms]", ylabel="rows", title="times of the taxel stream")
+        return
     if len(lag):
         axes.hist(lag, bins=60, color="tab:blue")
         axes.set_yscale("log")

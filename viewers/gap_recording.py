@@ -55,6 +55,11 @@ class Shown(Protocol):
         """The channel that tells most."""
         ...
 
+    @property
+    def channel_name(self) -> str:
+        """What it is called."""
+        ...
+
 
 def write(episodes: Sequence[Shown], path: Path, title: str) -> None:
     """Write episodes, one view each of its telling channel and of its depth.
@@ -71,7 +76,7 @@ def write(episodes: Sequence[Shown], path: Path, title: str) -> None:
     views = []
     for k, own in enumerate(episodes):
         root = f"episode_{k}"
-        views.append(rrb.TimeSeriesView(origin=f"{root}/reading", name=f"{own.name}, channel {own.channel}"))
+        views.append(rrb.TimeSeriesView(origin=f"{root}/reading", name=f"{own.name}, {own.channel_name}"))
         views.append(rrb.TimeSeriesView(origin=f"{root}/depth", name=f"{own.name}, depth [mm]"))
     blueprint = rrb.Blueprint(rrb.Grid(*views, grid_columns=2), collapse_panels=True)
     with written_beside(path) as temporary:

@@ -89,9 +89,10 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
         if effect.get("confidence") is not None:
             lines.append(f"- probability that the name is right: {effect['confidence']:.0%}")
     gate, left = verdict["gate"], verdict["left"]
+    says = f"{GATE:g} or less says so"
+    share = f" **Left** {left['share']:.1%} of what could be explained." if verdict["effects"] else ""
     lines += [
-        "", f"**Gap** p = {gate['p']:.3g} ({'there is one' if gate['gap'] else 'none'}: {GATE:g} or less says so). "
-        f"**Left** {left['share']:.1%} of what could be explained.", "",
+        "", f"**Gap** p = {gate['p']:.3g} ({'there is one' if gate['gap'] else 'none'}: {says}).{share}", "",
     ]  # fmt: skip
     for heading, items in (
         ("Where it lives", verdict["located"]), ("Next", verdict["next"]), ("Of these recordings", verdict["remarks"]),

@@ -6,13 +6,12 @@ import numpy as np
 
 from tacdata.chain import Course
 from tacdata.discrepancy.clocks import shifted
+from tacdata.discrepancy.motion import HOLD, longest_hold, speeds
 
 FEWEST = 8
 """Fewer episodes carry no name."""
 RATES = 2.5
 """Rates of pressing must differ by such a factor for lags to be told from play and friction [1]."""
-TOUCHING = 0.02
-"""Depth, over the largest of all, from which on a speed is one of pressing and not of the way there [1]."""
 
 
 def amiss(course: Course) -> list[str]:
@@ -27,7 +26,7 @@ def amiss(course: Course) -> list[str]:
         told.append(
             "one rate only: delay, filter, backlash and relaxation look alike; record three rates over a decade"
         )
-    if longest_hold(course) < 1.0:
+    if longest_hold(course) < HOLD:
         told.append("no hold of a second or more: relaxation and baseline tracking show in holds; hold for 60 s")
     elif not _recovers(course):
         told.append("no rest after release: record the recovery, as long as the longest hold")
@@ -54,13 +53,17 @@ def amiss(course: Course) -> list[str]:
 
 
 def one_rate(course: Course) -> bool:
-    """Return whether all episodes are pressed at about the same rate; how they come to the skin does not count."""
-    deep = course.tip[:, 2] > TOUCHING * course.span
-    touching = deep & np.append(False, deep[:-1])  # a speed is the way from the row before
-    pressed = np.unique(course.episode[touching])
-    speeds = np.array([np.abs(course.speed[touching & (course.episode == e)]).max() for e in pressed])
-    low, high = np.quantile(speeds, [0.1, 0.9]) if len(speeds) else (0.0, 0.0)
-    return bool(high < RATES * low or high <= 0)
+    """Return whether all episodes press at about the same rate, and all let go at about the same.
+
+    How they come to the skin does not count.
+    """
+    return not any(_varies(told) for told in speeds(course))
+
+
+def _varies(rates: np.ndarray) -> bool:
+    known = rates[np.isfinite(rates)]
+    low, high = np.quantile(known, [0.1, 0.9]) if len(known) else (0.0, 0.0)
+    return bool(low > 0 and high >= RATES * low)
 
 
 STROKE, RATE, RADIUS, EVERY = (0.02, 60.0), 500.0, 200.0, (2e-5, 5.0)
@@ -91,24 +94,14 @@ def stuck(course: Course) -> list[str]:
     for channel in np.flatnonzero(still.any(axis=0) & ~still.all(axis=0)):
         count = int(still[:, channel].sum())
         if count > 0.1 * len(episodes) and still[:, channel].mean() > 2 * np.median(still.mean(axis=0)):
-            told.append(f"channel {channel}: the same reading throughout {count} of {len(episodes)} episodes: stuck at "
-                        "times; mend its contact, or leave it out")  # fmt: skip
+            called = course.channel_names[channel]
+            told.append(f"{called}: the same reading throughout {count} of {len(episodes)} episodes: stuck at times; "
+                        "mend its contact, or leave it out")  # fmt: skip
     for name, values in (("force", course.force), ("tag", None if course.tag is None else course.tag[:, 2])):
         if values is not None and np.isfinite(values[course.read]).mean() < 0.5:
             share = 100 * (1 - np.isfinite(values[course.read]).mean())
             told.append(f"{name}: missing at {share:.0f} % of the readings")
     return told
-
-
-def longest_hold(course: Course) -> float:
-    """Return the longest rest at depth [s]."""
-    deep = course.tip[:, 2] > course.tip[:, 2].min() + 0.3 * course.stroke
-    still = (np.abs(course.speed) < 1e-4) & ~course.first & deep
-    longest = current = 0.0
-    for step, rests in zip(course.step, still, strict=True):
-        current = current + float(step) if rests else 0.0
-        longest = max(longest, current)
-    return longest
 
 
 def _recovers(course: Course) -> bool:

@@ -30,14 +30,13 @@ def beside_model(course: Course, found: Judgement, sealed: np.ndarray, most: int
     scale = first.frame.noise
     every = max(int(np.ceil(measured.size / most)), 1)
     kept = slice(None, None, every)
-    names = (*course.channel_names, *["force"] * streams.force, *["tag x", "tag y", "tag depth"] * streams.tag)
     return Residuals(
         episode=reduced.episode[kept].astype(np.int32), time=reduced.time[kept],
         phase=phases(reduced)[kept].astype(np.int8), depth=reduced.tip[kept, 2].astype(np.float32),
         rate=reduced.speed[kept].astype(np.float32), measured=measured[kept].astype(np.float32),
         before=_level(measured, before, reduced.episode)[kept].astype(np.float32),
         after=_level(measured, after, reduced.episode)[kept].astype(np.float32),
-        noise=scale.scale / np.sqrt(max(1 - scale.memory**2, 0.02)), streams=names, phases=PHASES,
+        noise=scale.scale / np.sqrt(max(1 - scale.memory**2, 0.02)), streams=streams.names(course), phases=PHASES,
         names=course.names, sealed=tuple(int(k) for k in sealed), every=every,
     )  # fmt: skip
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from tacdata.chain import Course
-from tacdata.discrepancy.amiss import longest_hold, one_rate
+from tacdata.discrepancy.amiss import one_rate
+from tacdata.discrepancy.motion import HOLD, longest_hold
 
-HOLD = 1.0
-"""A hold must last so long for relaxation to be told from them [s]."""
 BY_RATE: tuple[str, ...] = (
     "latency", "low_pass_filter", "servo_lag", "backlash", "hysteresis", "quantization_hysteresis", "creep",
 )  # fmt: skip

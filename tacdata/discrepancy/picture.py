@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata.discrepancy.judgement import Judgement
 from tacdata.discrepancy.located import Slice, residual
+from tacdata.discrepancy.streams import Streams
 
 MOST_ROWS = 1200
 """Rows drawn of the worst episodes."""
@@ -28,15 +29,16 @@ def draw(found: Judgement, before: list[Slice], after: list[Slice], verdict: dic
     figure, axes = plt.subplots(2, 2, figsize=(12, 8), constrained_layout=True)
     said = textwrap.fill(f"{verdict['status']}: {verdict['why']}", WIDEST)
     figure.suptitle(said, fontsize=11)
-    _streams(axes[0, 0], found)
-    _slices(axes[0, 1], before, after)
+    added = bool(verdict["effects"])  # without an effect there is no after
+    _streams(axes[0, 0], found, added)
+    _slices(axes[0, 1], before, after, added)
     _rivals(axes[1, 0], found)
-    _episodes(axes[1, 1], found)
+    _episodes(axes[1, 1], found, added)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
 
-def _streams(axis: Any, found: Judgement) -> None:
+def _streams(axis: Any, found: Judgement, added: bool) -> None:
     course = found.problem.setting.course.reduced
     first, last = residual(found.problem), residual(found.final)
     power = np.square(first).mean(axis=1)
@@ -50,18 +52,22 @@ def _streams(axis: Any, found: Judgement) -> None:
         time = course.time[rows] - course.time[rows[0]] + at
         at = float(time[-1]) + 0.5
         axis.plot(time, first[rows, stream], color="tab:red", lw=0.8, label="before" if not number else None)
-        axis.plot(time, last[rows, stream], color="tab:blue", lw=0.8, label="after" if not number else None)
+        if added:
+            axis.plot(time, last[rows, stream], color="tab:blue", lw=0.8, label="after" if not number else None)
     axis.axhspan(-2, 2, color="0.9", zorder=0)
-    axis.set(title=f"stream {stream} in the three worst episodes", xlabel="time [s]", ylabel="residual / noise")
-    axis.legend()
+    called = Streams.of(course).names(course)[stream]
+    axis.set(title=f"{called} in the three worst episodes", xlabel="time [s]", ylabel="residual / noise")
+    if added:
+        axis.legend()
 
 
-def _slices(axis: Any, before: list[Slice], after: list[Slice]) -> None:
+def _slices(axis: Any, before: list[Slice], after: list[Slice], added: bool) -> None:
     shown = [(b, a) for b, a in zip(before, after, strict=True) if b.by != "stream"]
     names = [f"{b.by}: {b.name}" for b, _ in shown]
     where = np.arange(len(shown))
-    axis.barh(where - 0.2, [b.mean_square for b, _ in shown], 0.4, color="tab:red", label="before")
-    axis.barh(where + 0.2, [a.mean_square for _, a in shown], 0.4, color="tab:blue", label="after")
+    axis.barh(where - 0.2 * added, [b.mean_square for b, _ in shown], 0.4, color="tab:red", label="before")
+    if added:
+        axis.barh(where + 0.2, [a.mean_square for _, a in shown], 0.4, color="tab:blue", label="after")
     axis.axvline(1.0, color="k", lw=0.8)
     axis.set_yticks(where, names, fontsize=7)
     axis.invert_yaxis()
@@ -83,9 +89,10 @@ def _rivals(axis: Any, found: Judgement) -> None:
     axis.ticklabel_format(axis="x", style="sci", scilimits=(-1, 4))
 
 
-def _episodes(axis: Any, found: Judgement) -> None:
+def _episodes(axis: Any, found: Judgement, added: bool) -> None:
     floor = np.maximum(found.values, 1)
     axis.plot(2 * found.energy[0] / floor, "o", color="tab:red", ms=3, label="before")
-    axis.plot(2 * found.energy[1] / floor, "o", color="tab:blue", ms=3, label="after")
+    if added:
+        axis.plot(2 * found.energy[1] / floor, "o", color="tab:blue", ms=3, label="after")
     axis.axhline(1.0, color="k", lw=0.8)
     axis.set(yscale="log", xlabel="episode", ylabel="mean square over the noise floor", title="every episode")

@@ -9,19 +9,19 @@ import numpy as np
 
 from tacdata.chain import Course, Tool
 from tacdata.chain.rows import Rows, rows_of
+from tacdata.discrepancy.channels import in_source, readings, usable
 from tacdata.discrepancy.path_noise import resolved, without_noise
 from tacdata.discrepancy.second_view import Views, second_views
 from tacdata.discrepancy.strokes import strokes
 from tacdata.errors import FormatError, UsageError
-from tacdata.recording import Episode, read_episode, read_session
+from tacdata.recording import Episode, read_session
+from tacdata.recording.reader import read_recording
 from tacdata.recording.session import FILE
 
 SAME_PLACE = 0.15
 """Presses no farther apart count as one place [mm]."""
 FEW_ROWS = 8
 """A stroke with fewer readings is left out."""
-MISSING = 0.3
-"""A channel that lacks a larger share of its readings is left out [1]."""
 UNKNOWN = "unknown"
 """What an import calls an indenter that its source does not name."""
 HELD = 1.0
@@ -51,16 +51,15 @@ def course_of(paths: list[Path]) -> Course:
         UsageError: If there is none, or a path is neither.
         FormatError: If they do not have the same channels, or hold no readings.
     """
-    found: list[tuple[int, Episode]] = []
+    every = [(number, read_recording(file)) for number, path in enumerate(paths) for file in _files(path)]
+    every = [(number, r) for number, r in every if len(r.episode.taxels.sample_ns) > 1]
+    every.sort(key=lambda item: int(item[1].episode.taxels.sample_ns[0]))
+    found = [(number, r.episode) for number, r in every]
     notes: list[str] = []
-    for number, path in enumerate(paths):
-        found += [(number, read_episode(file)) for file in _files(path)]
-    found = [(number, e) for number, e in found if len(e.taxels.sample_ns) > 1]
     if not found:
         raise UsageError(
             f"no readings in {', '.join(map(str, paths))}", "recordings with taxel readings", "record some"
         )
-    found.sort(key=lambda item: int(item[1].taxels.sample_ns[0]))
     notes += _of_one_sensor([e for _, e in found])
     counts = {e.taxels.counts.shape[1] for _, e in found}
     if len(counts) > 1:
@@ -68,8 +67,9 @@ def course_of(paths: list[Path]) -> Course:
             f"recordings of {', '.join(map(str, sorted(counts)))} channels", "the same channels throughout",
             "judge sensors one at a time",
         )  # fmt: skip
-    kept, left_out = _channels([e.taxels.counts for _, e in found])
-    notes += left_out
+    recordings = [r for _, r in every]
+    kept, left_out = usable([readings(r) for r in recordings])
+    notes += in_source(recordings, min(counts)) + left_out
     names = sorted({m.name for _, e in found for m in e.measured})
     force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
     views: dict[int, Views] = {}
@@ -82,7 +82,8 @@ def course_of(paths: list[Path]) -> Course:
     if not parts:
         raise FormatError("no stretch with enough readings", f"{FEW_ROWS} or more readings a press", "record again")
     if len(parts) > len(found):
-        notes.append(f"{len(found)} recordings hold {len(parts)} strokes; each counts as an episode")
+        held = "one recording holds" if len(found) == 1 else f"{len(found)} recordings hold"
+        notes.append(f"{held} {len(parts)} strokes; each counts as an episode")
     if any(e.tags for _, e in found) and not views:
         notes.append("the tag was seen too seldom to tell of the guide: let it be in view during the presses")
     return _joined(parts, kept, found[0][1], (bool(force), bool(temperature), bool(views)), notes)
@@ -116,31 +117,6 @@ def _files(path: Path) -> list[Path]:
     if not path.is_file():
         raise UsageError(f"no file or folder {path}", "a recording (.mcap) or a session's folder", "check the path")
     return [path]
-
-
-def _channels(recorded: list[np.ndarray]) -> tuple[np.ndarray, list[str]]:
-    """Return which channels can be used, and in words why others cannot."""
-    notes, kept, counts = [], [], np.concatenate(recorded)
-    still = np.all([np.fmax.reduce(r) == np.fmin.reduce(r) for r in recorded if len(r)], axis=0)
-    for channel, values in enumerate(counts.T):
-        good = values[np.isfinite(values)]
-        if len(good) < (1 - MISSING) * len(values):
-            notes.append(f"channel {channel}: {100 * (1 - len(good) / len(values)):.0f} % missing, left out")
-        elif len(good) == 0 or np.ptp(good) == 0:
-            notes.append(f"channel {channel}: always {good[0] if len(good) else 'nothing'}, stuck or dead, left out")
-        elif still[channel]:
-            notes.append(f"channel {channel}: one reading throughout each recording, stuck or dead, left out")
-        else:
-            top = np.mean(good == good.max())
-            if top > 0.05 and len(np.unique(good)) > 20:
-                notes.append(f"channel {channel}: {100 * top:.0f} % of its readings are its largest: clipped")
-            kept.append(channel)
-    if not kept:
-        raise FormatError(
-            f"no channel with usable readings ({'; '.join(notes[:3])})", "at least one that changes",
-            "mend the board, or name other columns in the import's mapping, and record or import again",
-        )  # fmt: skip
-    return np.array(kept), notes
 
 
 def _named(names: list[str], *words: str) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tacdata import documents, provenance
-from tacdata.discrepancy import decide, residuals, verdict
+from tacdata.discrepancy import decide, residuals
 from tacdata.discrepancy.beside_model import beside_model
 from tacdata.discrepancy.judge import STEPS
 from tacdata.discrepancy.judged import judged
@@ -18,6 +18,7 @@ from tacdata.discrepancy.picture import draw
 from tacdata.discrepancy.recordings import course_of
 from tacdata.discrepancy.sealed import chosen
 from tacdata.discrepancy.spec import Spec
+from tacdata.discrepancy.text import in_text
 from tacdata.errors import UsageError
 
 VERDICT, TEXT, PICTURE, SPEC = "verdict.json", "verdict.txt", "verdict.png", "spec.json"
@@ -64,7 +65,7 @@ def run(
     answer = {**done.verdict, "slices": beside(done.before, done.after)}
     out.mkdir(parents=True)
     documents.write(out / VERDICT, answer, "verdict")
-    text = verdict.in_text(answer)
+    text = in_text(answer)
     documents.write_text(out / TEXT, text)
     draw(found, done.before, done.after, answer, out / PICTURE)
     told = beside_model(course, found, chosen(course))

@@ -34,6 +34,10 @@ class Streams:
         """Kind of each stream."""
         return ["signal"] * self.channels + ["force"] * self.force + ["tag"] * (3 * self.tag)
 
+    def names(self, course: Course) -> tuple[str, ...]:
+        """Return what each stream is called, channels by their numbers in the recordings."""
+        return (*course.channel_names, *["force"] * self.force, *["tag x", "tag y", "tag depth"] * self.tag)
+
     def measured(self, course: Course) -> np.ndarray:
         """Return what was measured at the rows that were read, shape (m, streams); NaN where missing."""
         parts = [course.readings]

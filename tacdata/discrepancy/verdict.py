@@ -1,4 +1,4 @@
-"""The verdict as a document, and in words."""
+"""The verdict as a document."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from tacdata.discrepancy.judgement import Judgement, Member
 from tacdata.discrepancy.limits import limits
 from tacdata.discrepancy.located import NOWHERE, Slice, in_words, outstanding
 from tacdata.discrepancy.sealed import Gap
+from tacdata.discrepancy.text import worsened
 from tacdata.discrepancy.wiring import miswired
 from tacdata.effects import load
 
@@ -57,7 +58,7 @@ def document(
     values = max(float(found.values.sum()), 1.0)
     return {
         "version": schemas.version("verdict"), "status": status,
-        "why": "; ".join([*wires, *odd]) or why(status, found, answer, course),
+        "why": "; ".join([*wires, *odd]) or why(status, found, answer, course, shown),
         "effects": effects,
         "gate": {"gap": found.gap, "p": float(tested.p.min(initial=1.0)), "p_generic": tested.p_generic,
                  "noise": [float(v) for v in found.problem.frame.noise.scale],
@@ -102,12 +103,19 @@ def _effect(member: Member, verdict: str, told: dict[str, float]) -> dict[str, A
     }  # fmt: skip
 
 
-def why(status: str, found: Judgement, answer: list[Member], course: Course) -> str:
-    """Return the verdict in a sentence."""
+def why(status: str, found: Judgement, answer: list[Member], course: Course, shown: Gap | None = None) -> str:
+    """Return the verdict in a sentence.
+
+    Args:
+        status: none, named, ambiguous or unknown.
+        found: What was found.
+        answer: The effects of the answer.
+        course: The recordings.
+        shown: The gap on episodes that were sealed before.
+    """
     names = " and ".join(m.placed.effect.title.lower() for m in answer)
-    sets = _sets(answer)
     if course.episodes < FEWEST:
-        return f"{course.episodes} episodes cannot carry a verdict" + (f"; they point to {sets}" if answer else "")
+        return f"{course.episodes} episodes cannot carry a verdict" + (f"; so far {_best(answer)}" if answer else "")
     if found.until != "decide":
         fitted = f"; {names} fits best, rivals were not tried" if answer else ""
         return f"stopped after {found.until}: {'a gap' if found.gap else 'no gap'}{fitted}"
@@ -118,16 +126,12 @@ def why(status: str, found: Judgement, answer: list[Member], course: Course) -> 
         return f"{names}: nothing else explains the episodes as well{more}"
     if status == "ambiguous":
         bounds = [m.placed.effect.called for m in answer if m.at_bound]
-        told = f"these recordings cannot tell {sets} apart" if any(m.rivals for m in answer) else f"{sets}"
+        told = _best(answer)
         weak = [m.placed.effect.called for m in answer if m.necessity < m.needed]
         told += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
         return told + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
     if answer:
-        closest = " with ".join(m.placed.effect.called for m in answer)
-        return (
-            f"something is missing; {closest} comes closest and leaves {100 * found.share_left:.0f} % of what could be "
-            "explained, so it is not the name, or not all of it"
-        )
+        return f"something is missing; {_closest(answer, found.share_left, shown)}"
     if len(odd := found.problem.frame.odd):
         names = [course.names[k] for k in odd]
         told = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
@@ -143,16 +147,49 @@ def why(status: str, found: Judgement, answer: list[Member], course: Course) -> 
     return "something is missing that no modelled effect explains"
 
 
-def _sets(answer: list[Member]) -> str:
-    """Return what each effect may be; effects that may be the same are told of once."""
+def _closest(answer: list[Member], share: float, shown: Gap | None) -> str:
+    """Return what comes closest without being the name: what it leaves, and how it fails on sealed episodes if so."""
+    names = list(dict.fromkeys(m.placed.effect.called for m in answer))
+    alone, told = len(names) == 1, _listed(names, "and")
+    told += " comes closest and leaves" if alone else " together come closest and leave"
+    told += f" {100 * share:.0f} % of what could be explained"
+    it, name = ("it", "it is not the name") if alone else ("them", "they are not the names")
+    if shown is not None and len(shown.before):
+        before, after = float(shown.before.mean()), float(shown.after.mean())
+        if worse := worsened(before, after):
+            return (
+                f"{told}, but sealed episodes fit {worse} with {it} (mean square {before:.3g} times the noise without, "
+                f"{after:.3g} with): {name}"
+            )
+    return f"{told}, so {name}, or not all of it"
+
+
+def _best(answer: list[Member]) -> str:
+    """Return what is found, and where that is open what fits best and what may stand in for it."""
+    clear = list(dict.fromkeys(m.placed.effect.called for m in answer if not m.rivals))
     groups: dict[frozenset[str], list[Member]] = {}
     for m in answer:
-        groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
-    told = []
-    for own in groups.values():
-        words = " or ".join((own[0].placed.effect.called, *own[0].rivals))
-        told.append(words if len(own) == 1 else f"{len(own)} effects, each of them {words}")
-    return "; ".join(told)
+        if m.rivals:
+            groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
+    told = "; ".join(_open(own) for own in groups.values())
+    if not told:
+        return _listed(clear, "and")
+    begins = f"{_listed(clear, 'and')}, and something else: " if clear else ""
+    return f"{begins}these recordings do not say which effect it is: {told}"
+
+
+def _open(own: list[Member]) -> str:
+    """Return effects of the answer with the same rivals, and those."""
+    names = list(dict.fromkeys(m.placed.effect.called for m in own))
+    others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in names]
+    words = f"{names[0]} fits best" if len(names) == 1 else f"{_listed(names, 'and')} together fit best"
+    if others:
+        return f"{words}, but {_listed(others, 'or')} may stand in for {'it' if len(names) == 1 else 'any of them'}"
+    return f"{words}, but one may stand in for another"
+
+
+def _listed(names: list[str], last: str) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}"
 
 
 def untested(answer: list[Member]) -> list[str]:
@@ -176,49 +213,8 @@ def data(course: Course) -> dict[str, Any]:
     """Return what was judged, in numbers."""
     return {
         "episodes": course.episodes, "rows": len(course.read), "channels": course.channels,
+        "channel_numbers": list(course.numbers or range(course.channels)),
         "places": len(np.unique(course.site)), "tools": [t.name for t in course.tools],
         "sessions": len(np.unique(course.session)), "force": course.force is not None, "tag": course.tag is not None,
         "temperature": course.temperature is not None, "seconds": float(course.time[-1]),
     }  # fmt: skip
-
-
-def in_text(verdict: dict[str, Any]) -> str:
-    """Return a verdict for reading."""
-    lines = [f"{verdict['status'].upper()}: {verdict['why']}", ""]
-    for e in verdict["effects"]:
-        sure = "" if e["confidence"] is None or e["status"] != "named" else f", {100 * e['confidence']:.0f} % sure"
-        lines.append(f"  {e['mechanism']} ({e['effect']}, {e['stage']}): {e['status']}{sure}")
-        for name, p in e["parameters"].items():
-            if isinstance(p["value"], list):
-                lines.append(
-                    f"    {name}: {min(p['value']):.4g} to {max(p['value']):.4g} {p['unit']} over the channels"
-                )
-            else:
-                spread = f" +- {p['error']:.2g}" if p["error"] is not None else ""
-                lines.append(f"    {name} = {p['value']:.4g}{spread} {p['unit']}")
-        if e["margins"]:
-            shown = ", ".join(f"{k} {v:.1f}" for k, v in sorted(e["margins"].items(), key=lambda kv: kv[1])[:6])
-            lines.append(f"    better, in standard errors over episodes, than: {shown}")
-    gate, left = verdict["gate"], verdict["left"]
-    lines += ["", f"gate: p = {gate['p']:.3f} over all effects, {gate['p_generic']:.3f} for patterns of no effect"]
-    lines.append(f"residual: {left['before']:.3f} before, {left['after']:.3f} after; 1 is the noise floor")
-    lines.append(f"left of what could be explained: {100 * left['share']:.1f} % ({left['t']:.1f} standard errors)")
-    sealed = verdict["sealed"]
-    if sealed["episodes"]:
-        lines.append(
-            f"{sealed['episodes']} sealed episodes: {sealed['before']:.3f} before, {sealed['after']:.3f} after, "
-            f"{sealed['ceiling']:.3f} at best; {100 * sealed['closed']:.0f} % of the gap closed "
-            f"(90 %: {100 * sealed['interval'][0]:.0f} to {100 * sealed['interval'][1]:.0f} %)"
-        )
-    lines += ["where it lives:", *(f"  {words}" for words in verdict["located"])]
-    if verdict["next"]:
-        lines += ["next:", *(f"  {words}" for words in verdict["next"])]
-    if verdict["remarks"]:
-        lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
-    lines.append("cannot be judged here: " + ", ".join(sorted(verdict["unjudgeable"])))
-    weak = [k for k, v in verdict["limits"].items() if v is None or v > 3]
-    if weak:
-        lines.append("would be seen only at more than three times their usual size: " + ", ".join(sorted(weak)))
-    if verdict["untested"]:
-        lines.append("known, not modelled: " + "; ".join(verdict["untested"][:12]))
-    return "\n".join(lines) + "\n"

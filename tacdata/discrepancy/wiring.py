@@ -42,13 +42,13 @@ def miswired(course: Course, response: Response) -> list[str]:
     likeness[:, ~moved] = 0.0
     own = np.diag(likeness)
     turned = [int(k) for k in np.flatnonzero(moved & (own < INVERTED))]
-    told = [f"channel {k} reads the other way round: turn its sign" for k in turned]
+    told = [f"{course.channel_names[k]} reads the other way round: turn its sign" for k in turned]
     likeness[turned] = np.abs(likeness[turned])
     _, best = linear_sum_assignment(-likeness)
     own = np.diag(likeness)
     off = [k for k in range(course.channels) if moved[k] and moved[best[k]] and own[k] < POOR
            and likeness[k, best[k]] > own[k] + BETTER]  # fmt: skip
-    return told + (_in_words(off, best, course.centers) if off else [])
+    return told + (_in_words(off, best, course) if off else [])
 
 
 def _likeness(read: np.ndarray, said: np.ndarray) -> np.ndarray:
@@ -58,7 +58,8 @@ def _likeness(read: np.ndarray, said: np.ndarray) -> np.ndarray:
     return (read / read_size).T @ (said / said_size)
 
 
-def _in_words(off: list[int], best: np.ndarray, centers: np.ndarray | None) -> list[str]:
+def _in_words(off: list[int], best: np.ndarray, course: Course) -> list[str]:
+    centers, number = course.centers, course.numbers or range(course.channels)
     if centers is not None:
         middle = centers.mean(axis=0)
         for words, sign in (
@@ -72,5 +73,8 @@ def _in_words(off: list[int], best: np.ndarray, centers: np.ndarray | None) -> l
                 return [f"the channels are {words}: correct the order of channels, or how the sensor lies"]
     pairs = sorted({(min(k, int(best[k])), max(k, int(best[k]))) for k in off if best[best[k]] == k})
     single = [k for k in off if best[best[k]] != k]
-    told = [f"channels {a} and {b} look swapped: check their wires" for a, b in pairs]
-    return told + [f"channel {k} reads what channel {int(best[k])} should: check the order of channels" for k in single]
+    told = [f"channels {number[a]} and {number[b]} look swapped: check their wires" for a, b in pairs]
+    return told + [
+        f"channel {number[k]} reads what channel {number[int(best[k])]} should: check the order of channels"
+        for k in single
+    ]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.recording.episode import PHASES, Episode
+from tacdata.recording.idle import idle_rows
 
 RUN = 12
 """Identical readings in a row that a live, noisy channel does not give [frames]."""
@@ -35,7 +36,9 @@ class Jump:
 
 
 def in_phase(episode: Episode, name: str) -> np.ndarray:
-    """Return the readings of a phase [counts], shape (n, taxels)."""
+    """Return the readings of a phase [counts], shape (n, taxels); those of rest also where no phase is marked."""
+    if name == "rest":
+        return episode.taxels.counts[idle_rows(episode)]
     return episode.taxels.counts[episode.phase_at(episode.taxels.sample_ns) == PHASES.index(name)]
 
 

@@ -13,7 +13,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.recording.check_clocks import clock_words
 from tacdata.recording.check_figures import Figures, figures
 from tacdata.recording.check_findings import UNUSABLE, WARNING, Finding, findings
-from tacdata.recording.check_imported import is_imported
+from tacdata.recording.check_imported import imported_summary, is_imported
 from tacdata.recording.check_session import session_findings
 from tacdata.recording.reader import read_recording
 from tacdata.recording.session import read_session
@@ -49,7 +49,9 @@ class Report:
     def text(self) -> str:
         """One page of words."""
         lines = [f"{self.source}: {len(self.episodes)} recordings"]
-        lines += _summary([entry.document for entry in self.episodes])
+        imported = bool(self.episodes) and is_imported(self.episodes[0].recording.episode)
+        told = imported_summary(self.episodes) if imported else _summary([entry.document for entry in self.episodes])
+        lines += told
         lines += _grouped(self.findings) or ["nothing to remark"]
         return "\n".join([*lines, "usable" if self.usable else "NOT usable as it is"])
 

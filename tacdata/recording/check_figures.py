@@ -21,6 +21,9 @@ from tacdata.recording.check_clocks import clock_figures, round_trip
 from tacdata.recording.episode import Episode
 from tacdata.recording.reader import Recording
 
+COUNTS = "counts"
+"""Unit of readings of which no board says another."""
+
 
 @dataclass(frozen=True)
 class Figures:
@@ -61,6 +64,8 @@ def _taxels(recording: Recording, lag: np.ndarray) -> dict[str, Any]:
         "nominal_rate": nominal,
         "lost": int(np.maximum(steps - 1, 0).sum()),
         "longest_gap": _longest(stream.sample_ns),
+        "unit": str(recording.board.get("unit", COUNTS)),
+        "interval_spread": _spread(stream.sample_ns),
         "jitter": _rounded(lag.std()) if len(lag) else 0.0,
         "latency": _rounded(np.percentile(lag, 99) - lag.min()) if len(lag) else 0.0,
         "idle_noise": [None if np.isnan(value) else _rounded(value) for value in noise],
@@ -135,6 +140,11 @@ def _hold_error(recording: Recording) -> float | None:
 def _rate(time_ns: np.ndarray) -> float | None:
     spans = np.diff(time_ns)
     return _rounded(1e9 / np.median(spans)) if len(spans) and np.median(spans) > 0 else None
+
+
+def _spread(time_ns: np.ndarray) -> float:
+    """Return by how much the times between samples vary: half of what the middle 68 % of them span [ms]."""
+    return _rounded(np.ptp(np.percentile(np.diff(time_ns), [16, 84])) / 2e6) if len(time_ns) > 2 else 0.0
 
 
 def _longest(time_ns: np.ndarray) -> float:

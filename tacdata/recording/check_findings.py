@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.recording.camera_findings import camera_doubts
 from tacdata.recording.check_clocks import clock_doubts
-from tacdata.recording.check_figures import Figures
+from tacdata.recording.check_figures import COUNTS, Figures
 from tacdata.recording.check_imported import imported_findings, is_imported
 
 WARNING, UNUSABLE = "warning", "unusable"
@@ -131,7 +131,7 @@ def _channels(figures: Figures) -> list[Judgement]:
     counts = figures.recording.episode.taxels.counts
     if len(counts) > 1 and (counts == counts[:1]).all() and figures.recording.episode.press.depth >= DEAD_DEPTH:
         found.append((UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"))
-    found += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1])]
+    found += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1], values["unit"])]
     if values["stuck"]:
         found.append((UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"))
     if values["saturated"]:
@@ -174,12 +174,13 @@ def _cameras(figures: Figures) -> list[Judgement]:
     return [(WARNING, stream, text) for stream, text in doubts]
 
 
-def _jumps(found: list[dict], channels: int) -> list[str]:
+def _jumps(found: list[dict], channels: int, unit: str) -> list[str]:
     if len(found) > channels / 2:
         first = min(jump["at"] for jump in found)
         return [f"{len(found)} channels jump while nothing moves, from {first:.1f} s on"]
+    digits = "+.0f" if unit == COUNTS else "+.3g"
     return [
-        f"channel {jump['channel']} jumps by {jump['size']:+.0f} counts at {jump['at']:.1f} s while nothing moves"
+        f"channel {jump['channel']} jumps by {jump['size']:{digits}} {unit} at {jump['at']:.1f} s while nothing moves"
         for jump in found
     ]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tacdata.recording.check_figures import Figures
@@ -14,6 +16,22 @@ GAP_PERIODS = 5.0
 def is_imported(episode: Episode) -> bool:
     """Say whether `tacdata import` made the recording."""
     return "imported" in episode.rig
+
+
+def imported_summary(entries: Sequence[Figures]) -> list[str]:
+    """Return figures of imported recordings in words: of times as the source stamps them, in the source's unit."""
+    taxels = [entry.document["taxels"] for entry in entries]
+    noise = [v for t in taxels for v in t["idle_noise"] if v is not None]
+    rates = [t["rate"] for t in taxels if t["rate"]]
+    spread = float(np.median([t["interval_spread"] for t in taxels]))
+    rate = float(np.median(rates)) if rates else np.nan
+    told = f"{np.median(noise):.3g} {taxels[0]['unit']}" if noise else "not known"
+    reports = [entry.document["cnc"]["rate"] for entry in entries if entry.document["cnc"]["rate"]]
+    lines = [
+        f"  taxels    {rate:.2f} Hz, {sum(t['frames'] for t in taxels)} rows, the time between two varies by "
+        f"{spread:.2g} ms ({spread * rate / 10:.2g} %), idle noise {told}"
+    ]
+    return lines + ([f"  position  {np.median(reports):.1f} rows/s"] if reports else [])
 
 
 def imported_findings(figures: Figures) -> list[tuple[str, str, str]]:
@@ -40,7 +58,7 @@ def imported_findings(figures: Figures) -> list[tuple[str, str, str]]:
     if lost:
         found.append(("warning", "taxels", f"{lost} frames lost by the source's counter"))
     if not episode.phases:
-        found.append(("warning", "recording", "no single press in the path: no rest to measure noise and baseline"))
+        found.append(("warning", "recording", "the path is not of one whole press: its phases are not marked"))
     for text, span in (("begins before", episode.tip_ns[0] - episode.taxels.sample_ns[0]),
                        ("ends after", episode.taxels.sample_ns[-1] - episode.tip_ns[-1])):  # fmt: skip
         if span > 1_000_000_000:

@@ -28,6 +28,13 @@ class EpisodeCurves:
     """The same with the effects [the source's unit], shape (n, channels)."""
     noise: np.ndarray
     """Standard deviation of a reading's noise [the source's unit], shape (channels,)."""
+    channels: tuple[str, ...]
+    """Name of each channel, by its number in the recordings."""
+
+    @property
+    def channel_name(self) -> str:
+        """What that channel is called."""
+        return self.channels[self.channel]
 
     @property
     def channel(self) -> int:
@@ -59,7 +66,14 @@ def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, mos
         time = course.time[rows] - course.time[rows[0]]
         found.append(
             EpisodeCurves(
-                course.names[e], time, course.tip[rows, 2], measured, level(before_said), level(after_said), scale
+                course.names[e],
+                time,
+                course.tip[rows, 2],
+                measured,
+                level(before_said),
+                level(after_said),
+                scale,
+                course.channel_names,
             )
         )
     return found

@@ -57,7 +57,7 @@ def _curves(axis: Any, own: EpisodeCurves, legend: bool) -> None:
     axis.plot(own.time, own.measured[:, c], ".", ms=3, color=MEASURED, label="measured")
     axis.plot(own.time, own.before[:, c], color=BEFORE, lw=1.2, label="model before")
     axis.plot(own.time, own.after[:, c], color=AFTER, lw=1.2, label="model after")
-    axis.set(title=f"{own.name}, channel {c}", xlabel="time [s]", ylabel="reading")
+    axis.set(title=f"{own.name}, {own.channel_name}", xlabel="time [s]", ylabel="reading")
     if legend:
         axis.legend(loc="best")
 

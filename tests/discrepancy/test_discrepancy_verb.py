@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from tacdata import documents
-from tacdata.discrepancy.recordings import _channels, _of_one_sensor, _to_the_end
+from tacdata.discrepancy.recordings import _of_one_sensor, _to_the_end
 from tacdata.discrepancy.residuals import read
 from tacdata.discrepancy.run import run
 from tacdata.discrepancy.spec import read_spec
@@ -96,14 +96,6 @@ def test_a_recording_of_many_strokes_is_cut_between_them():
     edges = np.array([s[0] for s in spans[1:]]) / 1e9
     np.testing.assert_allclose(edges, [10, 20, 30], atol=0.11)
     assert all(a[1] == b[0] for a, b in pairwise(spans))
-
-
-def test_a_channel_that_is_dead_at_another_reading_each_day_is_left_out_and_named():
-    rng = np.random.default_rng(0)
-    days = [np.column_stack([rng.normal(size=50), np.full(50, 5.0 + day), rng.normal(size=50)]) for day in (0, 1)]
-    kept, notes = _channels(days)
-    assert kept.tolist() == [0, 2]
-    assert len(notes) == 1 and "channel 1" in notes[0] and "left out" in notes[0]
 
 
 def test_what_is_read_after_the_tip_came_to_rest_counts_where_it_is_off_the_skin():

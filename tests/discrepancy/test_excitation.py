@@ -1,11 +1,14 @@
-"""Which ways of pressing can tell mechanisms of rate apart."""
+"""Which ways of pressing can tell mechanisms of rate apart; what is told of them where the path itself is measured."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from pressing import course
 
-from tacdata.discrepancy.excitation import inseparable, one_rate
+from tacdata.discrepancy.amiss import amiss, one_rate
+from tacdata.discrepancy.excitation import inseparable
+from tacdata.discrepancy.motion import longest_hold, path_noise, speeds
 
 
 def test_two_rates_of_pressing_are_told_from_one():
@@ -28,3 +31,55 @@ def test_the_way_to_the_skin_does_not_count_as_pressing():
 def test_a_session_that_never_touches_has_one_rate():
     made = course()
     assert one_rate(replace(made, tip=made.tip - np.array([0, 0, 5.0])))
+
+
+def measured(made, seed=0, noise=5e-4, quantum=1e-3):
+    """Return the course with a path as a gauge reads it."""
+    tip = made.tip.copy()
+    tip[:, 2] = np.round((tip[:, 2] + noise * np.random.default_rng(seed).normal(size=len(tip))) / quantum) * quantum
+    return replace(made, tip=tip)
+
+
+def test_a_hold_is_told_from_a_path_with_noise():
+    held = course(hold=1.5, episodes=8)
+    assert path_noise(held) == 0, "a commanded path has none"
+    assert path_noise(measured(held)) == pytest.approx(6e-4, rel=0.4)
+    for made in (held, measured(held)):
+        assert longest_hold(made) == pytest.approx(1.5, abs=0.1)
+        assert not any("no hold" in words for words in amiss(made))
+    for made in (course(hold=0.3, episodes=8), measured(course(hold=0.3, episodes=8))):
+        assert longest_hold(made) < 0.4
+        assert any("no hold" in words for words in amiss(made))
+    slow = course(rates=(0.002,), hold=0.0, episodes=1)
+    assert longest_hold(slow) == 0 == longest_hold(measured(slow)), "who presses slowly does not stand"
+    assert "relaxation" not in inseparable(measured(course(rates=(1.0,), hold=1.5)), "backlash")
+    assert "relaxation" in inseparable(measured(course(rates=(1.0,), hold=0.1)), "backlash")
+
+
+def stepped(pressing, letting_go, hold=2.0):
+    """Return presses at their own rates, let go of at one or several [mm/s]; the depth read with noise."""
+    made, parts = course(episodes=len(pressing)), []
+    for k, (down, up) in enumerate(zip(pressing, letting_go, strict=True)):
+        at = np.cumsum([0, 1.0, 1.5 / down, hold, 1.5 / up, 1.0])
+        time = np.arange(0, at[-1], 0.02)
+        parts.append((time, np.full(len(time), k), np.interp(time, at, [-0.5, -0.5, 1.0, 1.0, -0.5, -0.5])))
+    rows = sum(len(time) for time, _, _ in parts)
+    tip = np.zeros((rows, 3))
+    tip[:, 2] = np.concatenate([depth for _, _, depth in parts])
+    last = np.cumsum([0, *(time[-1] + 5 for time, _, _ in parts[:-1])])
+    whole = replace(
+        made, time=np.concatenate([t + begin for (t, _, _), begin in zip(parts, last, strict=True)]), tip=tip,
+        episode=np.concatenate([e for _, e, _ in parts]), tool=np.zeros(rows, dtype=int),
+        readings=np.zeros((rows, 3)), averaged=np.ones(rows),
+    )  # fmt: skip
+    return measured(whole)
+
+
+def test_rates_of_pressing_and_of_letting_go_count_apart():
+    """Two rates of pressing and one, faster, of letting go are not one rate; nor is the other way round."""
+    slow_and_fast, one = [0.5, 4.0] * 4, [4.0] * 8
+    down, up = speeds(stepped(slow_and_fast, one))
+    assert down == pytest.approx(np.array(slow_and_fast), rel=0.05) and up == pytest.approx(np.array(one), rel=0.05)
+    assert not one_rate(stepped(slow_and_fast, one))
+    assert not one_rate(stepped(one, slow_and_fast))
+    assert one_rate(stepped(one, one)) and one_rate(stepped(one, [0.5] * 8))

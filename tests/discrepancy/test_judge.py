@@ -15,6 +15,7 @@ from tacdata.discrepancy.judge import judge, out
 from tacdata.discrepancy.judgement import Member
 from tacdata.discrepancy.located import residual, slices
 from tacdata.discrepancy.setting import Setting
+from tacdata.discrepancy.text import in_text
 from tacdata.effects import load
 
 FEW = ("latency", "low_pass_filter", "relaxation", "backlash", "proportional_hysteresis", "drift", "creep")
@@ -76,7 +77,7 @@ def test_a_verdict_fits_its_schema_and_says_what_cannot_be_judged():
     documents.check(document, "verdict", "verdict")
     assert "gain" in document["unjudgeable"]
     assert document["limits"]["latency"] is not None
-    assert "latency" in verdict.in_text(document)
+    assert "latency" in in_text(document)
 
 
 def test_two_presses_unlike_all_others_are_no_effect_and_not_nothing():

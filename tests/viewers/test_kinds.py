@@ -180,7 +180,14 @@ def test_the_curves_of_a_revision_are_read_back(tmp_path):
     time = np.linspace(0, 2, 30)
     values = np.outer(np.sin(time), [1.0, 2.0])
     own = SimpleNamespace(
-        name="episode-000003", time=time, depth=time, measured=values, before=2 * values, after=values, channel=1
+        name="episode-000003",
+        time=time,
+        depth=time,
+        measured=values,
+        before=2 * values,
+        after=values,
+        channel=1,
+        channel_name="channel 7",
     )
     write_gap([own], tmp_path / "gap.rrd", "gap")
     (curves,) = read_gap_curves(tmp_path / "gap.rrd")

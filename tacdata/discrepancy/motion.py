@@ -1,0 +1,132 @@
+"""How the tip moved: what its recorded path carries of noise, how fast it pressed and let go, how long it stood."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from tacdata.chain import Course
+
+HOLD = 0.95
+"""Shortest hold from which relaxation can be told [s]: one of a second, of which readings may miss both ends."""
+TOUCHING = 0.02
+"""Depth, over the largest of all, from which on a way is one of pressing and not of the way there [1]."""
+LEVELS = 40
+"""Levels of depth between which a speed is told, at most [1]."""
+CLEAR = 10.0
+"""Levels lie so many times the path's noise apart at least [1]."""
+FEWEST = 0.1
+"""A smaller share of rows off the straight line between their neighbours are corners of a path, not noise [1]."""
+STILL = 0.002
+"""Band within which a tip stands, of the stroke [1]..."""
+SWAY = 10.0
+"""...and of the path's noise: that much more than what a minute of readings takes up [1]."""
+LINGERS = 4.0
+"""A tip that stands stays in the band so many times as long as one that presses takes through it [1]."""
+DEEP = 0.3
+"""A hold is one deeper than this share of the stroke [1]."""
+MIDDLE = 1.4826
+"""Standard deviation over the median of what is off without its sign [1]."""
+
+
+def path_noise(course: Course) -> float:
+    """Return the standard deviation of what a row's depth is off the line through its neighbours, as noise [mm].
+
+    A commanded path is straight but for its corners: it has none. Rows laid between the path's own points are on the
+    line and do not count.
+    """
+    time, depth = course.time, course.tip[:, 2]
+    if len(depth) < 3:
+        return 0.0
+    gap = np.maximum(time[2:] - time[:-2], 1e-12)
+    share = (time[1:-1] - time[:-2]) / gap
+    off = depth[1:-1] - (1 - share) * depth[:-2] - share * depth[2:]
+    off = off / np.sqrt(1 + share**2 + (1 - share) ** 2)
+    inner = course.episode[2:] == course.episode[:-2]
+    told = np.abs(off[inner])
+    told = told[told > 1e-9]
+    return MIDDLE * float(np.median(told)) if len(told) > FEWEST * max(int(inner.sum()), 1) else 0.0
+
+
+def speeds(course: Course) -> tuple[np.ndarray, np.ndarray]:
+    """Return how fast each episode that touches is pressed and let go of.
+
+    A speed is the median over levels of depth of the way between two over the time that it takes: neither noise of the
+    path, nor a stop at a few depths, nor how the tip comes to the skin changes it.
+
+    Returns:
+        While pressing and while letting go [mm/s], each of shape (episodes that touch,); NaN where it is not seen.
+    """
+    least = max(course.span / LEVELS, CLEAR * path_noise(course))
+    loading, unloading = [], []
+    for e in range(course.episodes):
+        rows = np.flatnonzero(course.episode == e)
+        depth, time = course.tip[rows, 2], course.time[rows]
+        if not len(rows) or depth.max() <= TOUCHING * course.span:
+            continue
+        top = int(np.argmax(depth))
+        loading.append(_speed(time[: top + 1], depth[: top + 1], TOUCHING * course.span, least))
+        unloading.append(_speed(-time[top:][::-1], depth[top:][::-1], TOUCHING * course.span, least))
+    return np.array(loading), np.array(unloading)
+
+
+def _speed(time: np.ndarray, depth: np.ndarray, low: float, least: float) -> float:
+    """Return the speed at which a path first reaches levels of depth [mm/s]; NaN where it has none to reach."""
+    reached = np.maximum.accumulate(depth)
+    new = np.append(True, np.diff(reached) > 0)
+    low = max(low, float(depth[0]))
+    count = min(LEVELS, int((reached[-1] - low) / least))
+    if count < 1:
+        return np.nan
+    levels = np.linspace(low, float(reached[-1]), count + 1)
+    # A level is reached on the way from the row before, which may be long after the last new depth: not during a stop.
+    at = np.flatnonzero(new)
+    before = np.maximum(at - 1, 0)
+    known_time = np.column_stack([time[before], time[at]]).ravel()
+    known_depth = np.column_stack([reached[before], reached[at]]).ravel()
+    passed = np.interp(levels, known_depth, known_time)
+    took = np.diff(passed)
+    took = took[took > 0]
+    return float((levels[1] - levels[0]) / np.median(took)) if len(took) else np.nan
+
+
+def longest_hold(course: Course) -> float:
+    """Return the longest time that the tip stands at depth [s].
+
+    It stands while its depth stays within a band: a small share of the stroke, and room for the noise of the path.
+    """
+    depth = course.tip[:, 2]
+    band = STILL * course.stroke + SWAY * path_noise(course)
+    deep = depth > depth.min() + DEEP * course.stroke
+    longest = 0.0
+    for rows in np.split(np.arange(course.rows), np.flatnonzero(course.first | ~deep)):
+        rows = rows[deep[rows]]
+        if len(rows) > 1 and course.time[rows[-1]] - course.time[rows[0]] > longest:
+            longest = max(longest, _within(course.time[rows], depth[rows], band))
+    pressed = np.concatenate(speeds(course))
+    usual = float(np.nanmedian(pressed)) if np.isfinite(pressed).any() else 0.0
+    return longest if usual <= 0 or longest > LINGERS * band / usual else 0.0
+
+
+def _within(time: np.ndarray, depth: np.ndarray, band: float) -> float:
+    """Return the longest time over which a depth stays within a band [s]."""
+    high: deque[int] = deque()
+    low: deque[int] = deque()
+    begin, longest = 0, 0.0
+    value = depth.tolist()
+    for i, d in enumerate(value):
+        while high and value[high[-1]] <= d:
+            high.pop()
+        while low and value[low[-1]] >= d:
+            low.pop()
+        high.append(i)
+        low.append(i)
+        while value[high[0]] - value[low[0]] > band:
+            begin += 1
+            if high[0] < begin:
+                high.popleft()
+            if low[0] < begin:
+                low.popleft()
+        longest = max(longest, float(time[i] - time[begin]))
+    return longest

@@ -1,0 +1,35 @@
+"""Readings without contact, whether a phase marks them or the path alone tells of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.recording.episode import PHASES, Episode
+
+LOW = 0.02
+"""Share of the stroke above the surface, or above the highest point, up to which nothing is pressed [1]."""
+FEWEST = 5
+"""Readings that a stretch needs to tell of noise."""
+
+
+def idle_rows(episode: Episode) -> np.ndarray:
+    """Return which readings are taken off the skin, shape (n,), bool.
+
+    Those of the phase of rest; in a path without phases, which holds several presses, those before the first of them,
+    or the longest stretch between two.
+    """
+    time_ns = episode.taxels.sample_ns
+    if episode.phases or len(episode.tip_ns) < 2 or not len(time_ns):
+        return episode.phase_at(time_ns) == PHASES.index("rest")
+    depth = episode.tip_at(time_ns)[:, 2]
+    highest, deepest = float(episode.tip[:, 2].min()), float(episode.tip[:, 2].max())
+    surface = max(0.0, highest) if deepest > 0 else highest
+    off = (depth <= surface + LOW * (deepest - highest)) & (deepest > highest)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(int)))
+    begins, ends = edges[::2], edges[1::2]
+    chosen = np.zeros(len(time_ns), dtype=bool)
+    if len(begins):
+        first = begins[0] == 0 and ends[0] >= FEWEST
+        one = 0 if first else int(np.argmax(ends - begins))
+        chosen[begins[one] : ends[one]] = True
+    return chosen

@@ -1,0 +1,118 @@
+"""A verdict reads plainly: what it says agrees with its own numbers, and each number says what it is."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+from pressing import course
+
+from tacdata.discrepancy import verdict
+from tacdata.discrepancy.judgement import Judgement, Member
+from tacdata.discrepancy.sealed import Gap
+from tacdata.discrepancy.text import in_text
+from tacdata.effects import Placed, load
+
+
+def effect(name, alternatives=(), margins=None, status="named"):
+    """Return an entry of ``effects``."""
+    own = load(name)
+    return {
+        "mechanism": own.called, "effect": name, "stage": own.stage, "status": status, "confidence": None,
+        "parameters": {"a": {"value": 0.2, "unit": "1", "error": 0.01}}, "alternatives": list(alternatives),
+        "margins": margins or {},
+    }  # fmt: skip
+
+
+def document(status="named", effects=(), limits=None, sealed=None, share=0.02) -> dict[str, Any]:
+    """Return what the text reads of a verdict."""
+    return {
+        "status": status, "why": "so it is", "effects": list(effects), "gate": {"p": 0.001, "p_generic": 1.0},
+        "left": {"before": 3.316, "after": 1.612, "share": share, "t": 3.0}, "located": ["everywhere"], "next": [],
+        "remarks": [], "limits": limits or {}, "untested": [], "unjudgeable": {"frame_compliance": "x", "tilt": "y"},
+        "sealed": {"episodes": 4, "before": 18.489, "after": 20.374, "ceiling": 1.286, "closed": -0.11,
+                   "interval": [-0.58, 0.66]} | (sealed or {}),
+    }  # fmt: skip
+
+
+def line(text, beginning):
+    """Return the one line that begins so."""
+    [found] = [words for words in text.splitlines() if words.strip().startswith(beginning)]
+    return found
+
+
+def test_where_nothing_is_missing_no_share_of_it_is_left_and_each_number_says_what_it_is():
+    text = in_text(document("none", share=1.0, sealed={"before": 42.429, "after": 42.429, "ceiling": 12.478}))
+    assert "could be explained" not in text and "before" not in text and "closed" not in text
+    assert line(text, "residual") == "residual: 3.316; 1 is the noise floor"
+    assert line(text, "4 sealed") == "4 sealed episodes: 42.429; 12.478 after a regression on the path's history"
+    assert "do not compare" in text and "mean squares over the noise" in text
+    same = in_text(document("none", sealed={"before": 57.954, "after": 57.954, "ceiling": 57.954}))
+    assert line(same, "4 sealed") == "4 sealed episodes: 57.954"
+
+
+def test_an_effect_that_is_named_is_not_one_that_would_hardly_be_seen():
+    """Nor are other forms of it, or what may stand in for it; what is judged is not called unjudgeable either."""
+    limits = {"power_creep": None, "relaxation": 9.0, "bouc_wen": 9.0, "drift": 9.0, "tilt": 1.0}
+    told = in_text(document(effects=[effect("power_creep", ("hysteresis",))], limits=limits))
+    assert line(told, "would be seen") == "would be seen only at more than three times their usual size: drift"
+    assert "would be seen" not in in_text(document(effects=[effect("softening")], limits={"softening": None}))
+    assert line(in_text(document(effects=[effect("carriage_compliance")])), "cannot be judged") == (
+        "cannot be judged here: tilt"
+    )
+
+
+def test_what_is_worse_is_not_called_better():
+    margins = {"power_creep": -2.7, "relaxation": -2.2, "backlash": 3.9}
+    text = in_text(document("unknown", [effect("bouc_wen", margins=margins, status="suspected")]))
+    assert line(text, "better, in") == "    better, in standard errors over episodes, than: backlash 3.9"
+    assert line(text, "worse, in").endswith("than: power_creep 2.7, relaxation 2.2")
+
+
+def test_a_gap_that_becomes_wider_on_sealed_episodes_is_told_of():
+    worse = line(in_text(document("unknown", [effect("power_creep")])), "4 sealed")
+    assert worse == "4 sealed episodes: 18.489 before, 20.374 after: worse by 10 %, 1.286 at best"
+    closed = {"after": 2.0, "ceiling": 1.286, "closed": 0.96, "interval": [0.9, 1.0]}
+    better = line(in_text(document("named", [effect("power_creep")], sealed=closed)), "4 sealed")
+    assert better.endswith("1.286 at best; 96 % of the gap closed (90 %: 90 to 100 %)")
+
+
+def member(name, *rivals):
+    """Return an effect of an answer."""
+    return Member(Placed(load(name), {}), {}, (), rivals, {}, 9.0)
+
+
+def said(status, answer, before=None, after=None):
+    """Return the sentence of a verdict."""
+    found = SimpleNamespace(until="decide", share_left=0.1, left=SimpleNamespace(t=3.0))
+    shown = Gap(np.array([before]), np.array([after]), np.array([1.0]), ("press",)) if before else None
+    return verdict.why(status, cast(Judgement, found), answer, course(episodes=8), shown)
+
+
+def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
+    rates = ("relaxation", "backlash", "hysteresis", "latency", "creep")
+    answer = [member(n, *(r for r in rates if r != load(n).called)) for n in ("power_creep", "backlash", "bouc_wen")]
+    assert said("ambiguous", answer) == (
+        "these recordings do not say which effect it is: relaxation, backlash and hysteresis together fit best, but "
+        "latency or creep may stand in for any of them"
+    )
+    assert said("ambiguous", [member("low_pass_filter", "latency", "creep")]).endswith(
+        "low_pass_filter fits best, but latency or creep may stand in for it"
+    )
+    assert said("ambiguous", [member("drift"), member("backlash", "creep")]).startswith(
+        "drift, and something else: these recordings do not say which effect it is: backlash fits best, but creep may"
+    )
+    pair = [member("backlash", "hysteresis"), member("bouc_wen", "backlash")]
+    assert said("ambiguous", pair).endswith("and hysteresis together fit best, but one may stand in for another")
+
+
+def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
+    assert said("unknown", [member("power_creep")], 18.489, 20.374) == (
+        "something is missing; relaxation comes closest and leaves 10 % of what could be explained, but sealed "
+        "episodes fit worse by 10 % with it (mean square 18.5 times the noise without, 20.4 with): it is not the name"
+    )
+    assert "fit no better" in said("unknown", [member("power_creep")], 20.128, 20.130)
+    both = said("unknown", [member("latency"), member("power_creep")], 95.0, 6.0)
+    assert both == (
+        "something is missing; latency and relaxation together come closest and leave 10 % of what could be explained, "
+        "so they are not the names, or not all of it"
+    )

@@ -1,0 +1,58 @@
+"""What `tacdata check` says of recordings that were imported: in their own unit, by their own times."""
+
+import re
+
+import numpy as np
+from foreign import mapping, press_data, wide_csv
+
+from tacdata import documents
+from tacdata.importing.imported_session import import_session
+from tacdata.recording.check import check
+from viewers.check_picture import draw
+
+
+def several(presses, begin=2.0, seed=0, spread=0.05):
+    """Return times, depths, forces and channels [pF] of presses one after another, with stamps that vary."""
+    rng = np.random.default_rng(seed)
+    at, path = [0.0, begin] if begin else [0.0], [-0.5, -0.5] if begin else [1.0]
+    for _ in range(presses):
+        at += (at[-1] + np.cumsum([1.5, 1.5])).tolist()
+        path += [1.0, -0.5]
+    time = np.cumsum(0.02 * (1 + spread * rng.normal(size=int(at[-1] / 0.02))))
+    depth = np.interp(time, at, path)
+    signals = 20 + 3 * np.maximum(depth, 0)[:, None] * rng.uniform(0.3, 1, 5)
+    return time, depth, np.maximum(depth, 0), np.round(signals + rng.normal(0, 0.01, signals.shape), 4)
+
+
+def told(tmp_path, data):
+    wide_csv(tmp_path / "wide.csv", data)
+    return check(import_session(tmp_path, mapping(tmp_path), tmp_path / "session").folder)
+
+
+def test_times_that_vary_and_noise_are_told_of_in_the_sources_own_terms(tmp_path):
+    report = told(tmp_path, several(4))
+    [words] = re.findall(r"varies by .* ms \(([0-9.]+) %\)", report.text)
+    assert 4 < float(words) < 6
+    [noise] = re.findall(r"idle noise ([0-9.]+) pF", report.text)
+    assert 0.008 < float(noise) < 0.012
+    assert "counts" not in report.text and "jitter" not in report.text and "arrival" not in report.text
+    documents.check(report.document, "check", "check")
+    draw(report, tmp_path / "check.png")
+    assert (tmp_path / "check.png").stat().st_size > 10_000
+
+
+def test_a_rest_before_several_presses_is_an_idle_stretch(tmp_path):
+    report = told(tmp_path, several(4))
+    assert "no idle stretch" not in report.text and "no rest" not in report.text
+    idle = report.document["episodes"][0]["taxels"]["idle_reading"]
+    np.testing.assert_allclose(idle, 20, atol=0.01)
+
+
+def test_between_presses_is_one_where_they_begin_in_contact(tmp_path):
+    idle = told(tmp_path, several(4, begin=0.0)).document["episodes"][0]["taxels"]["idle_reading"]
+    np.testing.assert_allclose(idle, 20, atol=0.01)
+
+
+def test_one_press_is_judged_by_its_rest_as_before(tmp_path):
+    report = told(tmp_path, press_data())
+    assert "no idle stretch" not in report.text and "(0 %)" in report.text
