@@ -44,7 +44,8 @@ def members(found: Judgement) -> list[Member]:
     own = []
     for m in found.members:
         called = m.placed.effect.called
-        more = [*m.rivals, *inseparable(course, called), *_hidden(found, m)]
+        time = max((float(v) for name, v in m.placed.values.items() if name.startswith("tau")), default=0.0)
+        more = [*m.rivals, *inseparable(course, called, time), *_hidden(found, m)]
         own.append(replace(m, rivals=tuple(name for name in dict.fromkeys(more) if name != called)))
     return [*own, *calibrated(found)]
 

@@ -13,9 +13,15 @@ BY_RATE: tuple[str, ...] = (
 BY_HOLD = "relaxation"
 
 
-def inseparable(course: Course, mechanism: str) -> tuple[str, ...]:
-    """Return mechanisms that presses of one rate, or without holds, cannot tell from one, in words of the library."""
+def inseparable(course: Course, mechanism: str, time: float = 0.0) -> tuple[str, ...]:
+    """Return mechanisms that presses of one rate, or without holds, cannot tell from one, in words of the library.
+
+    Args:
+        course: The recordings.
+        mechanism: The one.
+        time: Its time constant [s], if it has one: a hold that is over before says little of it.
+    """
     group: list[str] = [*BY_RATE] if one_rate(course) else []
-    if group and longest_hold(course) < HOLD:
+    if group and longest_hold(course) < max(HOLD, time):
         group.append(BY_HOLD)
     return tuple(name for name in group if name != mechanism) if mechanism in group else ()

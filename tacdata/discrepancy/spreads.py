@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.optimize import brentq, minimize
+from scipy.optimize import minimize, root_scalar
 from scipy.stats import chi2
 
 FREEDOM = 4.0
@@ -58,4 +58,4 @@ def _consistent(kinds: int) -> float:
     def off(scale: float) -> float:
         return float(np.mean((FREEDOM + kinds) * at / (FREEDOM * scale + at))) - kinds
 
-    return float(brentq(off, 0.1, 20.0))
+    return float(root_scalar(off, bracket=(0.1, 20.0)).root)

@@ -13,7 +13,7 @@ class PowerCreepLetGo(PowerCreep):
     """Stress relaxation over many decades, of a skin that the tool can leave."""
 
     title = "Stress relaxation over many decades, of a skin that the tool can leave"
-    equation = "q = q_e - f mean of L_tau q_e over six times in steps of 3 where the force pushes, 0 where it would pull"
+    equation = "q = q_e - f mean of L_tau q_e over six times in steps of 3, 0 where the force would pull"
     source = "broad spectrum; Ferry, ch. 4; unilateral contact: Johnson, Contact Mechanics, ch. 6.5"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

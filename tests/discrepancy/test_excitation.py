@@ -54,6 +54,8 @@ def test_a_hold_is_told_from_a_path_with_noise():
     assert longest_hold(slow) == 0 == longest_hold(measured(slow)), "who presses slowly does not stand"
     assert "relaxation" not in inseparable(measured(course(rates=(1.0,), hold=1.5)), "backlash")
     assert "relaxation" in inseparable(measured(course(rates=(1.0,), hold=0.1)), "backlash")
+    held = measured(course(rates=(1.0,), hold=1.5))
+    assert inseparable(held, "relaxation", 0.5) == () and "hysteresis" in inseparable(held, "relaxation", 4.0)
 
 
 def stepped(pressing, letting_go, hold=2.0):
