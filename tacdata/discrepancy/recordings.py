@@ -163,7 +163,7 @@ def _strokes_of(
     made = []
     tip, _ = without_noise(episode.tip_ns, episode.tip)
     known = resolved(episode.tip_ns, tip[:, 2], time_ns)
-    spans = _to_the_end(strokes(episode.tip_ns, tip[:, 2]), episode.tip_ns, tip[:, 2], time_ns)
+    spans = _to_the_end(strokes(episode.tip_ns, tip[:, 2]), tip[:, 2], time_ns)
     for number, (first, last) in enumerate(spans):
         rows = known & (time_ns >= first) & (time_ns < last)
         if rows.sum() < FEW_ROWS:
@@ -177,9 +177,7 @@ def _strokes_of(
     return made
 
 
-def _to_the_end(
-    spans: list[tuple[int, int]], tip_ns: np.ndarray, depth: np.ndarray, time_ns: np.ndarray
-) -> list[tuple[int, int]]:
+def _to_the_end(spans: list[tuple[int, int]], depth: np.ndarray, time_ns: np.ndarray) -> list[tuple[int, int]]:
     """Return spans with what was read before the tip began to move and after it came to rest, off the skin."""
     away = depth <= max(0.0, float(depth.min()) + 0.05 * float(np.ptp(depth)))
     if away[0]:

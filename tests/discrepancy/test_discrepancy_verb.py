@@ -102,10 +102,9 @@ def test_what_is_read_after_the_tip_came_to_rest_counts_where_it_is_off_the_skin
     """A recovery is read long after the guide's last motion; where the tip rests in the skin, nobody knows how long."""
     time_ns = np.arange(0, 20_000, 100) * 1_000_000
     span = [(2_000_000_000, 5_000_000_001)]
-    away = SimpleNamespace(tip=np.array([[0, 0, -2.0], [0, 0, 1.0], [0, 0, -2.0]]))
-    inside = SimpleNamespace(tip=np.array([[0, 0, -2.0], [0, 0, 0.5], [0, 0, 1.0]]))
-    assert _to_the_end(span, cast(Episode, away), time_ns) == [(0, 19_900_000_001)]
-    assert _to_the_end(span, cast(Episode, inside), time_ns) == [(0, 5_000_000_001)]
+    away, inside = np.array([-2.0, 1.0, -2.0]), np.array([-2.0, 0.5, 1.0])
+    assert _to_the_end(span, away, time_ns) == [(0, 19_900_000_001)]
+    assert _to_the_end(span, inside, time_ns) == [(0, 5_000_000_001)]
 
 
 def test_recordings_of_several_sensors_are_told_of_or_refused():

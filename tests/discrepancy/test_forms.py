@@ -67,7 +67,9 @@ def test_a_mechanism_may_have_any_of_its_forms_and_shapes(pressed):
         for other in found:
             counts[name][other.effect.name] += 1
     # Beside the grid, half and twice its own time constant.
-    assert counts["relaxation"] == {"relaxation": 10, "power_creep": 3, "nonlinear_relaxation": 4}
+    assert counts["relaxation"] == {
+        "relaxation": 10, "relaxation_let_go": 8, "power_creep": 3, "power_creep_let_go": 3, "nonlinear_relaxation": 4,
+    }  # fmt: skip
     assert counts["proportional_hysteresis"] == {"proportional_hysteresis": 5, "hysteresis": 1, "bouc_wen": 3}
     assert counts["low_pass_filter"] == {"low_pass_filter": 4}
     wide = Placed(load("low_pass_filter"), {"tau": np.array(1.0)})
