@@ -19,8 +19,8 @@ from protocols import PROTOCOLS, STEP
 from skins import SKINS
 
 HERE = Path(__file__).parent
-NOISE, GAIN, WANDER, TOUCH = 0.003, 0.01, 0.002, 0.008
-"""Noise of a reading, an episode's own gain, steps of offsets [largest rise]; errors of depth [mm]."""
+NOISE, GAIN, WANDER, TOUCH, ENCODER = 0.003, 0.01, 0.002, 0.008, 0.0005
+"""Noise of a reading, an episode's own gain, steps of offsets [largest rise]; errors of contact, of a position [mm]."""
 
 
 def written(folder, skin_name, protocol, effect_name, size, seed):
@@ -49,7 +49,8 @@ def written(folder, skin_name, protocol, effect_name, size, seed):
         said = clean * (1 + rng.normal(0, GAIN)) + wander + noise
         said = np.round(said / skin.levels)
         force = 8.0 * loads(trial.site, tip, deepest)[rows].clip(0).sum(axis=1) + rng.normal(0, 0.01, len(rows))
-        depth = np.round(np.interp(at, np.arange(len(tip)), trial.depth), 3)
+        depth = np.interp(at, np.arange(len(tip)), trial.depth)
+        depth = np.round(depth + rng.normal(0, ENCODER, len(depth)), 3)
         parts = [trial.begin + at * STEP, *(np.full(len(rows), value) for value in place[trial.site]), depth]
         head = ["time_s", "x_mm", "y_mm", "depth_mm"]
         if gauge:
