@@ -22,6 +22,7 @@ class LostSteps(Effect):
     source = "standard form"
     experiment = "home again, and repeat the reference press"
     form_error = 0.02
+    odds = 0.1  # drives lose steps when they are overloaded: machines are built not to, and any moment will do
     parameters = (
         Parameter("dz", "mm", "lost", 0.05, -1.0, 1.0),
         Parameter(

@@ -35,7 +35,7 @@ class Springs(Response):
 
 @functools.cache
 def pressed():
-    """Six presses at two places, two sessions, two tools, with a tag that is a little off."""
+    """Six presses at two places, four sessions, two tools, with a tag that is a little off."""
     one = np.concatenate([np.linspace(-0.5, 1, 60), np.full(60, 1.0), np.linspace(1, -0.5, 60), np.full(40, -0.5)])
     episode = np.repeat(np.arange(6), len(one))
     site = np.array([0, 0, 1, 0, 1, 1])
@@ -46,7 +46,7 @@ def pressed():
     n = len(time)
     return Course(
         time=time, episode=episode, tip=tip, tool=(episode % 2).astype(int), readings=np.zeros((n, 9)),
-        averaged=np.ones(n), session=np.array([0, 0, 0, 1, 1, 1]), site=site,
+        averaged=np.ones(n), session=np.array([0, 0, 1, 2, 2, 3]), site=site,
         tools=(Tool("a", "sphere", 4.0), Tool("b", "sphere", 2.0)), names=tuple("abcdef"), centers=Springs.places,
         force=np.zeros(n), tag=tip + 0.02, temperature=20 + time / time[-1] * 5,
     )  # fmt: skip
