@@ -39,6 +39,8 @@ def forms(course: Course, response: Response, placed: Sequence[Placed], given: S
         columns += [one.effect.form_error * own * by for by in modulations(course, streams, own)]
         size = float(np.linalg.norm(own))
         for other in variants(one, course.channels):
+            if other.effect.name != one.effect.name and other.effect.unjudgeable(course, response):
+                continue
             change = streams.predicted(chain.again([*rest, other])) - bare
             large = float(np.linalg.norm(change))
             if large > NOTHING * size:

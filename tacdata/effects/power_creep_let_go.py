@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.chain import State
+from tacdata.chain import Course, Response, State
 from tacdata.chain.contact import let_go
 from tacdata.effects.power_creep import PowerCreep
 
@@ -19,3 +19,7 @@ class PowerCreepLetGo(PowerCreep):
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         return let_go(super().apply(state, values))
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        """Return why such recordings cannot tell of it; empty if they may."""
+        return "loads are not known: read by a transducer of any power" if response.fitted else ""

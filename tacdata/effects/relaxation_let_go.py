@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.chain import State
+from tacdata.chain import Course, Response, State
 from tacdata.chain.contact import let_go
 from tacdata.effects.relaxation import Relaxation
 
@@ -20,3 +20,8 @@ class RelaxationLetGo(Relaxation):
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         return let_go(super().apply(state, values))
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        """Return why such recordings cannot tell of it; empty if they may."""
+        few = super().unjudgeable(course, response)
+        return few or ("loads are not known: read by a transducer of any power" if response.fitted else "")

@@ -9,9 +9,13 @@ FINE = 200
 
 
 def course(
-    seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5, pulls=True
+    seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5, pulls=True,
+    power=1.0,
 ):  # fmt: skip
-    """Return presses of three channels at two places; sizes in s, s, share, mm; a tool that pulls sticks."""
+    """Return presses of three channels at two places; sizes in s, s, share, mm.
+
+    A tool that pulls sticks to the skin; readings grow by a power of load.
+    """
     rng = np.random.default_rng(seed)
     parts, clock, slow, late = [], 0.0, np.zeros(3), np.zeros(3)
     for k in range(episodes):
@@ -31,7 +35,7 @@ def course(
             slow += (load - slow) / (FINE * 2.0)
             now = load - relaxed * slow if pulls else np.maximum(load - relaxed * slow, 0.0)
             late = late + (now - late) / (FINE * lag) if lag > 0 else now
-            read[i] = 5000 + 800 * late
+            read[i] = 5000 + 800 * (late if power == 1.0 else np.maximum(late, 0.0) ** power)
         pick = np.arange(rng.integers(6), len(time), 6)
         before = np.maximum(pick - round(delay * FINE), 0)
         values = np.round(read[before] + noise * rng.normal(size=(len(pick), 3)))

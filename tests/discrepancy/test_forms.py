@@ -68,7 +68,8 @@ def test_a_mechanism_may_have_any_of_its_forms_and_shapes(pressed):
             counts[name][other.effect.name] += 1
     # Beside the grid, half and twice its own time constant.
     assert counts["relaxation"] == {
-        "relaxation": 10, "relaxation_let_go": 8, "power_creep": 3, "power_creep_let_go": 3, "nonlinear_relaxation": 4,
+        "relaxation": 10, "relaxation_let_go": 8, "relaxation_read": 12, "power_creep": 3, "power_creep_let_go": 3,
+        "power_creep_read": 9, "nonlinear_relaxation": 4,
     }  # fmt: skip
     assert counts["proportional_hysteresis"] == {"proportional_hysteresis": 5, "hysteresis": 1, "bouc_wen": 3}
     assert counts["low_pass_filter"] == {"low_pass_filter": 4}

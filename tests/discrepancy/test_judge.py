@@ -50,12 +50,15 @@ def test_relaxation_is_named_and_measured():
     assert answer.members[0].placed.values["f"] == pytest.approx(0.15, rel=0.2)
 
 
-def test_relaxation_of_a_skin_that_the_tool_leaves_is_named_and_measured():
-    """A free tool cannot pull: readings are idle at once where a skin that sticks would read less than that."""
-    answer = found(effects=(*FEW, "relaxation_let_go"), relaxed=0.15, hold=4.0, pulls=False)
+@pytest.mark.parametrize("power", [1.0, 0.67])
+def test_relaxation_of_a_skin_that_the_tool_leaves_is_named_and_measured(power):
+    """A free tool cannot pull, and readings need not be linear in load."""
+    answer = found(effects=(*FEW, "relaxation_read"), relaxed=0.15, hold=4.0, pulls=False, power=power)
     assert names(answer) == {"relaxation"} and decide.status(answer) == "named"
-    assert answer.members[0].placed.effect.name == "relaxation_let_go"
-    assert answer.members[0].placed.values["f"] == pytest.approx(0.15, rel=0.1)
+    placed = answer.members[0].placed
+    assert placed.effect.name == "relaxation_read"
+    assert placed.values["f"] == pytest.approx(0.15, rel=0.1)
+    assert placed.values["m"] == pytest.approx(power, abs=0.1)
 
 
 def test_one_rate_names_no_lag():
