@@ -24,7 +24,7 @@ def low_pass(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
     return filtered(_wide(values), decay, weight).reshape(values.shape)
 
 
-def play(values: np.ndarray, width: float) -> np.ndarray:
+def play(values: np.ndarray, width: float, anew: np.ndarray | None = None) -> np.ndarray:
     """Return the play operator: what follows an input through a dead band of +- ``width``, shape as the input.
 
     y_i = max(u_i - w, min(u_i + w, y_{i-1})); before the first row the input came from below.
@@ -32,10 +32,12 @@ def play(values: np.ndarray, width: float) -> np.ndarray:
     Args:
         values: Input, shape (n,) or (n, k).
         width: Half the dead band, in the input's unit.
+        anew: Rows at which it begins anew, come from below, shape (n,), bool; None for the first alone.
     """
     from tacdata.chain.memory_kernels import played
 
-    return played(_wide(values), width).reshape(values.shape)
+    forgets = np.zeros(len(values), dtype=bool) if anew is None else anew
+    return played(_wide(values), width, forgets).reshape(values.shape)
 
 
 def slipping(values: np.ndarray, width: float, first: np.ndarray) -> np.ndarray:

@@ -23,13 +23,19 @@ def _filter(
 
 
 @wp.kernel(module="unique", enable_backward=False)
-def _play(values: wp.array2d(dtype=wp.float64), width: wp.float64, result: wp.array2d(dtype=wp.float64)):
+def _play(
+    values: wp.array2d(dtype=wp.float64), width: wp.float64, anew: wp.array(dtype=wp.int8),
+    result: wp.array2d(dtype=wp.float64),
+):  # fmt: skip
     for j in range(values.shape[1]):
         result[0, j] = values[0, j] - width
     for i in range(1, values.shape[0]):
         for j in range(values.shape[1]):
             u = values[i, j]
-            result[i, j] = wp.max(u - width, wp.min(u + width, result[i - 1, j]))
+            if anew[i] > wp.int8(0):
+                result[i, j] = u - width
+            else:
+                result[i, j] = wp.max(u - width, wp.min(u + width, result[i - 1, j]))
 
 
 def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -46,11 +52,18 @@ def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray) -> np.nd
     return result
 
 
-def played(values: np.ndarray, width: float) -> np.ndarray:
-    """Return y_i = max(u_i - w, min(u_i + w, y_{i-1})) with y_0 = u_0 - w, shape (n, k), as u (float64)."""
+def played(values: np.ndarray, width: float, anew: np.ndarray) -> np.ndarray:
+    """Return y_i = max(u_i - w, min(u_i + w, y_{i-1})), u_i - w at first and anew, shape (n, k), as u (float64).
+
+    Args:
+        values: u, shape (n, k), float64.
+        width: w, in the input's unit.
+        anew: Rows that forget those before, shape (n,), bool.
+    """
     result = np.zeros(values.shape)
     if len(values):
-        wp.launch(_play, 1, [_shared(values), wp.float64(width), _shared(result)], device="cpu")
+        forgets = wp.array(np.ascontiguousarray(anew, dtype=np.int8), dtype=wp.int8, device="cpu", copy=False)
+        wp.launch(_play, 1, [_shared(values), wp.float64(width), forgets, _shared(result)], device="cpu")
     return result
 
 

@@ -45,7 +45,7 @@ def members(found: Judgement) -> list[Member]:
     for m in found.members:
         called = m.placed.effect.called
         time = max((float(v) for name, v in m.placed.values.items() if name.startswith("tau")), default=0.0)
-        more = [*m.rivals, *inseparable(course, called, time), *_hidden(found, m)]
+        more = [*m.rivals, *inseparable(course, called, time, m.placed.effect.name), *_hidden(found, m)]
         own.append(replace(m, rivals=tuple(name for name in dict.fromkeys(more) if name != called)))
     return [*own, *calibrated(found)]
 

@@ -16,8 +16,10 @@ INTERVALS = 50
 many they are; too few cannot follow how a skin is first touched, and half of that looks like a skin that sticks. (What
 predicts left-out episodes best is no guide: that bias lies far below one reading's noise, and far above what a test of
 all of them sees.)"""
-BENT = 0.5
+BENT = 0.65
 """Share of the intervals that go where the response bends, as a skin's does when it is first touched [1]."""
+LITTLE = 0.02
+"""Added to what is read where a bend counts over it, of the largest reading [1]."""
 ROWS_EACH = 12
 """Rows of a place that a spline must have at least."""
 SMOOTH = 1e-5
@@ -173,10 +175,13 @@ class FittedResponse(Response):
         basis, low, high = self._bases[k], float(self._bases[k].t[0]), float(self._bases[k].t[-1])
         at = np.linspace(low, high, 8 * count + 1)
         size = np.maximum(np.abs(self._weights[k]).max(axis=0), 1e-12)
-        bend = BSpline(basis.t, self._weights[k] / size, 3).derivative(2)(at)
-        monitor = np.sqrt(np.sqrt(np.mean(np.square(bend), axis=1)))
+        spline = BSpline(basis.t, self._weights[k] / size, 3)
+        bend, rise = spline.derivative(2)(at), np.abs(spline(at) - spline(at[0]))
+        # Where much is read presses differ by their gains, which looks like bends: half of what bends counts over it.
+        each = [np.sqrt(np.sqrt(np.mean(np.square(b), axis=1))) for b in (bend, bend / (LITTLE + rise))]
+        monitor = sum(m / max(float(m.mean()), 1e-12) for m in each) / len(each)
         inner = len(basis.t) - 7
-        share = BENT * monitor / max(float(monitor.mean()), 1e-12) + 1 - BENT
+        share = BENT * monitor + 1 - BENT
         whole = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
         knots = np.interp(np.linspace(0, whole[-1], inner), whole, at)
         kept = [low]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,6 +20,7 @@ from tacdata.discrepancy.nuisances import jitter, nuisance_columns
 from tacdata.discrepancy.setting import Setting
 from tacdata.discrepancy.spline_response import taken_up
 from tacdata.discrepancy.streams import Streams
+from tacdata.effects import Placed
 
 MODEL = 0.003
 """What any response is off at least, in each stream of an episode, as a standard deviation of its rise [1]."""
@@ -58,12 +60,16 @@ class Frame:
     """Episodes that err by far more than the others, shape (k,), int64."""
     draws: np.ndarray
     """White noise, drawn [noise scales], shape (m, streams, draws)."""
+    sizes: np.ndarray | None = None
+    """Of errors of pose, over their priors [1], shape (kinds,); None where all models share ``errors``."""
+    spread: float = 0.0
+    """Of the gain of a stream of an episode, as a standard deviation [1]."""
 
     @classmethod
     def of(
         cls, reduced: Course, context: np.ndarray, features: np.ndarray | None, errors: np.ndarray, ridge: np.ndarray,
         beside: np.ndarray, noise: Noise, folds: np.ndarray, known: Cleaner | None = None,
-        odd: np.ndarray | None = None,
+        odd: np.ndarray | None = None, sizes: np.ndarray | None = None, spread: float = 0.0,
     ) -> Frame:  # fmt: skip
         """Return a frame of the rows read, with what follows from its parts."""
         white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), DRAWS))
@@ -72,15 +78,30 @@ class Frame:
             context, features, errors, ridge, beside, nuisances, evidence.summed(nuisances, reduced).gram, noise, folds,
             known or Cleaner(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
-            white,
+            white, sizes, spread,
         )  # fmt: skip
 
-    def cleaner(self, course: Course, features: np.ndarray | None) -> Cleaner:
-        """Return what takes nuisances out of columns beside a response that may take up given features."""
-        before = self.known.features
+    def cleaner(self, setting: Setting, placed: Sequence[Placed]) -> Cleaner:
+        """Return what takes nuisances out of columns beside a model's response.
+
+        What the response takes up, and an episode's own errors of pose and gain, go through the model's effects: those
+        of another one would hold its effect, of which any share might then be every episode's error.
+
+        Args:
+            setting: With the model's response.
+            placed: Its effects, given ones first.
+        """
+        course, before = setting.course, self.known.features
+        features = taken_up(course, setting.response, placed)
         if features is before or (features is not None and before is not None and np.array_equal(features, before)):
             return self.known
-        return Cleaner(course.reduced, self.noise, self.context, features, self.errors)
+        errors, noise = self.errors, self.noise
+        if self.sizes is not None and noise.swing is not None:
+            errors = jitter(setting, placed) * self.sizes
+            streams = Streams.of(course)
+            rise = streams.rise(predict(course, setting.response, list(placed)), setting.response)
+            noise = replace(noise, swing=(rise * self.spread).astype(np.float32))
+        return Cleaner(course.reduced, noise, self.context, features, errors)
 
     def shaken(self, cleaner: Cleaner) -> np.ndarray:
         """Return what a cleaner leaves of the draws [noise scales], shape (m, streams, draws), float32."""
@@ -107,7 +128,7 @@ def frame(setting: Setting) -> Frame:
     told = EpisodeErrors(residual, every, reduced, context, features, rise)
     known = told.noise(errors)
     prior, own = errors, Sizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
-    before = np.zeros(errors.shape[2] + 1)
+    before, spread = np.zeros(errors.shape[2] + 1), MODEL
     for _ in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is told beside the other.
         known = replace(known, swing=None)
@@ -122,4 +143,7 @@ def frame(setting: Setting) -> Frame:
     cleaner = Cleaner(reduced, known, context, features, errors)
     beside = cleaner.cleaned(every[:, :, : extra.shape[2] + rich.shape[2]])
     folds = fold_of(course.episodes)
-    return Frame.of(reduced, context, features, errors, ridge, beside, known, folds, cleaner, own.odd)
+    sizes = own.sizes if response.fitted else None
+    return Frame.of(
+        reduced, context, features, errors, ridge, beside, known, folds, cleaner, own.odd, sizes, max(spread, MODEL)
+    )

@@ -30,7 +30,6 @@ from tacdata.discrepancy.frame import Frame
 from tacdata.discrepancy.refine import Refined
 from tacdata.discrepancy.search import follows_clock
 from tacdata.discrepancy.setting import Setting
-from tacdata.discrepancy.spline_response import taken_up
 
 TINY = 1e-6
 """Models that differ by less, over all episodes, are the same [noise scales squared]."""
@@ -52,8 +51,8 @@ class Off:
         own = [p for k, p in enumerate(model.placed) if at is None or k == at]
         others = [p for p in model.placed if p not in own]
         columns = forms(setting.course, model.response, own, [*setting.given, *others])
-        features = taken_up(setting.course, model.response, [*setting.given, *model.placed])
-        return cls(frame.cleaner(setting.course, features).cleaned(columns), setting.course.reduced, frame)
+        cleaner = frame.cleaner(replace(setting, response=model.response), [*setting.given, *model.placed])
+        return cls(cleaner.cleaned(columns), setting.course.reduced, frame)
 
     def beside(self, left: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, float]:
         """Hold two whitened residuals, shape (m, streams), beside these columns.

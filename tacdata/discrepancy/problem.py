@@ -13,7 +13,6 @@ from tacdata.discrepancy.evidence import Evidence
 from tacdata.discrepancy.forms import forms
 from tacdata.discrepancy.frame import Frame
 from tacdata.discrepancy.setting import Setting
-from tacdata.discrepancy.spline_response import taken_up
 from tacdata.discrepancy.streams import Streams
 from tacdata.discrepancy.tangent import Tangent, tangents
 from tacdata.effects import Placed
@@ -90,8 +89,7 @@ def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Pr
     last = slack + off.shape[2]
     first = last + (numerics is not None)
     values = np.concatenate([board.values, moving.values, off, *([] if numerics is None else [numerics])], axis=2)
-    features = taken_up(course, response, [*setting.given, *placed])
-    found = frame.cleaner(course, features).collected(values, frame.beside)
+    found = frame.cleaner(setting, [*setting.given, *placed]).collected(values, frame.beside)
     second = first + len(frame.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
     board = replace(board, values=board.values[:, :, :1])

@@ -11,20 +11,23 @@ from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.fitted_response import FittedResponse
 from tacdata.effects import Placed
 
+SMALL = 0.01
+"""How much of a spline is added, over the largest load [1]: effects need not be linear in load."""
+
 
 class SplineResponse(Response):
-    """A response whose channels are the splines of a fitted one, each with weight 1."""
+    """A response whose channels are all alike but for a little of one spline each."""
 
     fitted = True
 
-    def __init__(self, response: FittedResponse, weight: float = 1.0) -> None:
-        """Keep the response; ``weight`` 0 for what effects add by themselves."""
+    def __init__(self, response: FittedResponse, weight: float) -> None:
+        """Keep the response and the weight of each spline [the source's unit]."""
         self._response, self._weight = response, weight
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
-        """Return the splines less what each says in the air, shape (n, splines)."""
+        """Return the size of the loads, with a little of the splines less what each says in the air (n, splines)."""
         there = self._response.basis(np.broadcast_to(pose, (len(self._response.context), 3)))
-        return self._weight * (there - self._response.air)
+        return self.force(pose, tool)[:, None] + self._weight * (there - self._response.air)
 
     def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return the force of the response as it is, shape (n,)."""
@@ -51,6 +54,7 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
     if not isinstance(response, FittedResponse) or not acting:
         return response.features(course.reduced)
     plain = replace(course, readings=np.zeros((course.rows, response.width)), centers=None, force=None).forgetting()
-    moved = predict(plain, SplineResponse(response), acting).signal
+    little = SMALL * max(float(np.abs(response.force(course.tip, course.tool)).max()), 1e-12)
+    moved = predict(plain, SplineResponse(response, little), acting).signal
     alone = predict(plain, SplineResponse(response, 0.0), acting).signal
-    return (moved - alone + response.air)[course.read]
+    return ((moved - alone) / little + response.air)[course.read]

@@ -19,7 +19,7 @@ class BoucWen(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
-    equation = "q = q_e (1 - a (1 - z) / 2), dz/dd = (1 - z sgn d') / w, z = -1 before a press"
+    equation = "q = q_e (1 - a (1 - z) / 2), dz/dd = (1 - z sgn d') / w, z = -1 at every touch"
     source = "Bouc-Wen of exponent 1: Wen, J. Eng. Mech. Div. 102 (1976) 249; Dahl, The Aerospace Corp. TOR-158 (1968)"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
     parameters = (
@@ -32,6 +32,6 @@ class BoucWen(Effect):
         """Return the state after it."""
         course = state.course
         width = max(float(values["w"]) * course.span, 1e-9)
-        z = slipping(np.maximum(state.depth, 0.0), width, course.first)
+        z = slipping(np.maximum(state.depth, 0.0), width, course.first | (state.depth <= 0))
         ease = 1 - 0.5 * values["a"] * (1 - z)
         return replace(state, load=state.load * ease[:, None], force=state.force * ease)

@@ -19,7 +19,10 @@ class Hysteresis(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
-    equation = "q = q_e - a q_e / F_e (F_e - mean of stop_r F_e over r of 0.05, 0.15, 0.4 of the largest force)"
+    equation = (
+        "q = q_e - a q_e / F_e (F_e - mean of stop_r F_e over r of 0.05, 0.15, 0.4 of the largest force), anew at "
+        "every touch: what nothing presses holds no friction"
+    )
     source = "Prandtl-Ishlinskii; Brokate & Sprekels, ch. 2"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
     parameters = (Parameter("a", "1", "share carried by friction", 0.1, -1.0, 3.0),)
@@ -28,7 +31,8 @@ class Hysteresis(Effect):
         """Return the state after it."""
         force = np.maximum(state.force, 0.0)
         largest = max(float(force.max()), 1e-12)
-        lost = np.mean([play(force, r * largest) + r * largest for r in (0.05, 0.15, 0.4)], axis=0)
+        free = state.depth <= 0
+        lost = np.mean([play(force, r * largest, free) + r * largest for r in (0.05, 0.15, 0.4)], axis=0)
         lag = lost - force
         share = np.minimum(lag / np.maximum(force, 0.02 * largest), 3.0)
         ease = np.maximum(1 - values["a"] * share, 0.0)

@@ -32,6 +32,6 @@ class ProportionalHysteresis(Effect):
         """Return the state after it."""
         force = np.maximum(state.force, 0.0)
         width = max(float(values["w"]) * float(force.max()), 1e-12)
-        turned = np.clip((play(force, width) + width - force) / (2 * width), 0.0, 1.0)
+        turned = np.clip((play(force, width, state.depth <= 0) + width - force) / (2 * width), 0.0, 1.0)
         ease = 1 - values["a"] * turned
         return replace(state, load=state.load * ease[:, None], force=state.force * ease)

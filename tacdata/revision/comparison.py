@@ -99,4 +99,5 @@ def _frame_of(whole: Frame, course: Course, rows: np.ndarray, episodes: np.ndarr
     return Frame.of(
         course.reduced, whole.context[rows], None if whole.features is None else whole.features[rows],
         whole.errors[rows], whole.ridge, whole.beside[rows], whole.noise.of(rows, episodes), whole.folds,
+        sizes=whole.sizes, spread=whole.spread,
     )  # fmt: skip

@@ -39,6 +39,13 @@ def test_play_is_its_definition():
     np.testing.assert_array_equal(play(values, width), expected)
 
 
+def test_play_begins_anew_where_it_forgets():
+    values = np.cumsum(np.random.default_rng(2).normal(size=200))
+    anew = np.arange(200) % 40 == 25
+    expected = np.concatenate([play(part, 0.7) for part in np.split(values, np.flatnonzero(anew))])
+    np.testing.assert_array_equal(play(values, 0.7, anew), expected)
+
+
 def test_play_of_many_columns_is_that_of_each():
     values = np.cumsum(np.random.default_rng(0).normal(size=(200, 5)), axis=0)
     np.testing.assert_array_equal(play(values, 0.7), np.stack([play(c, 0.7) for c in values.T], axis=-1))

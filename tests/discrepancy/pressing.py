@@ -10,12 +10,14 @@ FINE = 200
 
 def course(
     seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5, pulls=True,
-    power=1.0,
+    power=1.0, friction=0.0,
 ):  # fmt: skip
     """Return presses of three channels at two places; sizes in s, s, share, mm.
 
-    A tool that pulls sticks to the skin; readings grow by a power of load.
+    A tool that pulls sticks to the skin; readings grow by a power of load. Friction is a share of load, carried by
+    elements that slip beyond loads of their own and come to rest when the tool is off.
     """
+    slips = np.array([0.03, 0.08, 0.2])
     rng = np.random.default_rng(seed)
     parts, clock, slow, late = [], 0.0, np.zeros(3), np.zeros(3)
     for k in range(episodes):
@@ -29,9 +31,12 @@ def course(
         read = np.empty((len(time), 3))
         slow, late = slow * np.exp(-1 / 2.0), late * 0
         jitter = 0.002 * rng.normal()
+        held, pressed = np.zeros(3), 0.0
         for i, z in enumerate(tip):
             follower = min(max(follower, z - 0.0), z + play)
-            load = weights * max(follower + jitter, 0.0) ** 1.5
+            pressed, before = max(follower + jitter, 0.0) ** 1.5, pressed
+            held = np.clip(held + pressed - before, -slips, slips) if pressed > 0 else np.zeros(3)
+            load = weights * max((1 - friction) * pressed + friction * held.mean(), 0.0)
             slow += (load - slow) / (FINE * 2.0)
             now = load - relaxed * slow if pulls else np.maximum(load - relaxed * slow, 0.0)
             late = late + (now - late) / (FINE * lag) if lag > 0 else now

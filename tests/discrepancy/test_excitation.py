@@ -85,3 +85,16 @@ def test_rates_of_pressing_and_of_letting_go_count_apart():
     assert not one_rate(stepped(slow_and_fast, one))
     assert not one_rate(stepped(one, slow_and_fast))
     assert one_rate(stepped(one, one)) and one_rate(stepped(one, [0.5] * 8))
+
+
+def test_presses_spaced_evenly_do_not_tell_what_they_do_from_what_time_does():
+    made = course()
+    first = np.flatnonzero(made.first)
+    one = replace(made, site=np.zeros(made.episodes, dtype=int))
+    begins = 50.0 * np.arange(made.episodes)
+    even = replace(one, time=one.time - one.time[first][one.episode] + begins[one.episode])
+    assert inseparable(even, "softening", form="wear_in") == ("gain_drift",)
+    assert inseparable(even, "softening", form="softening") == ()
+    assert inseparable(even, "gain_drift", form="settling_gain") == ("softening",)
+    rested = replace(even, time=even.time + 2000.0 * (even.episode >= made.episodes // 2))
+    assert inseparable(rested, "softening", form="wear_in") == ()

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from pressing import course
 
+from tacdata.chain import predict
+from tacdata.discrepancy.episode_errors import EpisodeErrors, Sizes
 from tacdata.discrepancy.fitted_response import FittedResponse
 from tacdata.discrepancy.frame import frame
 from tacdata.discrepancy.refine import refine
@@ -37,14 +39,37 @@ def test_the_same_depths_asked_again_are_answered_the_same():
 
 def test_slopes_are_told_through_the_noise():
     """What moves the tip shows by slopes: those of splines that follow the noise are mostly noise in the air."""
-    made = course(noise=4.0)
-    response, step = FittedResponse(made), np.array([0.0, 0.0, 0.005])
-    slope = (response.load(made.tip + step, made.tool) - response.load(made.tip - step, made.tool)) / 0.01
-    weights = np.array([[1.0, 0.5, 0.2], [0.2, 0.6, 1.0]])[made.row_site]
-    true = 800 * 1.5 * weights * np.sqrt(np.maximum(made.tip[:, 2:], 0.0))
-    air = made.tip[:, 2] < -0.05
-    assert np.sqrt(np.mean(np.square(slope - true)[~air])) < 0.1 * np.sqrt(np.mean(np.square(true)[~air]))
-    assert np.sqrt(np.mean(np.square(slope)[air])) < 0.02 * np.abs(true).max()
+    pressed, free = [], []
+    for seed in range(3):
+        made = course(noise=4.0, seed=seed)
+        response, step = FittedResponse(made), np.array([0.0, 0.0, 0.005])
+        slope = (response.load(made.tip + step, made.tool) - response.load(made.tip - step, made.tool)) / 0.01
+        weights = np.array([[1.0, 0.5, 0.2], [0.2, 0.6, 1.0]])[made.row_site]
+        true = 800 * 1.5 * weights * np.sqrt(np.maximum(made.tip[:, 2:], 0.0))
+        air = made.tip[:, 2] < -0.05
+        pressed.append(np.sqrt(np.mean(np.square(slope - true)[~air]) / np.mean(np.square(true)[~air])))
+        free.append(np.sqrt(np.mean(np.square(slope)[air])) / np.abs(true).max())
+    assert np.mean(pressed) < 0.12
+    assert np.mean(free) < 0.02
+
+
+def test_how_a_skin_is_first_touched_is_followed():
+    """Half of what splines miss there looks like a skin that sticks: knots lie close where little is read yet."""
+    missed = []
+    for seed in range(3):
+        made, rng = course(noise=0.2, seed=seed, power=0.75, episodes=36), np.random.default_rng(seed)
+        # Presses of any depth, with gains of 2 %: they bend what is fitted to all of them, where much is read.
+        deeper = rng.uniform(0.5, 2.0, made.episodes)[made.episode][:, None]
+        gains = (1 + 0.02 * rng.normal(size=made.episodes))[made.episode][:, None]
+        tip = made.tip.copy()
+        tip[:, 2:] = np.where(tip[:, 2:] > 0, deeper * tip[:, 2:], tip[:, 2:])
+        varied = replace(made, tip=tip, readings=5000 + gains * deeper**1.125 * (made.readings - 5000))
+        response = FittedResponse(varied)
+        left = varied.reduced.readings - response.signal(response.load(tip, made.tool))[made.read]
+        depth = tip[made.read, 2]
+        near = [left[(depth > low) & (depth < low + 0.02)].mean() for low in np.arange(-0.06, 0.06, 0.02)]
+        missed.append(np.sqrt(np.mean(np.square(near))))
+    assert np.mean(missed) < 0.33, "counts; 0.40 with knots laid by curvature alone"
 
 
 def placed(name, share=1.0):
@@ -93,3 +118,36 @@ def test_a_fitted_response_that_is_corrected_leaves_as_much(name, monkeypatch):
     told.append(refine(setting, model, same, steps=0).energy.sum())
     assert told[0] < 0.95 * bare
     assert told[0] == pytest.approx(told[1], abs=1e-3 * bare)
+
+
+@pytest.mark.parametrize("name", ["relaxation_read", "hysteresis_read"])
+def test_splines_go_through_an_effect_beside_the_load_that_there_is(name):
+    """Effects that are not linear in load: what a little of each spline adds is what the model says of it."""
+    made = course(noise=0.1, hold=3.0)
+    made = replace(made, time=made.time + 60.0 * made.episode)
+    one = placed(name)
+    response, effect = FittedResponse(made), [Placed(one.effect, one.values | {"m": np.array(1.6)})]
+    by, channels = np.linspace(1.0, 2.0, response.width), np.array([1.0, 0.5, 0.2])
+    other = response.copied()
+    other._weights = [w + 1e-3 * by[: len(w), None] * channels for w in response._weights]
+    other._answers = []
+    change = predict(made, other, effect).signal - predict(made, response, effect).signal
+    adds = (taken_up(made, response, effect) - response.air[made.read]) @ by
+    pressed = made.tip[made.read, 2] > 0.3
+    expected = (1e-3 * adds[:, None] * channels)[pressed]
+    wrong = np.sqrt(np.mean(np.square(change[made.read][pressed] - expected)))
+    assert wrong < 0.1 * np.sqrt(np.mean(np.square(expected)))
+
+
+def test_errors_of_an_episode_hold_no_effect_of_another_model(monkeypatch):
+    """Beside large errors of gain a model without relaxation must not take it for every episode's own error."""
+    made = course(relaxed=0.15, hold=4.0, pulls=False)
+    setting, effect = Setting(made, FittedResponse(made), []), load("relaxation_read")
+    monkeypatch.setattr(EpisodeErrors, "poses", lambda *_: Sizes(np.array([1.0, 10.0]), np.zeros(0, dtype=np.int64)))
+    first = frame(setting)
+    start = Placed(effect, {"f": np.array(0.1), "tau": np.array(2.0), "m": np.array(1.0)})
+    model = refine(setting, [start], first)
+    again = frame(replace(setting, response=model.response, given=model.placed))
+    left = [refine(setting, [], same, steps=0).energy.sum() for same in (first, again)]
+    assert model.energy.sum() < 0.2 * left[0]
+    assert left[1] > 0.5 * left[0]

@@ -61,6 +61,15 @@ def test_relaxation_of_a_skin_that_the_tool_leaves_is_named_and_measured(power):
     assert placed.values["m"] == pytest.approx(power, abs=0.1)
 
 
+@pytest.mark.parametrize("power", [1.0, 1.5])
+def test_friction_of_a_skin_that_forgets_it_in_the_air_is_named(power):
+    """Elements that slip beyond three loads, whatever the rate; readings need not be linear in load."""
+    answer = found(effects=(*FEW, "hysteresis", "hysteresis_read", "relaxation_read"), friction=0.2, power=power)
+    assert names(answer) == {"hysteresis"} and decide.status(answer) == "named"
+    # A power of load is told from friction in load: the form that has none fits far worse.
+    assert power == 1.0 or answer.members[0].placed.effect.name == "hysteresis_read"
+
+
 def test_one_rate_names_no_lag():
     answer = found(delay=0.05, rates=(1.0,))
     assert decide.status(answer) in ("ambiguous", "unknown")
