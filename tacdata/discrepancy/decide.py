@@ -13,6 +13,8 @@ from tacdata.effects import Placed, load
 
 LEFT = 0.05
 """Share of the explainable that may be left before no name is given [1]."""
+ALONE = 0.15
+"""The same for a single effect of which every rival leaves more than that again [1]."""
 LEFT_T = 2.0
 """Leftovers count when they show over episodes by so many standard errors [1]."""
 FAR = 5.0
@@ -33,9 +35,17 @@ COMMON = ("modulus", "thickness")
 """What a common gain cannot be told from without a force reading."""
 
 
-def adequate(found: Judgement) -> bool:
-    """Return whether nothing much is left to explain."""
-    return found.left.t < LEFT_T or found.share_left < LEFT
+def adequate(found: Judgement, answer: list[Member]) -> bool:
+    """Return whether nothing much is left to explain.
+
+    Real things have other forms than any library. What a single effect leaves is its own form where every rival would
+    leave twice as much, or more.
+    """
+    if found.left.t < LEFT_T or found.share_left < LEFT:
+        return True
+    if len(answer) != 1 or settled(answer[0]) != "named" or found.share_left >= ALONE:
+        return False
+    return all(loss > found.left.gain for loss in answer[0].losses.values())
 
 
 def members(found: Judgement) -> list[Member]:
@@ -97,7 +107,7 @@ def status(found: Judgement) -> str:
         return quiet
     if not answer and found.tested.p_generic > GATE and found.left.t < SURE:
         return quiet  # one effect in a hundred flips, and nothing that bears it out
-    if not answer or not adequate(found):
+    if not answer or not adequate(found, answer):
         return "unknown"
     return "ambiguous" if any(settled(m) != "named" for m in answer) else "named"
 

@@ -20,7 +20,7 @@ BENT = 0.65
 """Share of the intervals that go where the response bends, as a skin's does when it is first touched [1]."""
 LITTLE = 0.02
 """Added to what is read where a bend counts over it, of the largest reading [1]."""
-ROWS_EACH = 12
+ROWS_EACH = 4
 """Rows of a place that a spline must have at least."""
 SMOOTH = 1e-5
 """Weight of the splines' bending, over the mean diagonal: what no row decides goes on straight."""

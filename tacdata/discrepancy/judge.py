@@ -35,7 +35,7 @@ LIKELIER = 1.0
 """A rival is out by no fewer standard errors, however rare it is [1]."""
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
-MINOR = 0.3
+MINOR = 1.0
 """A further effect must explain so much of what the equations of the others may be off about, in energy [1]."""
 KEPT = 2.8
 """An effect stays in the answer if that is worse by so many standard errors without it [1]."""

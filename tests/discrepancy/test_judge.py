@@ -123,6 +123,17 @@ def test_what_did_not_race_is_named_by_its_necessity_alone(necessity, decoys, na
     assert (decide.settled(member) == "named") == named
 
 
+@pytest.mark.parametrize(
+    ("share", "rival", "others", "enough"),
+    [(0.04, 1.0, 1, True), (0.1, 30.0, 0, True), (0.1, 5.0, 0, False), (0.16, 30.0, 0, False), (0.1, 30.0, 1, False)],
+)
+def test_a_single_effect_may_leave_more_where_every_rival_leaves_twice_as_much(share, rival, others, enough):
+    left = SimpleNamespace(gain=10.0, t=4.0)
+    one = Member(None, {}, (), (), {}, 9.0, losses={"creep": rival})
+    told = decide.adequate(SimpleNamespace(left=left, share_left=share), [one] * (1 + others))
+    assert told == enough
+
+
 def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():
     common, rare = load("relaxation"), load("poroelasticity")
     alike = out(common, load("creep"))
