@@ -6,14 +6,15 @@ import numpy as np
 
 from tacdata.chain import Course
 from tacdata.discrepancy.amiss import one_rate
-from tacdata.discrepancy.motion import HOLD, longest_hold
+from tacdata.discrepancy.motion import HOLD, longest_hold, stairs
 from tacdata.effects import load
 
-BY_RATE: tuple[str, ...] = (
-    "latency", "low_pass_filter", "servo_lag", "backlash", "hysteresis", "quantization_hysteresis", "creep",
-)  # fmt: skip
-"""Mechanisms that differ by how they follow the rate."""
-BY_HOLD = "relaxation"
+CATCHING_UP: tuple[str, ...] = ("latency", "low_pass_filter", "servo_lag")
+"""Mechanisms that differ by how they follow the rate, and are over while the tip stands."""
+STAYING: tuple[str, ...] = ("backlash", "hysteresis", "quantization_hysteresis")
+"""Those that stay as they are while it stands: a staircase tells them from the others."""
+SLOW: tuple[str, ...] = ("creep", "relaxation")
+"""Those that go on while it stands, the latter so much that a hold as long as its time tells it."""
 BY_PRESS, BY_CLOCK = "wear_in", "gain_drift"
 """A form of softening, and a mechanism, that differ by whether presses or time count."""
 EVEN = 0.995
@@ -29,13 +30,25 @@ def inseparable(course: Course, mechanism: str, time: float = 0.0, form: str = "
         time: Its time constant [s], if it has one: a hold that is over before says little of it.
         form: The file of the effect that stands for it.
     """
-    group: list[str] = [*BY_RATE] if one_rate(course) else []
-    if group and longest_hold(course) < max(HOLD, time):
-        group.append(BY_HOLD)
+    group = _group(course, mechanism, time)
     more = [name for name in group if name != mechanism] if mechanism in group else []
     if (form == BY_PRESS or mechanism == BY_CLOCK) and _even(course):
         more.append(BY_CLOCK if form == BY_PRESS else load(BY_PRESS).called)
     return tuple(more)
+
+
+def _group(course: Course, mechanism: str, time: float) -> list[str]:
+    """Return what looks alike at one rate."""
+    if not one_rate(course):
+        return []
+    held = longest_hold(course) >= max(HOLD, time)
+    if not stairs(course):
+        return [*CATCHING_UP, *STAYING, *(SLOW[:1] if held else SLOW)]
+    if mechanism in CATCHING_UP:
+        return [*CATCHING_UP]
+    if held:
+        return []
+    return [*STAYING, *SLOW] if mechanism in SLOW else [mechanism, *SLOW]
 
 
 def _even(course: Course) -> bool:

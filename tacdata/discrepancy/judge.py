@@ -35,8 +35,9 @@ LIKELIER = 1.0
 """A rival is out by no fewer standard errors, however rare it is [1]."""
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
-MINOR = 1.0
-"""A further effect must explain so much of what the equations of the others may be off about, in energy [1]."""
+MINOR = {False: 0.3, True: 1.0}
+"""A further effect must explain so much of what the equations of the others may be off about, in energy [1]; more beside
+a fitted response (True), as what its transducers do to loads is not known either."""
 KEPT = 2.8
 """An effect stays in the answer if that is worse by so many standard errors without it [1]."""
 SWAPS = 2
@@ -90,7 +91,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         if best is None:
             break
         more = current.loss - best.loss
-        if members and more < MINOR * off:
+        if members and more < MINOR[setting.response.fitted] * off:
             break
         off += more * float(np.mean([p.effect.form_error**2 for p in best.placed[len(members) :]]))
         members = list(best.placed)
@@ -258,10 +259,11 @@ def _members(
         start = replace(setting, response=current.response)
         without = {k: refine(start, placed[:k] + placed[k + 1 :], problem.frame, 3) for k in range(len(placed))}
         need = {k: _needed(start, current, r, problem.frame, lent) for k, r in without.items()}
-        weakest = min(need, key=lambda k: need[k])
-        if need[weakest] >= KEPT:
+        spare = [k for k in need if need[k] < KEPT]
+        if not spare:
             break
-        current = without[weakest]
+        # Of those that could go, the one that the others stand in for best.
+        current = without[min(spare, key=lambda k: _cost(without[k]))]
         placed = list(current.placed)
     if len(placed) == 1:
         without = {0: refine(setting, [], problem.frame)}

@@ -26,6 +26,10 @@ LINGERS = 4.0
 """A tip that stands stays in the band so many times as long as one that presses takes through it [1]."""
 DEEP = 0.3
 """A hold is one deeper than this share of the stroke [1]."""
+STOP = 0.4
+"""A stop of a staircase is no shorter [s]."""
+STAIRS = 3
+"""A staircase stops so often on its way in, and on its way out, below its top [1]."""
 MIDDLE = 1.4826
 """Standard deviation over the median of what is off without its sign [1]."""
 
@@ -107,6 +111,38 @@ def longest_hold(course: Course) -> float:
     pressed = np.concatenate(speeds(course))
     usual = float(np.nanmedian(pressed)) if np.isfinite(pressed).any() else 0.0
     return longest if usual <= 0 or longest > LINGERS * band / usual else 0.0
+
+
+def stairs(course: Course) -> bool:
+    """Return whether most presses stop at several depths on the way in, and on the way out.
+
+    What lags behind catches up at a stop; friction and play do not.
+    """
+    band = STILL * course.stroke + SWAY * path_noise(course)
+    count, pressed = 0, 0
+    for e in range(course.episodes):
+        rows = np.flatnonzero(course.episode == e)
+        time, depth = course.time[rows], course.tip[rows, 2]
+        if not len(rows) or depth.max() <= TOUCHING * course.span:
+            continue
+        between = (depth > DEEP / 3 * course.span) & (depth < depth.max() - 2 * band)
+        top = int(np.argmax(depth))
+        ways = between & (np.arange(len(rows)) < top), between & (np.arange(len(rows)) > top)
+        pressed += 1
+        count += all(_stops(time[way], depth[way], band) >= STAIRS for way in ways)
+    return 2 * count > pressed
+
+
+def _stops(time: np.ndarray, depth: np.ndarray, band: float) -> int:
+    """Return how often a depth stays within a band for as long as a stop."""
+    found, begin = 0, 0
+    while begin < len(depth):
+        off = np.flatnonzero(np.abs(depth[begin:] - depth[begin]) > band)
+        end = begin + int(off[0]) if len(off) else len(depth)
+        stops = time[end - 1] - time[begin] >= STOP
+        found += bool(stops)
+        begin = end if stops else begin + 1
+    return found
 
 
 def _within(time: np.ndarray, depth: np.ndarray, band: float) -> float:

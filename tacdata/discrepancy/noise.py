@@ -16,7 +16,7 @@ SAME = 1.2
 """Noise that is nowhere larger than so many times what it is without load is the same everywhere [1]."""
 LARGEST = 5.0
 """It is told to be no larger than so many times that [1]."""
-ENOUGH = 400
+ENOUGH = 150
 """Fewer values tell no spread."""
 
 

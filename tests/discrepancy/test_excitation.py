@@ -8,7 +8,7 @@ from pressing import course
 
 from tacdata.discrepancy.amiss import amiss, one_rate
 from tacdata.discrepancy.excitation import inseparable
-from tacdata.discrepancy.motion import longest_hold, path_noise, speeds
+from tacdata.discrepancy.motion import longest_hold, path_noise, speeds, stairs
 
 
 def test_two_rates_of_pressing_are_told_from_one():
@@ -98,3 +98,30 @@ def test_presses_spaced_evenly_do_not_tell_what_they_do_from_what_time_does():
     assert inseparable(even, "gain_drift", form="settling_gain") == ("softening",)
     rested = replace(even, time=even.time + 2000.0 * (even.episode >= made.episodes // 2))
     assert inseparable(rested, "softening", form="wear_in") == ()
+
+
+def staircase(stop):
+    """Return a course of one rate that stops at four depths on the way in and out, for ``stop`` seconds each."""
+    made = course(episodes=4)
+    levels = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 0.8, 0.6, 0.4, 0.2, 0.0])
+    corners = np.repeat(levels, 2)[1:-1]
+    at = np.cumsum([0.0, *np.where(np.diff(corners) == 0, stop, 0.2)])
+    time = np.arange(0.0, at[-1], 0.02)
+    parts = np.tile(np.interp(time, at, corners), 4)
+    rows = len(time)
+    clock = np.concatenate([time + k * (at[-1] + 5.0) for k in range(4)])
+    tip = np.column_stack([0 * parts, 0 * parts, parts])
+    return replace(
+        made, time=clock, tip=tip, tool=np.zeros(4 * rows, dtype=int), readings=np.zeros((4 * rows, 3)),
+        averaged=np.zeros(4 * rows, dtype=bool), episode=np.repeat(np.arange(4), rows),
+    )  # fmt: skip
+
+
+def test_a_staircase_of_one_rate_tells_what_stays_from_what_catches_up():
+    long, short = staircase(1.2), staircase(0.6)
+    assert stairs(long) and stairs(short) and not stairs(course()) and not stairs(staircase(0.2))
+    assert inseparable(long, "hysteresis") == ()
+    assert set(inseparable(short, "hysteresis")) == {"creep", "relaxation"}
+    assert set(inseparable(long, "latency")) == {"low_pass_filter", "servo_lag"}
+    assert inseparable(long, "relaxation", 0.5) == ()
+    assert "hysteresis" in inseparable(long, "relaxation", 6.0)
