@@ -36,7 +36,7 @@ LIKELIER = 1.0
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
 MINOR = {False: 0.3, True: 1.0}
-"""A further effect must explain so much of what the equations of the others may be off about, in energy [1]; more beside
+"""A further effect must explain so much of what the others' equations may be off about, in energy [1]; more beside
 a fitted response (True), as what its transducers do to loads is not known either."""
 KEPT = 2.8
 """An effect stays in the answer if that is worse by so many standard errors without it [1]."""
