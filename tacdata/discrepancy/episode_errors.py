@@ -52,18 +52,19 @@ class EpisodeErrors:
     def noise(self, errors: np.ndarray) -> Noise:
         """Return the noise beside errors of pose, shape (m, streams, kinds)."""
         course, relative = self.course, noise.relative_scale(self.residual, self.rise, self.course)
-        known = noise.first_guess(self.residual, course, relative)
-        columns = np.concatenate([self.residual[:, :, None], self.rich], axis=2)
+        residual = noise.beside_depth(self.residual, course)
+        known = noise.first_guess(residual, course, relative)
+        columns = np.concatenate([residual[:, :, None], self.rich], axis=2)
         best = np.zeros(self.rich.shape[2])
         for _ in range(2):
             best = self._best(columns, Cleaner(course, known, self.context, self.features, errors))
-            left = (self.residual - self.rich @ best.astype(np.float32)) / known.scale
+            left = (residual - self.rich @ best.astype(np.float32)) / known.scale
             still = noise.still(known, left.shape[1])
             cleaner = Cleaner(course, still, self.context, self.features, errors / known.scale[None, :, None])
             bare = cleaner.cleaned(left[:, :, None])[:, :, 0]
-            bare[~np.isfinite(self.residual)] = np.nan
+            bare[~np.isfinite(residual)] = np.nan
             known = noise.refined(bare * known.scale, course, known)
-        rest = self.residual - self.rich @ best.astype(np.float32)
+        rest = residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
         wandering = wander(rest, course, known.scale, known.memory, kinds)
         walk = random_walk.modes(rest, course, known.scale, known.memory, self._places())

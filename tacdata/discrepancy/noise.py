@@ -177,6 +177,46 @@ def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
     return float(np.sqrt(high))
 
 
+INTERVALS = 10
+"""Of the function of depth that a tag's noise is told beside [1]."""
+FEW_VIEWS = 100
+"""Fewer views tell no function of depth beside an offset each episode [1]."""
+
+
+def beside_depth(residual: np.ndarray, course: Course) -> np.ndarray:
+    """Return residuals in which a tag's are without what goes with depth, shape (n, streams).
+
+    Splines take that out of readings beside a fitted response, and nothing does it for a tag: a frame that gives way
+    would be noise of the gauge that sees it, a hundred times what it is. Each way has a function of its own.
+
+    Args:
+        residual: Shape (n, streams).
+        course: Whose rows.
+    """
+    if course.tag is None:
+        return residual
+    result, depth = residual.copy(), np.clip(course.tip[:, 2] / max(float(course.tip[:, 2].max()), 1e-12), 0.0, 1.0)
+    hats = np.maximum(1 - np.abs(depth[:, None] * INTERVALS - np.arange(1, INTERVALS + 1)), 0.0)
+    leaving = (course.speed < 0)[:, None]
+    columns = np.concatenate([np.where(leaving, 0.0, hats), np.where(leaving, hats, 0.0)], axis=1)
+    for k in range(residual.shape[1] - 3, residual.shape[1]):
+        there = np.isfinite(residual[:, k])
+        if there.sum() < FEW_VIEWS:
+            continue
+        own = [_about_mean(x, course.episode[there]) for x in (columns[there], residual[there, k : k + 1])]
+        gram = own[0].T @ own[0]
+        gram += 1e-6 * max(float(np.trace(gram)) / len(gram), 1e-12) * np.eye(len(gram))
+        result[:, k] -= columns @ np.linalg.solve(gram, own[0].T @ own[1])[:, 0]
+    return result
+
+
+def _about_mean(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Return values, shape (n, k), less the mean of their group."""
+    count = np.maximum(np.bincount(group), 1)
+    means = np.stack([np.bincount(group, column) / count for column in values.T], axis=1)
+    return values - means[group]
+
+
 def tag_wander(residual: np.ndarray, course: Course, known: Noise) -> float | None:
     """Return how far an episode's offset of the tag is off the next one's, in noise scales [1]; None without a tag.
 

@@ -14,12 +14,15 @@ STEPS = 5
 
 
 def given_way(self: Effect, state: State, values: dict[str, np.ndarray]) -> State:
-    """Return the state after a frame gave way under load: by c where the force that is reached is largest."""
-    tool, pose = state.course.tool, state.pose
+    """Return the state after a frame gave way under load: by c where the force that is reached is largest.
+
+    Where only readings are known, the force goes with a power 1 / m of them.
+    """
+    tool, pose, power = state.course.tool, state.pose, 1 / float(values.get("m", 1.0))
     load = np.maximum(state.response.force(pose, tool), 0.0)
     for _ in range(STEPS):
         share = load / max(float(load.max()), 1e-12)
-        pose = state.pose - np.array([0.0, 0.0, 1.0]) * (values["c"] * share)[:, None]
+        pose = state.pose - np.array([0.0, 0.0, 1.0]) * (values["c"] * share**power)[:, None]
         load = 0.5 * (load + np.maximum(state.response.force(pose, tool), 0.0))
     return replace(state, pose=pose)
 

@@ -18,7 +18,7 @@ class ScrewError(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal")
     group = "depth offset"
-    equation = "d -> d + s sin(2 pi d / p) + c cos(2 pi d / p) - c"
+    equation = "d -> d + s sin(2 pi d / p) + c cos(2 pi d / p) - c, p no longer than the stroke"
     source = "standard form"
     experiment = "slow presses over several periods: the residual's spectrum in commanded position"
     parameters = (
@@ -30,7 +30,8 @@ class ScrewError(Effect):
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
-        angle = 2 * np.pi * state.depth / values["p"]
+        # Less than a period is no more a screw's than any other curve.
+        angle = 2 * np.pi * state.depth / np.minimum(values["p"], state.course.stroke)
         pose = state.pose.copy()
         pose[:, 2] += values["s"] * np.sin(angle) + values["c"] * (np.cos(angle) - 1)
         return replace(state, pose=pose)

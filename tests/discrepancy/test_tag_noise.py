@@ -1,0 +1,57 @@
+"""The noise of a tag, or a gauge, is told beside what goes with depth: a frame that gives way is no noise of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pressing import course
+
+from tacdata.discrepancy import decide
+from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.discrepancy.frame import frame
+from tacdata.discrepancy.judge import judge
+from tacdata.discrepancy.noise import beside_depth
+from tacdata.discrepancy.setting import Setting
+from tacdata.effects import load
+
+NOISE = 0.002
+"""Of the gauge [mm]."""
+
+
+def gauged(compliance, power=1.0, seed=0):
+    """Return presses with a gauge at the tip: the frame gives way by a share of the depth's power 1.5 [mm]."""
+    made = course(seed=seed, power=power)
+    rng, depth = np.random.default_rng(seed), np.maximum(made.tip[:, 2], 0.0)
+    seen = np.full((made.rows, 3), np.nan)
+    given = compliance * (depth / depth.max()) ** 1.5
+    seen[:, 2] = made.tip[:, 2] - given + NOISE * rng.normal(size=made.rows)
+    # The skin is pressed less than was asked for by as much.
+    asked = made.tip.copy()
+    asked[:, 2] += given
+    seen[:, 2] += given
+    return replace(made, tip=asked, tag=seen)
+
+
+@pytest.mark.parametrize("compliance", [0.0, 0.1])
+def test_a_gauges_noise_is_its_own(compliance):
+    made = gauged(compliance)
+    told = frame(Setting(made, FittedResponse(made), [])).noise
+    assert told.scale[-1] == pytest.approx(NOISE, rel=0.3)
+
+
+def test_nothing_is_taken_from_readings_or_from_recordings_without_a_tag():
+    made = gauged(0.1)
+    residual = np.random.default_rng(0).normal(size=(made.rows, 6))
+    np.testing.assert_array_equal(beside_depth(residual, made)[:, :3], residual[:, :3])
+    assert beside_depth(residual[:, :3], replace(made, tag=None)) is not None
+
+
+@pytest.mark.parametrize("power", [1.0, 0.7])
+def test_compliance_that_a_gauge_sees_is_named_whatever_power_of_load_is_read(power):
+    made = gauged(0.05, power)
+    effects = ("carriage_compliance", "carriage_compliance_read", "travel_scale", "screw_error", "backlash", "latency")
+    answer = judge(Setting(made, FittedResponse(made), [load(name) for name in effects]))
+    assert decide.status(answer) == "named"
+    (member,) = answer.members
+    assert member.placed.effect.called == "frame_compliance"
+    assert float(member.placed.values["c"]) == pytest.approx(0.05, rel=0.1)
