@@ -1,9 +1,8 @@
 """Every effect is nothing at its default, does something at its typical size, and says what it is."""
 
 import functools
-from importlib import resources
-
 from dataclasses import replace
+from importlib import resources
 
 import numpy as np
 import pytest
