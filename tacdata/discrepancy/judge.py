@@ -38,6 +38,8 @@ AGAIN = 3
 MINOR = {False: 0.3, True: 1.0}
 """A further effect must explain so much of what the others' equations may be off about, in energy [1]; more beside
 a fitted response (True), as what its transducers do to loads is not known either."""
+COARSE = {False: 0.0, True: 0.05}
+"""Least that any equation may be off about for that: sensors without a model often have paths sampled seldom [1]."""
 KEPT = 2.8
 """An effect stays in the answer if that is worse by so many standard errors without it [1]."""
 SWAPS = 2
@@ -93,7 +95,8 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         more = current.loss - best.loss
         if members and more < MINOR[setting.response.fitted] * off:
             break
-        off += more * float(np.mean([p.effect.form_error**2 for p in best.placed[len(members) :]]))
+        least = COARSE[setting.response.fitted]
+        off += more * float(np.mean([max(p.effect.form_error, least) ** 2 for p in best.placed[len(members) :]]))
         members = list(best.placed)
         # Noise told beside a large missing effect is too large: tell it again.
         same = frame(replace(setting, response=best.response, given=(*setting.given, *best.placed)))
@@ -188,9 +191,10 @@ def _tried(order: list[Candidate]) -> list[Candidate]:
 
 
 def _gain(problem: Problem, chosen: list[Candidate]) -> float:
-    columns, values = fitted(problem, chosen, np.arange(len(problem.folds)))
+    everything = np.arange(len(problem.folds))
+    columns, values = fitted(problem, chosen, everything)
     fee = 0.5 * sum(len(c.columns) for c in chosen) * float(np.log(max(len(problem.folds), 2)))
-    return float(gains(problem.evidence.gram, columns, values).sum()) - fee
+    return float(gains(problem.evidence.of(everything)[None], columns, values)[0]) - fee
 
 
 def _beside(problem: Problem, first: Candidate, others: list[Candidate]) -> list[float]:

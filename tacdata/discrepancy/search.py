@@ -171,9 +171,10 @@ def best_shapes(problem: Problem, among: np.ndarray | None = None) -> dict[str, 
     """Return each effect's candidate with the largest gain in a fit with its bounds."""
     everything = np.arange(len(problem.folds)) if among is None else among
     best: dict[str, tuple[float, Candidate]] = {}
+    total = problem.evidence.of(everything)[None]
     for candidate in problem.candidates:
         columns, values = fitted(problem, [candidate], everything)
-        gain = float(gains(problem.evidence.gram[everything], columns, values).sum())
+        gain = float(gains(total, columns, values)[0])
         name = candidate.effect.name
         if name not in best or gain > best[name][0]:
             best[name] = gain, candidate

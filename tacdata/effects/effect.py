@@ -8,6 +8,7 @@ amplitude, in which the effect is nearly linear around 0.
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
@@ -145,6 +146,7 @@ def load(name: str) -> Effect:
     return kind()
 
 
-def library() -> list[Effect]:
+@functools.cache
+def library() -> tuple[Effect, ...]:
     """Return every modelled effect, by name."""
-    return [load(name) for name in registry.names(ROOM, BASE)]
+    return tuple(load(name) for name in registry.names(ROOM, BASE))
