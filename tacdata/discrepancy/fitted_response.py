@@ -179,7 +179,7 @@ class FittedResponse(Response):
         bend, rise = spline.derivative(2)(at), np.abs(spline(at) - spline(at[0]))
         # Where much is read presses differ by their gains, which looks like bends: half of what bends counts over it.
         each = [np.sqrt(np.sqrt(np.mean(np.square(b), axis=1))) for b in (bend, bend / (LITTLE + rise))]
-        monitor = sum(m / max(float(m.mean()), 1e-12) for m in each) / len(each)
+        monitor = np.mean([m / max(float(m.mean()), 1e-12) for m in each], axis=0)
         inner = len(basis.t) - 7
         share = BENT * monitor + 1 - BENT
         whole = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
