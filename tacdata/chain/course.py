@@ -10,6 +10,10 @@ import numpy as np
 
 FORGOTTEN = 1e9
 """Longer than any skin remembers [s]."""
+CORNERS = 0.1
+"""A smaller share of rows off the straight line between their neighbours are corners of a path, not noise [1]."""
+MIDDLE = 1.4826
+"""Standard deviation over the median of what is off without its sign [1]."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,25 @@ class Course:
         """Commanded rate of depth, from the row before [mm/s], shape (n,); 0 in first rows."""
         rate = np.diff(self.tip[:, 2], prepend=self.tip[:1, 2]) / np.maximum(self.step, 1e-9)
         return np.where(self.first, 0.0, rate)
+
+    @cached_property
+    def dither(self) -> float:
+        """Noise of the depth, as the standard deviation of what a row is off the line through its neighbours [mm].
+
+        A commanded path is straight but for its corners: it has none. Rows laid between the path's own points are on
+        the line and do not count.
+        """
+        time, depth = self.time, self.tip[:, 2]
+        if len(depth) < 3:
+            return 0.0
+        gap = np.maximum(time[2:] - time[:-2], 1e-12)
+        share = (time[1:-1] - time[:-2]) / gap
+        off = depth[1:-1] - (1 - share) * depth[:-2] - share * depth[2:]
+        off = off / np.sqrt(1 + share**2 + (1 - share) ** 2)
+        inner = self.episode[2:] == self.episode[:-2]
+        told = np.abs(off[inner])
+        told = told[told > 1e-9]
+        return MIDDLE * float(np.median(told)) if len(told) > CORNERS * max(int(inner.sum()), 1) else 0.0
 
     @cached_property
     def row_site(self) -> np.ndarray:

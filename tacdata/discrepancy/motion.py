@@ -16,8 +16,6 @@ LEVELS = 40
 """Levels of depth between which a speed is told, at most [1]."""
 CLEAR = 10.0
 """Levels lie so many times the path's noise apart at least [1]."""
-FEWEST = 0.1
-"""A smaller share of rows off the straight line between their neighbours are corners of a path, not noise [1]."""
 STILL = 0.002
 """Band within which a tip stands, of the stroke [1]..."""
 SWAY = 10.0
@@ -30,27 +28,6 @@ STOP = 0.4
 """A stop of a staircase is no shorter [s]."""
 STAIRS = 3
 """A staircase stops so often on its way in, and on its way out, below its top [1]."""
-MIDDLE = 1.4826
-"""Standard deviation over the median of what is off without its sign [1]."""
-
-
-def path_noise(course: Course) -> float:
-    """Return the standard deviation of what a row's depth is off the line through its neighbours, as noise [mm].
-
-    A commanded path is straight but for its corners: it has none. Rows laid between the path's own points are on the
-    line and do not count.
-    """
-    time, depth = course.time, course.tip[:, 2]
-    if len(depth) < 3:
-        return 0.0
-    gap = np.maximum(time[2:] - time[:-2], 1e-12)
-    share = (time[1:-1] - time[:-2]) / gap
-    off = depth[1:-1] - (1 - share) * depth[:-2] - share * depth[2:]
-    off = off / np.sqrt(1 + share**2 + (1 - share) ** 2)
-    inner = course.episode[2:] == course.episode[:-2]
-    told = np.abs(off[inner])
-    told = told[told > 1e-9]
-    return MIDDLE * float(np.median(told)) if len(told) > FEWEST * max(int(inner.sum()), 1) else 0.0
 
 
 def speeds(course: Course) -> tuple[np.ndarray, np.ndarray]:
@@ -62,7 +39,7 @@ def speeds(course: Course) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         While pressing and while letting go [mm/s], each of shape (episodes that touch,); NaN where it is not seen.
     """
-    least = max(course.span / LEVELS, CLEAR * path_noise(course))
+    least = max(course.span / LEVELS, CLEAR * course.dither)
     loading, unloading = [], []
     for e in range(course.episodes):
         rows = np.flatnonzero(course.episode == e)
@@ -101,7 +78,7 @@ def longest_hold(course: Course) -> float:
     It stands while its depth stays within a band: a small share of the stroke, and room for the noise of the path.
     """
     depth = course.tip[:, 2]
-    band = STILL * course.stroke + SWAY * path_noise(course)
+    band = STILL * course.stroke + SWAY * course.dither
     deep = depth > depth.min() + DEEP * course.stroke
     longest = 0.0
     for rows in np.split(np.arange(course.rows), np.flatnonzero(course.first | ~deep)):
@@ -118,7 +95,7 @@ def stairs(course: Course) -> bool:
 
     What lags behind catches up at a stop; friction and play do not.
     """
-    band = STILL * course.stroke + SWAY * path_noise(course)
+    band = STILL * course.stroke + SWAY * course.dither
     count, pressed = 0, 0
     for e in range(course.episodes):
         rows = np.flatnonzero(course.episode == e)

@@ -10,6 +10,9 @@ from tacdata.chain import State
 from tacdata.chain.memory import play
 from tacdata.effects.effect import Effect, Parameter
 
+STILL = 4.0
+"""A position that moves by less is still, in standard deviations of its noise [1]."""
+
 
 class Backlash(Effect):
     """Play of the depth drive."""
@@ -33,6 +36,7 @@ class Backlash(Effect):
         half = 0.5 * float(values["b"])
         if half == 0.0:
             return state
-        pose = state.pose.copy()
-        pose[:, 2] = play(pose[:, 2], half) + half
+        # A measured position's noise is taken up by any play: what that would change is no play's doing.
+        pose, still = state.pose.copy(), STILL * state.course.dither
+        pose[:, 2] += play(pose[:, 2], still + half) - play(pose[:, 2], still) + half
         return replace(state, pose=pose)

@@ -8,7 +8,7 @@ from pressing import course
 
 from tacdata.discrepancy.amiss import amiss, one_rate
 from tacdata.discrepancy.excitation import inseparable
-from tacdata.discrepancy.motion import longest_hold, path_noise, speeds, stairs
+from tacdata.discrepancy.motion import longest_hold, speeds, stairs
 
 
 def test_two_rates_of_pressing_are_told_from_one():
@@ -42,8 +42,8 @@ def measured(made, seed=0, noise=5e-4, quantum=1e-3):
 
 def test_a_hold_is_told_from_a_path_with_noise():
     held = course(hold=1.5, episodes=8)
-    assert path_noise(held) == 0, "a commanded path has none"
-    assert path_noise(measured(held)) == pytest.approx(6e-4, rel=0.4)
+    assert held.dither == 0, "a commanded path has none"
+    assert measured(held).dither == pytest.approx(6e-4, rel=0.4)
     for made in (held, measured(held)):
         assert longest_hold(made) == pytest.approx(1.5, abs=0.1)
         assert not any("no hold" in words for words in amiss(made))
