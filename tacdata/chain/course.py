@@ -127,23 +127,28 @@ class Course:
         return np.where(self.first, 0.0, rate)
 
     @cached_property
-    def dither(self) -> float:
-        """Noise of the depth, as the standard deviation of what a row is off the line through its neighbours [mm].
+    def dithers(self) -> np.ndarray:
+        """Noise of x, y and depth, as the standard deviation of what a row is off the line through its neighbours [mm].
 
         A commanded path is straight but for its corners: it has none. Rows laid between the path's own points are on
-        the line and do not count.
+        the line and do not count. Shape (3,).
         """
-        time, depth = self.time, self.tip[:, 2]
-        if len(depth) < 3:
-            return 0.0
+        time, tip = self.time, self.tip
+        if len(tip) < 3:
+            return np.zeros(3)
         gap = np.maximum(time[2:] - time[:-2], 1e-12)
-        share = (time[1:-1] - time[:-2]) / gap
-        off = depth[1:-1] - (1 - share) * depth[:-2] - share * depth[2:]
+        share = ((time[1:-1] - time[:-2]) / gap)[:, None]
+        off = tip[1:-1] - (1 - share) * tip[:-2] - share * tip[2:]
         off = off / np.sqrt(1 + share**2 + (1 - share) ** 2)
         inner = self.episode[2:] == self.episode[:-2]
-        told = np.abs(off[inner])
-        told = told[told > 1e-9]
-        return MIDDLE * float(np.median(told)) if len(told) > CORNERS * max(int(inner.sum()), 1) else 0.0
+        told = [axis[axis > 1e-9] for axis in np.abs(off[inner]).T]
+        least = CORNERS * max(int(inner.sum()), 1)
+        return np.array([MIDDLE * float(np.median(axis)) if len(axis) > least else 0.0 for axis in told])
+
+    @property
+    def dither(self) -> float:
+        """Noise of the depth [mm]."""
+        return float(self.dithers[2])
 
     @cached_property
     def row_site(self) -> np.ndarray:

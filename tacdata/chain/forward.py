@@ -12,7 +12,7 @@ from tacdata.chain.course import Course
 from tacdata.chain.response import Response
 from tacdata.chain.state import STAGES, State
 
-_BEFORE_SIGNAL = STAGES.index("taxel")
+_AFTER_POSE, _BEFORE_SIGNAL = STAGES.index("mechanics"), STAGES.index("taxel")
 
 
 class Acting(Protocol):
@@ -60,7 +60,7 @@ class Chain:
         """
         empty = np.empty(0)
         self._steps = _steps(effects)
-        self._runs = [_Run(State(course, response, course.tip, empty, empty, empty), course.tip, empty)]
+        self._runs = [_Run(State(course, response, course.tip, empty, empty, empty), empty)]
         for step in self._steps:
             self._runs.append(_after(self._runs[-1], step))
 
@@ -96,7 +96,6 @@ class _Run:
     """The state after a step, with what was put aside before."""
 
     state: State
-    tag: np.ndarray
     force: np.ndarray
 
 
@@ -108,8 +107,9 @@ def _steps(effects: Sequence[Acting]) -> list[Acting | str]:
     by_stage = {stage: [e for e in effects if e.stage == stage] for stage in STAGES}
     kinematic = by_stage["kinematics"]
     return [
-        *(e for e in kinematic if e.seen_by_tag), _TAG, *(e for e in kinematic if not e.seen_by_tag), _LOAD,
-        *(e for stage in STAGES[1:_BEFORE_SIGNAL] for e in by_stage[stage]), _SIGNAL,
+        *(e for e in kinematic if e.seen_by_tag), _TAG, *by_stage["view"],
+        *(e for e in kinematic if not e.seen_by_tag), _LOAD,
+        *(e for stage in STAGES[_AFTER_POSE:_BEFORE_SIGNAL] for e in by_stage[stage]), _SIGNAL,
         *(e for stage in STAGES[_BEFORE_SIGNAL:] for e in by_stage[stage]),
     ]  # fmt: skip
 
@@ -119,7 +119,7 @@ def _after(run: _Run, step: Acting | str) -> _Run:
     if not isinstance(step, str):
         return replace(run, state=step.act(state))
     if step is _TAG:
-        return replace(run, tag=state.pose)
+        return replace(run, state=replace(state, view=state.pose))
     if step is _LOAD:
         tool = state.course.tool
         load, force = state.response.load(state.pose, tool), state.response.force(state.pose, tool)
@@ -128,4 +128,4 @@ def _after(run: _Run, step: Acting | str) -> _Run:
 
 
 def _said(run: _Run) -> Prediction:
-    return Prediction(run.state.signal, run.force, run.tag, run.state.pose)
+    return Prediction(run.state.signal, run.force, run.state.view, run.state.pose)

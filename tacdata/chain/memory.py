@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+STILL = 4.0
+"""An input that moves by less is still, in standard deviations of its noise [1]."""
+
 
 def low_pass(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
     """Return the solution of tau y' + y = u for u linear between rows, from rest.
@@ -38,6 +41,20 @@ def play(values: np.ndarray, width: float, anew: np.ndarray | None = None) -> np
 
     forgets = np.zeros(len(values), dtype=bool) if anew is None else anew
     return played(_wide(values), width, forgets).reshape(values.shape)
+
+
+def dead_band(values: np.ndarray, width: float, noise: float) -> np.ndarray:
+    """Return by how much what follows a measured input through a dead band is off it, shape (n,).
+
+    Any dead band takes up the noise of what was measured: what that would change is not this one's doing.
+
+    Args:
+        values: Input, shape (n,).
+        width: Half the dead band, in the input's unit.
+        noise: Standard deviation of the input's noise; 0 for a command.
+    """
+    still = STILL * noise
+    return play(values, still + width) - play(values, still)
 
 
 def slipping(values: np.ndarray, width: float, first: np.ndarray) -> np.ndarray:

@@ -14,6 +14,8 @@ class Response(ABC):
 
     fitted = False
     """Whether it was fitted to the recordings that are judged; then only what has memory can be judged."""
+    form_error = 0.0
+    """Share of what an effect explains that may be its equation's error through this response, root of squares [1]."""
 
     @property
     def spacing(self) -> float | None:

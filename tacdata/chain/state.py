@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tacdata.chain.course import Course
 from tacdata.chain.response import Response
 
-STAGES = ("kinematics", "mechanics", "contact", "taxel", "readout", "timing", "simulator")
-"""In the order in which they act; the simulator's own errors act last."""
+STAGES = ("kinematics", "view", "mechanics", "contact", "taxel", "readout", "timing", "simulator")
+"""In the order in which they act; a view is what a second observer makes of the tip, the simulator's own errors act
+last."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class State:
     """Normal force on the indenter [the response's unit], shape (n,); empty in the kinematic stage."""
     signal: np.ndarray
     """Readings [the source's unit], shape (n, channels); empty before the taxel stage."""
+    view: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    """x, y, depth of the tip as a tag, or a gauge, sees it [mm], shape (n, 3); empty in the kinematic stage."""
 
     @property
     def depth(self) -> np.ndarray:

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from tacdata.discrepancy.excitation import inseparable
+from tacdata.discrepancy.excitation import lookalikes
 from tacdata.discrepancy.judge import DECOYS, GATE
 from tacdata.discrepancy.judgement import Judgement, Member
+from tacdata.discrepancy.nuisances import VIEW
 from tacdata.effects import Placed, load
 
 LEFT = 0.05
@@ -31,6 +32,8 @@ WIDE = 2.0
 """Gains scatter more than calibration leaves open beyond so many of its standard deviations [1]."""
 RARE = 0.003
 """What so few decoys do as well as is needed, whatever the two models' own episodes make of it [1]."""
+TRAVEL = "travel_scale"
+"""What the scale of a second observation cannot be told from."""
 COMMON = ("modulus", "thickness")
 """What a common gain cannot be told from without a force reading."""
 
@@ -53,11 +56,10 @@ def members(found: Judgement) -> list[Member]:
     course = found.problem.setting.course
     own = []
     for m in found.members:
-        called = m.placed.effect.called
-        time = max((float(v) for name, v in m.placed.values.items() if name.startswith("tau")), default=0.0)
-        more = [*m.rivals, *inseparable(course, called, time, m.placed.effect.name), *_hidden(found, m)]
-        own.append(replace(m, rivals=tuple(name for name in dict.fromkeys(more) if name != called)))
-    return [*own, *calibrated(found)]
+        effect = m.placed.effect
+        more = [*m.rivals, *lookalikes(course, effect, m.placed.values), *_hidden(found, m)]
+        own.append(replace(m, rivals=tuple(name for name in dict.fromkeys(more) if name != effect.called)))
+    return [*own, *calibrated(found), *_viewed(found)]
 
 
 def _hidden(found: Judgement, member: Member) -> list[str]:
@@ -90,6 +92,21 @@ def calibrated(found: Judgement) -> list[Member]:
         placed = Placed(load("channel_gain"), {"e": np.where(far, own, 0.0)})
         made.append(Member(placed, {"e": prior}, (), (), {}, float(np.abs(own).max() / prior), needed=BEYOND))
     return made
+
+
+def _viewed(found: Judgement) -> list[Member]:
+    """Return a second observation's scale, or the drive's, that is beyond what calibration leaves open."""
+    if not np.any(found.views):
+        return []
+    prior = found.problem.setting.nuisance[VIEW]
+    far = float(np.abs(found.views).max()) / prior
+    if far <= BEYOND:
+        return []
+    placed = Placed(load(VIEW), {"s": np.array(found.views[0]), "a": np.array(found.views[1])})
+    there = {m.placed.effect.called for m in found.members}
+    # Whether the drive or its observer is wrong is not for either of them to say.
+    rivals = tuple({TRAVEL} - there)
+    return [Member(placed, {"s": prior, "a": prior}, (), rivals, {}, far, needed=BEYOND)]
 
 
 def loudness(found: Judgement) -> float:

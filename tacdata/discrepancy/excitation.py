@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from tacdata.chain import Course
 from tacdata.discrepancy.amiss import one_rate
 from tacdata.discrepancy.motion import HOLD, longest_hold, stairs
-from tacdata.effects import load
+from tacdata.effects import Effect, load
 
 CATCHING_UP: tuple[str, ...] = ("latency", "low_pass_filter", "servo_lag")
 """Mechanisms that differ by how they follow the rate, and are over while the tip stands."""
@@ -35,6 +37,12 @@ def inseparable(course: Course, mechanism: str, time: float = 0.0, form: str = "
     if (form == BY_PRESS or mechanism == BY_CLOCK) and _even(course):
         more.append(BY_CLOCK if form == BY_PRESS else load(BY_PRESS).called)
     return tuple(more)
+
+
+def lookalikes(course: Course, effect: Effect, values: Mapping[str, np.ndarray | float]) -> tuple[str, ...]:
+    """Return mechanisms that a course cannot tell from an effect with some values, as `inseparable`."""
+    time = max((float(value) for name, value in values.items() if name.startswith("tau")), default=0.0)
+    return inseparable(course, effect.called, time, effect.name)
 
 
 def _group(course: Course, mechanism: str, time: float) -> list[str]:

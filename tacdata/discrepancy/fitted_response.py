@@ -34,12 +34,15 @@ STIFF = 1e9
 """Largest weight of bending [1]."""
 KEPT = 3
 """Answers remembered: most effects leave the pose alone."""
+FORM_ERROR = 0.12
+"""What it does not know of an effect: transducers that are not linear in load, paths that are sampled seldom [1]."""
 
 
 class FittedResponse(Response):
     """Splines in depth for every place and tool; works on the rows of its own course."""
 
     fitted = True
+    form_error = FORM_ERROR
 
     def __init__(self, course: Course, knots: int | None = None) -> None:
         """Lay out splines and fit them to the course's readings.

@@ -9,10 +9,11 @@ import numpy as np
 
 from tacdata.discrepancy.candidates import Candidate
 from tacdata.discrepancy.clusters import Lent
+from tacdata.discrepancy.excitation import lookalikes
 from tacdata.discrepancy.fit import clipped_t, gains
 from tacdata.discrepancy.frame import Frame, frame
 from tacdata.discrepancy.judgement import Judgement, Member
-from tacdata.discrepancy.nuisances import calibrated
+from tacdata.discrepancy.nuisances import VIEW, calibrated
 from tacdata.discrepancy.paired import Off, ahead
 from tacdata.discrepancy.problem import Problem, prepare
 from tacdata.discrepancy.refine import Refined, refine
@@ -35,11 +36,8 @@ LIKELIER = 1.0
 """A rival is out by no fewer standard errors, however rare it is [1]."""
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
-MINOR = {False: 0.3, True: 1.0}
-"""A further effect must explain so much of what the others' equations may be off about, in energy [1]; more beside
-a fitted response (True), as what its transducers do to loads is not known either."""
-COARSE = {False: 0.0, True: 0.05}
-"""Least that any equation may be off about for that: sensors without a model often have paths sampled seldom [1]."""
+MINOR = 0.3
+"""A further effect must explain so much of what the others' equations may be off about, in energy [1]."""
 KEPT = 2.8
 """An effect stays in the answer if that is worse by so many standard errors without it [1]."""
 SWAPS = 2
@@ -93,10 +91,10 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         if best is None:
             break
         more = current.loss - best.loss
-        if members and more < MINOR[setting.response.fitted] * off:
+        if members and more < MINOR * off:
             break
-        least = COARSE[setting.response.fitted]
-        off += more * float(np.mean([max(p.effect.form_error, least) ** 2 for p in best.placed[len(members) :]]))
+        added = [p.effect.form_error for p in best.placed[len(members) :]]
+        off += more * float(np.mean(np.square(added)) + setting.response.form_error**2)
         members = list(best.placed)
         # Noise told beside a large missing effect is too large: tell it again.
         same = frame(replace(setting, response=best.response, given=(*setting.given, *best.placed)))
@@ -109,7 +107,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         bare = [Member(p, *_errors(current, k), (), {}, 0.0) for k, p in enumerate(current.placed)]
         return Judgement(
             gap, tested, tuple(bare), Left(0.0, 0.0), nothing.loss - current.loss,
-            (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), until,
+            (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), _views(now), until,
         )  # fmt: skip
     note("rivals and leftovers")
     if members:
@@ -129,7 +127,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     left = leftovers(now)
     return Judgement(
         gap, tested, tuple(found), left, nothing.loss - current.loss,
-        (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now),
+        (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), _views(now),
     )  # fmt: skip
 
 
@@ -162,10 +160,19 @@ def _gains(problem: Problem) -> np.ndarray:
     return np.where(power > TOLD * problem.ridge[:channels], own, np.nan)
 
 
+def _views(problem: Problem) -> np.ndarray:
+    if problem.setting.course.tag is None or VIEW not in problem.setting.nuisance:
+        return np.zeros(2)
+    _, values = fitted(problem, [], np.arange(len(problem.folds)))
+    return values[-2:] * [p.typical for p in load(VIEW).amplitudes]
+
+
 def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:
     """Return sets of effects worth adding: up to three single ones, and the pair that does better than any of them."""
     taken = {p.effect.called for p in (*problem.setting.given, *problem.placed)}
     best = best_shapes(problem)
+    # Two that these presses cannot split are a set, not a pair.
+    taken |= {name for p in problem.placed for name in lookalikes(problem.setting.course, p.effect, p.values)}
     free = [c for c in best.values() if c.called not in taken]
 
     singles = sorted(((_gain(problem, [c]), c) for c in free), key=lambda item: -item[0])[:TOP]
@@ -222,9 +229,9 @@ def _pair(problem: Problem, first: list[Candidate], free: list[Candidate]) -> li
     """
     made = []
     for a in first[:BEAM]:
-        made += [
-            (gain, [a, c]) for gain, c in zip(_beside(problem, a, free), free, strict=True) if c.called != a.called
-        ]
+        alike = (a.called, *lookalikes(problem.setting.course, a.effect, a.shapes))
+        others = [c for c in free if c.called not in alike]
+        made += [(gain, [a, c]) for gain, c in zip(_beside(problem, a, others), others, strict=True)]
     made.sort(key=lambda item: -item[0])
     told = [(float(held_out(problem, pair).sum()), pair) for _, pair in made[:BEAM]]
     if not told:

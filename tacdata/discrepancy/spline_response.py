@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, predict
-from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.discrepancy.fitted_response import FORM_ERROR, FittedResponse
 from tacdata.effects import Placed
 
 SMALL = 0.01
@@ -19,6 +19,7 @@ class SplineResponse(Response):
     """A response whose channels are all alike but for a little of one spline each."""
 
     fitted = True
+    form_error = FORM_ERROR
 
     def __init__(self, response: FittedResponse, weight: float) -> None:
         """Keep the response and the weight of each spline [the source's unit]."""

@@ -7,11 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.chain.memory import play
+from tacdata.chain.memory import dead_band
 from tacdata.effects.effect import Effect, Parameter
-
-STILL = 4.0
-"""A position that moves by less is still, in standard deviations of its noise [1]."""
 
 
 class Backlash(Effect):
@@ -36,7 +33,6 @@ class Backlash(Effect):
         half = 0.5 * float(values["b"])
         if half == 0.0:
             return state
-        # A measured position's noise is taken up by any play: what that would change is no play's doing.
-        pose, still = state.pose.copy(), STILL * state.course.dither
-        pose[:, 2] += play(pose[:, 2], still + half) - play(pose[:, 2], still) + half
+        pose = state.pose.copy()
+        pose[:, 2] += dead_band(pose[:, 2], half, state.course.dither) + half
         return replace(state, pose=pose)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.chain.memory import play
+from tacdata.chain.memory import dead_band
 from tacdata.effects.effect import Effect, Parameter
 
 
@@ -32,7 +32,7 @@ class LateralBacklash(Effect):
             return state
         pose = state.pose.copy()
         for axis in (0, 1):
-            pose[:, axis] = play(pose[:, axis], half)
+            pose[:, axis] += dead_band(pose[:, axis], half, float(state.course.dithers[axis]))
         return replace(state, pose=pose)
 
     def unjudgeable(self, course: Course, response: Response) -> str:

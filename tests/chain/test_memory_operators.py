@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.chain.memory import delayed, low_pass, play, running_max, slipping
+from tacdata.chain.memory import dead_band, delayed, low_pass, play, running_max, slipping
 
 
 @pytest.mark.parametrize("tau", [0.02, 0.3, 5.0, 400.0])
@@ -44,6 +44,18 @@ def test_play_begins_anew_where_it_forgets():
     anew = np.arange(200) % 40 == 25
     expected = np.concatenate([play(part, 0.7) for part in np.split(values, np.flatnonzero(anew))])
     np.testing.assert_array_equal(play(values, 0.7, anew), expected)
+
+
+def test_a_dead_band_leaves_alone_what_a_gauge_adds_to_a_path_that_stands():
+    """Where the path moves, what follows is half the band behind; where it stands, it stands."""
+    rng, noise, width = np.random.default_rng(3), 0.002, 0.001
+    path = np.concatenate([np.linspace(0, 1, 200), np.ones(400), np.linspace(1, 0, 200)])
+    read = path + noise * rng.normal(size=len(path))
+    off = dead_band(read, width, noise)
+    ramps = np.r_[20:200, 620:800]
+    np.testing.assert_allclose(off[ramps], np.where(ramps < 300, -width, width), atol=1e-12)
+    assert np.std(off[200:600]) < 0.1 * width
+    assert np.std(play(read, width)[200:600] - read[200:600]) > 0.5 * width, "what is taken for motion does not"
 
 
 def test_play_of_many_columns_is_that_of_each():

@@ -44,6 +44,7 @@ def test_a_hold_is_told_from_a_path_with_noise():
     held = course(hold=1.5, episodes=8)
     assert held.dither == 0, "a commanded path has none"
     assert measured(held).dither == pytest.approx(6e-4, rel=0.4)
+    assert np.array_equal(measured(held).dithers[:2], [0, 0]), "each axis has its own"
     for made in (held, measured(held)):
         assert longest_hold(made) == pytest.approx(1.5, abs=0.1)
         assert not any("no hold" in words for words in amiss(made))

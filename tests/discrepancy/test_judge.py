@@ -166,3 +166,11 @@ def test_what_is_of_another_unit_or_stuck_is_said():
     readings[made.episode % 3 == 0, 1] = 5000
     assert any("channel 1" in words and "stuck" in words for words in amiss(made.with_readings(readings)))
     assert not any("stuck" in words or "in mm" in words for words in amiss(made))
+
+
+def test_what_one_rate_cannot_split_is_a_set_and_no_pair():
+    effects = (*FEW, "servo_lag")
+    answer = found(effects=effects, rates=(1.0,), play=0.05, delay=0.1)
+    assert decide.status(answer) == "ambiguous" and len(answer.members) == 1
+    assert {"latency", "backlash"} <= {answer.members[0].placed.effect.called, *decide.members(answer)[0].rivals}
+    assert names(found(effects=effects, play=0.05, delay=0.1)) == {"latency", "backlash"}, "two rates split them"

@@ -54,3 +54,31 @@ def test_compliance_that_a_gauge_sees_is_named_whatever_power_of_load_is_read(po
     (member,) = answer.members
     assert member.placed.effect.called == "frame_compliance"
     assert float(member.placed.values["c"]) == pytest.approx(0.05, rel=0.1)
+
+
+@pytest.mark.parametrize("scale", [0.004, 0.06])
+def test_a_gauges_scale_is_known_so_well_and_no_better(scale):
+    """What calibrating a gauge leaves is no error of the drive; what is far more is one of the two's."""
+    made = gauged(0.0)
+    seen = made.tag.copy()
+    seen[:, 2] += scale * made.tip[:, 2]
+    effects = [load(name) for name in ("travel_scale", "screw_error", "view_scale")]
+    answer = judge(Setting(replace(made, tag=seen), FittedResponse(made), effects))
+    if scale < 0.005:
+        assert decide.status(answer) == "none"
+        return
+    assert decide.status(answer) == "ambiguous"
+    (member,) = decide.members(answer)
+    assert member.placed.effect.called == "view_scale"
+    assert member.rivals == ("travel_scale",)
+    assert float(member.placed.values["s"]) == pytest.approx(scale, rel=0.05)
+
+
+def test_compliance_is_named_beside_a_gauge_of_slightly_wrong_scale():
+    made = gauged(0.05)
+    seen = made.tag.copy()
+    seen[:, 2] *= 1.004
+    effects = ("carriage_compliance", "carriage_compliance_read", "travel_scale", "screw_error", "backlash", "latency")
+    answer = judge(Setting(replace(made, tag=seen), FittedResponse(made), [load(name) for name in effects]))
+    assert decide.status(answer) == "named"
+    assert [m.placed.effect.called for m in decide.members(answer)] == ["frame_compliance"]

@@ -103,7 +103,7 @@ def test_it_moves_what_it_says_and_nothing_else(effect):
         return not np.allclose(getattr(after, stream), getattr(before, stream), atol=1e-9)
 
     if effect.name != "lateral_backlash":  # a course at rest sideways does not excite it within its dead band
-        assert moved("signal")
+        assert moved("signal") == ("signal" in effect.moves)
     assert moved("tag") == ("tag" in effect.moves and effect.seen_by_tag)
     if "force" not in effect.moves and effect.stage != "kinematics":
         assert not moved("force")

@@ -1,0 +1,38 @@
+"""Wrong scale of a second observation of the tip."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import Course, Response, State
+from tacdata.effects.effect import Effect, Parameter
+
+
+class ViewScale(Effect):
+    """Wrong scale of a second observation of the tip."""
+
+    title = "Wrong scale of the camera, or the gauge, that sees the tip"
+    catalogue = ("K19",)
+    stage = "view"
+    moves = ("tag",)
+    group = "amplitude"
+    equation = "what is seen of (x, y, d) is ((1 + a) x, (1 + a) y, (1 + s) d)"
+    source = "standard form"
+    experiment = "a gauge block, or a second camera: the readings do not follow what one of two observers sees wrong"
+    form_error = 0.02
+    seen_by_tag = True
+    parameters = (
+        Parameter("s", "1", "relative error of the depth seen", 0.01, -0.3, 0.3),
+        Parameter("a", "1", "relative error of places seen", 0.01, -0.3, 0.3),
+    )
+
+    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+        """Return the state after it."""
+        aside, depth = 1 + float(values["a"]), 1 + float(values["s"])
+        return replace(state, view=state.view * np.array([aside, aside, depth]))
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        """Return why such recordings cannot tell of it; empty if they may."""
+        return "" if course.tag is not None else "nothing but the command says where the tip is"
