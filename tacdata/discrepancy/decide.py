@@ -96,17 +96,17 @@ def calibrated(found: Judgement) -> list[Member]:
 
 def _viewed(found: Judgement) -> list[Member]:
     """Return a second observation's scale, or the drive's, that is beyond what calibration leaves open."""
-    if not np.any(found.views):
+    if not found.view:
         return []
     prior = found.problem.setting.nuisance[VIEW]
-    far = float(np.abs(found.views).max()) / prior
+    far = abs(found.view) / prior
     if far <= BEYOND:
         return []
-    placed = Placed(load(VIEW), {"s": np.array(found.views[0]), "a": np.array(found.views[1])})
+    placed = Placed(load(VIEW), {"s": np.array(found.view)})
     there = {m.placed.effect.called for m in found.members}
     # Whether the drive or its observer is wrong is not for either of them to say.
     rivals = tuple({TRAVEL} - there)
-    return [Member(placed, {"s": prior, "a": prior}, (), rivals, {}, far, needed=BEYOND)]
+    return [Member(placed, {"s": prior}, (), rivals, {}, far, needed=BEYOND)]
 
 
 def loudness(found: Judgement) -> float:

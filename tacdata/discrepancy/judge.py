@@ -107,7 +107,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         bare = [Member(p, *_errors(current, k), (), {}, 0.0) for k, p in enumerate(current.placed)]
         return Judgement(
             gap, tested, tuple(bare), Left(0.0, 0.0), nothing.loss - current.loss,
-            (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), _views(now), until,
+            (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), _view(now), until,
         )  # fmt: skip
     note("rivals and leftovers")
     if members:
@@ -127,7 +127,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     left = leftovers(now)
     return Judgement(
         gap, tested, tuple(found), left, nothing.loss - current.loss,
-        (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), _views(now),
+        (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), _view(now),
     )  # fmt: skip
 
 
@@ -160,11 +160,11 @@ def _gains(problem: Problem) -> np.ndarray:
     return np.where(power > TOLD * problem.ridge[:channels], own, np.nan)
 
 
-def _views(problem: Problem) -> np.ndarray:
+def _view(problem: Problem) -> float:
     if problem.setting.course.tag is None or VIEW not in problem.setting.nuisance:
-        return np.zeros(2)
+        return 0.0
     _, values = fitted(problem, [], np.arange(len(problem.folds)))
-    return values[-2:] * [p.typical for p in load(VIEW).amplitudes]
+    return float(values[-1]) * load(VIEW).amplitudes[0].typical
 
 
 def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:

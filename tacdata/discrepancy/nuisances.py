@@ -34,7 +34,7 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
     """Return the nuisances' columns (n, streams, k) and the weights of their priors (k,).
 
     Gains of channels, then what is known of each without load, unless the response is fitted; what recordings of
-    several strokes are off one another; the scales of a second observation, last.
+    several strokes are off one another; the scale of a second observation, last.
     """
     parts = [set_ups(setting, placed), _calibration(VIEW, setting, placed)]
     if calibrated(setting):

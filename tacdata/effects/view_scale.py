@@ -18,20 +18,16 @@ class ViewScale(Effect):
     stage = "view"
     moves = ("tag",)
     group = "amplitude"
-    equation = "what is seen of (x, y, d) is ((1 + a) x, (1 + a) y, (1 + s) d)"
+    equation = "what is seen of (x, y, d) is (1 + s) (x, y, d)"
     source = "standard form"
     experiment = "a gauge block, or a second camera: the readings do not follow what one of two observers sees wrong"
     form_error = 0.02
     seen_by_tag = True
-    parameters = (
-        Parameter("s", "1", "relative error of the depth seen", 0.01, -0.3, 0.3),
-        Parameter("a", "1", "relative error of places seen", 0.01, -0.3, 0.3),
-    )
+    parameters = (Parameter("s", "1", "relative error of lengths seen", 0.01, -0.3, 0.3),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
-        aside, depth = 1 + float(values["a"]), 1 + float(values["s"])
-        return replace(state, view=state.view * np.array([aside, aside, depth]))
+        return replace(state, view=state.view * (1 + values["s"]))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         """Return why such recordings cannot tell of it; empty if they may."""

@@ -53,7 +53,9 @@ def build_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
 def mesh_key(sensor: Sensor, settings: MeshSettings) -> str:
     """Return the name under which a mesh is kept: a hash of what it is made from (32 hex digits)."""
     centers = sensor.taxels.centers.tolist() if sensor.skin.protrusion_radius else []
-    wanted = {name: value for name, value in asdict(settings).items() if name != "tip" or value is not None}
+    wanted = asdict(settings)
+    if settings.tip is None or not sensor.skin.protrusion_radius:
+        wanted.pop("tip")
     made_from = {"recipe": RECIPE, "skin": sensor.skin.identity, "protrusions": centers, "settings": wanted}
     return provenance.content_hash(made_from)[:32]
 

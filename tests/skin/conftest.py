@@ -54,4 +54,4 @@ def fine_slab():
 @pytest.fixture(scope="session")
 def bumps():
     """Four protrusions on a board."""
-    return SkinModel(bumps_sensor(), _settings(outer=0.9, interior=1.5, protrusion=1.0))
+    return SkinModel(bumps_sensor(), _settings(outer=0.9, interior=1.5, protrusion=1.0, tip=None))

@@ -76,6 +76,6 @@ def test_presses_on_a_slab_agree(as_on_a_card):
 
 def test_presses_on_protrusions_agree(as_on_a_card):
     sensor = bumps_sensor()
-    mesh = build_mesh(sensor, MeshSettings(outer=0.9, interior=1.5, protrusion=1.0))
+    mesh = build_mesh(sensor, MeshSettings(outer=0.9, interior=1.5, protrusion=1.0, tip=None))
     requests = [PressRequest(Sphere(2.0), x, 0.45, 0.0, (0.2, 0.4)) for x in (0.5, -0.3)]
     both_ways_agree(sensor, mesh, requests, as_on_a_card)

@@ -61,7 +61,7 @@ def test_presses_on_a_slab_agree():
 
 
 def test_presses_on_protrusions_agree():
-    settings = replace(PLAIN, mesh=MeshSettings(outer=0.9, interior=1.5, protrusion=1.0))
+    settings = replace(PLAIN, mesh=MeshSettings(outer=0.9, interior=1.5, protrusion=1.0, tip=None))
     cpu, card = pair(bumps_sensor(), settings)
     request = PressRequest(Sphere(2.0), 0.5, 0.45, 0.0, (0.2, 0.4, 0.2))
     ours, theirs = card.solve(request), cpu.solve(request)

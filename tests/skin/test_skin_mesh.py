@@ -137,7 +137,7 @@ def test_a_skin_whose_faces_collapse_is_refused_with_its_volume():
 
 
 def test_protrusions_finer_than_their_rings_are_meshed_without_slivers():
-    mesh = make_mesh(bumps_sensor(), MeshSettings(outer=0.9, interior=1.2, protrusion=0.35))
+    mesh = make_mesh(bumps_sensor(), MeshSettings(outer=0.9, interior=1.2, protrusion=0.35, tip=None))
     assert quality(mesh).worst_ratio > 0.01
     assert np.bincount(mesh.protrusion_taxel).min() > 10
     _, weights = mesh.shape_gradients()

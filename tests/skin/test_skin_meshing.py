@@ -16,7 +16,7 @@ from tacdata.skin.mesher import MeshSettings, make_mesh, mesh_key
 from tacdata.skin.meshing.protrusion import Protrusion
 from tacdata.skin.meshing.true_volume import true_volume, volume_error
 
-COARSE = MeshSettings(outer=0.9, interior=1.5, protrusion=1.0)
+COARSE = MeshSettings(outer=0.9, interior=1.5, protrusion=1.0, tip=None)
 
 
 def skin_of(sensor, **changes):

@@ -1,6 +1,8 @@
 """The model against another code's solutions of the same presses (folder given by TACDATA_REFERENCE).
 
-The bars asserted are what the default mesh reaches; the figures are printed, so that the gap to the aim can be read.
+Aim: force 1 %, the field 0.5 % of the depth rms over the top and 1.5 % in the contact (2.5 % at 0.25 mm), each protrusion
+5 % of the largest. The sensor's mesh ships, and is held to it. The slab's is made anew at every run: its force scatters by
+1 % where the sphere touches a few elements alone. The figures are printed.
 """
 
 import json
@@ -76,19 +78,21 @@ def force_of(document, depth):
     return {"total": result["force_N"], "protrusions": protrusions}
 
 
-def test_a_sphere_on_a_slab():
-    """Aim: force 1 %, top 0.5 %, contact 1.5 % (2.5 % at 0.25 mm)."""
-    rows = compare("A1", SLAB, PressRequest(Sphere(4.0), 0.0, 0.0, 0.0, DEPTHS))
-    assert max(abs(row["force"]) for row in rows) < 4.0
-    assert max(abs(row["force"]) for row in rows[1:]) < 2.5
+def fields_agree(rows):
     assert max(row["top"] for row in rows) < 0.5
-    assert max(row["contact"] for row in rows) < 1.6
+    assert rows[0]["contact"] < 2.5
+    assert max(row["contact"] for row in rows[1:]) < 1.5
+
+
+def test_a_sphere_on_a_slab():
+    rows = compare("A1", SLAB, PressRequest(Sphere(4.0), 0.0, 0.0, 0.0, DEPTHS))
+    assert abs(rows[0]["force"]) < 2.5
+    assert max(abs(row["force"]) for row in rows[1:]) < 1.5
+    fields_agree(rows)
 
 
 def test_a_sphere_above_a_protrusion():
-    """Aim: as on the slab, and every protrusion within 5 % of the largest."""
     rows = compare("B2", BUMPS, PressRequest(Sphere(4.0), 0.95, 1.25, 0.0, DEPTHS))
-    assert max(abs(row["force"]) for row in rows) < 8.0
-    assert max(row["top"] for row in rows) < 1.2
-    assert max(row["contact"] for row in rows) < 1.6
-    assert max(row["protrusion"] for row in rows[1:]) < 16.0
+    assert max(abs(row["force"]) for row in rows) < 1.0
+    assert max(row["protrusion"] for row in rows) < 5.0
+    fields_agree(rows)
