@@ -34,7 +34,7 @@ STIFF = 1e9
 """Largest weight of bending [1]."""
 KEPT = 3
 """Answers remembered: most effects leave the pose alone."""
-FORM_ERROR = 0.12
+FORM_ERROR = 0.15
 """What it does not know of an effect: transducers that are not linear in load, paths that are sampled seldom [1]."""
 
 

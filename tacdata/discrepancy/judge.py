@@ -93,8 +93,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         more = current.loss - best.loss
         if members and more < MINOR * off:
             break
-        added = [p.effect.form_error for p in best.placed[len(members) :]]
-        off += more * float(np.mean(np.square(added)) + setting.response.form_error**2)
+        off += more * _off(best, len(members))
         members = list(best.placed)
         # Noise told beside a large missing effect is too large: tell it again.
         same = frame(replace(setting, response=best.response, given=(*setting.given, *best.placed)))
@@ -165,6 +164,17 @@ def _view(problem: Problem) -> float:
         return 0.0
     _, values = fitted(problem, [], np.arange(len(problem.folds)))
     return float(values[-1]) * load(VIEW).amplitudes[0].typical
+
+
+def _off(model: Refined, before: int) -> float:
+    """Return the share of what a model's effects explain that their equations may be off about, in energy [1].
+
+    Args:
+        model: With the effects.
+        before: How many of the first do not count.
+    """
+    added = [p.effect.form_error for p in model.placed[before:]]
+    return float(np.mean(np.square(added)) + model.response.form_error**2)
 
 
 def _next(problem: Problem, tested: Tested) -> list[list[Candidate]]:
@@ -255,9 +265,23 @@ def _race(
             at += len(candidate.columns)
         tried.append(refine(problem.setting, [*problem.placed, *first], problem.frame))
     tried.sort(key=_cost)
-    if not tried or _needed(problem.setting, tried[0], current, problem.frame, lent) < KEPT:
+    if not tried:
         return None, tried
-    return tried[0], tried[1:]
+    for chosen in (_without_minor(tried, current), tried[0]):
+        if _needed(problem.setting, chosen, current, problem.frame, lent) >= KEPT:
+            return chosen, [other for other in tried if other is not chosen]
+    return None, tried
+
+
+def _without_minor(tried: list[Refined], current: Refined) -> Refined:
+    """Return the best of what was tried, or the best with one effect less if what the last adds is its equation's."""
+    best = tried[0]
+    fewer = [other for other in tried if len(other.placed) < len(best.placed)]
+    if not fewer:
+        return best
+    explained = current.loss - fewer[0].loss
+    more = fewer[0].loss - best.loss
+    return fewer[0] if more < MINOR * explained * _off(fewer[0], len(current.placed)) else best
 
 
 def _members(

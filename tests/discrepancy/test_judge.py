@@ -11,7 +11,7 @@ from tacdata import documents
 from tacdata.discrepancy import decide, verdict
 from tacdata.discrepancy.amiss import amiss
 from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.judge import judge, out
+from tacdata.discrepancy.judge import _without_minor, judge, out
 from tacdata.discrepancy.judgement import Member
 from tacdata.discrepancy.located import residual, slices
 from tacdata.discrepancy.setting import Setting
@@ -174,3 +174,17 @@ def test_what_one_rate_cannot_split_is_a_set_and_no_pair():
     assert decide.status(answer) == "ambiguous" and len(answer.members) == 1
     assert {"latency", "backlash"} <= {answer.members[0].placed.effect.called, *decide.members(answer)[0].rivals}
     assert names(found(effects=effects, play=0.05, delay=0.1)) == {"latency", "backlash"}, "two rates split them"
+
+
+def test_a_pairs_second_effect_is_held_to_what_the_firsts_equation_may_be_off_about():
+    """A law of a material may be off by 10 %, what a fitted response makes of it by 15: 1 % of the energy says nothing."""
+
+    def refined(loss, *effects):
+        made = SimpleNamespace(effect=load("relaxation"))
+        return SimpleNamespace(loss=loss, placed=[made] * len(effects), response=SimpleNamespace(form_error=0.15))
+
+    nothing, alone = refined(1000.0), refined(500.0, "first")
+    slight, sound = refined(496.0, "first", "second"), refined(490.0, "first", "second")
+    assert _without_minor([slight, alone], nothing) is alone
+    assert _without_minor([sound, alone], nothing) is sound
+    assert _without_minor([alone], nothing) is alone
