@@ -22,7 +22,7 @@ from tacdata.skin.mesher import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 
-RUNGS = (MeshSettings(outer=0.8), MeshSettings(), MeshSettings(outer=0.5, interior=1.2))
+RUNGS = (MeshSettings(outer=0.8, tip=0.24), MeshSettings(), MeshSettings(outer=0.45, interior=1.8, tip=0.13))
 DEPTHS = (0.25, 0.5, 0.75, 1.0)
 WIDTHS = (7, 8, 9, 7, 5, 7, 29, 29)
 

@@ -177,7 +177,7 @@ def test_what_one_rate_cannot_split_is_a_set_and_no_pair():
 
 
 def test_a_pairs_second_effect_is_held_to_what_the_firsts_equation_may_be_off_about():
-    """A law of a material may be off by 10 %, what a fitted response makes of it by 15: 1 % of the energy says nothing."""
+    """A law may be off by 10 %, what a fitted response makes of it by 15: 1 % of the energy says nothing."""
 
     def refined(loss, *effects):
         made = SimpleNamespace(effect=load("relaxation"))

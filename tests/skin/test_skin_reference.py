@@ -1,8 +1,8 @@
 """The model against another code's solutions of the same presses (folder given by TACDATA_REFERENCE).
 
-Aim: force 1 %, the field 0.5 % of the depth rms over the top and 1.5 % in the contact (2.5 % at 0.25 mm), each protrusion
-5 % of the largest. The sensor's mesh ships, and is held to it. The slab's is made anew at every run: its force scatters by
-1 % where the sphere touches a few elements alone. The figures are printed.
+Aim: force 1 %, the field 0.5 % of the depth rms over the top and 1.5 % in the contact (2.5 % at 0.25 mm), each
+protrusion 5 % of the largest. The sensor's mesh ships, and is held to it. The slab's is made anew at every run: its
+force scatters by 1 % where the sphere touches a few elements alone. The figures are printed.
 """
 
 import json

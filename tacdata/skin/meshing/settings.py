@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class MeshSettings:
     """Target edge lengths [mm].
 
-    The default ones meet, with some 13,800 nodes, what independent solutions differ by: force 1 %, each protrusion 5 % of the
-    largest (`tests/skin/test_skin_reference.py`; decision 0014).
+    The default ones meet, with some 13,800 nodes, what independent solutions differ by: force 1 %, each protrusion 5 %
+    of the largest (`tests/skin/test_skin_reference.py`; decision 0014).
     """
 
     outer: float = 0.6
