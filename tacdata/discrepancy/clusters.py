@@ -26,8 +26,11 @@ ALIKE = 1.64
 LEVERAGE = 0.6
 """A candidate of which one stretch holds a larger share of all information is not judged [1]."""
 FLOOR = 1e-300
-LENT = 1.0
+LENT = 0.5
 """Most degrees of freedom that effects lend each other, of their number: many look alike [1]."""
+LEAST = 1.0
+"""Least excess that is lent: nothing scatters less than the noise makes, but by chance, or as noise was told too large
+[1]."""
 UNLIKE = 0.05
 """One that scatters more than so many of its kind would by chance is lent the less, the fewer would [1]."""
 LENDERS = 5
@@ -114,7 +117,7 @@ def lent(effects: dict[str, list[Clustered]]) -> Lent | None:
     middle = float(np.median(log))
     spread = float(1.4826 * np.median(np.abs(log - middle))) ** 2 - float(np.mean(polygamma(1, half)))
     freedom = min(2 * _trigamma_inverse(spread), LENT * len(told)) if spread > 0 else LENT * len(told)
-    return Lent(float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2))), freedom)
+    return Lent(max(float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2))), LEAST), freedom)
 
 
 def of_kinds(others: Lent | None, clock: Lent | None) -> dict[bool, Lent | None]:

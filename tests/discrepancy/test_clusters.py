@@ -62,3 +62,17 @@ def test_one_that_scatters_far_more_than_its_kind_is_lent_little():
     assert wild.score(given) == pytest.approx(wild.score(), abs=0.05), "8 of 12 degrees of freedom beside 1 of 40"
     like = Clustered(np.array([8.0]), own / np.sqrt(6), np.arange(13), (1.0, 12.0), 1.0)
     assert like.score(given) > like.score() + 0.5
+
+
+def test_noise_told_too_large_is_not_lent_as_quiet():
+    """Most effects scatter as half the noise would; the one that scatters as the noise does is no discovery for it."""
+    rng = np.random.default_rng(6)
+    alarms, worlds = 0, 400
+    for _ in range(worlds):
+        quiet = {}
+        for k in range(20):
+            gram = gram_of(rng, 18, False)
+            gram[:, 0, 1] = gram[:, 1, 0] = 0.7 * gram[:, 0, 1]
+            quiet[str(k)] = [clustered(gram, np.array([0]))]
+        alarms += clustered(gram_of(rng, 18, False), np.array([0])).score(lent(quiet)) > 2.326
+    assert alarms < 1.6 * 0.01 * worlds
