@@ -139,7 +139,7 @@ def _unjudgeable(effect: Effect, course: Course, response: Response) -> str:
 
 def _absorbed(effect: Effect, nuisance: Sequence[str]) -> str:
     """Return why an effect is not tried by itself: what calibration takes up cannot be tested beside it."""
-    return "read off what calibration leaves open" if effect.name in nuisance else ""
+    return "read off the calibration of each channel's gain" if effect.name in nuisance else ""
 
 
 def _unlike(first: list[np.ndarray], second: list[np.ndarray]) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 from tacdata.discrepancy.excitation import lookalikes
 from tacdata.discrepancy.judge import DECOYS, GATE
 from tacdata.discrepancy.judgement import Judgement, Member
-from tacdata.discrepancy.nuisances import VIEW
 from tacdata.effects import Placed, load
 
 LEFT = 0.05
@@ -32,8 +31,10 @@ WIDE = 2.0
 """Gains scatter more than calibration leaves open beyond so many of its standard deviations [1]."""
 RARE = 0.003
 """What so few decoys do as well as is needed, whatever the two models' own episodes make of it [1]."""
-TRAVEL = "travel_scale"
-"""What the scale of a second observation cannot be told from."""
+VIEW, SCALES = "view_scale", ("view_scale", "travel_scale")
+"""Scale of a second observation; what it cannot be told from where nothing else follows the tip."""
+CALIBRATED = 0.005
+"""Standard deviation of that scale: what calibrating a camera or a gauge leaves [1]."""
 COMMON = ("modulus", "thickness")
 """What a common gain cannot be told from without a force reading."""
 
@@ -59,7 +60,7 @@ def members(found: Judgement) -> list[Member]:
         effect = m.placed.effect
         more = [*m.rivals, *lookalikes(course, effect, m.placed.values), *_hidden(found, m)]
         own.append(replace(m, rivals=tuple(name for name in dict.fromkeys(more) if name != effect.called)))
-    return [*own, *calibrated(found), *_viewed(found)]
+    return [*(m for m in own if not _of_calibration(m)), *calibrated(found)]
 
 
 def _hidden(found: Judgement, member: Member) -> list[str]:
@@ -94,19 +95,13 @@ def calibrated(found: Judgement) -> list[Member]:
     return made
 
 
-def _viewed(found: Judgement) -> list[Member]:
-    """Return a second observation's scale, or the drive's, that is beyond what calibration leaves open."""
-    if not found.view:
-        return []
-    prior = found.problem.setting.nuisance[VIEW]
-    far = abs(found.view) / prior
-    if far <= BEYOND:
-        return []
-    placed = Placed(load(VIEW), {"s": np.array(found.view)})
-    there = {m.placed.effect.called for m in found.members}
-    # Whether the drive or its observer is wrong is not for either of them to say.
-    rivals = tuple({TRAVEL} - there)
-    return [Member(placed, {"s": prior}, (), rivals, {}, far, needed=BEYOND)]
+def _of_calibration(member: Member) -> bool:
+    """Return whether a drive and its observer disagree by no more than calibrating the observer leaves open."""
+    placed = member.placed
+    called = {placed.effect.called, *member.rivals}
+    if VIEW not in called or placed.effect.called not in SCALES:
+        return False
+    return all(abs(float(value)) <= BEYOND * CALIBRATED for value in placed.values.values())
 
 
 def loudness(found: Judgement) -> float:

@@ -12,7 +12,7 @@ from tacdata.discrepancy.clusters import Lent
 from tacdata.discrepancy.fit import clipped_t, gains
 from tacdata.discrepancy.frame import Frame, frame
 from tacdata.discrepancy.judgement import Judgement, Member
-from tacdata.discrepancy.nuisances import VIEW, calibrated
+from tacdata.discrepancy.nuisances import calibrated
 from tacdata.discrepancy.paired import Off, ahead
 from tacdata.discrepancy.problem import Problem, prepare
 from tacdata.discrepancy.refine import Refined, refine
@@ -95,7 +95,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         bare = [Member(p, *_errors(current, k), (), {}, 0.0) for k, p in enumerate(current.placed)]
         return Judgement(
             gap, tested, tuple(bare), Left(0.0, 0.0), nothing.loss - current.loss,
-            (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), _view(now), until,
+            (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), until,
         )  # fmt: skip
     note("rivals and leftovers")
     if members:
@@ -115,7 +115,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     left = leftovers(now)
     return Judgement(
         gap, tested, tuple(found), left, nothing.loss - current.loss,
-        (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now), _view(now),
+        (nothing.energy, current.energy), problem.evidence.rows, problem, now, _gains(now),
     )  # fmt: skip
 
 
@@ -146,13 +146,6 @@ def _gains(problem: Problem) -> np.ndarray:
     own = values[first : first + channels] * unit
     power = np.diag(problem.evidence.of(np.arange(len(problem.folds))))[problem.nuisances[:channels] + 1]
     return np.where(power > TOLD * problem.ridge[:channels], own, np.nan)
-
-
-def _view(problem: Problem) -> float:
-    if problem.setting.course.tag is None or VIEW not in problem.setting.nuisance:
-        return 0.0
-    _, values = fitted(problem, [], np.arange(len(problem.folds)))
-    return float(values[-1]) * load(VIEW).amplitudes[0].typical
 
 
 def _off(model: Refined, before: int) -> float:

@@ -65,8 +65,6 @@ class Judgement:
     gains: np.ndarray
     """Gain of each channel beyond the response's, as calibration finds it [1], shape (channels,); 0 if fitted, NaN for
     channels that these presses do not stir."""
-    view: float
-    """Scale of a second observation beyond 1, as calibration finds it [1]; 0 where there is none."""
     until: str = "decide"
     """The last step that was made, one of `tacdata.discrepancy.judge.STEPS`."""
 

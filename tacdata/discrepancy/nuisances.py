@@ -26,43 +26,30 @@ SET_UP = 2.0
 FEW = 24
 """In more recordings than so many a set-up's errors are left to their strokes' own [1]."""
 
-GAINS, VIEW = "channel_gain", "view_scale"
-"""What calibration leaves open: of channels, and of a second observation of the tip."""
-
 
 def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
     """Return the nuisances' columns (n, streams, k) and the weights of their priors (k,).
 
-    Gains of channels, then what is known of each without load, unless the response is fitted; what recordings of
-    several strokes are off one another; the scale of a second observation, last.
+    Calibration's (a gain of each channel, then what is known of each without load) unless the response is fitted; then
+    what recordings of several strokes are off one another.
     """
-    parts = [set_ups(setting, placed), _calibration(VIEW, setting, placed)]
-    if calibrated(setting):
-        parts = [_calibration(GAINS, setting, placed), _idle(setting, placed), *parts]
-    return np.concatenate([p[0] for p in parts], axis=2), np.concatenate([p[1] for p in parts])
-
-
-def _calibration(name: str, setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
-    """Return an effect's columns (n, streams, k), and weights (k,), for what calibration leaves open of it."""
-    effects = [load(name)] if name in setting.nuisance else []
-    board = build(setting.course, setting.response, placed, effects)
+    course, response = setting.course, setting.response
+    if response.fitted:
+        return set_ups(setting, placed)
+    effects = [load(name) for name in setting.nuisance]
+    board = build(course, response, placed, effects)
+    idle = np.zeros((len(course.read), board.values.shape[1], course.channels), dtype=np.float32)
+    rise = Streams.of(course).rise(predict(course, response, placed), response)[:, : course.channels]
+    idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * float(np.abs(rise).max())
     weights = [
-        (p.typical / setting.nuisance[name]) ** 2
+        (p.typical / setting.nuisance[c.effect.name]) ** 2
         for c in board.candidates
         for p in c.effect.amplitudes
         for _ in range(len(c.columns) // len(c.effect.amplitudes))
     ]
-    return board.values[:, :, 1:], np.array(weights)
-
-
-def _idle(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
-    """Return what is known of each channel without load (n, streams, channels), and weights (channels,)."""
-    course, response = setting.course, setting.response
-    streams = Streams.of(course)
-    idle = np.zeros((len(course.read), streams.count, course.channels), dtype=np.float32)
-    rise = streams.rise(predict(course, response, placed), response)[:, : course.channels]
-    idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * float(np.abs(rise).max())
-    return idle, np.ones(course.channels)
+    own, ridge = set_ups(setting, placed)
+    columns = np.concatenate([board.values[:, :, 1:], idle, own], axis=2)
+    return columns, np.array([*weights, *np.ones(course.channels), *ridge])
 
 
 def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +69,7 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
 
 def calibrated(setting: Setting) -> bool:
     """Return whether the first nuisances are gains of channels, and then what is known of them without load."""
-    return not setting.response.fitted and GAINS in setting.nuisance
+    return not setting.response.fitted and "channel_gain" in setting.nuisance
 
 
 def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:

@@ -12,7 +12,6 @@ from tacdata.discrepancy.candidates import Board, Candidate, build
 from tacdata.discrepancy.evidence import Evidence
 from tacdata.discrepancy.forms import forms
 from tacdata.discrepancy.frame import Frame
-from tacdata.discrepancy.nuisances import VIEW
 from tacdata.discrepancy.setting import Setting
 from tacdata.discrepancy.streams import Streams
 from tacdata.discrepancy.tangent import Tangent, tangents
@@ -80,7 +79,7 @@ def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Pr
     course, response = setting.course, setting.response
     # A force reading tells a stiffer skin from a larger gain: then only the gain is left to calibration.
     common = AMPLITUDES[:1] if course.force is not None else AMPLITUDES
-    taken = (VIEW,) if response.fitted else (*setting.nuisance, *common)
+    taken = () if response.fitted else (*setting.nuisance, *common)
     board = build(course, response, [*setting.given, *placed], setting.effects, taken)
     moving = tangents(course, response, placed, setting.given)
     off = forms(course, response, placed, setting.given)

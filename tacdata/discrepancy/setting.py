@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from tacdata.chain import Course, Response
 from tacdata.effects import Effect, Placed
 
-NUISANCE = {"channel_gain": 0.05, "view_scale": 0.005}
-"""What calibration leaves open: standard deviations in the effects' own units. Gains count where the response was not
-fitted, a view's scale where there is one."""
+NUISANCE = {"channel_gain": 0.05}
+"""What calibration leaves open of a response that was not fitted: standard deviations in the effects' own units."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class Setting:
     effects: Sequence[Effect]
     """The library."""
     nuisance: dict[str, float] = field(default_factory=lambda: dict(NUISANCE))
-    """Effect -> prior standard deviation."""
+    """Effect -> prior standard deviation, for a response that is not fitted."""
     given: tuple[Placed, ...] = ()
     """Effects that the model has already, with their numbers fixed."""
     decoys: bool = True

@@ -35,7 +35,7 @@ class Spec:
     @property
     def nuisance(self) -> dict[str, float]:
         """Effect -> how well calibration knows it."""
-        return {**NUISANCE, **self.document.get("nuisance", {})}
+        return dict(self.document.get("nuisance", NUISANCE))
 
     def effects(self) -> tuple[Placed, ...]:
         """Return the effects that the model has.
