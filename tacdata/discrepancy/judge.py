@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from tacdata.chain import Response
 from tacdata.discrepancy.candidates import Candidate
 from tacdata.discrepancy.clusters import Lent
 from tacdata.discrepancy.fit import clipped_t, gains
+from tacdata.discrepancy.forms import SPREAD
 from tacdata.discrepancy.frame import Frame, frame
 from tacdata.discrepancy.judgement import Judgement, Member
 from tacdata.discrepancy.nuisances import calibrated
@@ -69,7 +71,8 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
     tested = test(problem)
     gap = bool(min(tested.p.min(initial=1.0), tested.p_generic) <= GATE)
     nothing = refine(setting, [], problem.frame)
-    now, current, members, off = problem, nothing, [], 0.0
+    now, current, members = problem, nothing, []
+    explained: list[tuple[Effect, float]] = []
     verdicts, beaten = tested, _beaten(problem, tested, {})
     while gap and len(members) < MOST and until not in STEPS[:2]:
         chosen = shortlist(now, verdicts)
@@ -80,9 +83,10 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
         if best is None:
             break
         more = current.loss - best.loss
-        if members and more < MINOR * off:
+        added = _added(best, len(members), more)
+        if members and more < MINOR * _off(explained, [effect for effect, _ in added], best.response):
             break
-        off += more * _off(best, len(members))
+        explained += added
         members = list(best.placed)
         # Noise told beside a large missing effect is too large: tell it again.
         same = frame(replace(setting, response=best.response, given=(*setting.given, *best.placed)))
@@ -148,15 +152,31 @@ def _gains(problem: Problem) -> np.ndarray:
     return np.where(power > TOLD * problem.ridge[:channels], own, np.nan)
 
 
-def _off(model: Refined, before: int) -> float:
-    """Return the share of what a model's effects explain that their equations may be off about, in energy [1].
+def _off(explained: list[tuple[Effect, float]], further: list[Effect], response: Response) -> float:
+    """Return how much their equations may be off about of what effects explain, as far as further ones take it [nats].
+
+    An effect of the same ambiguity group looks like another form of what is there, and takes more of it.
 
     Args:
-        model: With the effects.
-        before: How many of the first do not count.
+        explained: Effects, each with what it explains [nats].
+        further: Those that would be added.
+        response: Of which not everything is known, either.
     """
-    added = [p.effect.form_error for p in model.placed[before:]]
-    return float(np.mean(np.square(added)) + model.response.form_error**2)
+
+    def off(one: Effect) -> float:
+        kin = [SPREAD if effect.group == one.group else 1.0 for effect, _ in explained]
+        return sum(
+            much * ((wide * effect.form_error) ** 2 + response.form_error**2)
+            for wide, (effect, much) in zip(kin, explained, strict=True)
+        )
+
+    return min(off(one) for one in further)
+
+
+def _added(model: Refined, before: int, more: float) -> list[tuple[Effect, float]]:
+    """Return a model's effects but the first few, each with its share of what they explain together [nats]."""
+    added = [p.effect for p in model.placed[before:]]
+    return [(effect, more / len(added)) for effect in added]
 
 
 def _race(
@@ -188,9 +208,11 @@ def _without_minor(tried: list[Refined], current: Refined) -> Refined:
     fewer = [other for other in tried if len(other.placed) < len(best.placed)]
     if not fewer:
         return best
-    explained = current.loss - fewer[0].loss
-    more = fewer[0].loss - best.loss
-    return fewer[0] if more < MINOR * explained * _off(fewer[0], len(current.placed)) else best
+    explained = _added(fewer[0], len(current.placed), current.loss - fewer[0].loss)
+    there = [p.effect.name for p in fewer[0].placed]
+    further = [p.effect for p in best.placed if p.effect.name not in there]
+    minor = MINOR * _off(explained, further or [p.effect for p in best.placed[-1:]], best.response)
+    return fewer[0] if fewer[0].loss - best.loss < minor else best
 
 
 def _members(
