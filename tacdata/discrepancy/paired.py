@@ -31,6 +31,8 @@ from tacdata.discrepancy.refine import Refined
 from tacdata.discrepancy.search import follows_clock
 from tacdata.discrepancy.setting import Setting
 
+MOST = 3.0
+"""No equation is off by more than so many of its standard deviations, however much they would explain [1]."""
 TINY = 1e-6
 """Models that differ by less, over all episodes, are the same [noise scales squared]."""
 
@@ -63,11 +65,15 @@ class Off:
         """
         both = np.concatenate([np.stack([left, apart], axis=2), self.columns], axis=2)
         gram = evidence.summed(both, self.course, self.frame.nuisances, self.frame.inner).gram
-        ridge = np.concatenate([np.ones(self.columns.shape[2]), self.frame.ridge])
+        own = self.columns.shape[2]
+        ridge = np.concatenate([np.ones(own), self.frame.ridge])
         total, index = gram.sum(axis=0), np.arange(2, gram.shape[1])
-        matrix = total[np.ix_(index, index)] + np.diag(ridge)
-        matrix = matrix + 1e-9 * np.eye(len(index)) * max(float(np.trace(matrix)) / len(index), 1e-12)
         pulls = np.stack([total[index, 0], total[index, 0] - total[index, 1]])
+        bare = total[np.ix_(index, index)]
+        bare = bare + 1e-9 * np.eye(len(index)) * max(float(np.trace(bare)) / len(index), 1e-12)
+        while np.abs(np.linalg.solve(bare + np.diag(ridge), pulls[0])[:own]).max(initial=0.0) > MOST:
+            ridge[:own] *= 2
+        matrix = bare + np.diag(ridge)
         falls = 0.5 * np.einsum("ki,ik->k", pulls, np.linalg.solve(matrix, pulls.T))
         fallen = max(float(falls[0] - falls[1]), 0.0)
         return eliminated(gram, index - 1, ridge)[:, :2, :2], fallen

@@ -4,9 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pressing import course
 
+from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.discrepancy.frame import frame
 from tacdata.discrepancy.noise import spread_of
 from tacdata.discrepancy.paired import Off, ahead
+from tacdata.discrepancy.setting import Setting
 from tacdata.effects import load
 
 EPISODES, ROWS = 48, 40
@@ -162,3 +166,16 @@ def test_numbers_of_its_own_do_not_bring_a_model_ahead():
         told.append(ahead(richer, model(noise, "relaxation"), Nothing()))
     assert np.mean(np.array(told) > 2.33) < 0.03, "by 3.5 on average if they are not counted"
     assert abs(np.mean(told)) < 0.7
+
+
+def test_an_equation_is_off_by_a_few_standard_deviations_and_not_by_a_hundred():
+    """However many readings there are: a scale was taken for a frame that gives way, 46,000 nats for 680,000."""
+    made = course(episodes=12)
+    same = frame(Setting(made, FittedResponse(made), []))
+    column = np.random.default_rng(0).normal(size=(made.reduced.rows, made.channels, 1)).astype(np.float32)
+    off = Off(column, made.reduced, same)
+    for times, most in ((1.0, 1.0), (100.0, 0.1)):
+        left = times * column[:, :, 0]
+        _, fallen = off.beside(left, left)
+        assert fallen <= most * 0.5 * float(np.square(left).sum())
+    assert off.beside(column[:, :, 0], column[:, :, 0])[1] > 0.4 * float(np.square(column).sum())
