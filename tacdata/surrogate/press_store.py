@@ -25,7 +25,7 @@ from tacdata.transduction import Loads
 FIELDS = ("force", "closure", "area", "normal", "seconds", "ended")
 TRIES, LEAST = 4, 3
 """A press without an equilibrium is tried so many times, a depth less each time, as long as so many are left."""
-SECONDS_EACH = 1e-3
+SECONDS_EACH = 4e-4
 """Time of a node of the mesh and a state on one core of a CPU [s], where none was measured yet."""
 
 
