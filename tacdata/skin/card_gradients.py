@@ -90,7 +90,7 @@ class CardGradients:
         member = wanted.to(torch.int32).argsort(descending=True, stable=True)[: self._columns(count)]
         for width in (*range(self._step, len(member), self._step), len(member)):
             if width not in self._lanes:
-                self._lanes[width] = Lane(u, swelling, conditions, self._contacts, width, len(rest.order))
+                self._lanes[width] = Lane(u, swelling, conditions, self._contacts, width, rest.padded)
         now = self._lanes[len(member)]
         now.begin(member, u, r, swelling, conditions, self._contacts, self._preconditioner.share())
         largest = (now.r[rest.order] * rest.scale[:, None]).abs().amax(dim=0)

@@ -34,7 +34,7 @@ class Lane:
             conditions: Of the same.
             contacts: Evaluated for the same.
             width: Number of columns b.
-            rows: Of the rest state's inverse.
+            rows: Of what the rest state's inverse is multiplied with.
         """
         device, nodes = u.device, u.shape[0]
         some = torch.zeros(width, dtype=torch.int64, device=device)

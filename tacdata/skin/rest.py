@@ -151,6 +151,9 @@ class DenseRest:
 
     _SHIFT = 2e-4
     """Added to the unit diagonal, so that rounding (2^-12) leaves the matrix positive [1]."""
+    _ALIGNED = 64
+    """Rows are padded to a multiple of this: a card's library falls back to kernels of half the rate where rows do not
+    begin at multiples of 16 bytes."""
     _LARGEST = 1024.0
     """To which right-hand sides are scaled, clear of both ends of half precision."""
 
@@ -180,7 +183,10 @@ class DenseRest:
         """By which a right-hand side is multiplied, and then the product, shape (k,)."""
         self._scale = self.scale[:, None]
         inverse.diagonal().add_(self._SHIFT)
-        self._inverse = inverse.to(torch.float16)
+        self.padded = -(-len(order) // self._ALIGNED) * self._ALIGNED
+        """Rows that `times` takes: one for every entry of ``order``, and zeros."""
+        self._inverse = torch.zeros(len(order), self.padded, dtype=torch.float16, device=device)
+        self._inverse[:, : len(order)] = inverse
         del inverse
         part = self._inverse[: self.count, : self.count].to(torch.float32)
         part *= self._scale[: self.count] * self._scale[: self.count].T
@@ -203,10 +209,11 @@ class DenseRest:
     def _times(self, matrix: torch.Tensor, residual: torch.Tensor) -> torch.Tensor:
         scaled = residual[self._order] * self._scale
         size = scaled.abs().amax(dim=0).clamp_min(1e-30) / self._LARGEST
-        return _product(matrix, (scaled / size).to(torch.float16)) * size
+        half = torch.nn.functional.pad((scaled / size).to(torch.float16), (0, 0, 0, self.padded - len(scaled)))
+        return _product(matrix, half) * size
 
     def times(self, scaled: torch.Tensor, rows: int | None = None) -> torch.Tensor:
-        """Return the first rows of the inverse, scaled to a unit diagonal, times ``scaled``, shape (k, b), float16."""
+        """Return the first rows of the scaled inverse times ``scaled``, shape (padded, b), float16."""
         return _product(self._inverse[:rows], scaled)
 
 
