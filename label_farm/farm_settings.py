@@ -21,7 +21,7 @@ class FarmSettings:
     ladder: Ladder = field(default_factory=Ladder)
     """How the states of a path are spaced."""
     uncertainty: bool = True
-    """Whether labels say what the spreads that the sensor file states make of them; costs about as much again."""
+    """Whether labels say what the spreads that the sensor file states make of them; costs some two thirds more."""
     workers: int = field(default_factory=environment.cores)
     """Number of worker processes."""
     redo: bool = False

@@ -51,6 +51,7 @@ def answered(folder, method):
     said = {
         "time": course.time[rows], "episode": course.episode[rows], "before": before.signal[rows].astype(np.float32),
         "after": after[rows].astype(np.float32), "pose": pose[rows].astype(np.float32),
+        "nominal": before.pose[rows].astype(np.float32),
     }  # fmt: skip
     return {"status": status, "effects": members}, said, seconds
 

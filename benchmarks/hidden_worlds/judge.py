@@ -112,6 +112,7 @@ def answered(folder, without=(), **switches):
     said = {
         "time": course.time[rows], "episode": course.episode[rows], "before": before.signal[rows].astype(np.float32),
         "after": after.signal[rows].astype(np.float32), "pose": after.pose[rows].astype(np.float32),
+        "nominal": before.pose[rows].astype(np.float32),
     }  # fmt: skip
     return answer, said, seconds
 

@@ -101,7 +101,21 @@ class Batch:
         """Walk through presses; yield ``(number, depth, state)`` as found, the state as `collect` makes it.
 
         A press that fails yields its `SolveError` in place of a state, and no more.
+
+        Raises:
+            SolveError: If so many columns do not fit into a card's memory.
         """
+        try:
+            yield from self._run(presses, collect)
+        except torch.OutOfMemoryError as error:
+            nodes, _, count = self._u.shape
+            raise SolveError(
+                f"{count} presses at a time on a mesh of {nodes} nodes",
+                f"as many as the memory of {self._u.device} holds",
+                "ask for fewer at a time, or coarsen the mesh",
+            ) from error
+
+    def _run(self, presses: Iterable[Press], collect: Collect) -> Iterator[tuple[int, float, Any]]:
         waiting = iter(presses)
         yield from self._fill(waiting)
         while any(press is not None for press in self._presses):

@@ -90,15 +90,19 @@ def _change(distance):
         gap_before: wp.array3d(dtype=wp.float64), d_gap_before: wp.array3d(dtype=wp.float64),
         place_before: wp.array2d(dtype=wp.float64), d_place_before: wp.array2d(dtype=wp.float64),
         penalty_over_modulus: wp.float64, stick_over_modulus: wp.float64, rough: int,
+        pressure: wp.array3d(dtype=wp.float64), whole: int,
         d_force: wp.array3d(dtype=wp.float64), d_gap: wp.array3d(dtype=wp.float64),
         d_pressure: wp.array3d(dtype=wp.float64), d_shear: wp.array4d(dtype=wp.float64),
         d_local: wp.array4d(dtype=wp.float64),
     ):
         f, k, b = wp.tid()
+        if whole == 0 and pressure[f, k, b] <= wp.float64(0.0):
+            return
         zero, one, two = wp.float64(0.0), wp.float64(1.0), wp.float64(2.0)
         q, dq = numbers(parameters, b), numbers(d_parameters, b)
         R, dR = square(turn, b), square(d_turn, b)
         tip, d_tip = column(place, b), column(d_place, b)
+        penalty, stick = penalty_over_modulus * modulus[b], stick_over_modulus * modulus[b]
         x, dx = wp.vec3d(), wp.vec3d()
         for a in range(6):
             n = faces[f, a]
@@ -120,7 +124,6 @@ def _change(distance):
             e = wp.float64(1.0e-5) / size_q
             dg += (distance(local, q + e * dq) - distance(local, q - e * dq)) / (two * e)
         d_gap[f, k, b] = dg
-        penalty, stick = penalty_over_modulus * modulus[b], stick_over_modulus * modulus[b]
         g = distance(local, q)
         t = multiplier[f, k, b] - penalty * g
         if t > zero:
@@ -216,7 +219,7 @@ class ContactChange:
 
 def contact_change(
     contact: Contact, distance: wp.Function, u: torch.Tensor, pose: Pose, state: ContactState, conditions: Conditions,
-    du: torch.Tensor, change: ConditionsChange, history: ContactState,
+    du: torch.Tensor, change: ConditionsChange, history: ContactState, whole: bool = True,
 ) -> ContactChange:
     """Return how a contact changes along directions, at fixed status of its points.
 
@@ -227,9 +230,10 @@ def contact_change(
         pose: Of the shape.
         state: History that the state at ``u`` starts from.
         conditions: Of the members.
-        du: Change of ``u`` along each member's direction [mm].
+        du: Change of ``u`` along each member's direction [mm], shape (n, 3, c), perhaps of the first c members alone.
         change: Change of conditions and pose.
         history: Change of the history.
+        whole: Whether gaps and places of open points are asked for, too, in which no force changes; else they are 0.
     """
     f, k = contact.weights.shape
     pairs = [
@@ -243,12 +247,13 @@ def contact_change(
     fields += [value.contiguous() for pair in pairs for value in pair]
 
     def zeros(*shape: int) -> torch.Tensor:
-        return torch.zeros(f, k, *shape, u.shape[2], dtype=torch.float64, device=u.device)
+        return torch.zeros(f, k, *shape, du.shape[2], dtype=torch.float64, device=u.device)
 
-    outputs = [torch.zeros_like(u), zeros(), zeros(), zeros(3), zeros(3)]
+    outputs = [torch.zeros_like(du), zeros(), zeros(), zeros(3), zeros(3)]
     wp.launch(
-        _change(distance), dim=(f, k, u.shape[2]),
-        inputs=[*(wp.from_torch(value) for value in fields), contact.penalty, contact.stick, int(contact.rough)],
+        _change(distance), dim=(f, k, du.shape[2]),
+        inputs=[*(wp.from_torch(value) for value in fields), contact.penalty, contact.stick, int(contact.rough),
+                wp.from_torch(contact.pressure), int(whole)],
         outputs=[wp.from_torch(value) for value in outputs], device=str(u.device),
     )
     return ContactChange(*outputs, load=(outputs[2] * contact.weights[:, :, None]).sum(dim=1))

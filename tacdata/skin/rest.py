@@ -213,7 +213,16 @@ class DenseRest:
         return _product(matrix, half) * size
 
     def times(self, scaled: torch.Tensor, rows: int | None = None) -> torch.Tensor:
-        """Return the first rows of the scaled inverse times ``scaled``, shape (padded, b), float16."""
+        """Return the scaled inverse, or its first rows only, times ``scaled``.
+
+        Args:
+            scaled: right-hand sides in the order of `order`, scaled by `scale`, shape (padded, b), float16; what
+                stands beyond the rows of ``order`` is not read into the result.
+            rows: how many, k if None.
+
+        Returns:
+            The product before it is scaled, shape (rows, b), float32.
+        """
         return _product(self._inverse[:rows], scaled)
 
 

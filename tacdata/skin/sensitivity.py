@@ -49,8 +49,8 @@ class Sensitivity:
     taxel_area: np.ndarray
     """Of each protrusion's contact area [mm^2/unit], shape (p, taxels), by Hertz's A ~ (F (1 - nu^2) / E)^(2/3), so to
     some tens of per cent: the area itself is counted in quadrature points and has no derivative."""
-    residual: float
-    """Largest residual of the linear solves up to here, over their right-hand sides [1]."""
+    error: float
+    """Largest error of the linear solves up to here, over what they found [1]."""
 
 
 def sensitivities(
@@ -65,7 +65,7 @@ def sensitivities(
         model: The skin.
         request: The press.
         parameters: Names of parameters (`tacdata.skin.parameter.known`).
-        tolerance: Residual of the linear solves over their right-hand sides [1].
+        tolerance: Error of the linear solves, over what they find [1].
 
     Raises:
         UsageError: If a parameter is not one of this press.
@@ -136,7 +136,7 @@ class _Reader:
         return Sensitivity(
             tuple(self._names), self._units, self._map(state, tangents.du, along.conditions.thickness),
             -tangents.changes[0].force.sum(dim=0).T.cpu().numpy(), taxel_force,
-            self._model._gauge.closure(tangents.du).T.cpu().numpy(), self._area(state, taxel_force), tangents.residual,
+            self._model._gauge.closure(tangents.du).T.cpu().numpy(), self._area(state, taxel_force), tangents.error,
         )
 
     def _map(self, state: State, du: torch.Tensor, thickness: torch.Tensor) -> np.ndarray:

@@ -18,7 +18,7 @@ import torch
 import warp as wp
 
 from tacdata.errors import SolveError
-from tacdata.skin import gmres
+from tacdata.skin.block_residuals import Space
 from tacdata.skin.conditions import Conditions
 from tacdata.skin.contact import Contact, ContactState
 from tacdata.skin.contact_change import ConditionsChange, ContactChange, contact_change
@@ -26,10 +26,8 @@ from tacdata.skin.newton import Newton
 from tacdata.skin.pose import Pose
 from tacdata.skin.trail import Milestone
 
-TOLERANCE = 1e-6
-"""Residual of the linear solves over their right-hand sides [1]; small, as these hold the stiff penalty of contact, the
-forces looked for a thousandth of it or less: at 1e-5 one by tilt was off by a tenth, at 1e-6 by 2e-4, for a third more
-products."""
+TOLERANCE = 1e-5
+"""Error of the linear solves, as `tacdata.skin.block_residuals.Solution` counts it [1]."""
 
 _LAW_STEP = 1e-5
 """Step of the central difference of internal forces by a law's numbers, over these [1]."""
@@ -62,15 +60,17 @@ class _Point:
     def contact_product(self, du: torch.Tensor) -> torch.Tensor:
         """Return the change of contact forces [N] with ``du`` alone."""
         parts = [
-            self._change(k, du, along.still(), _zeros(state)).force
+            self._change(k, du, along.still(), _zeros(state), whole=False).force
             for k, (along, state) in enumerate(zip(self.along, self.states, strict=True))
         ]
         return torch.stack(parts).sum(dim=0)
 
-    def _change(self, k: int, du: torch.Tensor, along: ConditionsChange, history: ContactState) -> ContactChange:
+    def _change(
+        self, k: int, du: torch.Tensor, along: ConditionsChange, history: ContactState, whole: bool = True
+    ) -> ContactChange:
         return contact_change(
             self.contacts[k], self.distances[k], self.u, self.poses[k], self.states[k], self.conditions, du, along,
-            history,
+            history, whole,
         )
 
 
@@ -88,7 +88,7 @@ class Tangents:
             distances: Of the contacts' shapes.
             free: 1 for nodes that are not held, else 0, shape (n, 1, 1).
             label: The press in words, for errors.
-            tolerance: Residual of the linear solves over their right-hand sides [1].
+            tolerance: Error of the linear solves [1].
             slack: How held nodes move with each parameter [mm over its unit], of the reactions [N], shapes (n, 3, p);
                 None: not at all.
         """
@@ -99,8 +99,8 @@ class Tangents:
         """Of the displacements [mm over the parameter's unit], shape (n, 3, p)."""
         self.changes: list[ContactChange] = []
         """Of each contact."""
-        self.residual = 0.0
-        """Largest residual of the linear solves so far, over their right-hand sides [1]."""
+        self.error = 0.0
+        """Largest error of the linear solves so far, over what they found [1]."""
         self.products = 0
         """Products with the tangent so far, for benchmarks."""
         self._history: list[ContactState] = []
@@ -162,23 +162,28 @@ class Tangents:
         self._newton.preconditioner.update(point.conditions.modulus)
         internal = self._internal(point)
 
-        def product(p: torch.Tensor) -> torch.Tensor:
-            result = torch.zeros_like(p)
-            body.tangent_product(point.u, p, point.conditions, result)
-            return (result - point.contact_product(p)) * free
+        fields: dict[tuple[int, torch.dtype], torch.Tensor] = {}
 
+        def product(p: torch.Tensor) -> torch.Tensor:
+            key = p.shape[2], p.dtype
+            if key not in fields:
+                fields[key] = point.u[:, :, : key[0]].to(key[1]).contiguous()
+            result = torch.zeros_like(p)
+            body.tangent_product(fields[key], p, point.conditions, result)
+            return (result - point.contact_product(p.to(torch.float64))) * free
+
+        space = Space(product, self._newton.preconditioner.apply)
         for _ in range(_AUGMENTATIONS if augmented else 1):
             still = point.changes(torch.zeros_like(point.u), self._history)
             rhs = (torch.stack([change.force for change in still]).sum(dim=0) - internal) * free
             if self._slack:
                 rhs -= product(held)
-            guess = self.du * free
-            found = gmres.solve(product, self._newton.preconditioner.apply, rhs, guess, self._tolerance)
-            self.du, self.products = found.x + held, self.products + found.iterations
-            self.residual = max(self.residual, float(found.residual.max()))
-            if not self.residual <= self._tolerance:
+            found = space.solve(rhs, self.du * free, self._tolerance)
+            self.du, self.products = found.x + held, self.products + found.products
+            self.error = max(self.error, float(found.error.max()))
+            if not self.error <= self._tolerance:
                 raise SolveError(
-                    f"{self._label}: derivatives with a residual of {self.residual:.1e} after {found.iterations} "
+                    f"{self._label}: derivatives with an error of {self.error:.1e} after {found.products} "
                     "products",
                     f"at most {self._tolerance:g}", "press less deep, or refine the mesh",
                 )

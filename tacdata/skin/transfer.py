@@ -70,9 +70,9 @@ class FactoredTransfer:
             self._parts[column] = sparse, scipy.linalg.lu_factor(system, overwrite_a=True, check_finite=False)
 
     def times(self, displacement: torch.Tensor) -> torch.Tensor:
-        """Return the forces, as `Transfer`."""
+        """Return the forces of the first members, as `Transfer`."""
         result = torch.zeros_like(displacement)
-        for row, part in enumerate(self._parts):
+        for row, part in enumerate(self._parts[: len(displacement)]):
             if part is not None:
                 sparse, factors = part
                 own = slice(0, len(factors[0]))
@@ -115,9 +115,9 @@ class DenseTransfer:
         inverse_of_sum(held, compliance, member, self.matrix, lead, reach)
 
     def times(self, displacement: torch.Tensor) -> torch.Tensor:
-        """Return the forces, as `Transfer`."""
+        """Return the forces of the first members, as `Transfer`."""
         size = self.matrix.shape[1]
         own = torch.nn.functional.pad(displacement, (0, max(size - displacement.shape[1], 0)))[:, :size]
-        forces = (self.matrix @ own[:, :, None])[:, :, 0]
+        forces = (self.matrix[: len(own)] @ own[:, :, None])[:, :, 0]
         wide = torch.nn.functional.pad(forces, (0, max(displacement.shape[1] - size, 0)))
         return wide[:, : displacement.shape[1]]

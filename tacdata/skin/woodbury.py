@@ -197,14 +197,16 @@ class ContactPreconditioner:
         return Share(self._scale, self._which, own, self._transfer.matrix)
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
-        """Return the approximate solution for residuals of shape (n, 3, b), float32."""
+        """Return the approximate solution for residuals of the first b members, shape (n, 3, b), float32."""
         r = residual.reshape(self._size, -1)
-        if self._which.shape[1]:
-            z = torch.nn.functional.pad(self._rest.loadable(r) * self._scale, (0, 0, 0, 1))
-            columns = torch.arange(r.shape[1], device=r.device)[:, None]
-            y = self._transfer.times(z[self._which, columns])
+        count = r.shape[1]
+        which, scale = self._which[:count], self._scale[:count]
+        if which.shape[1]:
+            z = torch.nn.functional.pad(self._rest.loadable(r) * scale, (0, 0, 0, 1))
+            columns = torch.arange(count, device=r.device)[:, None]
+            y = self._transfer.times(z[which, columns])
             r = torch.cat([r, torch.zeros_like(r[:1])])
             # A member's degrees of freedom are all different, the one that stands for none aside.
-            r.scatter_add_(0, self._dof[self._which].T, -y.T)
+            r.scatter_add_(0, self._dof[which].T, -y.T)
             r = r[:-1]
-        return (self._rest.apply(r) * self._scale).reshape(residual.shape)
+        return (self._rest.apply(r) * scale).reshape(residual.shape)

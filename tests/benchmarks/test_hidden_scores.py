@@ -84,6 +84,11 @@ def test_gap_and_labels_know_the_truth_from_the_start():
     before, after = labels({**said, "after": bare}, known, True)
     assert before > 0.02 and after < 1e-6
     assert labels({**said, "after": bare}, known, False) == (before, before)
+    # Readings that are far apart cut the path's corners, before as after.
+    few = {k: v[::40] for k, v in {**said, "nominal": known["command"], "pose": known["command"]}.items()}
+    before, after = labels(few, known, True)
+    assert before == after
+    assert abs(before - labels({**said, "pose": known["command"]}, known, True)[1]) > 1e-5
 
 
 def test_coverage_and_calibration_count_what_was_given():

@@ -252,3 +252,13 @@ def test_an_impossible_press_is_named_and_takes_no_other_along(model):
     assert isinstance(answers[1], SolveError) and "99" in str(answers[1])
     assert answers[0].force[0, 2] == pytest.approx(answers[2].force[0, 2], rel=1e-6)
     assert answers[0].force[0, 2] > 0.01
+
+
+def test_more_presses_than_a_card_holds_are_refused_in_words(model, monkeypatch):
+    def full(*_):
+        raise torch.OutOfMemoryError("CUDA out of memory")
+
+    monkeypatch.setattr("tacdata.skin.newton.Newton.step", full)
+    with pytest.raises(SolveError, match="presses at a time on a mesh of") as refusal:
+        list(model.walk(PRESSES[:2], 2))
+    assert "fewer at a time" in refusal.value.remedy

@@ -97,7 +97,7 @@ def assert_alike(skin, request, names, share):
     assert [depth for depth, _, _ in states] == list(request.depths)
     for column, name in enumerate(names):
         for (depth, _, found), expected in zip(states, wholes[name], strict=True):
-            assert found.residual <= 1e-6
+            assert found.error <= 1e-5
             own = [found.force, found.surface, found.taxel_force, found.taxel_closure]
             for value, wanted in zip(own, expected, strict=True):
                 assert value[column] == pytest.approx(wanted, abs=share * np.abs(wanted).max() + 1e-7), (name, depth)

@@ -52,6 +52,9 @@ def gap(said, truth):
 def labels(said, truth, trusted):
     """Return the error of depth maps before and after [mm rms].
 
+    Both from poses at the judge's readings, straight in between: at a corner of the path that is off by a micrometre or
+    two, which is nothing that a name does.
+
     Args:
         said: What the judge's model says.
         truth: What is.
@@ -65,7 +68,8 @@ def labels(said, truth, trusted):
     def error(pose):
         return float(np.sqrt(np.mean((skin.depth_map(pose[rows], radius) - real) ** 2)))
 
-    before = error(truth["command"])
+    # Verdicts of judges that did not say the nominal pose are held against the command itself.
+    before = error(_at(said, "nominal", truth) if "nominal" in said else truth["command"])
     return before, error(_at(said, "pose", truth)) if trusted else before
 
 

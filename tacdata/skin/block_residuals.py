@@ -1,0 +1,136 @@
+"""Generalized conjugate residuals for many right-hand sides of one matrix, which share one space.
+
+Eisenstat, Elman and Schultz, SIAM J. Numer. Anal. 20 (1983) 345, by blocks: every direction serves every right-hand
+side, and those that come later (Parks et al., SIAM J. Sci. Comput. 28 (2006) 1651). The space is kept in single
+precision; residuals are taken anew in double, so that the accuracy is that of the products.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+
+Field = Callable[[torch.Tensor], torch.Tensor]
+"""From fields (n, 3, b) to fields (n, 3, b)."""
+
+_INDEPENDENT = 1e-3
+"""Least length of a direction beside the longest of its block, of what stands across the others [1]: shorter ones are
+mostly rounding, and come again, longer, in a later block if they are needed."""
+
+_ENOUGH = 0.5
+"""Share of the tolerance to which the error is brought in single precision before the residual is taken anew [1]."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What was found."""
+
+    x: torch.Tensor
+    """The solution, shape (n, 3, b), float64."""
+    error: torch.Tensor
+    """|M^-1 (rhs - A x)| over |x| [1], shape (b,), M^-1 the preconditioner: about how far x is off. 0 where the
+    right-hand side vanishes. (The residual itself says little where A holds a stiff penalty.)"""
+    products: int
+    """Products with the matrix."""
+
+
+class Space:
+    """Directions z and what the matrix makes of them, w = A z, these orthonormal; for one matrix."""
+
+    def __init__(self, product: Field, precondition: Field, most: int = 400) -> None:
+        """Bind the matrix.
+
+        Args:
+            product: A times fields, float64 or float32, of any number of columns.
+            precondition: Approximate inverse of A, float32, likewise.
+            most: Largest number of directions; beyond, the space begins anew.
+        """
+        self._product, self._precondition, self._most = product, precondition, most
+        self._z = self._w = torch.empty(0)
+        self._count = 0
+        self._products = 0
+
+    def solve(self, rhs: torch.Tensor, guess: torch.Tensor, tolerance: float, limit: int = 300) -> Solution:
+        """Solve A x = rhs.
+
+        Args:
+            rhs: Right-hand sides, shape (n, 3, b), float64.
+            guess: Where to start, likewise.
+            tolerance: Error at which all must arrive, as `Solution` counts it [1].
+            limit: Products with the matrix before giving up.
+        """
+        there = _norm(rhs) > 0
+        # Without a right-hand side the solution is 0 whatever the guess.
+        x, began = torch.where(there, guess, 0.0), self._products
+        while True:
+            residual = rhs - self._times(x)
+            size = _norm(residual).clamp_min(1e-300)
+            z = self._precondition((residual / size).to(torch.float32))
+            error = torch.where(there, _norm(z) * size / _norm(x).clamp_min(1e-300), 0.0)
+            used = self._products - began
+            if bool((error <= tolerance).all()) or used >= limit:
+                return Solution(x, error, used)
+            x = x + self._correction(x, residual / size, size, tolerance, limit - used) * size
+
+    def _times(self, p: torch.Tensor) -> torch.Tensor:
+        self._products += 1
+        return self._product(p)
+
+    def _correction(
+        self, x: torch.Tensor, residual: torch.Tensor, size: torch.Tensor, tolerance: float, most: int
+    ) -> torch.Tensor:
+        """Return what brings residuals of unit length, of which x is off by ``size`` times, shape (b,), to the
+        tolerance, by at most so many products; directions are added for those alone that are not there yet."""
+        shape, extent = residual.shape, _norm(x) / size
+        left = residual.to(torch.float32).reshape(-1, shape[2])
+        found = torch.zeros_like(left)
+        wanted = torch.arange(shape[2], device=left.device)
+        for _ in range(most):
+            before = self._count
+            if before:
+                share = self._w[:before] @ left
+                found += self._z[:before].T @ share
+                left = left - self._w[:before].T @ share
+            now = torch.linalg.vector_norm(left[:, wanted], dim=0).clamp_min(1e-30)
+            z = self._precondition((left[:, wanted] / now).reshape(*shape[:2], -1))
+            goal = _ENOUGH * tolerance * torch.linalg.vector_norm(found, dim=0).maximum(extent)[wanted]
+            still = _norm(z) * now > goal
+            wanted = wanted[still]
+            if not len(wanted):
+                break
+            self._extend(z[:, :, still])
+            if self._count == before:
+                break
+        return found.to(torch.float64).reshape(shape)
+
+    def _extend(self, z: torch.Tensor) -> None:
+        """Add directions, shape (n, 3, c)."""
+        w = self._times(z).to(torch.float32).reshape(-1, z.shape[2])
+        z = z.reshape(w.shape)
+        longest = torch.linalg.vector_norm(w, dim=0).max()
+        # Twice, as once leaves the space skew in single precision.
+        for _ in range(2):
+            if self._count:
+                share = self._w[: self._count] @ w
+                w = w - self._w[: self._count].T @ share
+                z = z - self._z[: self._count].T @ share
+            squares, turn = torch.linalg.eigh((w.T @ w).to(torch.float64))
+            kept = squares > (_INDEPENDENT * longest) ** 2
+            mix = (turn[:, kept] / squares[kept].sqrt()).to(torch.float32)
+            w, z, longest = w @ mix, z @ mix, torch.ones_like(longest)
+        self._append(z.T, w.T)
+
+    def _append(self, z: torch.Tensor, w: torch.Tensor) -> None:
+        more = len(w)
+        if not len(self._w) or self._count + more > self._most:
+            self._z = torch.empty(self._most, w.shape[1], dtype=torch.float32, device=w.device)
+            self._w, self._count = torch.empty_like(self._z), 0
+        rows = slice(self._count, self._count + more)
+        self._z[rows], self._w[rows] = z, w
+        self._count += more
+
+
+def _norm(field: torch.Tensor) -> torch.Tensor:
+    return torch.linalg.vector_norm(field, dim=(0, 1))
