@@ -103,7 +103,8 @@ def test_its_spread_is_in_a_labels_uncertainty_by_derivatives_and_beside_samples
     told = SkinModel(stated, skin.settings, mesh=skin.mesh, companion=skin.mesh)
     solution = with_uncertainty(told, PRESS, told.solve(PRESS))
     assert solution.force_uncertainty is not None
-    np.testing.assert_allclose(solution.force_uncertainty[-1], alone.force, rtol=1e-2)
+    # Those of a label stop at an error of 1e-2, those that they are held against at 1e-5.
+    np.testing.assert_allclose(solution.force_uncertainty[-1], alone.force, atol=1e-2 * np.linalg.norm(alone.force))
     assert solution.provenance["uncertainty"]["units"] == {"bonding": "mm/MPa"}
 
 
