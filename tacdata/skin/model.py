@@ -56,9 +56,6 @@ _LIFT = 0.5
 _JUMP = (200, 40)
 """Newton iterations per state, and without progress, that a jump into contact or off it may take."""
 
-_NEARLY_INCOMPRESSIBLE = 0.495
-"""Poisson's ratio from which on the sparse preconditioner knows of averaged volume changes [1]."""
-
 
 @dataclass(frozen=True)
 class ModelSettings:
@@ -137,10 +134,8 @@ class SkinModel:
 
     @cached_property
     def _rest(self) -> RestSolver:
-        # The averaged one costs several times the fill of a sparse factor, and pays where the other is far too stiff.
-        dense, nu = self.device != "cpu", self.sensor.material.poisson_ratio
-        known = self._averaged and (dense or nu >= _NEARLY_INCOMPRESSIBLE)
-        return rest_solver(self.mesh, self.sensor.material, self._fixed, self._loadable, self.device, known)
+        material = self.sensor.material
+        return rest_solver(self.mesh, material, self._fixed, self._loadable, self.device, self._averaged)
 
     @cached_property
     def companion(self) -> SkinModel | None:

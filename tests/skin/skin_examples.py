@@ -13,9 +13,18 @@ from tacdata.skin import elements
 from tacdata.skin.conditions import Conditions
 from tacdata.skin.mesh import SkinMesh
 from tacdata.skin.mesher import quadratic
+from tacdata.skin.model import ModelSettings
+from tacdata.skin.newton import SolverSettings
 from tacdata.skin.rest import rest_stiffness
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
+
+PLAIN = ModelSettings(error_estimate=False)
+EXACT = ModelSettings(
+    error_estimate=False,
+    solver=SolverSettings(residual=1e-5, penetration=1e-4, mean_penetration=1e-5, newton_limit=200, patience=40),
+)
+"""So tight that two solvers of one mesh's equations must say the same: what the tolerance leaves stands elsewhere."""
 
 Parameters = wp.types.vector(length=8, dtype=wp.float64)
 

@@ -16,6 +16,7 @@ from tacdata.skin.conditions import conditions
 from tacdata.skin.elasticity import Elasticity
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
+from tacdata.skin.rest import for_averaged
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
@@ -90,6 +91,14 @@ def test_the_rest_stiffness_of_a_press_is_near_the_tangent():
     model = pressed(0.4999, 4, 1)
     assert force(model, 0.02) > 0
     assert model.last_run["cg"] / model.last_run["ticks"] < 40
+
+
+def test_half_way_is_a_bulk_modulus_of_the_geometric_mean():
+    for nu in (0.3, 0.47, 0.49):
+        material = Material("neo_hookean", 0.30, nu)
+        half = for_averaged(material)
+        assert half.shear_modulus == pytest.approx(material.shear_modulus)
+        assert half.bulk_modulus == pytest.approx(np.sqrt(material.bulk_modulus * material.shear_modulus))
 
 
 def pressed(nu, count, layers, averaged_from=0.48):

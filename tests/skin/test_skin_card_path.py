@@ -2,20 +2,18 @@
 
 import numpy as np
 import pytest
-from skin_examples import box_mesh, bumps_sensor, slab_sensor
+from skin_examples import PLAIN, box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
 from tacdata.skin import model, woodbury
 from tacdata.skin.card_gradients import CardGradients
 from tacdata.skin.mesher import MeshSettings, build_mesh
-from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.skin.model import SkinModel
 from tacdata.skin.newton import Newton
 from tacdata.skin.patches import in_order
 from tacdata.skin.press import PressRequest
 from tacdata.skin.rest import DenseRest, rest_stiffness
 from tacdata.skin.transfer import DenseTransfer
-
-PLAIN = ModelSettings(error_estimate=False)
 
 
 @pytest.fixture
