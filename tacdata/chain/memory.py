@@ -19,12 +19,24 @@ def low_pass(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
         step: Time since the row before [s], shape (n,).
         tau: Time constant [s], above 0.
     """
+    return low_passes(values, step, np.array([tau]), np.ones(1))
+
+
+def low_passes(values: np.ndarray, step: np.ndarray, taus: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """Return the sum of `low_pass` by several time constants, each times its share, shape as the input.
+
+    Args:
+        values: Input, shape (n,) or (n, k).
+        step: Time since the row before [s], shape (n,).
+        taus: Time constants [s], above 0, shape (t,).
+        shares: Their shares [1], shape (t,).
+    """
     from tacdata.chain.memory_kernels import filtered
 
-    ratio = step / tau
+    ratio = step[:, None] / taus
     decay = np.exp(-np.minimum(ratio, 700.0))
     weight = np.where(ratio > 1e-8, -np.expm1(-ratio) / np.maximum(ratio, 1e-12), 1.0)
-    return filtered(_wide(values), decay, weight).reshape(values.shape)
+    return filtered(_wide(values), decay, weight, np.asarray(shares, dtype=float)).reshape(values.shape)
 
 
 def play(values: np.ndarray, width: float, anew: np.ndarray | None = None) -> np.ndarray:
@@ -72,7 +84,7 @@ def slipping(values: np.ndarray, width: float, first: np.ndarray) -> np.ndarray:
     change = np.where(first, 0.0, np.diff(values, prepend=values[:1]))
     keep = np.where(first, 0.0, np.exp(-np.abs(change) / width))
     toward = np.where(first, -1.0, np.sign(change))
-    return filtered(_wide(toward + 1.0), keep, keep).reshape(values.shape) - 1.0
+    return filtered(_wide(toward + 1.0), keep[:, None], keep[:, None], np.ones(1)).reshape(values.shape) - 1.0
 
 
 def _wide(values: np.ndarray) -> np.ndarray:

@@ -9,17 +9,23 @@ import numpy as np
 import warp as wp  # noqa: TID253 - kernels; imported when a history is run, never with an effect
 
 import tacdata.warp_runtime  # noqa: F401 - starts Warp
+from tacdata.chain.lanes import Lanes, in_lanes, padded
 
 
 @wp.kernel(module="unique", enable_backward=False)
 def _filter(
-    values: wp.array2d(dtype=wp.float64), decay: wp.array(dtype=wp.float64), weight: wp.array(dtype=wp.float64),
-    result: wp.array2d(dtype=wp.float64),
+    values: wp.array2d(dtype=Lanes), decay: wp.array2d(dtype=wp.float64), weight: wp.array2d(dtype=wp.float64),
+    share: wp.array(dtype=wp.float64), now: wp.array2d(dtype=Lanes), result: wp.array2d(dtype=Lanes),
 ):  # fmt: skip
     for i in range(1, values.shape[0]):
-        fade, now, before = decay[i], wp.float64(1.0) - weight[i], weight[i] - decay[i]
         for j in range(values.shape[1]):
-            result[i, j] = fade * result[i - 1, j] + now * values[i, j] + before * values[i - 1, j]
+            value, before, total = values[i, j], values[i - 1, j], Lanes()
+            for t in range(share.shape[0]):
+                fade, kept = decay[i, t], weight[i, t]
+                y = fade * now[t, j] + (wp.float64(1.0) - kept) * value + (kept - fade) * before
+                now[t, j] = y
+                total += share[t] * y
+            result[i, j] = total
 
 
 @wp.kernel(module="unique", enable_backward=False)
@@ -38,18 +44,21 @@ def _play(
                 result[i, j] = wp.max(u - width, wp.min(u + width, result[i - 1, j]))
 
 
-def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return y_i = E_i y_{i-1} + (1 - w_i) u_i + (w_i - E_i) u_{i-1} with y_0 = 0, shape (n, k).
+def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return the sum of y_i = E_i y_{i-1} + (1 - w_i) u_i + (w_i - E_i) u_{i-1}, y_0 = 0, over filters, shape (n, k).
 
     Args:
         values: u, shape (n, k), float64.
-        decay: E, shape (n,), float64.
-        weight: w, shape (n,), float64.
+        decay: E of each filter, shape (n, t), float64.
+        weight: w of each, shape (n, t), float64.
+        share: By which each is multiplied, shape (t,), float64.
     """
-    result = np.zeros(values.shape)
+    columns, wide = values.shape[1], padded(values)
+    result, now = np.zeros(wide.shape), np.zeros((len(share), wide.shape[1]))
     if len(values):
-        wp.launch(_filter, 1, [_shared(values), _shared(decay), _shared(weight), _shared(result)], device="cpu")
-    return result
+        given = [in_lanes(wide), _shared(decay), _shared(weight), _shared(share), in_lanes(now), in_lanes(result)]
+        wp.launch(_filter, 1, given, device="cpu")
+    return np.ascontiguousarray(result[:, :columns])
 
 
 def played(values: np.ndarray, width: float, anew: np.ndarray) -> np.ndarray:

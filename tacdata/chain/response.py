@@ -39,6 +39,14 @@ class Response(ABC):
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return the readings of loads, shape (n, channels)."""
 
+    def largest(self, signal: np.ndarray) -> float:
+        """Return the largest rise of readings above what is said in the air: the unit of some effects' sizes.
+
+        Args:
+            signal: Readings of all rows, shape (n, channels).
+        """
+        return float(np.abs(signal - self.signal(np.zeros_like(signal[:1]))).max())
+
     def rougher(self) -> Response | None:
         """Return the same response told a little worse, to see how far numerics matter; None where there are none."""
         return None

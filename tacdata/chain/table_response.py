@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import spline_filter
-from scipy.sparse import csr_matrix
 
 from tacdata.chain.response import Response
 from tacdata.errors import FormatError, UsageError
@@ -46,16 +45,14 @@ class TableResponse(Response):
         self.gain, self.offset = gain, offset
         self._rough = False
         both = np.concatenate([load, force[..., None]], axis=-1)
-        # Splines with mirrored ends, one more node around, so that the four nodes of a place always exist.
         self._splines = [
-            np.pad(
-                np.stack([spline_filter(both[t, ..., c], order=3) for c in range(both.shape[-1])], axis=-1),
-                ((1, 2), (1, 2), (1, 2), (0, 0)), mode="reflect",
-            )
-            for t in range(len(both))
-        ]  # fmt: skip
-        self._nodes = [np.pad(table, ((1, 2), (1, 2), (1, 2), (0, 0)), mode="reflect") for table in both]
+            _Table.of(np.stack([spline_filter(each[..., c], order=3) for c in range(each.shape[-1])], axis=-1))
+            for each in both
+        ]
+        self._nodes = [_Table.of(each) for each in both]
+        self._channels = load.shape[-1]
         self._kept: dict[int, _Answer] = {}
+        self._forces: dict[int, np.ndarray] = {}
 
     @property
     def spacing(self) -> float:
@@ -65,7 +62,7 @@ class TableResponse(Response):
     def rougher(self) -> TableResponse:
         """Return the same table read by polynomials through four nodes: off the splines by about the splines' error."""
         other = copy.copy(self)
-        other._rough, other._kept = True, {}
+        other._rough, other._kept, other._forces = True, {}, {}
         return other
 
     @classmethod
@@ -91,14 +88,14 @@ class TableResponse(Response):
     def idling_at(self, offset: np.ndarray) -> TableResponse:
         """Return the same response with other readings without load, shape (channels,)."""
         other = copy.copy(self)
-        other.offset, other._kept = offset, {}
+        other.offset, other._kept, other._forces = offset, {}, {}
         return other
 
     def with_tools(self, order: list[int]) -> TableResponse:
         """Return the same response with its tools in another order, or fewer."""
         other = copy.copy(self)
         other._splines, other._nodes = [self._splines[k] for k in order], [self._nodes[k] for k in order]
-        other.tools, other._kept = tuple(self.tools[k] for k in order), {}
+        other.tools, other._kept, other._forces = tuple(self.tools[k] for k in order), {}, {}
         return other
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
@@ -107,7 +104,13 @@ class TableResponse(Response):
 
     def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return the normal force [N], shape (n,)."""
-        return self._both(pose, tool).force
+        key = _key(pose, tool)
+        if key in self._kept:
+            return self._kept[key].force
+        if key not in self._forces:
+            _make_room(self._forces)
+            self._forces[key] = _locked(self._read(pose, tool, force=True)[:, 0])
+        return self._forces[key]
 
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return readings, shape (n, channels); the curve is continued straight beyond its ends."""
@@ -128,20 +131,25 @@ class TableResponse(Response):
         return result
 
     def _both(self, pose: np.ndarray, tool: np.ndarray) -> _Answer:
-        key = hash((pose.tobytes(), tool.tobytes()))
-        if key in self._kept:
-            return self._kept[key]
-        result = np.zeros((len(pose), self._splines[0].shape[-1]))
-        touching = pose[:, 2] > 0
-        weights = _lagrange if self._rough else _spline
+        key = _key(pose, tool)
+        if key not in self._kept:
+            result = self._read(pose, tool)
+            _make_room(self._kept)
+            load = np.ascontiguousarray(result[:, : self._channels])
+            self._kept[key] = _Answer(_locked(load), _locked(result[:, self._channels].copy()))
+        return self._kept[key]
+
+    def _read(self, pose: np.ndarray, tool: np.ndarray, force: bool = False) -> np.ndarray:
+        """Return loads and then the force, or the force alone, shape (n, channels + 1) or (n, 1)."""
+        from tacdata.chain.table_kernels import cubic
+
+        columns = 1 if force else self._channels + 1
+        result, touching = np.zeros((len(pose), columns)), pose[:, 2] > 0
         for t, table in enumerate(self._nodes if self._rough else self._splines):
             rows = np.flatnonzero(touching & (tool == t))
-            if len(rows):
-                result[rows] = _cubic(table, self._places(pose[rows]), weights)
-        if len(self._kept) >= KEPT:
-            self._kept.pop(next(iter(self._kept)))
-        self._kept[key] = _Answer(_locked(np.ascontiguousarray(result[:, :-1])), _locked(result[:, -1].copy()))
-        return self._kept[key]
+            values = table.force if force else table.both
+            result[rows] = cubic(values, self._places(pose[rows]), self._rough, columns)
+        return result
 
     def _places(self, pose: np.ndarray) -> np.ndarray:
         """Return places in units of nodes, kept inside the table, shape (n, 3)."""
@@ -162,32 +170,35 @@ class _Answer:
     """Readings, once they were asked for."""
 
 
+@dataclass(frozen=True)
+class _Table:
+    """One tool's coefficients or nodes, mirrored at the ends: the four nodes of a place always exist."""
+
+    both: np.ndarray
+    """Loads, then the force, padded (`tacdata.chain.lanes`), shape (a, b, d, lanes)."""
+    force: np.ndarray
+    """The force alone, padded, shape (a, b, d, lanes)."""
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> _Table:
+        """Return the table of loads and force, shape (a, b, d, channels + 1)."""
+        from tacdata.chain.lanes import padded
+
+        around = np.pad(values, ((1, 2), (1, 2), (1, 2), (0, 0)), mode="reflect")
+        return cls(padded(around), padded(around[..., -1:]))
+
+
+def _key(pose: np.ndarray, tool: np.ndarray) -> int:
+    return hash((pose.tobytes(), tool.tobytes()))
+
+
+def _make_room(kept: dict[int, Any]) -> None:
+    """Forget the oldest answer where as many are kept as may be."""
+    if len(kept) >= KEPT:
+        kept.pop(next(iter(kept)))
+
+
 def _locked(values: np.ndarray) -> np.ndarray:
     """Return values that nobody may write into: others are given the same."""
     values.flags.writeable = False
     return values
-
-
-def _spline(t: np.ndarray) -> np.ndarray:
-    """Return the weights of four B-spline coefficients at a share of the way between the middle two."""
-    return np.stack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]) / 6
-
-
-def _lagrange(t: np.ndarray) -> np.ndarray:
-    """Return the weights of four nodes of the cubic through them."""
-    back, on, two = t + 1, t - 1, t - 2
-    return np.stack([-t * on * two / 6, back * on * two / 2, -back * t * two / 2, back * t * on / 6])
-
-
-def _cubic(table: np.ndarray, place: np.ndarray, of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return what a padded array of coefficients or nodes says at places [nodes], shape (n, channels)."""
-    node = np.floor(place).astype(np.int64)
-    weights = of(place - node).transpose(1, 0, 2)  # n, 4, axes
-    _, b, c, channels = table.shape
-    x, y, z = (node[:, axis, None] + np.arange(4) for axis in range(3))
-    at = ((x[:, :, None, None] * b + y[:, None, :, None]) * c + z[:, None, None, :]).reshape(-1)
-    each = weights[:, :, None, None, 0] * weights[:, None, :, None, 1] * weights[:, None, None, :, 2]
-    rows = np.arange(len(place) + 1) * 64
-    return csr_matrix((each.reshape(-1), at, rows), shape=(len(place), table[..., 0].size)) @ table.reshape(
-        -1, channels
-    )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.chain.memory import dead_band, delayed, low_pass, play, running_max, slipping
+from tacdata.chain.memory import dead_band, delayed, low_pass, low_passes, play, running_max, slipping
 
 
 @pytest.mark.parametrize("tau", [0.02, 0.3, 5.0, 400.0])
@@ -20,6 +20,17 @@ def test_lag_forgets_across_a_long_pause():
     values = np.concatenate([np.ones(50), np.zeros(50)])
     result = low_pass(values, np.diff(time, prepend=0.0), 0.5)
     assert np.abs(result[51:]).max() < 1e-3
+
+
+@pytest.mark.parametrize("columns", [1, 7, 8, 25])
+def test_several_lags_at_once_are_their_sum(columns):
+    rng = np.random.default_rng(4)
+    values, step = rng.normal(size=(300, columns)), rng.uniform(0.001, 0.4, 300)
+    taus, shares = np.array([0.03, 0.5, 9.0]), np.array([0.5, 0.2, 0.3])
+    expected = sum(share * low_pass(values, step, tau) for tau, share in zip(taus, shares, strict=True))
+    np.testing.assert_allclose(low_passes(values, step, taus, shares), expected, atol=1e-13)
+    alone = low_pass(values[:, 0], step, 0.5)
+    np.testing.assert_array_equal(low_pass(values, step, 0.5)[:, 0], alone)
 
 
 def test_play_follows_through_its_dead_band():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from tacdata.chain.table_response import TableResponse
 
@@ -36,3 +37,23 @@ def test_rougher_says_the_same_at_nodes():
     tool = np.zeros(2, dtype=int)
     assert made.rougher().load(pose, tool) == pytest.approx(truth(pose)[:, None], rel=1e-9)
     assert made.load(pose, tool) == pytest.approx(truth(pose)[:, None], rel=1e-6)
+
+
+def test_places_are_read_by_the_cubic_splines_through_the_nodes():
+    """Against scipy's, node coordinates in x, y and the root of depth, ends mirrored."""
+    rng, shape = np.random.default_rng(2), (7, 6, 9)
+    x, y, depth = np.linspace(-3, 3, 7), np.linspace(-2, 2, 6), np.linspace(0, 1, 9) ** 2
+    load, force = rng.normal(size=(2, *shape, 5)), rng.normal(size=(2, *shape))
+    curve = np.array([-9.0, 9.0])
+    made = TableResponse(x, y, depth, load, force, curve, curve, np.ones(5), np.zeros(5), ("a", "b"))
+    pose, tool = rng.uniform([-3, -2, -0.1], [3, 2, 1], (400, 3)), rng.integers(0, 2, 400)
+    root = np.sqrt(np.maximum(pose[:, 2], 0.0))
+    there = np.stack([(pose[:, 0] + 3), (pose[:, 1] + 2) / 0.8, root * 8])
+    read = made.load(pose, tool)
+    for c, found in ((0, read[:, 0]), (4, read[:, 4]), (None, made.force(pose, tool))):
+        tables = force if c is None else load[..., c]
+        both = [map_coordinates(table, there, order=3, mode="mirror") for table in tables]
+        expected = np.where(pose[:, 2] > 0, np.choose(tool, both), 0.0)
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+    fresh = made.with_tools([0, 1])
+    np.testing.assert_array_equal(fresh.force(pose, tool), made.force(pose, tool), "alone, as beside the loads")
