@@ -59,8 +59,8 @@ class Candidate:
 class Board:
     """All candidates with their columns."""
 
-    values: np.ndarray
-    """Residual first, then columns [each stream's unit], shape (n, streams, 1 + columns), float32."""
+    columns: list[np.ndarray]
+    """Residual first, then columns [each stream's unit], shape (n, streams) each, float32."""
     candidates: list[Candidate]
     unjudgeable: dict[str, str]
     """Effect -> why these recordings cannot tell of it."""
@@ -107,7 +107,7 @@ def build(
                 index = np.arange(len(columns) - 1, len(columns) - 1 + len(columns_of))
                 columns += columns_of
                 candidates.append(Candidate(effect, shapes, index, np.array(low), np.array(high)))
-    return Board(np.stack(columns, axis=-1), candidates, unjudgeable)
+    return Board(columns, candidates, unjudgeable)
 
 
 class StandIn(Response):

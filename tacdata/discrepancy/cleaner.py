@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -191,8 +192,10 @@ class Cleaner:
         gram, rows = np.zeros((course.episodes, width, width)), np.zeros(course.episodes)
         for group, part in self.parts(columns):
             whole = part if beside is None else np.concatenate([part, beside[group]], axis=2)
-            for number in np.unique(course.episode[group]):
-                flat = whole[course.episode[group] == number].reshape(-1, width)
+            edges = np.flatnonzero(np.diff(course.episode[group], prepend=-1))
+            for begin, end in pairwise([*edges, len(group)]):
+                flat = whole[begin:end].reshape(-1, width)
+                number = course.episode[group[begin]]
                 gram[number] = flat.T @ flat
                 rows[number] = flat.shape[0]
         return Evidence(gram, rows)

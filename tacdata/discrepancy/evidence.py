@@ -78,9 +78,10 @@ def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | 
     some = slice(None) if rows is None else rows
     decay, spread = _filter(course, noise)
     decay, spread = decay[some], spread[some]
-    result = values.astype(np.float32)
-    if noise.relative_scale is not None:
-        result = result / noise.relative_scale[some][:, :, None]
+    if noise.relative_scale is None:
+        result = values.astype(np.float32)
+    else:
+        result = values.astype(np.float32, copy=False) / noise.relative_scale[some][:, :, None]
     if noise.missing is not None:
         missing = noise.missing[some]
         result[missing] = 0.0

@@ -85,7 +85,8 @@ class Frame:
         """Return what takes nuisances out of columns beside a model's response.
 
         What the response takes up, and an episode's own errors of pose and gain, go through the model's effects: those
-        of another one would hold its effect, of which any share might then be every episode's error.
+        of another one would hold its effect, of which any share might then be every episode's error. They keep the
+        size that they were told with: a model that has readings rise higher is not allowed larger errors for it.
 
         Args:
             setting: With the model's response.
@@ -97,10 +98,10 @@ class Frame:
             return self.known
         errors, noise = self.errors, self.noise
         if self.sizes is not None and noise.swing is not None:
-            errors = jitter(setting, placed) * self.sizes
-            streams = Streams.of(course)
+            episode, streams = course.reduced.episode, Streams.of(course)
+            errors = as_large(jitter(setting, placed), errors, episode)
             rise = streams.rise(predict(course, setting.response, list(placed)), setting.response)
-            noise = replace(noise, swing=(rise * self.spread).astype(np.float32))
+            noise = replace(noise, swing=as_large(rise, noise.swing, episode))
         return Cleaner(course.reduced, noise, self.context, features, errors)
 
     def shaken(self, cleaner: Cleaner) -> np.ndarray:
@@ -110,6 +111,24 @@ class Frame:
     @cached_property
     def _shaken(self) -> np.ndarray:
         return self.known.projected(self.draws)
+
+
+def as_large(shape: np.ndarray, told: np.ndarray, episode: np.ndarray) -> np.ndarray:
+    """Return what an episode's error changes in one model, as large in each episode as it was told to be in another.
+
+    Pose: shape (m, streams, kinds), the size of each kind over all streams. Gains: shape (m, streams), that of each.
+
+    Args:
+        shape: In the one model.
+        told: In the other.
+        episode: Of each row, shape (m,), int64.
+    """
+    over = 1 if told.ndim == 3 else ()
+    sizes = np.zeros((2, int(episode.max()) + 1, told.shape[-1]))
+    for size, values in zip(sizes, (shape, told), strict=True):
+        np.add.at(size, episode, np.square(values, dtype=float).sum(axis=over))
+    by = np.sqrt(sizes[1] / np.maximum(sizes[0], 1e-300))[episode]
+    return (shape * (by[:, None] if told.ndim == 3 else by)).astype(np.float32)
 
 
 def frame(setting: Setting) -> Frame:

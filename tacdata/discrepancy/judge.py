@@ -15,6 +15,7 @@ from tacdata.discrepancy.forms import SPREAD
 from tacdata.discrepancy.frame import Frame, frame
 from tacdata.discrepancy.judgement import Judgement, Member
 from tacdata.discrepancy.nuisances import calibrated
+from tacdata.discrepancy.overlap import overlap
 from tacdata.discrepancy.paired import Off, ahead
 from tacdata.discrepancy.problem import Problem, prepare
 from tacdata.discrepancy.refine import Refined, refine
@@ -32,7 +33,8 @@ LIKELIER = 1.0
 AGAIN = 3
 """Gauss-Newton steps when the noise was told again [1]."""
 MINOR = 0.3
-"""A further effect must explain so much of what the others' equations may be off about, in energy [1]."""
+"""A further effect must explain so much of what the others' equations may be off about, in energy, of the share of it
+that these could say press by press in other forms [1]."""
 KEPT = 2.8
 """An effect stays in the answer if that is worse by so many standard errors without it [1]."""
 SWAPS = 2
@@ -84,7 +86,7 @@ def judge(setting: Setting, note: Note = lambda text: None, until: str = "decide
             break
         more = current.loss - best.loss
         added = _added(best, len(members), more)
-        if members and more < MINOR * _off(explained, [effect for effect, _ in added], best.response):
+        if members and more < MINOR * _off(explained, [effect for effect, _ in added], best.response, now):
             break
         explained += added
         members = list(best.placed)
@@ -152,7 +154,9 @@ def _gains(problem: Problem) -> np.ndarray:
     return np.where(power > TOLD * problem.ridge[:channels], own, np.nan)
 
 
-def _off(explained: list[tuple[Effect, float]], further: list[Effect], response: Response) -> float:
+def _off(
+    explained: list[tuple[Effect, float]], further: list[Effect], response: Response, problem: Problem | None = None
+) -> float:  # fmt: skip
     """Return how much their equations may be off about of what effects explain, as far as further ones take it [nats].
 
     An effect of the same ambiguity group looks like another form of what is there, and takes more of it.
@@ -161,12 +165,16 @@ def _off(explained: list[tuple[Effect, float]], further: list[Effect], response:
         explained: Effects, each with what it explains [nats].
         further: Those that would be added.
         response: Of which not everything is known, either.
+        problem: With columns for what the equations may be off about; without it they may take up all of a further one,
+            as what a fitted response makes of them may in any case.
     """
 
     def off(one: Effect) -> float:
+        own = [c for c in problem.candidates if c.effect.name == one.name] if problem else []
+        alike = overlap(problem, own) if problem else 1.0
         kin = [SPREAD if effect.group == one.group else 1.0 for effect, _ in explained]
         return sum(
-            much * ((wide * effect.form_error) ** 2 + response.form_error**2)
+            much * (alike * (wide * effect.form_error) ** 2 + response.form_error**2)
             for wide, (effect, much) in zip(kin, explained, strict=True)
         )
 

@@ -33,7 +33,7 @@ class Slice:
 
 def residual(problem: Problem) -> np.ndarray:
     """Return the whitened residual without nuisances, shape (m, streams)."""
-    return problem.frame.known.cleaned(problem.board.values[:, :, :1])[:, :, 0]
+    return problem.frame.known.cleaned(problem.board.columns[0][:, :, None])[:, :, 0]
 
 
 PHASES = ("without contact", "loading", "hold", "unloading")

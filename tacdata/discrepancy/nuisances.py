@@ -8,6 +8,7 @@ import numpy as np
 
 from tacdata.chain import predict
 from tacdata.discrepancy.candidates import build
+from tacdata.discrepancy.columns import side_by_side
 from tacdata.discrepancy.generic import depth_slope
 from tacdata.discrepancy.setting import Setting
 from tacdata.discrepancy.streams import Streams
@@ -38,7 +39,7 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
         return set_ups(setting, placed)
     effects = [load(name) for name in setting.nuisance]
     board = build(course, response, placed, effects)
-    idle = np.zeros((len(course.read), board.values.shape[1], course.channels), dtype=np.float32)
+    idle = np.zeros((len(course.read), board.columns[0].shape[1], course.channels), dtype=np.float32)
     rise = Streams.of(course).rise(predict(course, response, placed), response)[:, : course.channels]
     idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * float(np.abs(rise).max())
     weights = [
@@ -48,7 +49,7 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
         for _ in range(len(c.columns) // len(c.effect.amplitudes))
     ]
     own, ridge = set_ups(setting, placed)
-    columns = np.concatenate([board.values[:, :, 1:], idle, own], axis=2)
+    columns = np.concatenate([side_by_side(board.columns)[:, :, 1:], idle, own], axis=2)
     return columns, np.array([*weights, *np.ones(course.channels), *ridge])
 
 
@@ -85,5 +86,5 @@ def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
     shift = sideways.candidates[0].effect.amplitudes[0].typical if sideways.candidates else 1.0
     parts = [slope[:, :, None] * JITTER[2]]
     if sideways.candidates:
-        parts.append(sideways.values[:, :, 1:] * (JITTER[0] / shift))
+        parts.append(side_by_side(sideways.columns)[:, :, 1:] * (JITTER[0] / shift))
     return np.concatenate(parts, axis=2)

@@ -6,12 +6,13 @@ much as the models differ in it, so that an effect that few presses excite is se
 of differences of energy over episodes are blind to that: of 48 episodes 5 cannot reach 2.4 standard errors by them,
 however clear they are.)
 
-Where a response is fitted, models that move the pose, or remember, have it take up different functions, and differ in
-noise alone: by V = |(P2 - P1) n|^2 for projections P1 and P2, told by draws of noise. That is taken off: by chance the
-pull has mean (V + f1 - f2) / 2 for the responses' degrees of freedom f, and a variance that the draws tell as well (it
-is a quadratic form in normal variables), beside the |d|^2 - V of what truly differs, d being the difference. A model's
-own amplitudes follow noise as well: all but the first of
-those that the other has not count in V and in f (the first is what a test of one column pays for; that the test rejects
+Where a response is fitted, models that move the pose, or remember, have it take up different functions. What the
+second's may take up is taken out of the difference d first (Frisch & Waugh, Econometrica 1, 1933, 387): the residual
+beside it has nothing of that over all episodes of a place, but much in each. Both differ in noise alone by
+V = |(1 - P2) P1 n|^2, P1 and P2 projections on what they take up, told by draws of noise. By chance that is the mean of
+the pull, too, which is taken off, and the pull has a variance that the draws tell as well (it is a quadratic form in
+normal variables), beside the |d|^2 - V of what truly differs. A model's own amplitudes follow noise as well: all but
+the first of those that the other has not count (the first is what a test of one column pays for; that the test rejects
 too often by the others: Godfrey & Pesaran, J. Econometrics 21, 1983, 133).
 """
 
@@ -85,8 +86,8 @@ class Chance:
 
     apart: float
     """V, the difference squared and summed [noise scales squared]."""
-    freer: float
-    """By how many degrees of freedom the first is freer [1]."""
+    pull: float
+    """Mean of the pull [1]."""
     variance: float
     """Of the pull [1]."""
 
@@ -94,28 +95,29 @@ class Chance:
     def of(cls, first: Refined, second: Refined) -> Chance:
         """Return what the draws of noise say.
 
-        Places and streams are nearly independent. The variance is V / 2 for responses that are much alike, and V with
-        what the first is freer by for those that have nothing in common.
+        V is half of |(P2 - P1) n|^2 and of what the first's response has more of freedom. Places and streams are
+        nearly independent. The variance is V for responses that are much alike, and 2 V for those that have nothing in
+        common.
         """
         if first.shaken is second.shaken:
             return cls(0.0, 0.0, 0.0)
         apart = second.shaken - first.shaken
-        draws, freer = apart.shape[2], first.freedom - second.freedom
-        noise = float(np.square(apart).sum()) / draws
+        draws = apart.shape[2]
+        noise = max(0.5 * (float(np.square(apart).sum()) / draws + first.freedom - second.freedom), 0.0)
         pull = np.zeros((int(first.place.max()) + 1, *apart.shape[1:]))
         np.add.at(pull, first.place, second.shaken * apart)
         groups = int(np.count_nonzero(np.any(pull, axis=2)))
         told = float(np.var(pull, axis=2, ddof=1).sum()) * (1 + 2 * np.sqrt(2 / max(groups * (draws - 1), 1)))
-        return cls(noise, freer, float(np.clip(told, 0.5 * noise, noise + max(freer, 0.0))))
+        return cls(noise, noise, float(np.clip(told, noise, 2 * noise)))
 
     def beside(self, more: int, less: int) -> Chance:
         """Return the same with amplitudes that only the first (``more``) or only the second (``less``) has."""
-        return Chance(self.apart + more + less, self.freer + more - less, self.variance + 2 * more)
+        return Chance(self.apart + more + less, self.pull + more, self.variance + 2 * more)
 
     def share(self, gram: np.ndarray) -> float:
         """Return the share of a pull that noise does not make [1]; products of episodes as in `ahead`."""
         pull, apart = float(gram[:, 0, 1].sum()), float(gram[:, 1, 1].sum())
-        return max(pull - 0.5 * (min(self.apart, apart) + self.freer), 0.0) / pull if pull > 0 else 1.0
+        return max(pull - min(self.pull, apart), 0.0) / pull if pull > 0 else 1.0
 
     def spread(self, apart: float) -> float:
         """Return the variance of a pull over what it is where noise makes nothing, the difference squared [1]."""
@@ -136,6 +138,8 @@ def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: O
     if loss < 0:
         return -ahead(second, first, lent)
     apart = second.left - first.left
+    if first.shaken is not second.shaken:
+        apart = second.cleaner.projected(apart[:, :, None])[:, :, 0]
     if off is None:
         gram = np.zeros((len(first.energy), 2, 2))
         for i, values in ((0, second.left), (1, apart)):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tacdata.chain import predict
+from tacdata.discrepancy import columns
 from tacdata.discrepancy.candidates import Board, Candidate, build
 from tacdata.discrepancy.evidence import Evidence
 from tacdata.discrepancy.forms import forms
@@ -83,16 +84,17 @@ def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Pr
     board = build(course, response, [*setting.given, *placed], setting.effects, taken)
     moving = tangents(course, response, placed, setting.given)
     off = forms(course, response, placed, setting.given)
-    count = board.values.shape[2] - 1
+    count = len(board.columns) - 1
     numerics = _numerics(setting, placed)
     slack = count + moving.values.shape[2]
     last = slack + off.shape[2]
     first = last + (numerics is not None)
-    values = np.concatenate([board.values, moving.values, off, *([] if numerics is None else [numerics])], axis=2)
+    more = [moving.values, off, *([] if numerics is None else [numerics])]
+    values = columns.side_by_side([*board.columns, *(column for each in more for column in columns.of(each))])
     found = frame.cleaner(setting, [*setting.given, *placed]).collected(values, frame.beside)
     second = first + len(frame.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
-    board = replace(board, values=board.values[:, :, :1])
+    board = replace(board, columns=board.columns[:1])
     return Problem(
         setting, frame, tuple(placed), board, found, moving.at(count), np.arange(slack, last), nuisances, rich,
         _rise(setting, frame), None if numerics is None else last,

@@ -48,6 +48,8 @@ class Refined:
     """Group of rows that share a response's features, shape (m,), int64."""
     shaken: np.ndarray
     """What it leaves of the frame's draws of noise [noise scales], shape (m, streams, draws), float32."""
+    cleaner: Cleaner
+    """What took nuisances out of it, and what its response may take up."""
     freedom: float
     """Degrees of freedom that its response takes up [1]; another response has others where effects move the pose."""
 
@@ -94,7 +96,7 @@ def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int 
             break
     return Refined(
         tuple(now), response, state.tangent, view.energy, state.covariance, view.left, setting.course.reduced.episode,
-        frame.context, frame.shaken(view.cleaner), view.cleaner.freedom,
+        frame.context, frame.shaken(view.cleaner), view.cleaner, view.cleaner.freedom,
     )  # fmt: skip
 
 

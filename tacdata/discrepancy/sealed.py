@@ -12,8 +12,10 @@ from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.generic import histories
 from tacdata.discrepancy.judgement import Judgement
 
-SHARE = 0.2
-"""Share of the episodes that is sealed [1]."""
+SHARE = 0.1
+"""Share of the episodes that is sealed [1]..."""
+FEWEST = 4
+"""...and no fewer: a handful shows the gap, all the others are needed to say what it is."""
 ENOUGH = 20
 """With fewer episodes none is sealed: all are needed for the verdict."""
 KEPT = 2
@@ -44,7 +46,7 @@ def chosen(course: Course) -> np.ndarray:
     for k in order:
         others = [other for other in left[int(course.site[k]), int(tool[k])] if other != k]
         enough = len(others) >= KEPT and depth[others].max() >= (1 - WITHIN) * depth[k]
-        if len(found) < int(SHARE * course.episodes) and enough:
+        if len(found) < max(int(SHARE * course.episodes), FEWEST) and enough:
             found.append(k)
             left[int(course.site[k]), int(tool[k])] = others
     return np.sort(np.array(found, dtype=np.int64))
@@ -78,7 +80,7 @@ class Gap:
         share = _closed(before, after, np.minimum(ceiling, after))
         low, high = np.quantile(share, [0.05, 0.95])
         return {
-            "episodes": len(self.before), "share": SHARE, "rule": "least SHA-256 of session/name",
+            "episodes": len(self.before), "share": SHARE, "rule": f"least SHA-256 of session/name, {FEWEST} at least",
             "before": float(self.before.mean()), "after": float(self.after.mean()), "floor": 1.0, "ceiling": best,
             "closed": float(_closed(self.before.mean(), self.after.mean(), np.array(best))),
             "interval": [float(low), float(high)],

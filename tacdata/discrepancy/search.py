@@ -215,7 +215,7 @@ def leftovers(problem: Problem) -> Left:
 def _stream_residual(problem: Problem) -> np.ndarray:
     """Return the whitened residual with nuisances fitted, shape (m, streams)."""
     same = problem.frame
-    residual = same.known.cleaned(problem.board.values[:, :, :1])[:, :, 0]
+    residual = same.known.cleaned(problem.board.columns[0][:, :, None])[:, :, 0]
     if len(problem.nuisances):
         _, values = fitted(problem, [], np.arange(len(problem.folds)))
         weights = values[len(problem.tangent.columns) + len(problem.forms) :].astype(np.float32)

@@ -16,7 +16,7 @@ SMALL = 0.01
 
 
 class SplineResponse(Response):
-    """A response whose channels are all alike but for a little of one spline each."""
+    """A response whose channels are all alike but for a little of one spline each; the last has none."""
 
     fitted = True
     form_error = FORM_ERROR
@@ -26,17 +26,25 @@ class SplineResponse(Response):
         self._response, self._weight = response, weight
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
-        """Return the size of the loads, with a little of the splines less what each says in the air (n, splines)."""
+        """Return the size of the loads with a little of each spline less what it says in the air, and as it is.
+
+        Shape (n, splines + 1).
+        """
         there = self._response.basis(np.broadcast_to(pose, (len(self._response.context), 3)))
-        return self.force(pose, tool)[:, None] + self._weight * (there - self._response.air)
+        more = np.pad(there - self._response.air, ((0, 0), (0, 1)))
+        return self.force(pose, tool)[:, None] + self._weight * more
 
     def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return the force of the response as it is, shape (n,)."""
         return self._response.force(pose, tool)
 
     def signal(self, load: np.ndarray) -> np.ndarray:
-        """Return the loads, shape (n, splines)."""
+        """Return the loads, shape (n, splines + 1)."""
         return load
+
+    def largest(self, signal: np.ndarray) -> float:
+        """Return the largest rise without any spline: a little more of one is no other unit for all."""
+        return super().largest(signal[:, -1:])
 
 
 def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np.ndarray | None:
@@ -54,8 +62,8 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
     acting = [p for p in placed if not p.effect.by_channel]
     if not isinstance(response, FittedResponse) or not acting:
         return response.features(course.reduced)
-    plain = replace(course, readings=np.zeros((course.rows, response.width)), centers=None, force=None).forgetting()
+    none = np.zeros((course.rows, response.width + 1))
+    plain = replace(course, readings=none, centers=None, force=None).forgetting()
     little = SMALL * max(float(np.abs(response.force(course.tip, course.tool)).max()), 1e-12)
-    moved = predict(plain, SplineResponse(response, little), acting).signal
-    alone = predict(plain, SplineResponse(response, 0.0), acting).signal
-    return ((moved - alone) / little + response.air)[course.read]
+    said = predict(plain, SplineResponse(response, little), acting).signal
+    return ((said[:, :-1] - said[:, -1:]) / little + response.air)[course.read]

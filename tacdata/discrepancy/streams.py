@@ -49,12 +49,12 @@ class Streams:
 
     def predicted(self, prediction: Prediction) -> np.ndarray:
         """Return what a model says at the rows that were read, shape (m, streams)."""
-        parts = [prediction.signal]
+        parts = [prediction.signal[self.rows]]
         if self.force:
-            parts.append(prediction.force[:, None])
+            parts.append(prediction.force[self.rows, None])
         if self.tag:
-            parts.append(prediction.tag)
-        return np.column_stack(parts)[self.rows]
+            parts.append(prediction.tag[self.rows])
+        return np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
 
     def rise(self, prediction: Prediction, response: Response) -> np.ndarray:
         """Return what presses add at the rows that were read, shape (m, streams): readings without what is said in the

@@ -28,7 +28,6 @@ class Drift(Effect):
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
-        idle = state.response.signal(np.zeros_like(state.load[:1]))
-        scale = np.abs(state.signal - idle).max()
+        scale = state.response.largest(state.signal)
         clock = state.course.time / max(float(state.course.time[-1]), 1e-9) - 0.5
         return replace(state, signal=state.signal + scale * clock[:, None] * values["r"])

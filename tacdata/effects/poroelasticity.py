@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import erfcinv
 
 from tacdata.chain import Course, Response, State
-from tacdata.chain.memory import low_pass
+from tacdata.chain.memory import low_passes
 from tacdata.effects.effect import Effect, Parameter
 
 ROOTS = 6
@@ -49,12 +49,12 @@ class Poroelasticity(Effect):
         radii = np.where(np.isfinite(radii), radii, np.nanmedian(radii))
         both = np.column_stack([state.load, state.force])
         slow = np.zeros_like(both)
+        rates, shares = np.array(SPECTRUM).T
         for t, radius in enumerate(radii):
             rows = course.tool == t
             tau = float(values["tau"]) * radius / np.median(radii)
             own = np.where(rows[:, None], both, 0.0)
-            late = [share * low_pass(own, course.step, tau / rate) for rate, share in SPECTRUM]
-            slow[rows] = np.sum(late, axis=0)[rows]
+            slow[rows] = low_passes(own, course.step, tau / rates, shares)[rows]
         both = both - values["f"] * slow
         return replace(state, load=both[:, :-1], force=both[:, -1])
 

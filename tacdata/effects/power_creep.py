@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.chain.memory import low_pass
+from tacdata.chain.memory import low_passes
 from tacdata.effects.effect import Effect, Parameter
 
 
@@ -34,6 +34,6 @@ class PowerCreep(Effect):
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         both = np.column_stack([state.load, state.force])
-        slow = [low_pass(both, state.course.step, float(values["tau0"]) * 3.0**k) for k in range(6)]
-        both = both - values["f"] * np.mean(slow, axis=0)
+        taus = float(values["tau0"]) * 3.0 ** np.arange(6)
+        both = both - values["f"] * low_passes(both, state.course.step, taus, np.full(6, 1 / 6))
         return replace(state, load=both[:, :-1], force=both[:, -1])

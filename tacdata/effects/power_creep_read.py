@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.chain.memory import low_pass
+from tacdata.chain.memory import low_passes
 from tacdata.effects.power_creep import PowerCreep
 from tacdata.effects.relaxation_read import POWER, RelaxationRead
 
@@ -19,4 +19,4 @@ class PowerCreepRead(RelaxationRead):
 
     def late(self, load: np.ndarray, step: np.ndarray, values: dict[str, np.ndarray]) -> np.ndarray:
         """Return the mean of the loads so far that relaxes, of the same shape."""
-        return np.mean([low_pass(load, step, float(values["tau0"]) * 3.0**k) for k in range(6)], axis=0)
+        return low_passes(load, step, float(values["tau0"]) * 3.0 ** np.arange(6), np.full(6, 1 / 6))

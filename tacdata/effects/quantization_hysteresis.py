@@ -26,8 +26,7 @@ class QuantizationHysteresis(Effect):
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
-        idle = state.response.signal(np.zeros_like(state.load[:1]))[0]
-        width = float(values["w"]) * np.abs(state.signal - idle).max()
+        width = float(values["w"]) * state.response.largest(state.signal)
         if width <= 0.0:
             return state
         return replace(state, signal=play(state.signal, width) + width)

@@ -28,8 +28,7 @@ class TemperatureOffset(Effect):
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
-        idle = state.response.signal(np.zeros_like(state.load[:1]))
-        scale = np.abs(state.signal - idle).max()
+        scale = state.response.largest(state.signal)
         given = np.zeros(state.course.rows) if state.course.temperature is None else state.course.temperature
         warm = np.nan_to_num((given - np.nanmean(given)) / 10.0)
         return replace(state, signal=state.signal + scale * warm[:, None] * values["k"])

@@ -28,7 +28,6 @@ class WarmUpDrift(Effect):
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
-        idle = state.response.signal(np.zeros_like(state.load[:1]))
-        scale = np.abs(state.signal - idle).max()
+        scale = state.response.largest(state.signal)
         settling = values["a"] * np.exp(-state.course.time / values["tau"])
         return replace(state, signal=state.signal + scale * settling[:, None])

@@ -87,7 +87,7 @@ def _groups(axis: Any, found: Gap) -> None:
     low = min(0.8, *(c.after for c in rows))
     axis.set(xscale="log", xlim=(0.8 * low, None), xlabel="mean square of the residual; 1 is the noise floor",
              title="the gap, where the numbers were not fitted")  # fmt: skip
-    axis.legend(loc="lower right", fontsize=8)
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8)  # clear of every bar
 
 
 def _networks(axis: Any, metrics: Sequence[dict[str, Any]]) -> None:

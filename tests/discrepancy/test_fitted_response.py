@@ -9,7 +9,7 @@ from pressing import course
 from tacdata.chain import predict
 from tacdata.discrepancy.episode_errors import EpisodeErrors, Sizes
 from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.frame import frame
+from tacdata.discrepancy.frame import as_large, frame
 from tacdata.discrepancy.refine import refine
 from tacdata.discrepancy.setting import Setting
 from tacdata.discrepancy.spline_response import taken_up
@@ -136,6 +136,33 @@ def test_splines_go_through_an_effect_beside_the_load_that_there_is(name):
     expected = (1e-3 * adds[:, None] * channels)[pressed]
     wrong = np.sqrt(np.mean(np.square(change[made.read][pressed] - expected)))
     assert wrong < 0.1 * np.sqrt(np.mean(np.square(expected)))
+
+
+def test_the_unit_of_an_effect_is_no_freedom():
+    """What drifts by a share of the largest rise does so by as much, whichever spline is a little larger."""
+    made = course(noise=0.1)
+    response = FittedResponse(made)
+    plain = taken_up(made, response, [])
+    assert taken_up(made, response, [placed("warm_up_drift")]) == pytest.approx(plain, abs=1e-9)
+
+
+def test_an_effect_on_gains_is_allowed_no_other_errors_of_gain():
+    """Where readings rise by half again, so would what one standard deviation of an own gain changes: it must not."""
+    made = course(episodes=12)
+    setting = Setting(made, FittedResponse(made), [])
+    same = frame(setting)
+    swing, errors = same.noise.swing, same.errors
+    assert swing is not None
+    episode = made.reduced.episode
+    bent = (1 + made.reduced.tip[:, 2] + 0.5 * (episode > 5))[:, None]
+    for told in (swing, errors):
+        now = as_large(told * (bent if told.ndim == 2 else bent[:, :, None]), told, episode)
+        assert not np.allclose(now, told)
+        for k in range(made.episodes):
+            # A gain of each stream has its own size, an error of pose one over all of them.
+            axis = 0 if told.ndim == 2 else (0, 1)
+            sizes = [np.sqrt(np.square(v[episode == k], dtype=float).sum(axis=axis)) for v in (now, told)]
+            assert sizes[0] == pytest.approx(sizes[1], rel=1e-4)
 
 
 def test_errors_of_an_episode_hold_no_effect_of_another_model(monkeypatch):

@@ -1,0 +1,46 @@
+"""What a further effect does that what is there could do in another form, and what it does that it could not."""
+
+import numpy as np
+import pytest
+from pressing import course
+
+from tacdata.discrepancy import judge
+from tacdata.discrepancy.candidates import StandIn
+from tacdata.discrepancy.fitted_response import FittedResponse
+from tacdata.discrepancy.frame import frame
+from tacdata.discrepancy.overlap import overlap
+from tacdata.discrepancy.problem import prepare
+from tacdata.discrepancy.refine import refine
+from tacdata.discrepancy.setting import Setting
+from tacdata.effects import Placed, load
+
+
+@pytest.fixture(scope="module")
+def late():
+    made = course(delay=0.05)
+    others = [load(name) for name in ("low_pass_filter", "relaxation", "gain_drift")]
+    setting = Setting(made, FittedResponse(made), others)
+    model = refine(setting, [Placed(load("latency"), {"L": np.array(0.05)})], frame(setting))
+    return prepare(Setting(made, model.response, others), frame(setting), model.placed)
+
+
+def of(problem, name):
+    return [c for c in problem.candidates if c.effect.name == name]
+
+
+def test_another_form_of_what_is_there_could_be_said_by_it(late):
+    shares = {name: overlap(late, of(late, name)) for name in ("low_pass_filter", "relaxation", "gain_drift")}
+    assert shares["low_pass_filter"] > 0.8
+    assert shares["gain_drift"] < 0.2
+    assert shares["gain_drift"] < shares["relaxation"] < 1.0
+    assert overlap(late, []) == 0.0
+
+
+def test_what_is_unlike_a_large_effect_needs_to_explain_less(late):
+    """One part in a hundred of a large effect's energy was asked for, whatever that looked like."""
+    there = [(load("latency"), 10000.0)]
+    table, fitted = StandIn(False), late.setting.response
+    whole, alike = (judge._off(there, [load("gain_drift")], table, known) for known in (None, late))
+    assert alike == pytest.approx(whole * overlap(late, of(late, "gain_drift")))
+    assert alike < 0.2 * whole
+    assert judge._off(there, [load("gain_drift")], fitted, late) > 200.0, "what a fitted response makes of it"
