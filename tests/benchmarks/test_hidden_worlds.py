@@ -100,6 +100,19 @@ def test_a_rival_that_is_a_multiple_of_the_truth_cannot_be_told_from_it():
     assert nearest(gram, 3, 1, 2) == pytest.approx(4.0, abs=0.01)
 
 
+def test_what_no_skin_shows_is_no_rival():
+    """A skin that creeps is one that relaxes backwards and is softer: no skin relaxes backwards."""
+    from worlds.oracle import nearest
+    from worlds.physics import KNOWN
+
+    line, other, _ = np.eye(3)
+    rows = np.array([-2 * line + 3 * other, line, 3 * line])
+    assert nearest(rows @ rows.T, 0, 1, 2, both=True) == pytest.approx(3.0, abs=0.01)
+    assert nearest(rows @ rows.T, 0, 1, 2, both=False) == pytest.approx(np.sqrt(13), abs=0.01)
+    assert not any(KNOWN[n].both for n in ("poroelasticity", "relaxation", "softening", "backlash", "low_pass_filter"))
+    assert all(KNOWN[n].both for n in ("gain", "z_offset", "drift", "latency"))
+
+
 def test_blocks_hold_what_the_protocol_asks_for():
     from worlds.cases import BLOCKS, cases
     from worlds.physics import FORMS, KNOWN, OUTSIDE

@@ -33,7 +33,7 @@ def lateral_backlash(w, s):
     w.tell("lateral_backlash", b=b)
 
 
-@hidden("guide", "depth offset", fitted=True, most=8)
+@hidden("guide", "depth offset", fitted=True, most=8, both=True)
 def lost_steps(w, s):
     """Steps are lost once, from a moment on."""
     w.carriage[w.episode > 0.45 * w.episode.max(), 2] -= 0.05 * s
@@ -50,14 +50,14 @@ def servo_lag(w, s):
         w.carriage[rows, 2] = z[0] + lfilter(top[0], bottom, z - z[0])
 
 
-@hidden("guide", "amplitude", most=10)
+@hidden("guide", "amplitude", most=10, both=True)
 def travel_scale(w, s):
     """Wrong steps a millimetre on all axes."""
     w.carriage *= 1 + 0.02 * s
     w.tell("travel_scale", k=0.02 * s)
 
 
-@hidden("guide", "lateral", most=8)
+@hidden("guide", "lateral", most=8, both=True)
 def skew(w, s):
     """The axes lean: x goes along as y goes, and is as much shorter as a parallelogram has it."""
     g = 0.025 * s
@@ -66,7 +66,7 @@ def skew(w, s):
     w.tell("skew", g=g)
 
 
-@hidden("guide", "depth offset", most=8)
+@hidden("guide", "depth offset", most=8, both=True)
 def screw_error(w, s):
     """The height wobbles once a turn of a 0.8 mm screw, with a second harmonic."""
     phase = w.rng.uniform(0, 2 * np.pi)
@@ -74,7 +74,7 @@ def screw_error(w, s):
     w.carriage[:, 2] += 0.015 * s * (np.sin(turn) - np.sin(phase) + 0.15 * (np.sin(2 * turn) - np.sin(2 * phase)))
 
 
-@hidden("guide", "depth offset", most=8, fitted=True, needs={"sessions": 4})
+@hidden("guide", "depth offset", most=8, fitted=True, needs={"sessions": 4}, both=True)
 def session_zero(w, s):
     """Every homing ends a little elsewhere."""
     off = 0.04 * s * w.rng.normal(size=w.session.max() + 1)

@@ -25,19 +25,21 @@ class Hidden:
     """Settings of a world without which it does not show."""
     fitted: bool = False
     """Whether it shows beside a response without memory that was fitted to the recordings."""
+    both: bool = False
+    """Whether it may be of negative size: lengths, gains and clocks are off either way, no skin relaxes backwards."""
 
 
 KNOWN: dict[str, Hidden] = {}
 """Name -> what may be hidden."""
 
 
-def hidden(stage, group, called=None, most=10.0, fitted=False, needs=None):
+def hidden(stage, group, called=None, most=10.0, fitted=False, needs=None, both=False):
     """Enter a function; it is called by its own name unless told otherwise."""
 
     def enter(act):
         name = act.__name__
         names = (name,) if called is None else tuple(called)
-        KNOWN[name] = Hidden(name, stage, act, names, group, most, needs or {}, fitted)
+        KNOWN[name] = Hidden(name, stage, act, names, group, most, needs or {}, fitted, both)
         return act
 
     return enter

@@ -89,7 +89,7 @@ def separations(known):
 
 
 def apart(oracle, sizes, steps):
-    """Return how far effects stay from any size of any rival: name -> size in limits -> [separation, rival].
+    """Return how far effects stay from any physical size of any rival: name -> size in limits -> [separation, rival].
 
     Args:
         oracle: Whose presses.
@@ -104,7 +104,7 @@ def apart(oracle, sizes, steps):
     for name, times in every:
         others = [r for r in rivals if not set(KNOWN[r].called) & set(KNOWN[name].called)]
         if times in steps and others:
-            left, by = min((nearest(gram, at[name, times], at[r, 1.0], at[r, 3.0]), r) for r in others)
+            left, by = min((nearest(gram, at[name, times], at[r, 1.0], at[r, 3.0], KNOWN[r].both), r) for r in others)
             made.setdefault(name, {})[times] = [round(left, 2), by]
     return made
 

@@ -7,7 +7,7 @@ from worlds.follow import late
 from worlds.hidden import hidden
 
 
-@hidden("layer", "amplitude", most=4)
+@hidden("layer", "amplitude", most=4, both=True)
 def thickness(w, s):
     """A thinner layer: loads anew."""
     w.layer *= 1 - 0.06 * s
@@ -86,20 +86,20 @@ def hysteresis(w, s):
     w.load = w.load * (1 + 0.08 * s * (out - 1) * share)[:, None]
 
 
-@hidden("skin", "amplitude", most=6)
+@hidden("skin", "amplitude", most=6, both=True)
 def modulus(w, s):
     """Stiffer throughout."""
     w.load = w.load * (1 + 0.12 * s)
     w.tell("modulus", e=0.12 * s)
 
 
-@hidden("skin", "depth curvature", most=6)
+@hidden("skin", "depth curvature", most=6, both=True)
 def stiffening(w, s):
     """Chains reach their length: an exponential of depth over radius (Fung)."""
     w.load = w.load * np.exp(0.5 * s * np.maximum(w.pose[:, 2], 0.0) / (w.radius + 4.0))[:, None]
 
 
-@hidden("skin", "lateral spread", most=5)
+@hidden("skin", "lateral spread", most=5, both=True)
 def bulge(w, s):
     """The skin does not give way in volume: it lifts around the contact."""
     c = skin.centers()
@@ -137,7 +137,7 @@ def permanent_set(w, s):
     w.load = w.load * ratio
 
 
-@hidden("skin", "temperature", fitted=True, most=6, needs={"streams": ("temperature",)})
+@hidden("skin", "temperature", fitted=True, most=6, needs={"streams": ("temperature",)}, both=True)
 def temperature_stiffness(w, s):
     """Nearly entropic: more load where it is warm, slightly bent."""
     t = (w.warm - w.warm.mean()) / 10.0

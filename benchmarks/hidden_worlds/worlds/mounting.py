@@ -6,14 +6,14 @@ from worlds import skin
 from worlds.hidden import hidden
 
 
-@hidden("mounting", "depth offset", most=6)
+@hidden("mounting", "depth offset", most=6, both=True)
 def z_offset(w, s):
     """The touch-off was wrong."""
     w.pose[:, 2] += 0.05 * s
     w.tell("z_offset", dz=0.05 * s)
 
 
-@hidden("mounting", "lateral", most=8)
+@hidden("mounting", "lateral", most=8, both=True)
 def xy_offset(w, s):
     """The sensor lies aside."""
     a = w.rng.uniform(0, 2 * np.pi)
@@ -22,7 +22,7 @@ def xy_offset(w, s):
     w.tell("xy_offset", dx=move[0], dy=move[1])
 
 
-@hidden("mounting", "depth offset", most=6)
+@hidden("mounting", "depth offset", most=6, both=True)
 def tilt(w, s):
     """The face is a slope: depth along its normal."""
     a = w.rng.uniform(0, 2 * np.pi)
@@ -31,7 +31,7 @@ def tilt(w, s):
     w.tell("tilt", a=slope[0], b=slope[1])
 
 
-@hidden("mounting", "lateral", most=8)
+@hidden("mounting", "lateral", most=8, both=True)
 def rotation(w, s):
     """The sensor is turned: a full rotation matrix."""
     t = 0.03 * s * w.rng.choice([-1, 1])
@@ -39,14 +39,14 @@ def rotation(w, s):
     w.tell("rotation", theta=t)
 
 
-@hidden("mounting", "depth offset", most=8)
+@hidden("mounting", "depth offset", most=8, both=True)
 def gantry_sag(w, s):
     """The beam hangs through between its ends, as a cosine along x and a little along y."""
     at = np.hypot(w.pose[:, 0], 0.9 * w.pose[:, 1]) / 4.6
     w.pose[:, 2] += 0.06 * s * (1 - np.cos(np.pi / 2 * np.minimum(at, 1.5)))
 
 
-@hidden("mounting", "depth offset", fitted=True, most=8)
+@hidden("mounting", "depth offset", fitted=True, most=8, both=True)
 def thermal_growth(w, s):
     """The column grows hyperbolically in time."""
     w.pose[:, 2] += 0.05 * s * (w.clock / (w.clock + 250.0))

@@ -97,8 +97,8 @@ class Oracle:
         return float(np.sqrt(max(self.gram([self.signature(effects)])[0, 0], 0.0)))
 
 
-def nearest(gram, mine, small, large):
-    """Return how far a signature is from a rival's of any size [standard deviations].
+def nearest(gram, mine, small, large, both=True):
+    """Return how far a signature is from a rival's of any physical size [standard deviations].
 
     A rival's signature of x times its limit is taken as x u + x^2 q, u and q from those at one and three times.
 
@@ -107,8 +107,10 @@ def nearest(gram, mine, small, large):
         mine: Which is the truth's.
         small: Which is the rival's at its limit.
         large: Which is the rival's at three times its limit.
+        both: Whether the rival may be of negative size.
     """
-    x = np.concatenate([-np.geomspace(0.01, 200, 400)[::-1], [0.0], np.geomspace(0.01, 200, 400)])
+    x = np.concatenate([[0.0], np.geomspace(0.01, 200, 400)])
+    x = np.concatenate([-x[:0:-1], x]) if both else x
     index = [mine, small, large]
     for _ in range(3):
         weights = np.stack([np.ones_like(x), -(9 * x - 3 * x**2) / 6, -(x**2 - x) / 6])

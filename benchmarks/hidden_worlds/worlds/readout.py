@@ -15,7 +15,7 @@ def low_pass_filter(w, s):
     w.tell("low_pass_filter", tau=0.05 * s)
 
 
-@hidden("readout", "lateral spread", most=6)
+@hidden("readout", "lateral spread", most=6, both=True)
 def crosstalk(w, s):
     """Traces side by side, in the order of numbers."""
     side = np.zeros_like(w.rise)
@@ -25,20 +25,20 @@ def crosstalk(w, s):
     w.tell("crosstalk", k=0.025 * s)
 
 
-@hidden("readout", "clock", fitted=True, most=10)
+@hidden("readout", "clock", fitted=True, most=10, both=True)
 def drift(w, s):
     """Nearly straight, each channel its own."""
     t = w.clock / w.clock[-1]
     w.rise = w.rise + 20.0 * s * (t + 0.15 * np.sin(3 * t))[:, None] * w.rng.normal(0, 1, w.rise.shape[1])
 
 
-@hidden("readout", "clock", fitted=True, most=6)
+@hidden("readout", "clock", fitted=True, most=6, both=True)
 def gain_drift(w, s):
     """As the root of time."""
     w.rise = w.rise * (1 - 0.08 * s * np.sqrt(w.clock / w.clock[-1]))[:, None]
 
 
-@hidden("readout", "clock", fitted=True, most=10, called=("warm_up_drift", "drift"))
+@hidden("readout", "clock", fitted=True, most=10, called=("warm_up_drift", "drift"), both=True)
 def warm_up_drift(w, s):
     """From power-on, two time constants, alike in all channels."""
     t = w.clock
@@ -60,14 +60,14 @@ def baseline_tracking(w, s):
     w.tell("baseline_tracking", r=0.02 * s)
 
 
-@hidden("readout", "temperature", fitted=True, most=8, needs={"streams": ("temperature",)})
+@hidden("readout", "temperature", fitted=True, most=8, needs={"streams": ("temperature",)}, both=True)
 def temperature_offset(w, s):
     """The front end moves with warmth, each channel its own way, slightly bent."""
     t = w.warm - w.warm.mean()
     w.rise = w.rise + 4.0 * s * (t + 0.03 * t**2)[:, None] * w.rng.normal(0, 1, w.rise.shape[1])
 
 
-@hidden("readout", "depth offset", most=8)
+@hidden("readout", "depth offset", most=8, both=True)
 def proximity(w, s):
     """A conductive tip is felt before it touches: one over the distance to the channel."""
     c = skin.centers()

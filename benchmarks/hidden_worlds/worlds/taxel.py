@@ -5,14 +5,14 @@ import numpy as np
 from worlds.hidden import hidden
 
 
-@hidden("taxel", "amplitude", most=6)
+@hidden("taxel", "amplitude", most=6, both=True)
 def gain(w, s):
     """All channels read too much."""
     w.rise = w.rise * (1 + 0.12 * s)
     w.tell("gain", e=0.12 * s)
 
 
-@hidden("taxel", "per channel", most=4)
+@hidden("taxel", "per channel", most=4, both=True)
 def channel_gain(w, s):
     """Half the channels up, half down, by half to whole of a fifth."""
     sign = w.rng.permutation(np.repeat([-1, 1], w.rise.shape[1] // 2))
