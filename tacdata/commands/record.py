@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import time
 from pathlib import Path
@@ -60,6 +59,7 @@ def run(
 
     from tacdata.plans import read_plan
     from tacdata.recording.detection_process import in_background
+    from tacdata.recording.interruption import Interruption
     from tacdata.recording.preflight import Preflight
     from tacdata.recording.recorder import Recorder
     from tacdata.registration.chosen import chosen_registration
@@ -67,12 +67,6 @@ def run(
     from tacdata.sensor import default_sensor, read_sensor
     from tacdata.tags import look
 
-    # A stop from outside is a Ctrl-C, also where a script started this in the background and its shell ignores Ctrl-C.
-    for stop in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(stop, signal.default_int_handler)
-    hang_up = getattr(signal, "SIGHUP", None)  # so is a closed terminal, but not under nohup; Windows has none
-    if hang_up is not None and signal.getsignal(hang_up) == signal.SIG_DFL:
-        signal.signal(hang_up, signal.default_int_handler)
     skin = read_sensor(sensor) if sensor else default_sensor()
     chosen = chosen_registration(read_rig(rig), rig, registration, skin)
     bench = chosen.rig
@@ -89,7 +83,7 @@ def run(
     else:
         view = nullcontext()
     bar = _Bar()
-    with view as watch, bar as progress, in_background(look) as detect:
+    with Interruption() as interruption, view as watch, bar as progress, in_background(look) as detect:
         recorder = Recorder(
             bench,
             skin,
@@ -102,6 +96,7 @@ def run(
             sync_tap=sync_tap,
             say=lambda words: print(f"  {words}", flush=True),
             watch=watch,
+            interruption=interruption,
         )
         try:
             session = recorder.run(confirm)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -43,9 +42,6 @@ def run(
     from tacdata.rig import read_rig
     from tacdata.sensor import default_sensor, read_sensor
 
-    # A stop from outside is a Ctrl-C, also where a script started this in the background and its shell ignores Ctrl-C.
-    for stop in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(stop, signal.default_int_handler)
     bench, skin = read_rig(rig), read_sensor(sensor) if sensor else default_sensor()
     target = out or rig.with_name("registration.yaml")
     settings = Settings(above, limit, depth, repeats, tuple(taxel or ()))
@@ -100,13 +96,14 @@ def _measure(
 ) -> tuple[dict[str, Any], str]:
     """Open the devices, ask, and carry the procedure out; return the file's document and the result in words."""
     from tacdata.errors import UsageError
+    from tacdata.recording.interruption import Interruption
     from tacdata.recording.rig_devices import RigDevices
     from tacdata.registration.guarded_probe import guarded_probe
     from tacdata.registration.procedure import described, register
     from tacdata.registration.result import document_of
     from tacdata.registration.touch_off import LIFT_SPEED
 
-    with RigDevices.of(rig).opened() as devices:
+    with Interruption() as interruption, RigDevices.of(rig).opened() as devices:
         controller = devices.cnc.settings()
         print(described(sensor, rig.registration, settings))
         if controller.get("$22") == "0":
@@ -117,7 +114,7 @@ def _measure(
             raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
         _mount(rig, specimen)
         safe = rig.registration.origin[2] + max(3.0, settings.above + 1.0)
-        with guarded_probe(rig, devices, safe, LIFT_SPEED) as probe:
+        with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption) as probe:
             found = register(probe, sensor, rig.registration, settings, say=lambda text: print(f"  {text}", flush=True))
     return document_of(found, rig, sensor, specimen, controller), found.text
 

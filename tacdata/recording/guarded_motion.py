@@ -11,6 +11,7 @@ from tacdata.clock import Clock
 from tacdata.devices.device import MotionController
 from tacdata.errors import TacdataError
 from tacdata.recording.anchoring import Command
+from tacdata.recording.interruption import Interruption
 from tacdata.recording.press_steps import Position, Step
 from tacdata.recording.streams import Streams
 from tacdata.recording.writer import EpisodeWriter
@@ -26,9 +27,9 @@ LETTING_GO = 10.0
 class GuardedMotion:
     """Carries out steps in a thread of its own, so that the calling one can stop them at any moment."""
 
-    def __init__(self, cnc: MotionController, clock: Clock) -> None:
-        """Drive ``cnc``; nothing moves before `drive`."""
-        self._cnc, self._clock = cnc, clock
+    def __init__(self, cnc: MotionController, clock: Clock, interruption: Interruption | None = None) -> None:
+        """Drive ``cnc``; nothing moves before `drive`, which looks for what the interruption keeps."""
+        self._cnc, self._clock, self._interruption = cnc, clock, interruption or Interruption()
         self._halted = threading.Event()
         self._rest: Position | None = None  # where it stands after a stop; None: it runs, or it does not obey
         self._why = "nothing was stopped"
@@ -59,6 +60,7 @@ class GuardedMotion:
             work.start()
             while work.is_alive():
                 work.join(WATCH)
+                self._interruption.check()
                 if streams.fault:
                     break
             if failure and streams.fault is None:

@@ -15,6 +15,7 @@ from tacdata.recording import file_names, sync_tap, sync_tap_motion
 from tacdata.recording.clock_model import Latency
 from tacdata.recording.detection_process import Detect
 from tacdata.recording.guarded_motion import WATCH, GuardedMotion
+from tacdata.recording.interruption import Interruption
 from tacdata.recording.live_feed import Watch
 from tacdata.recording.motion_profile import AxisLimits
 from tacdata.recording.preflight import Preflight, preflight, safe_height
@@ -55,6 +56,7 @@ class Recorder:
         sync_tap: bool = False,
         say: Callable[[str], None] | None = None,
         watch: Watch | None = None,
+        interruption: Interruption | None = None,
     ) -> None:
         """Prepare; nothing is opened, created or moved.
 
@@ -71,13 +73,15 @@ class Recorder:
             sync_tap: Begin with a few touches that measure the streams' constant delays.
             say: Is told in words what a person should know meanwhile.
             watch: Is shown some of what arrives (`live_feed`); must return at once.
+            interruption: Keeps Ctrl-C while the guide moves; without it, it is raised wherever it finds the thread.
         """
         self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(out), resume
         self.devices = devices or RigDevices.of(rig)
         self._mount, self._detect, self._progress = mount, detect, progress
         self._mounted: tuple[str, float, float, float] | None = None
         self._height = safe_height(plan, rig)
-        self._motion = GuardedMotion(self.devices.cnc, rig.clock)
+        self._interruption = interruption or Interruption()
+        self._motion = GuardedMotion(self.devices.cnc, rig.clock, self._interruption)
         self._tap = sync_tap_motion.touch(plan, sensor) if sync_tap else None
         self._say, self._watch = say or (lambda words: None), watch
         self._latencies: dict[str, Latency] = {}
@@ -115,7 +119,8 @@ class Recorder:
                 devices, self.rig.cameras, self._motion.stop, self._detect, self._watch, self.rig.fingers
             ) as streams:
                 try:
-                    self._record_all(session, streams, limits, summary, wanted)
+                    with self._interruption.kept():
+                        self._record_all(session, streams, limits, summary, wanted)
                 except BaseException:
                     with suppress(TacdataError):  # the fault itself is what the person must hear of
                         refresh(session)
@@ -161,6 +166,7 @@ class Recorder:
         while streams.frames < 2 or streams.position is None:
             if streams.fault:
                 raise streams.fault
+            self._interruption.check()
             if time.monotonic() > end:
                 silent = "the taxel board" if streams.frames < 2 else "the motion controller"
                 raise DeviceError(
@@ -171,6 +177,7 @@ class Recorder:
             time.sleep(WATCH)
         end = time.monotonic() + FIRST_SEARCH
         while not streams.searching and not streams.fault and time.monotonic() < end:
+            self._interruption.check()
             time.sleep(WATCH)
 
     def _rise(self, streams: Streams) -> Position:
@@ -199,7 +206,8 @@ class Recorder:
             if position[2] < self._height:
                 up = Step("", (*position[:2], self._height), self.plan.motion.approach_speed)
                 position = self._motion.drive((up,), position, streams, None)
-            self._mount(press)
+            with self._interruption.at_once():
+                self._mount(press)
         self._mounted = wanted
         return position
 

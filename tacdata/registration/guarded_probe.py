@@ -14,6 +14,7 @@ import numpy as np
 from tacdata.devices.device import CncStatus, TaxelFrame
 from tacdata.errors import DeviceError, FormatError, TacdataError
 from tacdata.recording.guarded_motion import GuardedMotion
+from tacdata.recording.interruption import Interruption
 from tacdata.recording.press_steps import Step
 from tacdata.recording.rig_devices import RigDevices
 from tacdata.recording.streams import Streams
@@ -48,10 +49,13 @@ class _Sink:
 class GuardedProbe(Probe):
     """Drives the devices of a rig; made by `guarded_probe`."""
 
-    def __init__(self, rig: Rig, devices: RigDevices, streams: Streams, motion: GuardedMotion, height: float) -> None:
+    def __init__(
+        self, rig: Rig, devices: RigDevices, streams: Streams, motion: GuardedMotion, height: float,
+        interruption: Interruption,
+    ) -> None:  # fmt: skip
         """Take over devices that are open and streams that run; ``height`` [mm, machine] is safe to rise to."""
         self._rig, self._devices, self._streams, self._motion = rig, devices, streams, motion
-        self._height, self._sink = height, _Sink()
+        self._height, self._sink, self._interruption = height, _Sink(), interruption
         streams.record_into(cast(Any, self._sink))
         self._position = self._begin()
         self._rested_ns = rig.clock.now_ns()
@@ -68,6 +72,7 @@ class GuardedProbe(Probe):
     def _begin(self) -> Position:
         end = time.monotonic() + PATIENCE
         while self._streams.position is None or len(self._sink.frames) < 2:
+            self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
             if time.monotonic() > end:
@@ -117,6 +122,7 @@ class GuardedProbe(Probe):
             rows = [counts for sample_ns, counts in list(self._sink.frames) if sample_ns >= self._rested_ns]
             if len(rows) >= frames:
                 break
+            self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
             if time.monotonic() > end:
@@ -133,21 +139,26 @@ class GuardedProbe(Probe):
         """Wait on the rig's clock, watching for faults; see the base."""
         until = self._rig.clock.now_ns() + round(seconds * 1e9)
         while self._rig.clock.now_ns() < until:
+            self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
             time.sleep(LOOK)
 
 
 @contextmanager
-def guarded_probe(rig: Rig, devices: RigDevices, height: float, speed: float) -> Iterator[GuardedProbe]:
+def guarded_probe(
+    rig: Rig, devices: RigDevices, height: float, speed: float, interruption: Interruption | None = None
+) -> Iterator[GuardedProbe]:
     """Open streams on devices that are open and yield a probe, risen to ``height`` [mm, machine] at ``speed`` [mm/s].
 
-    Whatever goes wrong, the motion stops first; then the indenter is lifted straight up.
+    Whatever goes wrong, the motion stops first; then the indenter is lifted straight up. So does what the interruption
+    keeps.
     """
-    motion = GuardedMotion(devices.cnc, rig.clock)
+    interruption = interruption or Interruption()
+    motion = GuardedMotion(devices.cnc, rig.clock, interruption)
     without_cameras = replace(devices, cameras={})
-    with Streams(without_cameras, {}, motion.stop) as streams:
-        probe = GuardedProbe(rig, devices, streams, motion, height)
+    with Streams(without_cameras, {}, motion.stop) as streams, interruption.kept():
+        probe = GuardedProbe(rig, devices, streams, motion, height, interruption)
         try:
             probe.rise(speed)
             yield probe

@@ -55,7 +55,7 @@ def test_a_signal_stops_and_the_session_can_be_resumed(bench, tmp_path, number):
         time.sleep(0.01)
     os.kill(child.pid, number)
     words = child.communicate(timeout=60)[1]
-    assert child.returncode == 130
+    assert child.returncode == 130, words
     assert "interrupted" in words
     assert "Traceback" not in words
     assert len(file_names.finished(tmp_path / "session")) == 1

@@ -15,6 +15,7 @@ from tacdata.plans import Plan
 from tacdata.recording import file_names
 from tacdata.recording.check import check
 from tacdata.recording.episode import PHASES
+from tacdata.recording.interruption import Interruption
 from tacdata.recording.reader import read_recording
 from tacdata.recording.recorder import Recorder
 from tacdata.rig import read_rig
@@ -67,6 +68,32 @@ def amiss(report):
     """Return what makes a session unusable, but for a depth not known since this machine stood still: ten times as long
     for the rig."""
     return [f.text for f in report.findings if f.severity == "unusable" and "while pressing is known to" not in f.text]
+
+
+@pytest.mark.parametrize("where", ["finalizer", "lock"])
+def test_ctrl_c_where_python_would_lose_it_stops_the_recording(virtual, tmp_path, where):
+    """In a finalizer it is ignored; amid the taking of a lock again it becomes a RuntimeError of the lock's."""
+
+    class Finalized:
+        def __del__(self):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    class Contended(threading.Condition):
+        def _acquire_restore(self, state):
+            os.kill(os.getpid(), signal.SIGINT)
+            super()._acquire_restore(state)
+
+    def stop(*progress):
+        if where == "finalizer":
+            Finalized()
+        else:
+            contended = Contended(threading.Lock())
+            with contended:
+                contended.wait(0.01)
+
+    with Interruption() as interruption, pytest.raises(KeyboardInterrupt):
+        recorder(virtual, tmp_path / "session", progress=stop, interruption=interruption).run(lambda summary: True)
+    assert len(file_names.finished(tmp_path / "session")) == 1
 
 
 def test_two_presses_agree_with_what_really_happened(virtual, tmp_path):

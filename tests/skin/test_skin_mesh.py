@@ -116,10 +116,11 @@ def test_other_settings_give_another_mesh(slab):
 
 
 def test_focus_refines_where_it_is_told_to(slab):
-    mesh = build_mesh(slab.sensor, MeshSettings(outer=1.5, interior=1.5, focus=(1.5, 1.5, 0.5, 0.25)))
+    """In a disc of some eighty faces: fTetWild never makes the same mesh twice, and few faces scatter too much."""
+    mesh = build_mesh(slab.sensor, MeshSettings(outer=1.5, interior=1.5, focus=(1.0, 1.0, 1.0, 0.25)))
     corners = mesh.nodes[mesh.outer[:, :3], :2]
     size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
-    near = np.hypot(*(corners.mean(axis=1) - 1.5).T) < 0.5
+    near = np.hypot(*(corners.mean(axis=1) - 1.0).T) < 1.0
     far = np.hypot(*(corners.mean(axis=1) + 1.5).T) < 1.0
     assert np.median(size[near]) < 0.45
     assert np.median(size[far]) > 1.5 * np.median(size[near])

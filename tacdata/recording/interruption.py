@@ -1,0 +1,79 @@
+"""Ctrl-C while something moves: it waits until whoever watches the motion asks for it.
+
+Python raises it wherever the main thread happens to be. Amid the taking of a lock that becomes a RuntimeError, in a
+finalizer it is lost, and the machine would go on.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+
+class Interruption:
+    """Takes Ctrl-C, SIGTERM, and SIGHUP unless it is ignored (nohup), while its context lasts; for the main thread.
+
+    Example:
+        ``with Interruption() as interruption, interruption.kept(): ...; interruption.check()``
+    """
+
+    def __init__(self) -> None:
+        """Take nothing yet."""
+        self._asked = self._answered = self._keeping = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Interruption:
+        """Take the signals, also where a shell started this in the background and has it ignore Ctrl-C."""
+        hang_up = getattr(signal, "SIGHUP", None)  # Windows has none
+        numbers = [signal.SIGINT, signal.SIGTERM]
+        if hang_up is not None and signal.getsignal(hang_up) == signal.SIG_DFL:
+            numbers.append(hang_up)
+        self._before = {number: signal.signal(number, self._heard) for number in numbers}
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Let the signals go where they went before."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def check(self) -> None:
+        """Answer what was asked for meanwhile.
+
+        Raises:
+            KeyboardInterrupt: If there was a signal that nobody has been told of.
+        """
+        if self._asked and not self._answered:
+            self._answered = True
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Let the first signal wait for `check`, or for the end; the next one is raised where it finds the thread."""
+        with self._set(True):
+            yield
+        self.check()
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Within `kept`: raise signals where they find the thread; a question to a person would not end otherwise."""
+        with self._set(False):
+            self.check()
+            yield
+
+    @contextmanager
+    def _set(self, keeping: bool) -> Iterator[None]:
+        before, self._keeping = self._keeping, keeping
+        try:
+            yield
+        finally:
+            self._keeping = before
+
+    def _heard(self, number: int, frame: FrameType | None) -> None:
+        if self._keeping and not self._asked:
+            self._asked = True
+            return
+        raise KeyboardInterrupt
+
