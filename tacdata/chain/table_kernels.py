@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import numpy as np
-import warp as wp  # noqa: TID253 - kernels; imported when a table is read at places, never with a response
+import warp as wp  # noqa: TID253 - kernels; imported with a table's values, never with the response's module
 
 import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.chain.lanes import Lanes, in_lanes

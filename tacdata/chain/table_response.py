@@ -61,8 +61,8 @@ class TableResponse(Response):
 
     def rougher(self) -> TableResponse:
         """Return the same table read by polynomials through four nodes: off the splines by about the splines' error."""
-        other = copy.copy(self)
-        other._rough, other._kept, other._forces = True, {}, {}
+        other = self._copied()
+        other._rough = True
         return other
 
     @classmethod
@@ -87,15 +87,15 @@ class TableResponse(Response):
 
     def idling_at(self, offset: np.ndarray) -> TableResponse:
         """Return the same response with other readings without load, shape (channels,)."""
-        other = copy.copy(self)
-        other.offset, other._kept, other._forces = offset, {}, {}
+        other = self._copied()
+        other.offset = offset
         return other
 
     def with_tools(self, order: list[int]) -> TableResponse:
         """Return the same response with its tools in another order, or fewer."""
-        other = copy.copy(self)
+        other = self._copied()
         other._splines, other._nodes = [self._splines[k] for k in order], [self._nodes[k] for k in order]
-        other.tools, other._kept, other._forces = tuple(self.tools[k] for k in order), {}, {}
+        other.tools = tuple(self.tools[k] for k in order)
         return other
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
@@ -129,6 +129,12 @@ class TableResponse(Response):
         if known is not None:
             known.signal = _locked(result)
         return result
+
+    def _copied(self) -> TableResponse:
+        """Return a response on the same table that remembers nothing."""
+        other = copy.copy(self)
+        other._kept, other._forces = {}, {}
+        return other
 
     def _both(self, pose: np.ndarray, tool: np.ndarray) -> _Answer:
         key = _key(pose, tool)

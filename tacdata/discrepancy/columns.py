@@ -26,6 +26,6 @@ def side_by_side(columns: Iterable[np.ndarray]) -> np.ndarray:
     return result
 
 
-def of(values: np.ndarray) -> list[np.ndarray]:
+def apart(values: np.ndarray) -> list[np.ndarray]:
     """Return the columns of an array (n, streams, k), each of shape (n, streams)."""
     return list(np.moveaxis(values, 2, 0))

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tacdata.chain import predict
-from tacdata.discrepancy import columns
 from tacdata.discrepancy.candidates import Board, Candidate, build
+from tacdata.discrepancy.columns import apart, side_by_side
 from tacdata.discrepancy.evidence import Evidence
 from tacdata.discrepancy.forms import forms
 from tacdata.discrepancy.frame import Frame
@@ -90,7 +90,7 @@ def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Pr
     last = slack + off.shape[2]
     first = last + (numerics is not None)
     more = [moving.values, off, *([] if numerics is None else [numerics])]
-    values = columns.side_by_side([*board.columns, *(column for each in more for column in columns.of(each))])
+    values = side_by_side([*board.columns, *(column for each in more for column in apart(each))])
     found = frame.cleaner(setting, [*setting.given, *placed]).collected(values, frame.beside)
     second = first + len(frame.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
