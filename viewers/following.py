@@ -63,7 +63,7 @@ class Follower:
         from dataclasses import replace
 
         from tacdata.recording.reader import recording_of
-        from viewers.source import scene_of
+        from viewers.recording_scene import scene_of
 
         remarks = () if self.finished else ("being recorded: it goes on while you look",)
         try:

@@ -17,17 +17,13 @@ DROP = 10.0
 MOST = 4
 
 
-def answered(folder, method):
+def answered(setting, method):
     """Return a verdict's least fields, what the model says with and without what was found, and CPU seconds."""
-    import judge
-
     from tacdata.chain import predict
     from tacdata.discrepancy.frame import frame
     from tacdata.discrepancy.problem import prepare
 
-    course = judge.course_of(dict(np.load(folder / "recordings.npz")))
-    setting = judge.setting_of(folder, course)
-    begin = time.process_time()
+    course, begin = setting.course, time.process_time()
     rows, before = course.read, predict(course, setting.response, [])
     after, pose, names = before.signal, before.pose, []
     if method == "ridge":

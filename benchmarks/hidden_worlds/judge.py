@@ -127,7 +127,8 @@ def main(folder, options):
         sys.path.insert(0, str(Path(__file__).parent))
         import baselines
 
-        answer, said, seconds = baselines.answered(folder, method)
+        course = course_of(dict(np.load(folder / "recordings.npz")))
+        answer, said, seconds = baselines.answered(setting_of(folder, course), method)
     if said:
         np.savez_compressed(folder / "said.npz", **said)
     (folder / "verdict.json").write_text(json.dumps({"verdict": answer, "seconds": seconds}))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -18,38 +18,14 @@ import numpy as np
 from tacdata import registry
 from tacdata.clock import Clock
 from tacdata.errors import UsageError
+from tacdata.wire.delivered import CncStatus, StreamCounts, TaxelFrame
 
 ROOM, BASE = "tacdata.devices", "device"
 
-
-@dataclass(frozen=True)
-class TaxelFrame:
-    """One reading of all channels, un-tared."""
-
-    arrival_ns: int
-    """Host time at which the last byte of the frame was received [ns]."""
-    counter: int
-    """The device's frame counter, unwrapped from the wire's width [frames]; -1 if the format has none."""
-    counts: np.ndarray
-    """Raw readings [counts], shape (channels,), float64."""
-    device_ns: int = -1
-    """The device's own time, unwrapped [ns of the device's clock]; -1 if the format has none."""
-
-
-@dataclass(frozen=True)
-class CncStatus:
-    """One status report."""
-
-    sent_ns: int
-    """Host time at which the query went out [ns]."""
-    arrival_ns: int
-    """Host time at which the answer was complete [ns]."""
-    state: str
-    """Controller state as it names it, for example "Run", "Idle", "Hold:0", "Alarm"."""
-    position: np.ndarray
-    """Machine position [mm], shape (3,)."""
-    feed: float
-    """Reported feed rate [mm/min]."""
+__all__ = [
+    "BASE", "ROOM", "Camera", "CncStatus", "Device", "ImageFrame", "Motion", "MotionController", "StreamCounts",
+    "TaxelBoard", "TaxelFrame", "create",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -78,24 +54,6 @@ class ImageFrame:
     """The same image as the camera sent it, if that was a JPEG file: what is stored, without loss; else empty."""
     device_ns: int = -1
     """The camera's or driver's own time of the image [ns of its clock]; -1 if it gives none."""
-
-
-@dataclass
-class StreamCounts:
-    """What a stream has delivered so far."""
-
-    received: int = 0
-    """Good frames."""
-    lost: int = 0
-    """Frames missing by the device's counter."""
-    repeated: int = 0
-    """Frames with a counter already seen."""
-    corrupt: int = 0
-    """Frames discarded by checksum or format."""
-    garbage_bytes: int = 0
-    """Bytes skipped while resynchronizing."""
-    notes: list[str] = field(default_factory=list)
-    """What else a person should know, in words."""
 
 
 class Device(ABC):

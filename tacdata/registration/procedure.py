@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from tacdata.registration.cross_scan import Cross, cross_scan
 from tacdata.registration.onset import POWERS, onset, shared_power
 from tacdata.registration.probe import Probe
 from tacdata.registration.result import Found
+from tacdata.registration.settings import Settings
 from tacdata.registration.solution import Plane, fit_plane, fit_rigid_motion
 from tacdata.registration.touch_off import LIFT_SPEED, Touch, touch_off
 from tacdata.rig import Registration
@@ -21,28 +22,6 @@ IDLE_FRAMES = 40
 """Readings from which the noise is taken."""
 QUIET_RISE = 0.4
 """How far above the first touch the search at the other places begins [mm], tilt not counted."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How far and how carefully."""
-
-    above: float = 1.0
-    """Height above the expected skin from which the first search begins [mm]."""
-    limit: float = 1.0
-    """How far below the expected skin the indenter may search [mm]."""
-    depth: float = 0.4
-    """Depth of the presses of the cross scan [mm]."""
-    repeats: int = 2
-    """Slow approaches at each place."""
-    taxels: tuple[int, ...] = ()
-    """Taxels of the cross scan; none: three that lie apart, away from the rim where there is room."""
-    most_tilt: float = 3.0
-    """Tilt that is still accepted [deg]."""
-    flatness: float = 0.05
-    """How far the touches may lie off their plane [mm]."""
-    tolerance: float = 0.02
-    """Largest uncertainty of the height that is accepted [mm]."""
 
 
 def reference_taxels(sensor: Sensor) -> tuple[int, ...]:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import schemas
 from tacdata import provenance
 from tacdata.registration.cross_scan import Cross
+from tacdata.registration.settings import Settings
 from tacdata.registration.solution import Plane, RigidMotion
 from tacdata.registration.touch_off import Touch
 from tacdata.rig import Registration, Rig
 from tacdata.sensor import Sensor
-
-if TYPE_CHECKING:
-    from tacdata.registration.procedure import Settings
 
 
 @dataclass(frozen=True)

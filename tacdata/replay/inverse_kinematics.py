@@ -8,13 +8,11 @@ said, and its joint values are NaN.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from tacdata.errors import FormatError, UsageError
-from tacdata.replay.engine import mujoco
 from tacdata.replay.kinematic_search import OTHERS, STEPS, KinematicSearch
+from tacdata.replay.kinematics import Joint, Kinematics
 from tacdata.replay.robot import Robot
 from tacdata.replay.targets import Targets
 
@@ -22,21 +20,6 @@ COUPLED = 1e-4
 """How far a mimic joint may be off the joint that it follows [rad or m]; beyond, no target of that time is reached."""
 AGAIN = 15
 """While a target stays out of reach, other beginnings are tried at every so many times [count]."""
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint that moves."""
-
-    name: str
-    unit: str
-    """"rad" or "m"."""
-    lower: float | None
-    """Lower limit [rad or m]."""
-    upper: float | None
-    """Upper limit [rad or m]."""
-    velocity: float | None
-    """Largest speed [rad/s or m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,88 +41,6 @@ class JointPath:
     """Finger -> rows whose target lies outside the robot's workspace."""
     too_fast: dict[str, tuple[int, ...]]
     """Joint -> rows that are reached only faster than the joint's limit."""
-
-
-class Kinematics:
-    """A robot's fingertips as functions of its joints, in the demonstration's frame."""
-
-    def __init__(self, robot: Robot, fingers: tuple[str, ...]) -> None:
-        """Build the model.
-
-        Raises:
-            UsageError: If the robot has no fingertip for a finger.
-            FormatError: If MuJoCo cannot make a model of the URDF.
-        """
-        engine = mujoco()
-        missing = [name for name in fingers if name not in robot.tips]
-        if missing:
-            raise UsageError(
-                f"robot {robot.name} has no fingertip for {', '.join(missing)}", ", ".join(robot.tips),
-                "add it to the robot file, or export other fingers with --finger",
-            )  # fmt: skip
-        self.robot, self.fingers = robot, fingers
-        try:
-            spec = engine.MjSpec.from_string(robot.urdf)
-            spec.compiler.fusestatic = False
-            # Kinematics needs no masses, MuJoCo does.
-            spec.compiler.boundmass, spec.compiler.boundinertia = 1e-3, 1e-6
-            for name in fingers:
-                self._add_site(spec, name)
-            self.model = spec.compile()
-        except (ValueError, RuntimeError, AttributeError) as error:
-            reason = str(error).strip().splitlines()[0]
-            raise FormatError(f"the URDF of {robot.name}: {reason}", "a URDF that MuJoCo reads", "correct it") from None
-        self.joints = tuple(self._joint(k) for k in range(self.model.njnt))
-        for joint, value in zip(self.joints, self.home, strict=True):
-            if (joint.lower is not None and value < joint.lower) or (joint.upper is not None and value > joint.upper):
-                given = f"home of joint {joint.name} of {robot.name}: {value:g} {joint.unit}"
-                raise FormatError(given, f"{joint.lower:g} to {joint.upper:g} {joint.unit}", "correct the robot file")
-
-    def _add_site(self, spec: Any, name: str) -> None:
-        from scipy.spatial.transform import Rotation
-
-        link, pose = self.robot.tips[name]
-        body = spec.body(link) or spec.worldbody  # MuJoCo makes the root link the world
-        x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat()
-        body.add_site(name=f"tip {name}", pos=pose[:3, 3], quat=[w, x, y, z])
-
-    def _joint(self, k: int) -> Joint:
-        engine = mujoco()
-        name, kind = self.model.joint(k).name, int(self.model.jnt_type[k])
-        if kind not in (engine.mjtJoint.mjJNT_HINGE, engine.mjtJoint.mjJNT_SLIDE):
-            raise FormatError(f"joint {name} of {self.robot.name} floats", "joints of one axis", "fix the robot's base")
-        low, high = self.model.jnt_range[k] if self.model.jnt_limited[k] else (None, None)
-        unit = "rad" if kind == engine.mjtJoint.mjJNT_HINGE else "m"
-        ends = (None if low is None else float(low), None if high is None else float(high))
-        return Joint(name, unit, *ends, self.robot.velocity.get(name))
-
-    @property
-    def moving(self) -> list[int]:
-        """Joints between the root and a fingertip: all that moves one, but for mimic joints elsewhere."""
-        bodies = set()
-        for name in self.fingers:
-            body = int(self.model.site(f"tip {name}").bodyid[0])
-            while body:
-                bodies.add(body)
-                body = int(self.model.body_parentid[body])
-        return [k for k in range(self.model.njnt) if int(self.model.jnt_bodyid[k]) in bodies]
-
-    @property
-    def home(self) -> np.ndarray:
-        """Where the search begins [rad or m], shape (joints,)."""
-        middles = [0.0 if j.lower is None or j.upper is None else (j.lower + j.upper) / 2 for j in self.joints]
-        return np.array([self.robot.home.get(j.name, m) for j, m in zip(self.joints, middles, strict=True)])
-
-    def tips(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return fingertips of joint values, shape (joints,): places [m], shape (f, 3), rotations, shape (f, 3, 3)."""
-        engine = mujoco()
-        data = engine.MjData(self.model)
-        data.qpos[:] = values
-        engine.mj_kinematics(self.model, data)
-        sites = [data.site(f"tip {name}") for name in self.fingers]
-        base = self.robot.base
-        places = np.array([base[:3, :3] @ site.xpos + base[:3, 3] for site in sites])
-        return places, np.array([base[:3, :3] @ site.xmat.reshape(3, 3) for site in sites])
 
 
 def follow(robot: Robot, targets: Targets) -> tuple[JointPath, Kinematics]:

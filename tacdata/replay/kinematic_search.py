@@ -7,12 +7,9 @@ and the targets after it are searched for from there instead of from wherever a 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from tacdata.replay.inverse_kinematics import Kinematics
+from tacdata.replay.kinematics import Kinematics
 
 STEPS = 60
 """Largest number of steps from one beginning [count]; the first time gets ten times as many."""

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tacdata.replay.engine import mujoco
-
-if TYPE_CHECKING:
-    from tacdata.replay.scene import Scene
+from tacdata.replay.scene import Scene
 
 STEP = 0.001
 """Time step [s]."""

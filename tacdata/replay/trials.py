@@ -10,7 +10,8 @@ from tacdata import provenance
 from tacdata.demonstrations.compensation import smallest_gain
 from tacdata.demonstrations.demonstration import Demonstration
 from tacdata.replay.grasp import cut, first_grasp
-from tacdata.replay.scene import Outcome, Scene, ball_centre, drawn, replay_targets
+from tacdata.replay.outcome import Outcome, ball_centre, replay_targets
+from tacdata.replay.scene import Scene, drawn
 from tacdata.replay.targets import Targets, targets_of
 
 DIRECT = "direct"

@@ -21,6 +21,7 @@ from tacdata.skin.mesh import quality
 from tacdata.skin.meshing.true_volume import volume_error
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.numerical_error import Figures, NumericalError
+from tacdata.skin.possible_press import check_press
 from tacdata.skin.press import PressRequest
 from tacdata.skin.state import State
 from tacdata.transduction import Loads, Readings, Transducer
@@ -131,7 +132,7 @@ def answer(
     Raises:
         SolveError: If the press is impossible or an equilibrium is not found.
     """
-    request.check(sensor)  # before seconds or minutes go into a mesh
+    check_press(request, sensor)  # before seconds or minutes go into a mesh
     model = SkinModel(sensor, settings)
     states, seconds, began = [], [], time.perf_counter()
     for depth, state in model.states(request):

@@ -31,6 +31,7 @@ from tacdata.skin.mesher import MeshSettings, build_mesh
 from tacdata.skin.newton import Newton, SolverSettings
 from tacdata.skin.numerical_error import Figures, NumericalError, estimate
 from tacdata.skin.patches import in_order
+from tacdata.skin.possible_press import check_press
 from tacdata.skin.press import PressRequest
 from tacdata.skin.raster import OuterFace
 from tacdata.skin.rest import RestSolver, rest_solver
@@ -225,7 +226,7 @@ class SkinModel:
         possible = list[tuple[int, PressRequest]]()
         for number, request in enumerate(requests):
             try:
-                request.check(self.sensor)
+                check_press(request, self.sensor)
                 possible.append((number, request))
             except SolveError as error:
                 yield number, 0.0, error

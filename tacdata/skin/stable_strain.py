@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.errors import SolveError
 from tacdata.sensor import Material
-from tacdata.skin.constitutive.stability import instabilities, unstable
+from tacdata.skin.law_stability import instabilities, unstable
 from tacdata.skin.mesh import SkinMesh
 
 
@@ -16,7 +16,7 @@ class StableStrain:
     """Checks states of one mesh and law; costs nothing for laws that are stable everywhere."""
 
     def __init__(self, mesh: SkinMesh, material: Material) -> None:
-        """Test the law along the usual paths (`tacdata.skin.constitutive.stability`)."""
+        """Test the law along the usual paths (`tacdata.skin.law_stability`)."""
         self._mesh, self._material = mesh, material
         self.remarks = tuple(instabilities(material))
         """In words, where the law is unstable between half and twice the length; empty if nowhere."""

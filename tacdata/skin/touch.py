@@ -15,9 +15,9 @@ import torch
 from tacdata.indenters import Indenter
 from tacdata.sensor import Sensor
 from tacdata.skin.pose import turned
+from tacdata.skin.press import PressRequest
 
 if TYPE_CHECKING:
-    from tacdata.skin.press import PressRequest
     from tacdata.skin.raster import OuterFace
 
 _SAMPLES, _ZOOMS, _NARROWER = 65, 8, 8.0

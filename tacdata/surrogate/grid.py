@@ -13,6 +13,7 @@ import numpy as np
 from tacdata.errors import SolveError
 from tacdata.indenters import Indenter
 from tacdata.sensor import Sensor
+from tacdata.skin.possible_press import check_press
 from tacdata.skin.press import PressRequest
 from tacdata.surrogate.symmetry import foldable
 
@@ -117,7 +118,7 @@ def request(reach: Reach, x: float, y: float, depths: np.ndarray, sensor: Sensor
             tuple(round(float(d), 6) for d in depths[:count]), *reach.tilt,
         )  # fmt: skip
         try:
-            wanted.check(sensor)
+            check_press(wanted, sensor)
         except SolveError:
             continue
         return wanted

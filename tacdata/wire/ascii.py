@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.devices.device import StreamCounts
 from tacdata.wire.binary import Fields
 from tacdata.wire.checksum import checksum
+from tacdata.wire.delivered import StreamCounts
 from tacdata.wire.frame_format import BITS, FrameFormat
 
 

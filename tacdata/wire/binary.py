@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.devices.device import StreamCounts
 from tacdata.wire.checksum import WIDTHS, checksum
+from tacdata.wire.delivered import StreamCounts
 from tacdata.wire.frame_format import BITS, FrameFormat
 
 Fields = dict[str, np.ndarray]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tacdata.devices.device import StreamCounts
+from tacdata.wire.delivered import StreamCounts
 
 REPEAT_WINDOW = 8
 """A step back of at most this many frames is a frame sent again; a longer one is a restart [frames]."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 
-from tacdata.devices.device import StreamCounts, TaxelFrame
 from tacdata.wire.ascii import AsciiLines
 from tacdata.wire.binary import BinaryFrames
 from tacdata.wire.counter import CounterTrack
+from tacdata.wire.delivered import StreamCounts, TaxelFrame
 from tacdata.wire.frame_format import BITS, FrameFormat
 from tacdata.wire.packets import PacketFrames
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import serial
 
 from tacdata.clock import Clock
-from tacdata.devices.device import CncStatus
 from tacdata.errors import DeviceError
 from tacdata.wire import grbl_codes
+from tacdata.wire.delivered import CncStatus
 from tacdata.wire.grbl_lines import ALARM, RESPONSE, WELCOME, StatusReport, parse_status
 from tacdata.wire.grbl_statuses import Statuses
 from tacdata.wire.grbl_watch import WELCOME_IN_MID_STREAM, what_is_wrong

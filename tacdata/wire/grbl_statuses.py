@@ -8,7 +8,7 @@ from collections import deque
 import numpy as np
 
 from tacdata.clock import Clock
-from tacdata.devices.device import CncStatus
+from tacdata.wire.delivered import CncStatus
 from tacdata.wire.grbl_lines import StatusReport
 
 REPORT_LAG_NS = 50_000_000

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tacdata.devices.device import StreamCounts
 from tacdata.wire.binary import Fields, fields, intact
+from tacdata.wire.delivered import StreamCounts
 from tacdata.wire.frame_format import FrameFormat
 
 END, ESCAPE, ESCAPED_END, ESCAPED_ESCAPE = 0xC0, 0xDB, 0xDC, 0xDD

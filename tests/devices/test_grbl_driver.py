@@ -388,9 +388,10 @@ def test_a_hold_ends_the_wait_and_lets_no_line_out(rig):
 
 @BOTH
 def test_somebody_elses_hold_is_noticed(rig):
-    _, controller, driver = rig
+    clock, controller, driver = rig
     with driver:
         driver.move((-50.0, -50.0, -30.0), 1.0)
+        clock.sleep(0.5)  # it is on its way
         controller.inject_byte(0x21)
         with pytest.raises(DeviceError, match="someone held"):
             driver.dwell(0.01)

@@ -13,7 +13,8 @@ from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import BASE, ROOM, exporter
 from tacdata.exporters.joints import read_joints
-from tacdata.replay.inverse_kinematics import Kinematics, follow
+from tacdata.replay.inverse_kinematics import follow
+from tacdata.replay.kinematics import Kinematics
 from tacdata.replay.robot import read_robot
 from tacdata.replay.targets import targets_of
 from tacdata.sensor import default_sensor

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from tacdata.demonstrations.compensation import read_gains, smallest_gain
 from tacdata.errors import UsageError
 from tacdata.replay.grasp import cut, first_grasp, touching
-from tacdata.replay.scene import Scene, ball_centre, drawn, replay_targets
+from tacdata.replay.outcome import ball_centre, replay_targets
+from tacdata.replay.scene import Scene, drawn
 from tacdata.replay.targets import Targets
 from tacdata.virtual_rig.hand import DIRECTIONS, HEIGHT, RADIUS, draw_hand
 

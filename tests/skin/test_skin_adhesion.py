@@ -17,6 +17,7 @@ from tacdata.skin.adhesions.adhesion_law import BASE, ROOM
 from tacdata.skin.attraction import AdhesiveContact
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.newton import SolverSettings
+from tacdata.skin.possible_press import check_press
 from tacdata.skin.press import PressRequest
 from tacdata.skin.sensitivity import sensitivities
 
@@ -130,7 +131,7 @@ def test_without_adhesion_there_is_none_and_a_sensor_keeps_its_hash():
     assert stuck.content_hash != plain.content_hash
     assert Sensor.from_document(stuck.document, "again") == stuck
     with pytest.raises(SolveError, match="above a skin that does not stick"):
-        PressRequest(Sphere(2.0), 0.0, 0.0, 0.0, (0.0, 0.1, -0.1)).check(plain)
+        check_press(PressRequest(Sphere(2.0), 0.0, 0.0, 0.0, (0.0, 0.1, -0.1)), plain)
 
 
 def test_what_cannot_be_is_said():

@@ -9,7 +9,7 @@ import warp as wp
 from tacdata import registry
 from tacdata.sensor.sensor import Material
 from tacdata.skin.constitutive import kinematics
-from tacdata.skin.constitutive.evaluation import evaluate
+from tacdata.skin.law_evaluation import evaluate
 from tacdata.skin.materials import load_law
 
 MU = 0.3 / (2 * 1.47)

@@ -10,7 +10,7 @@ from skin_examples import random_rotation
 from tacdata import registry
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor.sensor import Material
-from tacdata.skin.constitutive.evaluation import evaluate
+from tacdata.skin.law_evaluation import evaluate
 from tacdata.skin.materials import load_law
 from tacdata.skin.materials.law import Gradient
 

@@ -10,8 +10,8 @@ import warp as wp
 from tacdata.sensor import Material, PronyTerm
 from tacdata.skin.constitutive import kinematics
 from tacdata.skin.constitutive.prony import Prony
-from tacdata.skin.constitutive.relaxing import relaxing_functions
 from tacdata.skin.materials import load_law
+from tacdata.skin.relaxing_law import relaxing_functions
 
 TERMS = (PronyTerm(0.2, 0.1), PronyTerm(0.1, 2.0))
 IDENTITY = np.eye(3)

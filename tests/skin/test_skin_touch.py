@@ -18,6 +18,7 @@ from tacdata.sensor.sensor import Contact, Skin
 from tacdata.skin import touch as touching
 from tacdata.skin.case import read_case
 from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.skin.possible_press import check_press
 from tacdata.skin.press import PressRequest
 from tacdata.skin.raster import OuterFace
 from tacdata.skin.touch import reach, rise, room, rotation, touch
@@ -109,22 +110,22 @@ def test_a_press_on_a_curved_pad_starts_at_its_local_height():
 def test_a_press_through_the_thin_border_of_a_curved_pad_is_refused():
     request = press(Sphere(1.0), 1.3, x=3.9)
     with pytest.raises(SolveError, match=r"skin 1\.21 mm thick at \(3\.9, 0\) mm"):
-        request.check(CURVED)
-    press(Sphere(1.0), 1.3).check(CURVED)
+        check_press(request, CURVED)
+    check_press(press(Sphere(1.0), 1.3), CURVED)
 
 
 def test_a_tilt_may_bring_a_shape_over_the_rim():
     sensor = replace(slab_sensor(), contact=Contact(0.0, ("sides",), False))
     long = FlatPunch(1.5, 0.2)
-    press(long, 0.3, x=1.45).check(sensor)
+    check_press(press(long, 0.3, x=1.45), sensor)
     with pytest.raises(SolveError, match="over the rim"):
-        press(FlatPunch(1.5, 0.2), 0.3, tilt_y=4.0, x=1.7).check(sensor)
+        check_press(press(FlatPunch(1.5, 0.2), 0.3, tilt_y=4.0, x=1.7), sensor)
 
 
 @pytest.mark.parametrize("wrong", [{"tilt_x": 31.0}, {"tilt_y": -40.0}, {"tilt_x": float("nan")}])
 def test_impossible_tilts_are_refused(wrong):
     with pytest.raises(SolveError, match="tilts"):
-        press(PUNCH, 0.1, **wrong).check(slab_sensor())
+        check_press(press(PUNCH, 0.1, **wrong), slab_sensor())
 
 
 def test_case_files_tilt(tmp_path):

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import UsageError
-from viewers.kinds.kind import Asked, Kind
+from viewers.asked import Asked
+from viewers.kinds.kind import Kind
 from viewers.scene import Scene
 
 MARK = Path("meta/info.json")
@@ -26,8 +27,8 @@ class Dataset(Kind):
         """Return one episode, the first if none is named."""
         from tacdata.dataset import features
         from viewers.dataset_scene import dataset_scene
+        from viewers.recording_scene import prediction_for
         from viewers.single_episode import read_single
-        from viewers.source import prediction_for
 
         if asked.labels is not None:
             raise UsageError("--labels with a dataset", "a dataset holds its labels", "leave it out")

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tacdata.errors import TacdataError
-from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.asked import Asked
+from viewers.kinds.kind import Kind, refuse
 from viewers.scene import Scene
 
 if TYPE_CHECKING:

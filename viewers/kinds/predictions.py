@@ -6,7 +6,8 @@ from pathlib import Path
 
 from tacdata.errors import TacdataError, UsageError
 from tacdata.sensor import Sensor
-from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.asked import Asked
+from viewers.kinds.kind import Kind, refuse
 from viewers.scene import Scene
 
 CHECKPOINT = "best.safetensors"

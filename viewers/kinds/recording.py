@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.asked import Asked
+from viewers.kinds.kind import Kind, refuse
 from viewers.scene import Scene
 
 
@@ -19,7 +20,7 @@ class Recording(Kind):
 
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return the press; of a file that is still being written what has reached the disk."""
-        from viewers.source import recording_scene
+        from viewers.recording_scene import recording_scene
 
         refuse(asked, "one recording", "labels", "predictions")
         return recording_scene(path, asked)

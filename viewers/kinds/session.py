@@ -9,7 +9,8 @@ from pathlib import Path
 
 from tacdata.errors import UsageError
 from tacdata.recording import file_names
-from viewers.kinds.kind import Asked, Kind
+from viewers.asked import Asked
+from viewers.kinds.kind import Kind
 from viewers.scene import Scene
 
 EARLIER = 1_000_000_000
@@ -28,7 +29,7 @@ class Session(Kind):
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one episode; if none is named the first, or the first that the predictions are of."""
         from viewers.prediction_files import first_predicted
-        from viewers.source import recording_scene
+        from viewers.recording_scene import recording_scene
 
         number = asked.episode
         if number is None and asked.predictions is not None:

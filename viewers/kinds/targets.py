@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from tacdata.errors import UsageError
-from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.asked import Asked
+from viewers.kinds.kind import Kind, refuse
 from viewers.scene import Scene
 
 MARKS = {

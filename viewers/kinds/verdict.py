@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewers.kinds.kind import Asked, Kind, refuse
+from viewers.asked import Asked
+from viewers.kinds.kind import Kind, refuse
 from viewers.scene import Scene
 
 FILE, RESIDUALS = "verdict.json", "residuals.parquet"

@@ -1,1 +1,1 @@
-"""What material laws are built from and judged by: kinematics, principal axes, evaluation, stability, Prony series."""
+"""What material laws are built from: kinematics, invariants, principal axes, Prony series."""

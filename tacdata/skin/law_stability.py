@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.sensor import Material
-from tacdata.skin.constitutive.evaluation import evaluate
+from tacdata.skin.law_evaluation import evaluate
 from tacdata.skin.materials.law import load_law
 
 PATHS = {"uniaxial": (1.0, -0.5, -0.5), "equibiaxial": (1.0, 1.0, -2.0), "planar": (1.0, -1.0, 0.0)}

@@ -1,0 +1,119 @@
+"""An object on a table, and fingertips that follow targets like a robot's: springs pull them, contact pushes back.
+
+A fingertip is a soft sphere whose place is held by springs (the compliance of joints and controllers; an infinitely
+stiff robot would need no compensation). A direct replay brings the pads to where they were seen, so that the springs
+hardly press; targets that are moved into the object stretch them. Whether the ball is lifted is Coulomb's friction and
+gravity, in MuJoCo; nothing here decides it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from tacdata.replay.grasp import touching
+from tacdata.replay.scene import Scene
+from tacdata.replay.scene_model import PAD, SceneModel
+from tacdata.replay.targets import Targets
+
+HIGH = 0.9
+"""The object is held high while the fingers are above this share of their lift [1]."""
+HELD = 0.5
+"""The object is held if it never sinks below this share of the fingers' lift meanwhile [1]."""
+LEAST_LIFT = 0.01
+"""Targets that rise by less lift nothing, those that move by less wipe nothing [m]."""
+BEHIND = 0.015
+"""An eraser that falls behind the fingers by more is lost [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of the ball."""
+
+    held: bool
+    lift: float
+    """Lowest height of the ball over where it lay, while the fingers are high [m]."""
+    force: dict[str, float]
+    """Finger -> mean normal force meanwhile [N]."""
+    depth: dict[str, float]
+    """Finger -> mean depth of the simulated skin meanwhile [mm]."""
+    time: np.ndarray
+    """Times of the replay [s], shape (n,)."""
+    ball: np.ndarray
+    """Centre of the ball [m], shape (n, 3)."""
+    tips: np.ndarray
+    """Centres of the fingertips' pads [m], shape (n, f, 3)."""
+    slip: float = 0.0
+    """How far an eraser fell behind the fingertips along the strokes [m]; 0 of a ball."""
+
+
+def ball_centre(targets: Targets, touch: int, radius: float) -> np.ndarray:
+    """Return where a ball's centre was in a row in which all fingers touch it [m], shape (3,).
+
+    Each pad touches the ball, so the centre lies a radius along its normal, less the depth that it felt.
+    """
+    reach = (radius - np.nan_to_num(targets.depth[touch]) / 1000)[:, None]
+    return (targets.seen[touch] + reach * normals(targets)[touch]).mean(axis=0)
+
+
+def normals(targets: Targets) -> np.ndarray:
+    """Return the normals out of the pads [1], shape (n, f, 3)."""
+    x, y, z, w = np.moveaxis(targets.quaternion, -1, 0)
+    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
+
+
+def replay_targets(targets: Targets, scene: Scene, centre: np.ndarray) -> Outcome:
+    """Return what becomes of an object that lies with its centre at ``centre`` [m] when fingertips follow targets.
+
+    A ball is held if it stays high while the fingers are; an eraser, if it never falls behind the fingers' strokes.
+
+    Raises:
+        UsageError: If the targets do not lift, or wipe.
+    """
+    pads = targets.position - PAD * normals(targets)
+    high = _high(pads) if scene.task == "grasp" else _wiping(pads, targets)
+    if scene.bias:
+        pads = pads + np.array(scene.bias)
+    ground = np.array(centre) + scene.place
+    seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
+    path = SceneModel(scene, pads[0], ground).run(pads, seconds)
+    lowest = float((path.ball[high, 2] - ground[2]).min())
+    force = {name: float(path.force[high, k].mean()) for k, name in enumerate(targets.fingers)}
+    depth = {name: float(1000 * path.depth[high, k].mean()) for k, name in enumerate(targets.fingers)}
+    slip = 0.0
+    if scene.task == "grasp":
+        held = lowest > HELD * _lift(pads)
+    else:
+        slip = _slip(path.tips[high].mean(axis=1), path.ball[high])
+        held = slip < BEHIND
+    return Outcome(bool(held), lowest, force, depth, seconds, path.ball, path.tips, slip)
+
+
+def _lift(pads: np.ndarray) -> float:
+    return float(np.ptp(pads[..., 2].mean(axis=1)))
+
+
+def _high(pads: np.ndarray) -> np.ndarray:
+    height, lift = pads[..., 2].mean(axis=1), _lift(pads)
+    if lift < LEAST_LIFT:
+        raise UsageError(f"targets that rise by {1000 * lift:.0f} mm", "10 mm or more", "replay a demonstrated grasp")
+    return height > height.min() + HIGH * lift
+
+
+def _wiping(pads: np.ndarray, targets: Targets) -> np.ndarray:
+    """Return the rows from the first stroke to the last: while all fingers feel something."""
+    rows = touching(targets)
+    rows[np.argmax(rows) : len(rows) - np.argmax(rows[::-1])] = rows.any()
+    stroke = np.ptp(pads[rows].mean(axis=1), axis=0).max() if rows.any() else 0.0
+    if stroke < LEAST_LIFT:
+        raise UsageError(f"targets that wipe {1000 * stroke:.0f} mm", "10 mm or more", "replay a demonstrated wipe")
+    return rows
+
+
+def _slip(fingers: np.ndarray, eraser: np.ndarray) -> float:
+    """Return how far the eraser fell behind along the direction in which the fingers move most [m]."""
+    moved = fingers - fingers[0]
+    along = np.linalg.svd(moved - moved.mean(axis=0), full_matrices=False)[2][0]
+    return float(np.abs((eraser - eraser[0] - moved) @ along).max())

@@ -1,0 +1,25 @@
+"""What a person asks to see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+def nothing() -> None:
+    """Do nothing meanwhile."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a person asks to see beside the path."""
+
+    labels: Path | None = None
+    """Folder of labels."""
+    predictions: Path | None = None
+    """Folder of predictions, or a training run."""
+    episode: int | None = None
+    """Number of the episode in a folder."""
+    meanwhile: Callable[[], None] = nothing
+    """What can be done while a large file is read: imports, mostly."""
