@@ -16,9 +16,6 @@ from tacdata.skin.averaged_volume import averaged_stiffness
 from tacdata.skin.factor import factor_of
 from tacdata.skin.mesh import SkinMesh
 
-_NEARLY_INCOMPRESSIBLE = 0.495
-"""Poisson's ratio from which on the sparse factor knows of averaged volume changes [1]."""
-
 
 def rest_stiffness(mesh: SkinMesh, material: Material, averaged: bool = False) -> sp.csr_matrix:
     """Assemble the linear-elastic stiffness [N/mm], shape (3n, 3n): every law's tangent at F = I.
@@ -96,8 +93,8 @@ def rest_solver(
     Raises:
         SolveError: If the inverse does not fit onto the card.
     """
-    # A K0 with averages costs several times the fill of a sparse factor, and pays where one without is far too stiff.
-    known = averaged and (device != "cpu" or material.poisson_ratio >= _NEARLY_INCOMPRESSIBLE)
+    # A K0 with averages costs a sparse factor several times the fill, and saves no iterations (decision 0016).
+    known = averaged and device != "cpu"
     stiffness = rest_stiffness(mesh, material if known == averaged else for_averaged(material), known)
     free = np.flatnonzero(~np.repeat(fixed, 3))
     return (SparseRest if device == "cpu" else DenseRest)(stiffness, free, loadable, device)
