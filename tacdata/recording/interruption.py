@@ -76,4 +76,3 @@ class Interruption:
             self._asked = True
             return
         raise KeyboardInterrupt
-

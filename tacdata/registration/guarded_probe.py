@@ -151,8 +151,8 @@ def guarded_probe(
 ) -> Iterator[GuardedProbe]:
     """Open streams on devices that are open and yield a probe, risen to ``height`` [mm, machine] at ``speed`` [mm/s].
 
-    Whatever goes wrong, the motion stops first; then the indenter is lifted straight up. So does what the interruption
-    keeps.
+    Whatever goes wrong, the motion stops first; then the indenter is lifted straight up. A Ctrl-C that ``interruption``
+    has kept is noticed within 20 ms.
     """
     interruption = interruption or Interruption()
     motion = GuardedMotion(devices.cnc, rig.clock, interruption)

@@ -1,6 +1,9 @@
 """The verb on the virtual rig, through real drivers and pseudo-terminals."""
 
+import os
+import signal
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -161,3 +164,14 @@ def registration_of(rig, sensor):
         "residuals": {"touches": [-0.012], "taxels": [0.004], "scale": 1.0}, "noise": [4.0], "touches": [],
         "crosses": [],
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_the_search_and_nothing_is_written(virtual, monkeypatch, capfd, number):
+    before = signal.getsignal(number)
+    threading.Timer(2.0, os.kill, (os.getpid(), number)).start()
+    code, _, loud = run(monkeypatch, capfd, "register", "--rig", virtual.path, "--yes")
+    assert code == 130, loud
+    assert "motion stopped, nothing was written" in loud
+    assert not virtual.path.with_name(FILE).exists()
+    assert signal.getsignal(number) == before
