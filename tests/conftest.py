@@ -1,6 +1,7 @@
 """What drives devices in real time is tried again if it failed while the machine stood still, and only then."""
 
 import os
+import signal
 import threading
 import time
 
@@ -37,6 +38,14 @@ class Watch:
 
 
 WATCH = Watch()
+
+
+def pytest_configure():
+    """Let Ctrl-C and a hang-up reach tests that a script or nohup started in the background, where both are ignored."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_collection_modifyitems(items):
