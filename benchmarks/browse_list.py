@@ -24,7 +24,7 @@ from tacdata.dataset.frames import recording_hash
 from tacdata.dataset.pack import pack
 from tacdata.labels import Label, read_label
 from tacdata.recording.episode import Episode
-from tacdata.recording.reader import read_episode
+from tacdata.recording.files.reader import read_episode
 
 APART = 100_000_000_000
 """Time from one episode to the next [ns]."""
@@ -32,7 +32,7 @@ MEASURED = """
 import json, resource, sys, time
 begun = time.perf_counter()
 from pathlib import Path
-from viewers.list_sources import episodes_at
+from viewers.browse.list_sources import episodes_at
 from viewers.source import scene_at
 root, number = Path(sys.argv[1]), int(sys.argv[2])
 shown = len(episodes_at(root).entries) if number < 0 else len(scene_at(root, episode=number).frame_ns)

@@ -27,8 +27,8 @@ from scipy.spatial.transform import Rotation
 
 from tacdata import provenance
 from tacdata.tags import CubePose, FingerTracker, detect_cube, fingers_of
-from tacdata.virtual_rig.look import Look, Polygon
-from tacdata.virtual_rig.render import render_scene
+from tacdata.virtual_rig.optics.look import Look, Polygon
+from tacdata.virtual_rig.optics.render import render_scene
 
 INTRINSICS: dict[str, Any] = {"width": 1280, "height": 720, "fx": 900.0, "fy": 900.0, "cx": 639.5, "cy": 359.5}
 LENS = {**INTRINSICS, "distortion": [-0.25, 0.06, 0.001, 0.001, 0.0]}

@@ -25,7 +25,8 @@ from pathlib import Path
 import numpy as np
 
 from tacdata import provenance
-from tacdata.dataset import features, frames, pack, read_dataset
+from tacdata.dataset import frames, pack, read_dataset
+from tacdata.dataset.format import features
 from tacdata.indenters import from_document
 from tacdata.labels import Label
 from tacdata.plans import Press

@@ -5,7 +5,8 @@
 FOLDER holds JSON files of development seeds with ``verdict`` (as `tacdata discrepancy` writes it), ``truth`` (the
 mechanisms that may rightly be named) and, for the record, ``engine`` and ``block``: `hidden_worlds/score.py --dump`
 writes them. Every effect that a verdict names counts once. With ``--write`` the map goes into
-tacdata/discrepancy/confidence.json; without, only how well it does is printed: Brier score and calibration error, each
+tacdata/discrepancy/verdict/confidence.json; without, only how well it does is printed: Brier score and calibration
+error, each
 world judged by a map fitted without it.
 """
 
@@ -16,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tacdata.discrepancy.confidence import FILE, fit
+from tacdata.discrepancy.verdict.confidence import FILE, fit
 
 FEWEST = 60
 """Fewer names fit no map."""
@@ -72,7 +73,7 @@ def main(folder, write):
             **fit(rows, right), "command": "python benchmarks/discrepancy_confidence.py FOLDER --write",
             "worlds": counted(folder, "block"), "engines": counted(folder, "engine"),
         }  # fmt: skip
-        target = Path(__file__).parents[1] / "tacdata" / "discrepancy" / FILE
+        target = Path(__file__).parents[1] / "tacdata" / "discrepancy" / "verdict" / FILE
         target.write_text(json.dumps(given, indent=1) + "\n")
         print(f"written: {target}")
 

@@ -27,13 +27,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 
-from label_farm import environment, model
-from label_farm.job import Job
-from label_farm.ladder import Ladder
-from label_farm.ledger import FAILED, Ledger
-from label_farm.pool import Pool
-from label_farm.roster import Roster
-from label_farm.store import Store
+from label_farm import environment
+from label_farm.ledger.ledger import FAILED, Ledger
+from label_farm.ledger.roster import Roster
+from label_farm.presses import model
+from label_farm.presses.job import Job
+from label_farm.presses.ladder import Ladder
+from label_farm.store.store import Store
+from label_farm.workers.pool import Pool
 from tacdata import provenance
 from tacdata.errors import TacdataError, UsageError
 from tacdata.sensor import Sensor, default_sensor

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from label_farm import environment
-from label_farm.interpolate import Branch
-from label_farm.job import Job
-from label_farm.ladder import Ladder
-from label_farm.ledger import Ledger
-from label_farm.pool import Pool
-from label_farm.store import Store
+from label_farm.ledger.ledger import Ledger
+from label_farm.presses.interpolate import Branch
+from label_farm.presses.job import Job
+from label_farm.presses.ladder import Ladder
+from label_farm.store.store import Store
+from label_farm.workers.pool import Pool
 from tacdata import provenance
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor, default_sensor

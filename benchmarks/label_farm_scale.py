@@ -25,11 +25,11 @@ import numpy as np
 from farm_examples import press_episode
 
 from label_farm import environment
-from label_farm.farm_settings import FarmSettings
-from label_farm.label_index import Known, LabelIndex, stamp
 from label_farm.labelling import Labelling
-from label_farm.recall import skin_key
-from label_farm.store import Store
+from label_farm.labels.label_index import Known, LabelIndex, stamp
+from label_farm.labels.recall import skin_key
+from label_farm.settings import FarmSettings
+from label_farm.store.store import Store
 from tacdata import provenance
 from tacdata.recording.episode import Episode
 

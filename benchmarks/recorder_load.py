@@ -27,13 +27,13 @@ from tacdata.clock import Clock
 from tacdata.devices.capacitive_board import CapacitiveBoard
 from tacdata.devices.device import Camera, CncStatus, ImageFrame
 from tacdata.plans import Plan
-from tacdata.recording.mcap_records import walk
-from tacdata.recording.rig_devices import RigDevices
-from tacdata.recording.streams import Streams
-from tacdata.recording.writer import EpisodeWriter, Header
+from tacdata.recording.files.mcap_records import walk
+from tacdata.recording.files.writer import EpisodeWriter, Header
+from tacdata.recording.live.rig_devices import RigDevices
+from tacdata.recording.live.rig_streams import Streams
 from tacdata.sensor import default_sensor
 from tacdata.wire import Encoder, default_format
-from tacdata.wire.frame_format import from_document
+from tacdata.wire.frames.frame_format import from_document
 
 RATE, STATUS_RATE, IMAGE_RATE = 1000, 10.0, 30.0
 SIZE = (480, 640)

@@ -21,10 +21,10 @@ from solvers.getfem import GetFEM
 from solvers.ours import Ours
 from solvers.peer import Answer, Peer, PeerError
 
+from tacdata.cases.case import Case, read_case
 from tacdata.errors import TacdataError
-from tacdata.skin.case import Case, read_case
-from tacdata.skin.mesh import SkinMesh
-from tacdata.skin.mesher import build_mesh
+from tacdata.skin.mesh.build import build_mesh
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 PEERS = {"getfem": GetFEM, "calculix": CalculiX}
 

@@ -18,7 +18,7 @@ import torch
 
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 

@@ -4,7 +4,7 @@
 
 A slab of 6 x 6 x 2 mm, bottom bonded, under a sphere of 2 mm radius at depths of 0.25, 0.5 and 0.75 mm, on structured
 meshes; the finest stands for the truth. For every pair of the others the error is stated from the coarser
-(`tacdata.skin.numerical_error`) and held against what the finest says.
+(`tacdata.skin.validity.mesh_error`) and held against what the finest says.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "skin"))
 from skin_examples import box_mesh, slab_sensor  # pyright: ignore[reportMissingImports]
 
 from tacdata.indenters.sphere import Sphere
+from tacdata.skin.contact.first_touch import reach
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.numerical_error import Figures, estimate
 from tacdata.skin.press import PressRequest
-from tacdata.skin.touch import reach
+from tacdata.skin.validity.mesh_error import Figures, estimate
 
 SIZE, THICKNESS = 6.0, 2.0
 SENSOR = slab_sensor(size=SIZE, thickness=THICKNESS)

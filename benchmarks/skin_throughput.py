@@ -19,7 +19,7 @@ import torch
 from tacdata.errors import SolveError
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
-from tacdata.skin.mesh import SkinMesh
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
 

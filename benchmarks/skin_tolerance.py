@@ -19,8 +19,8 @@ from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.newton import SolverSettings
 from tacdata.skin.press import PressRequest
+from tacdata.skin.solve.newton import SolverSettings
 
 PRESSES = (
     PressRequest(Sphere(2.0), 0.5, -0.3, 0.0, (0.5, 1.0)),

@@ -33,10 +33,10 @@ from solvers.ours import Ours
 from solvers.peer import Answer, Peer, PeerError
 
 from tacdata import documents
+from tacdata.cases.case import Case, read_case
 from tacdata.errors import TacdataError
 from tacdata.sensor import default_sensor
-from tacdata.skin.case import Case, read_case
-from tacdata.skin.mesher import build_mesh
+from tacdata.skin.mesh.build import build_mesh
 
 SPHERE = {"shape": "sphere", "radius": 4.0}
 SLAB = {"size_x": 16.0, "size_y": 12.0, "thickness": 4.0, "protrusion_radius": 0.0}

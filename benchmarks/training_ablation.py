@@ -16,13 +16,13 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from training import checkpoint
-from training.comparison import groups
-from training.data import read_frames
-from training.evaluate import METRICS
+from training.frames.data import read_frames
 from training.generalization import generalize
+from training.inference import checkpoint
 from training.loss import WeightedLoss
-from training.score_sheet import number, row, rule, title
+from training.reports.comparison import groups
+from training.reports.score_sheet import number, row, rule, title
+from training.scoring.evaluate import METRICS
 from training.settings import Settings
 
 PAST = [-8, -7, -6, -5, -4, -3, -2, -1, 0]

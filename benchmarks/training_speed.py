@@ -25,14 +25,14 @@ import torch
 
 from tacdata import provenance
 from tacdata.sensor import default_sensor
-from training.checkpoint import load
-from training.compute import choose_device, reproducible
-from training.data import read_frames
-from training.frames import EpisodeSpan, Frames
-from training.inference import milliseconds_per_frame
+from training.frames.data import read_frames
+from training.frames.frames import EpisodeSpan, Frames
+from training.frames.windows import Windows
+from training.inference.checkpoint import load
+from training.inference.compute import choose_device, reproducible
+from training.inference.predictor import milliseconds_per_frame
 from training.settings import Settings
 from training.train import Progress, train
-from training.windows import Windows
 
 REPEATS = 3
 

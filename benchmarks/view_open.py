@@ -27,11 +27,11 @@ from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
 from tacdata.indenters.sphere import Sphere
 from tacdata.labels import Label, write_label
 from tacdata.plans import Press
-from tacdata.recording.anchoring import Command
-from tacdata.recording.clock_fit import fit
-from tacdata.recording.clock_model import ClockModel
-from tacdata.recording.polled_clock import PolledClock
-from tacdata.recording.writer import CubePoseRecord, EpisodeWriter, Header
+from tacdata.recording.clocks.clock_model import ClockModel
+from tacdata.recording.clocks.envelope_fit import fit
+from tacdata.recording.clocks.polled_clock import PolledClock
+from tacdata.recording.files.writer import CubePoseRecord, EpisodeWriter, Header
+from tacdata.recording.motion.move_times import Command
 from tacdata.sensor import default_sensor
 
 START = 1_760_000_000_000_000_000
@@ -97,7 +97,7 @@ def write(folder: Path, minutes: float, rate: float, camera_rate: float, labelle
     writer.close(True, clock_models=clocks, counts={"taxels": StreamCounts(received=len(time_ns))})
     if not labelled:
         return path
-    from tacdata.recording.reader import read_episode
+    from tacdata.recording.files.reader import read_episode
 
     write_label(folder / "labels" / "episode-000000.parquet", made_label(read_episode(path)))
     return path

@@ -11,19 +11,20 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from label_farm import label, model
-from label_farm.engine import StoreFull
-from label_farm.failure import Failure
-from label_farm.farm_settings import FarmSettings
-from label_farm.job import Job
-from label_farm.label_index import Known, stamp
-from label_farm.ledger import Change, Ledger, owner_name
-from label_farm.margin import Margin
-from label_farm.plan import LabelRequest, Planned, request
-from label_farm.recall import FLUSH, Recall, skin_key
-from label_farm.session_labels import SessionLabels
-from label_farm.store import Store
+from label_farm.labels import make_label
+from label_farm.labels.label_index import Known, stamp
+from label_farm.labels.margin import Margin
+from label_farm.labels.recall import FLUSH, Recall, skin_key
+from label_farm.labels.request import LabelRequest, Planned, request
+from label_farm.labels.session_labels import SessionLabels
+from label_farm.ledger.ledger import Change, Ledger, owner_name
+from label_farm.presses import model
+from label_farm.presses.job import Job
+from label_farm.settings import FarmSettings
+from label_farm.store.failure import Failure
+from label_farm.store.store import Store
 from label_farm.summary import Summary
+from label_farm.workers.engine import StoreFull
 from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.episode import Episode
@@ -262,7 +263,7 @@ class Labelling:
         """Hash of all that decides a label beside its recording."""
         key = version + (skin.transduction.content_hash if skin.transduction else "")
         if key not in self._made_by:
-            parts = [skin.document, version, asdict(self.settings.ladder), label.source_hash()]
+            parts = [skin.document, version, asdict(self.settings.ladder), make_label.source_hash()]
             self._made_by[key] = provenance.content_hash(parts)
         return self._made_by[key]
 

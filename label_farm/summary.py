@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from label_farm.margin import Margin
+from label_farm.labels.margin import Margin
 
 
 @dataclass

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tacdata.errors import FormatError, UsageError
-from training import checkpoint, report
-from training.evaluate import Evaluation, evaluate
-from training.frames import Frames
+from training.frames.frames import Frames
+from training.inference import checkpoint
+from training.reports import report
+from training.scoring.evaluate import Evaluation, evaluate
 from training.settings import Settings
 from training.splits.split import divide
 from training.train import Progress, train

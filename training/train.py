@@ -17,16 +17,17 @@ import torch
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import TacdataError, UsageError
-from training import checkpoint, metrics, seen, spread
-from training.compute import choose_device, reproducible
-from training.frames import Frames
-from training.inference import predict
+from training.frames.frames import Frames
+from training.frames.variation import Variation
+from training.frames.windows import Windows
+from training.inference import checkpoint
+from training.inference.compute import choose_device, reproducible
+from training.inference.predictor import predict
 from training.loss import normalized
+from training.metrics import depth_maps, seen, spread
 from training.networks.network import Network, create
 from training.settings import Settings
 from training.splits.split import Split, divide
-from training.variation import Variation
-from training.windows import Windows
 
 METRICS = "metrics.jsonl"
 
@@ -286,7 +287,7 @@ def _always(frames: Frames, learned: np.ndarray, settings: Settings) -> np.ndarr
     touching = np.zeros(len(frames.depth), bool)
     for span in frames.episodes:
         here = slice(span.start, span.stop)
-        touching[here] = frames.depth[here].max(axis=(1, 2)) > metrics.CONTACT_THRESHOLD
+        touching[here] = frames.depth[here].max(axis=(1, 2)) > depth_maps.CONTACT_THRESHOLD
     return touching[learned]
 
 
@@ -320,9 +321,10 @@ def _validate(
     prediction = predict(network, windows, chosen, top)
     label = frames.depth[chosen]
     loss = settings.loss(torch.from_numpy(prediction) / top, normalized(torch.from_numpy(label), top))
+    scores = depth_maps.score_frames(prediction, label)
     return {
         "validation_loss": float(loss),
-        "validation_contact_rmse_mm": metrics.summarize(metrics.score_frames(prediction, label).contact_rmse).median,
+        "validation_contact_rmse_mm": depth_maps.summarize(scores.contact_rmse).median,
     }
 
 

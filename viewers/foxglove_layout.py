@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from tacdata import documents
-from tacdata.recording import channels
-from tacdata.recording.mcap_records import read_records
-from viewers.color_scale import HUES
+from tacdata.recording.files import topics
+from tacdata.recording.files.mcap_records import read_records
 from viewers.output_file import new_file
+from viewers.scene.color_scale import HUES
 
 ENDING = ".json"
 
@@ -34,34 +34,34 @@ def write_foxglove_layout(recording: Path, out: Path) -> None:
     )
 
 
-def foxglove_layout(topics: set[str]) -> dict[str, Any]:
+def foxglove_layout(recorded: set[str]) -> dict[str, Any]:
     """Return a layout over those of a recording's topics that it has: readings, guide, images, phases, log.
 
     Args:
-        topics: The recording's topics.
+        recorded: The recording's topics.
     """
     panels: dict[str, dict[str, Any]] = {}
-    for topic in sorted(t for t in topics if t == channels.TAXELS or t.startswith(channels.TAXELS + "/")):
+    for topic in sorted(t for t in recorded if t == topics.TAXELS or t.startswith(topics.TAXELS + "/")):
         panels[f"Plot!{_name(topic)}"] = _plot(f"{topic} [counts]", [f"{topic}.counts[:]"])
-    if channels.STATUS in topics:
-        axes = [f"{channels.STATUS}.position.{axis}" for axis in "xyz"]
+    if topics.STATUS in recorded:
+        axes = [f"{topics.STATUS}.position.{axis}" for axis in "xyz"]
         panels["Plot!guide"] = _plot("Guide, machine position [mm]", axes)
-    for topic in sorted(t for t in topics if t.endswith("/image")):
+    for topic in sorted(t for t in recorded if t.endswith("/image")):
         panels[f"Image!{_name(topic)}"] = {"imageMode": {"imageTopic": topic}}
-    for topic in sorted(t for t in topics if t.endswith("/image")):
+    for topic in sorted(t for t in recorded if t.endswith("/image")):
         camera = topic.split("/")[2]
-        poses = {t: {"visible": True, "type": "axis"} for t in sorted(topics) if t.startswith(f"/camera/{camera}/")}
+        poses = {t: {"visible": True, "type": "axis"} for t in sorted(recorded) if t.startswith(f"/camera/{camera}/")}
         poses = {t: own for t, own in poses.items() if t.endswith("/pose")}
         if poses:  # where the camera sees the cube, in the camera's own frame
             panels[f"3D!{_name(topic)}"] = {"followTf": camera, "followMode": "follow-none", "topics": poses}
-    for topic in sorted(t for t in topics if t.endswith("/cube") or t.endswith("/view")):
+    for topic in sorted(t for t in recorded if t.endswith("/cube") or t.endswith("/view")):
         panels[f"Plot!{_name(topic)}"] = _plot(f"{topic}: reprojection [px]", [f"{topic}.reprojection"])
-    if channels.PHASE in topics:
+    if topics.PHASE in recorded:
         panels["StateTransitions!phases"] = {
-            "isSynced": True, "paths": [{"value": f"{channels.PHASE}.name", "timestampMethod": "receiveTime"}],
+            "isSynced": True, "paths": [{"value": f"{topics.PHASE}.name", "timestampMethod": "receiveTime"}],
         }  # fmt: skip
-    if channels.LOG in topics:
-        panels["RosOut!log"] = {"topicToRender": channels.LOG, "minLogLevel": 1, "searchTerms": []}
+    if topics.LOG in recorded:
+        panels["RosOut!log"] = {"topicToRender": topics.LOG, "minLogLevel": 1, "searchTerms": []}
     layout = {
         "configById": panels, "globalVariables": {}, "userNodes": {}, "playbackConfig": {"speed": 1},
     }  # fmt: skip

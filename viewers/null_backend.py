@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from viewers.backend import Backend
-from viewers.scene import Scene
+from viewers.scene.scene import Scene
 
 
 class NullBackend(Backend):

@@ -10,8 +10,9 @@ from importlib import import_module
 from pathlib import Path
 
 from tacdata.errors import UsageError
-from viewers import output_file, rerun_window
-from viewers.scene import Scene
+from viewers import output_file
+from viewers.rerun import window
+from viewers.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,13 @@ class Output:
 
     def prepare(self) -> None:
         """Import what is going to draw, which takes as long as reading a large file."""
-        import viewers.episode_scene
+        import viewers.scenes.episode
 
         import_module("trimesh.creation")  # of which indenters are made
         if self.save is not None or self.opens:
-            import viewers.rerun_backend
+            import viewers.rerun.backend
         if self.picture is not None:
-            import viewers.picture_backend  # noqa: F401
+            import viewers.pictures.backend  # noqa: F401
 
     def check(self) -> None:
         """Refuse what cannot be done, before anything is read.
@@ -61,7 +62,7 @@ class Output:
             if file is not None:
                 output_file.new_file(file, *suffixes)
         if self.opens and not self.web:
-            rerun_window.require_display()
+            window.require_display()
 
 
 def show(scene: Scene, output: Output) -> None:
@@ -74,12 +75,12 @@ def show(scene: Scene, output: Output) -> None:
         write_rerun(scene, output.save)
         print(f"saved {output.save}; look at it with: tacdata view {output.save}")
     if output.picture is not None:
-        from viewers.picture_backend import PictureBackend
+        from viewers.pictures.backend import PictureBackend
 
         PictureBackend(output.picture).draw(scene)
         print(f"saved {output.picture}")
     if output.video is not None:
-        from viewers.film_backend import FilmBackend
+        from viewers.pictures.film import FilmBackend
 
         FilmBackend(output.video).draw(scene)
         print(f"saved {output.video}")
@@ -105,7 +106,7 @@ def show_saved(path: Path, output: Output) -> None:
 
 def write_rerun(scene: Scene, file: Path) -> None:
     """Write a Rerun file."""
-    from viewers.rerun_backend import RerunBackend
+    from viewers.rerun.backend import RerunBackend
 
     RerunBackend(file).draw(scene)
 
@@ -114,10 +115,10 @@ def show_file(file: Path, web: bool) -> None:
     """Open a Rerun file; ends when the window is closed, or with Ctrl-C."""
     with suppress(KeyboardInterrupt):
         if not web:
-            rerun_window.window(file)
+            window.window(file)
             return
-        with rerun_window.web_server(file) as (server, address):
+        with window.web_server(file) as (server, address):
             print(f"open {address}\nCtrl-C ends it", flush=True)
-            if rerun_window.has_display():
+            if window.has_display():
                 webbrowser.open(address)
-            rerun_window.wait_for(server)
+            window.wait_for(server)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from viewers.asked import Asked, nothing
 from viewers.kinds.kind import kind_of
-from viewers.scene import Scene
+from viewers.scene.request import Asked, nothing
+from viewers.scene.scene import Scene
 
 
 def scene_at(

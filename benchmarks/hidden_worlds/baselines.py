@@ -20,8 +20,8 @@ MOST = 4
 def answered(setting, method):
     """Return a verdict's least fields, what the model says with and without what was found, and CPU seconds."""
     from tacdata.chain import predict
-    from tacdata.discrepancy.frame import frame
-    from tacdata.discrepancy.problem import prepare
+    from tacdata.discrepancy.noise.null_model import frame
+    from tacdata.discrepancy.search.problem import prepare
 
     course, begin = setting.course, time.process_time()
     rows, before = course.read, predict(course, setting.response, [])
@@ -54,13 +54,13 @@ def answered(setting, method):
 
 def _least(problem):
     """Return one candidate a mechanism: the shapes that do best alone."""
-    from tacdata.discrepancy.search import best_shapes
+    from tacdata.discrepancy.search.screen import best_shapes
 
     return list(best_shapes(problem).values())
 
 
 def _cut(gram, columns, low, high):
-    from tacdata.discrepancy.fit import solve
+    from tacdata.discrepancy.statistics.gram_fit import solve
 
     return solve(gram, columns, np.zeros(len(columns)), low, high)
 

@@ -62,8 +62,8 @@ def setting_of(folder, course, without=(), **switches):
     from dataclasses import fields
 
     from tacdata.chain.table_response import TableResponse
-    from tacdata.discrepancy.fitted_response import FittedResponse
-    from tacdata.discrepancy.setting import Setting
+    from tacdata.discrepancy.model.fitted_response import FittedResponse
+    from tacdata.discrepancy.model.setting import Setting
     from tacdata.effects import library
 
     if json.loads((folder / "task.json").read_text())["response"] == "fitted":
@@ -81,7 +81,7 @@ def setting_of(folder, course, without=(), **switches):
 def spec_of(folder):
     """Return the model's spec, as a lab would write it."""
     import schemas
-    from tacdata.discrepancy.spec import Spec
+    from tacdata.discrepancy.model.spec import Spec
 
     kind = json.loads((folder / "task.json").read_text())["response"]
     response = {"kind": kind} if kind == "fitted" else {"kind": kind, "file": "table.npz"}
@@ -92,16 +92,16 @@ def spec_of(folder):
 def answered(folder, without=(), **switches):
     """Return the verdict's document, what the model says with and without what was found, and CPU seconds."""
     from tacdata.chain import predict
-    from tacdata.discrepancy import verdict
-    from tacdata.discrepancy.judge import judge
-    from tacdata.discrepancy.judged import judged
-    from tacdata.discrepancy.located import residual, slices
+    from tacdata.discrepancy.judge import judged
+    from tacdata.discrepancy.search.judge import judge
+    from tacdata.discrepancy.verdict import document
+    from tacdata.discrepancy.verdict.residual_slices import residual, slices
 
     course = course_of(dict(np.load(folder / "recordings.npz")))
     begin = time.process_time()
     if switches:
         found = judge(setting_of(folder, course, without, **switches))
-        answer = verdict.document(found, slices(found.problem, residual(found.problem)), {})
+        answer = document.document(found, slices(found.problem, residual(found.problem)), {})
     else:
         done = judged(course, spec_of(folder), without=tuple(without))
         found, answer = done.found, done.verdict

@@ -11,8 +11,8 @@ import numpy as np
 from solvers import calculix_deck as deck
 from solvers.peer import Answer, Peer, PeerError, outer_face, run_alone, within_reach
 
-from tacdata.skin.case import Case
-from tacdata.skin.mesh import SkinMesh
+from tacdata.cases.case import Case
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 
 @dataclass(frozen=True)

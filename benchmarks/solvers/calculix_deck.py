@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.skin import elements
-from tacdata.skin.case import Case
-from tacdata.skin.mesh import SkinMesh
+from tacdata.cases.case import Case
+from tacdata.skin.mesh import elements
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 FACE_NAMES = {
     frozenset((0, 1, 2)): "S1",

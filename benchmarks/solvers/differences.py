@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay
 from solvers.peer import Answer
 
 from tacdata.indenters import Indenter
-from tacdata.skin.elements import triangle_shapes
+from tacdata.skin.mesh.elements import triangle_shapes
 
 SPACING = 0.1
 """Distance of the points at which fields are compared [mm]."""

@@ -11,10 +11,10 @@ import numpy as np
 from solvers import gwfl
 from solvers.peer import ALONE, Answer, Peer, PeerError, outer_face, run_alone, within_reach
 
-from tacdata.skin.case import Case
-from tacdata.skin.mesh import SkinMesh
-from tacdata.skin.raster import OuterFace
-from tacdata.skin.touch import rotation, touch
+from tacdata.cases.case import Case
+from tacdata.skin.contact.first_touch import rotation, touch
+from tacdata.skin.mesh.skin_mesh import SkinMesh
+from tacdata.skin.surface.outer_face import OuterFace
 
 PYTHON = "/usr/bin/python3"
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from solvers.slab_peer import SlabPeer
 
-from tacdata.skin.case import Case
+from tacdata.cases.case import Case
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 from solvers.peer import ALONE, Answer, Peer, PeerError, main_interpreter, outer_face, run_alone
 
 from tacdata import documents
-from tacdata.skin.case import Case
-from tacdata.skin.mesh import SkinMesh
+from tacdata.cases.case import Case
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from tacdata.skin.case import Case
-from tacdata.skin.mesh import SkinMesh
-from tacdata.skin.raster import OuterFace
-from tacdata.skin.touch import rotation, touch
+from tacdata.cases.case import Case
+from tacdata.skin.contact.first_touch import rotation, touch
+from tacdata.skin.mesh.skin_mesh import SkinMesh
+from tacdata.skin.surface.outer_face import OuterFace
 
 ALONE = Path(__file__).parent / "alone"
 """Scripts that run in a process, often an interpreter, of their own."""

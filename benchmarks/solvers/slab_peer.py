@@ -13,8 +13,8 @@ from scipy.spatial import Delaunay
 from solvers.environment import interpreter
 from solvers.peer import ALONE, Answer, Peer, PeerError, run_alone
 
-from tacdata.skin.case import Case
-from tacdata.skin.mesh import SkinMesh
+from tacdata.cases.case import Case
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 
 @dataclass(frozen=True)

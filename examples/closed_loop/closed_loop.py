@@ -19,7 +19,7 @@ import numpy as np
 import yaml
 
 from tacdata.virtual_rig.rig import VirtualRig
-from tacdata.virtual_rig.world import World
+from tacdata.virtual_rig.world.world import World
 
 PLAY = 0.06
 """Play of the depth drive [mm]: after turning, the carriage stays where it is for so long."""

@@ -11,7 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from label_farm.ledger import Ledger
+from label_farm.ledger.ledger import Ledger
 from label_farm.service.foreman import Foreman
 from label_farm.service.guard import Guard
 from label_farm.service.receiving import add_receiving

@@ -12,15 +12,15 @@ from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from label_farm.engine import Engine, StoreFull
-from label_farm.farm_settings import FarmSettings
-from label_farm.ledger import Ledger
-from label_farm.model import Version
-from label_farm.roster import Roster, WorkerRow
+from label_farm.labels.session_labels import SessionLabels
+from label_farm.ledger.ledger import Ledger
+from label_farm.ledger.roster import Roster, WorkerRow
+from label_farm.presses.model import Version
 from label_farm.service.run import LABELS, RECENT, Run
 from label_farm.service.submission import OPEN, Submission, Submissions
-from label_farm.session_labels import SessionLabels
-from label_farm.store import Store
+from label_farm.settings import FarmSettings
+from label_farm.store.store import Store
+from label_farm.workers.engine import Engine, StoreFull
 from tacdata.errors import TacdataError, UsageError
 
 ROUND_SECONDS = 0.1

@@ -16,7 +16,8 @@ from label_farm.service.confined import confined
 from label_farm.service.foreman import Foreman
 from tacdata import provenance
 from tacdata.errors import DeviceError, FormatError, UsageError
-from tacdata.recording import file_names, session
+from tacdata.recording import session
+from tacdata.recording.files import file_names
 
 SPARE = 1 << 30
 """Room that stays free on the disk for labels and results [bytes]."""

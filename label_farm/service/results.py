@@ -7,9 +7,9 @@ from typing import Any
 
 from fastapi import FastAPI, Request, Response
 
+from label_farm.labels.session_labels import SessionLabels
 from label_farm.service.foreman import Foreman
 from label_farm.service.run import LABELS
-from label_farm.session_labels import SessionLabels
 from tacdata import documents
 from tacdata.errors import UsageError
 

@@ -8,16 +8,16 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from label_farm.dataset_flow import DatasetFlow
-from label_farm.farm_settings import FarmSettings
 from label_farm.labelling import Labelling
-from label_farm.ladder import Ladder
-from label_farm.ledger import Ledger
-from label_farm.model import ProcessDied, Version
+from label_farm.labels.dataset_flow import DatasetFlow
+from label_farm.ledger.ledger import Ledger
+from label_farm.presses.ladder import Ladder
+from label_farm.presses.model import ProcessDied, Version
+from label_farm.presses.tolerance import Tolerance
 from label_farm.service.confined import confined
 from label_farm.service.submission import Submission, now
-from label_farm.store import Store
-from label_farm.tolerance import Tolerance
+from label_farm.settings import FarmSettings
+from label_farm.store.store import Store
 from tacdata.errors import TacdataError, UsageError
 
 LABELS = "labels"
@@ -91,7 +91,7 @@ class Run:
         self.planned.set()
 
     def _plan(self) -> None:
-        from tacdata.recording.reader import read_episode
+        from tacdata.recording.files.reader import read_episode
         from tacdata.recording.session import read_session
         from tacdata.sensor import read_sensor
 

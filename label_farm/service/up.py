@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from label_farm import environment
-from label_farm.engine import EngineMaker
-from label_farm.farm_settings import FarmSettings
-from label_farm.model import FACTORY
-from label_farm.pool import Pool
-from label_farm.store import Store
+from label_farm.presses.model import FACTORY
+from label_farm.settings import FarmSettings
+from label_farm.store.store import Store
+from label_farm.workers.engine import EngineMaker
+from label_farm.workers.pool import Pool
 from tacdata.errors import UsageError
 
 SHORTEST_TOKEN = 16
@@ -99,7 +99,7 @@ def _settings(asked: UpSettings) -> FarmSettings:
 def _engine(dask: str) -> EngineMaker:
     if not dask:
         return Pool
-    from label_farm.dask_pool import dask_engine
+    from label_farm.workers.dask_pool import dask_engine
 
     return dask_engine(dask)
 

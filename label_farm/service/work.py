@@ -9,11 +9,11 @@ from fastapi import FastAPI, Request
 from fastapi.concurrency import run_in_threadpool
 from pydantic import BaseModel, ConfigDict, Field
 
-from label_farm import solution_file
-from label_farm.failure import Failure
-from label_farm.ledger import Ledger
-from label_farm.roster import Roster
+from label_farm.ledger.ledger import Ledger
+from label_farm.ledger.roster import Roster
 from label_farm.service.foreman import Foreman
+from label_farm.store import solution_file
+from label_farm.store.failure import Failure
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import Sensor
 

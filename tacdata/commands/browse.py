@@ -10,7 +10,7 @@ import typer
 from tacdata.commands.command import PIPELINE
 
 if TYPE_CHECKING:
-    from viewers.episode_list import EpisodeList
+    from viewers.browse.episode_list import EpisodeList
 
 ORDER = 71
 PANEL = PIPELINE
@@ -36,8 +36,8 @@ def run(
     ] = False,
 ) -> None:
     """List, filter and sort episodes; flag bad ones, which training then leaves out; step through them in a browser."""
-    from viewers.flagging import flag_episode, unflag_episode
-    from viewers.list_sources import episodes_at
+    from viewers.browse.flagging import flag_episode, unflag_episode
+    from viewers.browse.list_sources import episodes_at
 
     if flag is not None or unflag is not None:
         whole = episodes_at(path, labels)
@@ -60,7 +60,7 @@ def run(
 
 
 def _print(chosen: EpisodeList, most: int, scored: bool) -> None:
-    from viewers.list_table import list_table
+    from viewers.browse.list_table import list_table
 
     print(list_table(chosen, most, scored))
     for remark in chosen.remarks:
@@ -69,17 +69,17 @@ def _print(chosen: EpisodeList, most: int, scored: bool) -> None:
 
 def serve(path: Path, labels: Path | None, predictions: Path | None) -> None:
     """Serve the page of a whole session or dataset, the worst episode first where errors are known."""
-    from viewers.list_sources import episodes_at
+    from viewers.browse.list_sources import episodes_at
 
     _serve(episodes_at(path, labels, predictions).by("error" if predictions else "number"), labels, predictions)
 
 
 def _serve(chosen: EpisodeList, labels: Path | None, predictions: Path | None) -> None:
-    from viewers import rerun_window
-    from viewers.browse_server import browse_server
+    from viewers.browse.server import browse_server
+    from viewers.rerun import window
 
     with browse_server(chosen, labels, predictions) as address:
         print(f"open {address}\nCtrl-C ends it", flush=True)
-        if rerun_window.has_display():
+        if window.has_display():
             typer.launch(address)
-        rerun_window.until_interrupted()
+        window.until_interrupted()

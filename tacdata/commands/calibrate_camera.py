@@ -11,8 +11,8 @@ import typer
 from tacdata.commands.command import TOOLS
 
 if TYPE_CHECKING:
-    from tacdata.tags.board import Board
-    from tacdata.tags.view_picker import ViewPicker
+    from tacdata.tags.calibration.board import Board
+    from tacdata.tags.calibration.view_picker import ViewPicker
 
 ORDER = 104
 PANEL = TOOLS
@@ -35,14 +35,14 @@ def run(
 ) -> None:
     """Estimate a camera's intrinsics from images, a video or a live camera; --draw makes the board."""
     from tacdata.errors import UsageError
-    from tacdata.tags.board import read_board
+    from tacdata.tags.calibration.board import read_board
 
     if draw:
         shape = {"columns": columns, "rows": rows, "square": square, "marker": marker, "dictionary": dictionary}
         return _draw(draw, board, shape, paper)
     if source is None or out is None:
         raise UsageError("neither --draw nor --source with --out", "one of them", "see tacdata calibrate-camera --help")
-    from tacdata.tags.calibration import MODELS
+    from tacdata.tags.calibration.intrinsics import MODELS
 
     if model not in ("auto", *MODELS):
         raise UsageError(f"model {model!r}", f"auto, {', '.join(MODELS)}", "choose one of them")
@@ -61,8 +61,8 @@ def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, out: P
     import yaml
 
     from tacdata import documents, provenance
-    from tacdata.tags.calibration import calibrate
-    from tacdata.tags.calibration_picture import draw_calibration
+    from tacdata.tags.calibration.intrinsics import calibrate
+    from tacdata.tags.calibration.picture import draw_calibration
 
     print(f"{picker.seen} images, the board in {picker.with_board}, {len(picker.views)} views taken", flush=True)
     found = calibrate(picker.views, board, picker.size or (0, 0), model)
@@ -94,7 +94,7 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
 
     from tacdata import documents
     from tacdata.errors import UsageError
-    from tacdata.tags.board import DPI, Board, draw_board, printable
+    from tacdata.tags.calibration.board import DPI, Board, draw_board, printable
 
     if target.suffix.lower() not in (".pdf", ".png"):
         raise UsageError(f"--draw {target}", "a file ending in .pdf or .png", "choose another name")
@@ -115,7 +115,7 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
 
 def _look_through(source: Path, board: Board, wanted: int) -> ViewPicker:
     """Take a folder's images all, and of a video the still ones that show something new."""
-    from tacdata.tags.view_picker import ViewPicker, images_of
+    from tacdata.tags.calibration.view_picker import ViewPicker, images_of
 
     picker = ViewPicker(board, still=not source.is_dir())
     for name, image in images_of(source):
@@ -130,8 +130,8 @@ def _watch(source: str, board: Board, size: str, wanted: int) -> ViewPicker:
     from tacdata.clock import Clock
     from tacdata.devices.opencv_camera import OpencvCamera
     from tacdata.errors import UsageError
-    from tacdata.tags.calibration import coverage_of
-    from tacdata.tags.view_picker import ViewPicker
+    from tacdata.tags.calibration.intrinsics import coverage_of
+    from tacdata.tags.calibration.view_picker import ViewPicker
 
     parts = size.lower().split("x")
     if len(parts) != 2 or not all(part.isdigit() and int(part) > 0 for part in parts):

@@ -41,7 +41,7 @@ def run(
     if out.exists():
         raise UsageError(f"{out} exists", "a new file; calibrations are not overwritten", "choose another --out")
     if pairs is not None:
-        from tacdata.demonstrations.hand_eye_pairs import solve_pairs
+        from tacdata.demonstrations.camera_pose.hand_eye_pairs import solve_pairs
 
         found = solve_pairs(pairs)
     elif board is not None and images is not None and calibration is not None:
@@ -65,10 +65,10 @@ def run(
 
 def _by_board(board: Path, images: Path, calibration: Path, camera: str, frame: str) -> CameraWorld:
     from tacdata import documents
-    from tacdata.demonstrations.board_pose import board_poses
-    from tacdata.demonstrations.hand_eye import board_world
-    from tacdata.tags.board import read_board
-    from tacdata.tags.view_picker import images_of
+    from tacdata.demonstrations.camera_pose.board_pose import board_poses
+    from tacdata.demonstrations.camera_pose.hand_eye import board_world
+    from tacdata.tags.calibration.board import read_board
+    from tacdata.tags.calibration.view_picker import images_of
 
     intrinsics = documents.read(calibration, "camera_calibration")["intrinsics"]
     poses, rms, spread = board_poses(images_of(images), read_board(board), intrinsics)

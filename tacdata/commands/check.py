@@ -21,8 +21,8 @@ def run(
 ) -> None:
     """Check every stream for gaps, noise, stuck channels and missing tags; exit 0 if usable, 1 if not."""
     from tacdata import documents
-    from tacdata.recording.check import check
-    from viewers.check_picture import draw
+    from tacdata.recording.check.report import check
+    from viewers.pictures.check import draw
 
     report = check(path)
     folder = out or (path if path.is_dir() else path.parent)

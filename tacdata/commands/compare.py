@@ -11,7 +11,7 @@ from tacdata.commands.command import PIPELINE
 from tacdata.errors import UsageError
 
 if TYPE_CHECKING:
-    from viewers.scene import Scene
+    from viewers.scene.scene import Scene
 
 ORDER = 72
 PANEL = PIPELINE
@@ -35,7 +35,7 @@ def run(
     web: Annotated[bool, typer.Option("--web", help="Serve Rerun's web viewer on this machine.")] = False,
 ) -> None:
     """Show two label versions, two networks, or models and measurement beside each other and as difference."""
-    from viewers import comparison_sources, showing
+    from viewers import comparison, showing
 
     output = showing.Output(save, picture, video, web)
     asked = [name for name, given in (("labels", labels), ("predictions", predictions), ("spec", spec)) if given]
@@ -44,9 +44,9 @@ def run(
         raise UsageError(given, "one of --labels, --predictions, --spec", "say what to compare")
     output.check()
     if labels:
-        scene = comparison_sources.labels_at(path, labels, episode)
+        scene = comparison.labels_at(path, labels, episode)
     elif predictions:
-        scene = comparison_sources.predictions_at(path, predictions, episode)
+        scene = comparison.predictions_at(path, predictions, episode)
     else:
         scene = _models(path, spec or [], episode)
     said = (line for line in scene.summary.splitlines() if line.startswith("- "))
@@ -59,11 +59,11 @@ def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:
 
     import numpy as np
 
-    from tacdata.discrepancy.recordings import course_of
-    from tacdata.discrepancy.spec import read_spec
+    from tacdata.discrepancy.data.recordings import course_of
+    from tacdata.discrepancy.model.spec import read_spec
     from tacdata.revision.comparison import Comparison
-    from viewers.comparison_scene import readings_comparison
-    from viewers.comparison_sources import array_of, telling_names
+    from viewers.comparison import array_of, telling_names
+    from viewers.scenes.comparison import readings_comparison
 
     # A response that is fitted needs every press, so all are read even where one is shown.
     course = course_of([path])

@@ -33,8 +33,8 @@ def run(
     """Find where recordings and a model disagree, and name the missing effect, or say why not."""
     from rich.console import Console
 
+    from tacdata.discrepancy.model.spec import read_spec
     from tacdata.discrepancy.run import run as judge
-    from tacdata.discrepancy.spec import read_spec
 
     console = Console(stderr=True)
     if fem:

@@ -32,10 +32,11 @@ def run(
     from rich.progress import Progress
 
     from tacdata.errors import UsageError
-    from training import checkpoint, report
-    from training.data import read_frames
-    from training.evaluate import evaluate
-    from training.score_sheet import markdown
+    from training.frames.data import read_frames
+    from training.inference import checkpoint
+    from training.reports import report
+    from training.reports.score_sheet import markdown
+    from training.scoring.evaluate import evaluate
 
     place = report.places(network, out)
     place.check()

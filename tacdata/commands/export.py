@@ -32,8 +32,8 @@ def run(
 ) -> None:
     """Write fingertip targets, direct or compensated by touch, in a format that a robot reads."""
     from tacdata.demonstrations.compensation import read_gains
-    from tacdata.demonstrations.demo_session import read_demo_session
-    from tacdata.demonstrations.tracks_file import path_of, read_tracks
+    from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks
+    from tacdata.demonstrations.recording.session import read_demo_session
     from tacdata.exporters.exporter import exporter
     from tacdata.replay.targets import targets_of
 
@@ -68,6 +68,6 @@ def _notes(targets: Targets) -> list[str]:
 
 
 def _tracks(path: Path) -> Path:
-    from tacdata.demonstrations.tracks_file import ENDING, path_of
+    from tacdata.demonstrations.paths.tracks_file import ENDING, path_of
 
     return path if path.name.endswith(ENDING) else path_of(path)

@@ -24,10 +24,10 @@ def run(
     import numpy as np
     import torch
 
-    from training import checkpoint
-    from training.data import read_frames
-    from training.onnx_export import export
-    from training.windows import Windows
+    from training.frames.data import read_frames
+    from training.frames.windows import Windows
+    from training.inference import checkpoint
+    from training.inference.onnx_export import export
 
     trained = checkpoint.load(network)
     readings = None

@@ -44,9 +44,9 @@ def run(
     """
     from tacdata import documents
     from tacdata.errors import UsageError
-    from training.data import read_frames
+    from training.frames.data import read_frames
     from training.generalization import DEFAULTS, generalize, run_name
-    from training.report_page import Scored, page
+    from training.reports.report_page import Scored, page
     from training.settings import Settings
     from training.splits.split import describe
 

@@ -12,7 +12,7 @@ from tacdata.commands.command import TOOLS
 if TYPE_CHECKING:
     from tacdata.grasping.lessons import Lesson
     from tacdata.sensor import Sensor
-    from training.frames import Frames
+    from training.frames.frames import Frames
 
 ORDER = 124
 PANEL = TOOLS
@@ -39,9 +39,9 @@ def run(
     from tacdata.grasping.fingertip import fingertip_sensor
     from tacdata.grasping.press_set import FOLDER, read_presses
     from tacdata.grasping.study import Setup
-    from training import checkpoint
-    from training.sequence import identity, sequence_maps
-    from training.wilson import interval
+    from training.inference import checkpoint
+    from training.inference.sequence import identity, sequence_maps
+    from training.scoring.wilson import interval
 
     for name in (RESULT, PICTURE):
         if (out / name).exists():
@@ -92,7 +92,7 @@ def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | N
 def _frames(found: list[Lesson], sensor: Sensor, origin: str) -> Frames:
     import numpy as np
 
-    from training.frames import EpisodeSpan, Frames
+    from training.frames.frames import EpisodeSpan, Frames
 
     ends = np.cumsum([len(lesson.taxels) for lesson in found]).tolist()
     spans = []

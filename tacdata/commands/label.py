@@ -54,17 +54,17 @@ def run(
     """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
     from functools import partial
 
-    from label_farm.dask_pool import dask_engine
-    from label_farm.dataset_flow import DatasetFlow
     from label_farm.environment import cores, devices, idle_cards
-    from label_farm.farm_settings import FarmSettings
     from label_farm.labelling import Labelling
-    from label_farm.ladder import Ladder
-    from label_farm.model import FACTORY
-    from label_farm.pool import Pool
-    from label_farm.store import Store
-    from label_farm.tolerance import Tolerance
-    from tacdata.recording.reader import read_episode
+    from label_farm.labels.dataset_flow import DatasetFlow
+    from label_farm.presses.ladder import Ladder
+    from label_farm.presses.model import FACTORY
+    from label_farm.presses.tolerance import Tolerance
+    from label_farm.settings import FarmSettings
+    from label_farm.store.store import Store
+    from label_farm.workers.dask_pool import dask_engine
+    from label_farm.workers.pool import Pool
+    from tacdata.recording.files.reader import read_episode
     from tacdata.recording.session import read_session
     from tacdata.sensor import read_sensor
 

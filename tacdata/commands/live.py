@@ -39,10 +39,10 @@ def run(
     from tacdata.live.live_loop import LiveLoop
     from tacdata.live.message_server import MessageServer
     from tacdata.live.source import touched_board
-    from tacdata.recording.device_streams import stream_clock
-    from training import seen
-    from training.checkpoint import load
-    from training.sequence import window_map
+    from tacdata.recording.live.device_streams import stream_clock
+    from training.inference.checkpoint import load
+    from training.inference.sequence import window_map
+    from training.metrics import seen
 
     trained = load(network)
     source = touched_board(rig, finger, trained.sensor)
@@ -56,7 +56,7 @@ def run(
     with ExitStack() as stack:
         watch = server = None
         if view:
-            from viewers.live_view import live_view
+            from viewers.live.window import live_view
 
             watch = stack.enter_context(live_view(view, source.sensor.taxels.columns, source.sensor.taxels.rows))
         if socket is not None:

@@ -26,10 +26,10 @@ def run(
     model: Annotated[str | None, typer.Option(help="Content hash of the skin model to insist on.")] = None,
 ) -> None:
     """Write the recordings and their labels as a LeRobot v3 dataset."""
-    from tacdata.dataset.features import asked_for
     from tacdata.dataset.flags import carry_flags
+    from tacdata.dataset.format.features import asked_for
     from tacdata.dataset.pack import LabelFiles, pack, refuse_existing
-    from tacdata.recording.reader import read_episode
+    from tacdata.recording.files.reader import read_episode
     from tacdata.recording.session import read_session
     from tacdata.sensor import read_sensor
 

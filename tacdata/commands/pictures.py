@@ -23,8 +23,8 @@ def run(
 ) -> None:
     """Draw the pictures of README and tutorial from what the demo made: small enough for the repository."""
     from tacdata.errors import UsageError
-    from viewers.list_sources import episodes_at
-    from viewers.small_pictures import small_film, small_page
+    from viewers.browse.list_sources import episodes_at
+    from viewers.pictures.small_pictures import small_film, small_page
     from viewers.source import scene_at
 
     session, network = demo / "session", demo / "network"

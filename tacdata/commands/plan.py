@@ -11,7 +11,7 @@ from tacdata.commands.command import TOOLS
 
 if TYPE_CHECKING:
     from tacdata.plans import Plan
-    from tacdata.recording.plan_time import PlanTime
+    from tacdata.recording.motion.plan_time import PlanTime
     from tacdata.sensor import Sensor
 
 ORDER = 101
@@ -35,7 +35,7 @@ def run(
     from tacdata import documents
     from tacdata.errors import UsageError
     from tacdata.plans import Plan
-    from tacdata.recording.plan_time import plan_time
+    from tacdata.recording.motion.plan_time import plan_time
     from tacdata.sensor import default_sensor, read_sensor
 
     for path in (out, picture):
@@ -54,7 +54,7 @@ def run(
     expected = plan_time(plan)
     print(_summary(plan, skin, expected))
     if picture:
-        from viewers.plan_picture import draw
+        from viewers.pictures.plan import draw
 
         draw(plan, skin, expected.press_seconds, picture)
         print(f"picture: {picture}")
@@ -98,7 +98,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _summary(plan: Plan, skin: Sensor, expected: PlanTime) -> str:
-    from tacdata.recording.plan_time import SECONDS_PER_MOUNTING, USUAL_LIMITS
+    from tacdata.recording.motion.plan_time import SECONDS_PER_MOUNTING, USUAL_LIMITS
 
     presses = plan.presses
     x, y, depth = ([getattr(p, axis) for p in presses] for axis in ("x", "y", "depth"))

@@ -28,10 +28,10 @@ def run(
     """
     from tacdata import documents
     from tacdata.errors import UsageError
-    from training import checkpoint
-    from training.data import read_frames
-    from training.protocol_sheet import markdown
-    from training.protocols import protocols
+    from training.frames.data import read_frames
+    from training.inference import checkpoint
+    from training.reports.protocol_sheet import markdown
+    from training.scoring.protocols import protocols
 
     if out and out.exists():
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")

@@ -58,9 +58,9 @@ def run(
     from contextlib import nullcontext
 
     from tacdata.plans import read_plan
-    from tacdata.recording.detection_process import in_background
-    from tacdata.recording.interruption import Interruption
-    from tacdata.recording.preflight import Preflight
+    from tacdata.recording.live.detection_process import in_background
+    from tacdata.recording.live.interruption import Interruption
+    from tacdata.recording.motion.preflight import Preflight
     from tacdata.recording.recorder import Recorder
     from tacdata.registration.chosen import chosen_registration
     from tacdata.rig import read_rig
@@ -77,7 +77,7 @@ def run(
         return yes or _answer("Move now? [y/N] ").lower() in ("y", "yes")
 
     if live:
-        from viewers.live_view import live_view
+        from viewers.live.window import live_view
 
         view = live_view(live, skin.taxels.columns, skin.taxels.rows)
     else:
@@ -114,7 +114,7 @@ def run(
 def _by_hand(
     rig: Path, out: Path, task: str, seconds: float | None, count: int, resume: bool, unwanted: list[str]
 ) -> None:
-    from tacdata.demonstrations.by_hand import record_by_hand
+    from tacdata.demonstrations.recording.by_hand import record_by_hand
     from tacdata.errors import UsageError
 
     if unwanted:
@@ -139,7 +139,7 @@ def _answer(question: str) -> str:
 def _mounting(rig: Rig, bar: _Bar) -> Callable[[Press], None]:
     """Return who mounts indenters: the virtual rig, or a person who is asked."""
     if "mounting" in rig.document:
-        from tacdata.virtual_rig.mounting import mount
+        from tacdata.virtual_rig.world.mounting import mount
 
         return lambda press: mount(rig.document, press.indenter.document, **press.angles)
 

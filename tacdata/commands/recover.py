@@ -18,7 +18,7 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Where to write the repaired copy; default beside it.")] = None,
 ) -> None:
     """Write a repaired copy of a recording that a crash cut off."""
-    from tacdata.recording.recover import recover
+    from tacdata.recording.files.recover import recover
 
     found = recover(file, out)
     for damage in found.damage or ["nothing was wrong with it"]:

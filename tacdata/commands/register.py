@@ -96,8 +96,8 @@ def _measure(
 ) -> tuple[dict[str, Any], str]:
     """Open the devices, ask, and carry the procedure out; return the file's document and the result in words."""
     from tacdata.errors import UsageError
-    from tacdata.recording.interruption import Interruption
-    from tacdata.recording.rig_devices import RigDevices
+    from tacdata.recording.live.interruption import Interruption
+    from tacdata.recording.live.rig_devices import RigDevices
     from tacdata.registration.guarded_probe import guarded_probe
     from tacdata.registration.procedure import described, register
     from tacdata.registration.result import document_of
@@ -121,7 +121,7 @@ def _measure(
 
 def _mount(rig: Rig, specimen: dict[str, Any]) -> None:
     if "mounting" in rig.document:
-        from tacdata.virtual_rig.mounting import mount
+        from tacdata.virtual_rig.world.mounting import mount
 
         mount(rig.document, specimen)
         return

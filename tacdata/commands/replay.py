@@ -38,11 +38,11 @@ def run(
     """Replay demonstrated grasps or wipes directly and compensated in MuJoCo, over many seeds."""
     from tacdata import documents
     from tacdata.demonstrations.compensation import read_gains
-    from tacdata.demonstrations.tracks_file import read_tracks
+    from tacdata.demonstrations.paths.tracks_file import read_tracks
     from tacdata.errors import UsageError
     from tacdata.replay.scene import scene_of
     from tacdata.replay.trials import Trials, result
-    from training.wilson import interval
+    from training.scoring.wilson import interval
 
     for file in (out, view, video):
         if file is not None and file.exists():
@@ -88,15 +88,15 @@ def run(
 
 
 def _tracks(path: Path) -> Path:
-    from tacdata.demonstrations.tracks_file import ENDING, path_of
+    from tacdata.demonstrations.paths.tracks_file import ENDING, path_of
 
     return path if path.name.endswith(ENDING) else path_of(path)
 
 
 def _save(view: Path | None, video: Path | None, tried: Trials, scene: Scene) -> None:
     """Write the undisturbed replays of one recording, and say how they ended."""
-    from viewers.replay_film import film_replays
-    from viewers.replay_view import save_replays
+    from viewers.pictures.replay_film import film_replays
+    from viewers.rerun.replay import save_replays
 
     shown = {kind: tried.one(kind, scene) for kind in tried.paths}
     if view is not None:

@@ -32,13 +32,13 @@ def run(
     """
     from tacdata import documents
     from tacdata.errors import UsageError
-    from training import checkpoint
-    from training.data import read_frames
-    from training.evaluate import evaluate
-    from training.frames import Frames
-    from training.protocol_sheet import markdown
-    from training.protocols import protocols
-    from training.report_page import Scored, page
+    from training.frames.data import read_frames
+    from training.frames.frames import Frames
+    from training.inference import checkpoint
+    from training.reports.protocol_sheet import markdown
+    from training.reports.report_page import Scored, page
+    from training.scoring.evaluate import evaluate
+    from training.scoring.protocols import protocols
 
     if out.exists():
         raise UsageError(f"{out} exists", "a new file; nothing is overwritten", "choose another --out")
@@ -61,7 +61,7 @@ def run(
 
 def _folders(given: list[Path]) -> list[Path]:
     """Return the runs: those named, and those in folders that hold runs."""
-    from training.checkpoint import BEST
+    from training.inference.checkpoint import BEST
 
     found = []
     for path in given:

@@ -40,12 +40,12 @@ def run(
     from rich.console import Console
 
     from label_farm.labelling import FarmSettings
-    from label_farm.model import FACTORY
-    from tacdata.discrepancy.spec import read_spec
-    from tacdata.revision.retrain import Recipe
+    from label_farm.presses.model import FACTORY
+    from tacdata.discrepancy.model.spec import read_spec
+    from tacdata.revision.evidence.table import in_words
+    from tacdata.revision.labels.retrain import Recipe
     from tacdata.revision.revise import CARD, SPEC, Wishes, revise
-    from tacdata.revision.table import in_words
-    from viewers.gap_recording import write
+    from viewers.rerun.gap_recording import write
 
     console = Console(stderr=True)
     farm = FarmSettings(factory=factory or FACTORY, uncertainty=uncertainty) if relabel else None

@@ -22,7 +22,7 @@ def run(
     from rich.console import Console
 
     from tacdata import documents
-    from tacdata.skin.case import read_case, solve_case
+    from tacdata.cases.case import read_case, solve_case
 
     console = Console(stderr=True)
     wanted = read_case(case)

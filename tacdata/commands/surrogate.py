@@ -31,7 +31,7 @@ def run(
     """Solve what a session pressed by finite elements: the base that tacdata discrepancy --spec starts from."""
     from rich.console import Console
 
-    from tacdata.skin.mesher import MeshSettings
+    from tacdata.skin.mesh.build import MeshSettings
     from tacdata.stages import clock_face
     from tacdata.surrogate import TableSettings, work, written_spec
     from tacdata.surrogate.pressed import pressed

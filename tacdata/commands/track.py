@@ -12,7 +12,7 @@ from tacdata.commands.command import TOOLS
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
-    from tacdata.demonstrations.tracking import Estimator
+    from tacdata.demonstrations.paths.tracking import Estimator
 
 ORDER = 120
 PANEL = TOOLS
@@ -31,11 +31,11 @@ def run(
 ) -> None:
     """Smooth the fingertip paths of demonstrations, mark gaps, name faults, and add a network's predicted depth."""
     from tacdata.demonstrations.compensation import contact_depth
-    from tacdata.demonstrations.demo_reader import read_demo
-    from tacdata.demonstrations.demo_session import read_demo_session
-    from tacdata.demonstrations.second_look import look_again
-    from tacdata.demonstrations.tracking import track
-    from tacdata.demonstrations.tracks_file import path_of, read_tracks, write_tracks
+    from tacdata.demonstrations.paths.second_look import look_again
+    from tacdata.demonstrations.paths.tracking import track
+    from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks, write_tracks
+    from tacdata.demonstrations.recording.reader import read_demo
+    from tacdata.demonstrations.recording.session import read_demo_session
     from tacdata.errors import UsageError
 
     recordings = read_demo_session(path).episodes if path.is_dir() else (path,)
@@ -76,7 +76,7 @@ def _draw(made: Demonstration, recording: Path) -> None:
     import numpy as np
 
     from tacdata.demonstrations.compensation import contact_depth
-    from viewers.tracks_picture import Strip, draw_tracks
+    from viewers.pictures.tracks import Strip, draw_tracks
 
     strips = [
         Strip(
@@ -90,10 +90,10 @@ def _draw(made: Demonstration, recording: Path) -> None:
 
 
 def _estimator(network: Path) -> Estimator:
-    from tacdata.demonstrations.tracking import Estimator
-    from training import seen
-    from training.checkpoint import load
-    from training.sequence import identity, sequence_maps
+    from tacdata.demonstrations.paths.tracking import Estimator
+    from training.inference.checkpoint import load
+    from training.inference.sequence import identity, sequence_maps
+    from training.metrics import seen
 
     trained = load(network)
     known = seen.read(trained.path.parent, trained.content_hash)

@@ -52,7 +52,7 @@ def run(
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
-    from training.data import read_frames
+    from training.frames.data import read_frames
     from training.settings import Settings
     from training.tensorboard import event_log
     from training.train import METRICS, train

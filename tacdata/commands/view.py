@@ -36,7 +36,8 @@ def run(
     ] = None,
 ) -> None:
     """Look at an episode, a demonstration, targets or a verdict, in a window or browser, or save what is to be seen."""
-    from viewers import following, output_file, showing
+    from viewers import output_file, showing
+    from viewers.live import following
     from viewers.source import scene_at
 
     if foxglove is not None:

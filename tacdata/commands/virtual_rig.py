@@ -46,8 +46,8 @@ def run(
     """Emulate a rig (GRBL, taxel board, camera) that other verbs reach by its rig.yaml, until Ctrl-C."""
     from tacdata.errors import UsageError
     from tacdata.sensor import read_sensor
-    from tacdata.virtual_rig.hidden import hidden_from
     from tacdata.virtual_rig.rig import VirtualRig
+    from tacdata.virtual_rig.world.hidden import hidden_from
 
     secret = hidden_from(hide or [])
     if secret and demo:
@@ -62,7 +62,7 @@ def run(
     skin = read_sensor(sensor) if sensor else None
     if demo:
         from tacdata.virtual_rig.demo import VirtualDemo
-        from tacdata.virtual_rig.hand import RADIUS
+        from tacdata.virtual_rig.world.hand import RADIUS
 
         rig = VirtualDemo(
             directory, 0.5 if speed is None else speed, seed, cameras, fault, skin, task, RADIUS if nub is None else nub

@@ -18,7 +18,7 @@ import pyarrow as pa
 from numpy.lib.format import open_memmap
 
 from tacdata import documents, provenance
-from tacdata.dataset import folder, tiff
+from tacdata.dataset.format import folder, tiff
 from tacdata.errors import FormatError
 
 LAYOUT = 1

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.dataset import features, label_states
-from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.dataset import label_states
+from tacdata.dataset.format import features
+from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.dataset.reader import Dataset
 from tacdata.plans import Press
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import schemas
 from tacdata import documents
-from tacdata.dataset import metadata
+from tacdata.dataset.format import metadata
 from tacdata.dataset.reader import Dataset
 from tacdata.errors import UsageError
 

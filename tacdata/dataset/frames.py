@@ -8,8 +8,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from tacdata import provenance
-from tacdata.dataset import features
-from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.dataset.format import features
+from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.errors import FormatError
 from tacdata.labels import Label
 from tacdata.recording.episode import PHASES, Episode

@@ -9,7 +9,7 @@ from typing import Any
 
 import schemas
 from tacdata import documents
-from tacdata.dataset import folder, metadata
+from tacdata.dataset.format import folder, metadata
 
 FILE = Path("meta/tacdata_labels.json")
 

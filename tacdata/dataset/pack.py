@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tacdata import documents, provenance
-from tacdata.dataset import features, frames
+from tacdata.dataset import frames
+from tacdata.dataset.format import features
 from tacdata.dataset.writer import DatasetWriter
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import Label, read_label, table

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 
-from tacdata.dataset import cache, features, folder, metadata
-from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.dataset import cache
+from tacdata.dataset.format import features, folder, metadata
+from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.errors import FormatError
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
@@ -53,7 +54,7 @@ class Dataset:
     root: Path
     """The folder."""
     columns: dict[str, np.ndarray]
-    """Column by name (`tacdata.dataset.features`), read-only memory maps."""
+    """Column by name (`tacdata.dataset.format.features`), read-only memory maps."""
     episodes: tuple[DatasetEpisode, ...]
     """Episodes in order; their frames follow each other without gaps."""
     sensors: dict[str, Sensor]

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tacdata.dataset import cache, features, folder, metadata
-from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.dataset import cache
+from tacdata.dataset.format import features, folder, metadata
+from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.errors import FormatError
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch  # noqa: TID253 - only who trains imports this module
 
-from tacdata.dataset import features
+from tacdata.dataset.format import features
 from tacdata.dataset.reader import Dataset, read_dataset
 from tacdata.errors import UsageError
 

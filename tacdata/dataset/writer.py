@@ -17,8 +17,9 @@ import numpy as np
 import pyarrow as pa
 
 from tacdata import documents
-from tacdata.dataset import cache, features, folder, metadata, statistics, tiff
-from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.dataset import cache
+from tacdata.dataset.format import features, folder, metadata, statistics, tiff
+from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import Sensor
 

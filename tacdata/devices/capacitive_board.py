@@ -12,7 +12,7 @@ from tacdata.clock import Clock
 from tacdata.devices.device import StreamCounts, TaxelBoard, TaxelFrame
 from tacdata.errors import DeviceError
 from tacdata.wire import Decoder, FrameFormat, default_format, read_format
-from tacdata.wire.frame_format import from_document
+from tacdata.wire.frames.frame_format import from_document
 from tacdata.wire.serial_port import open_port, read_available
 
 FINE_TICK = 0.0002

@@ -10,10 +10,10 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, Motion, MotionController
 from tacdata.errors import DeviceError, UsageError
-from tacdata.wire.grbl_lines import MOVING, OPENED_AGAIN
-from tacdata.wire.grbl_link import GrblLink
-from tacdata.wire.grbl_opening import ANSWER, clear, greet, locked
-from tacdata.wire.grbl_settings import GrblSettings
+from tacdata.wire.grbl.lines import MOVING, OPENED_AGAIN
+from tacdata.wire.grbl.link import GrblLink
+from tacdata.wire.grbl.opening import ANSWER, clear, greet, locked
+from tacdata.wire.grbl.settings import GrblSettings
 from tacdata.wire.serial_port import open_port
 
 HOMING = 600.0

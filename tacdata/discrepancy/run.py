@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from tacdata import documents, provenance
-from tacdata.discrepancy import decide, residuals
-from tacdata.discrepancy.beside_model import beside_model
-from tacdata.discrepancy.judge import STEPS
-from tacdata.discrepancy.judged import judged
-from tacdata.discrepancy.located import beside
-from tacdata.discrepancy.picture import draw
-from tacdata.discrepancy.recordings import course_of
-from tacdata.discrepancy.sealed import chosen
-from tacdata.discrepancy.spec import Spec
-from tacdata.discrepancy.text import in_text
+from tacdata.discrepancy.data.recordings import course_of
+from tacdata.discrepancy.judge import judged
+from tacdata.discrepancy.model.spec import Spec
+from tacdata.discrepancy.search.judge import STEPS
+from tacdata.discrepancy.verdict import decide, residual_table
+from tacdata.discrepancy.verdict.before_and_after import beside_model
+from tacdata.discrepancy.verdict.picture import draw
+from tacdata.discrepancy.verdict.residual_slices import beside
+from tacdata.discrepancy.verdict.sealed import chosen
+from tacdata.discrepancy.verdict.text import in_text
 from tacdata.errors import UsageError
 
 VERDICT, TEXT, PICTURE, SPEC = "verdict.json", "verdict.txt", "verdict.png", "spec.json"
@@ -44,7 +44,7 @@ def run(
         spec: The model.
         out: Folder to create.
         note: Is told what is being done.
-        until: The last step to make (`tacdata.discrepancy.judge.STEPS`).
+        until: The last step to make (`tacdata.discrepancy.search.judge.STEPS`).
 
     Raises:
         UsageError: If ``out`` exists, or there is nothing to read.
@@ -69,7 +69,7 @@ def run(
     documents.write_text(out / TEXT, text)
     draw(found, done.before, done.after, answer, out / PICTURE)
     told = beside_model(course, found, chosen(course))
-    residuals.write(out / residuals.FILE, told, provenance.content_hash(answer))
+    residual_table.write(out / residual_table.FILE, told, provenance.content_hash(answer))
     if answer["status"] == "named":
         members = decide.members(found)
         following = spec.with_effects([m.placed for m in members], [m.error for m in members], VERDICT)

@@ -11,8 +11,8 @@ import numpy as np
 import pyarrow as pa
 
 from tacdata import documents
-from tacdata.dataset import folder, statistics, tiff
-from tacdata.dataset.features import INDEX_COLUMNS
+from tacdata.dataset.format import folder, statistics, tiff
+from tacdata.dataset.format.features import INDEX_COLUMNS
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import Exporter, new_folder
 from tacdata.replay.columns import AXES, TURNS

@@ -19,7 +19,8 @@ from tacdata.importing.presses import presses_of
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets
 from tacdata.importing.trials import split_tables
-from tacdata.recording import file_names, session
+from tacdata.recording import session
+from tacdata.recording.files import file_names
 from tacdata.recording.session import FILE
 
 

@@ -14,9 +14,9 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from schemas import tacdata_pb2 as pb
 from tacdata.importing.streams import Stream
 from tacdata.plans import Press
-from tacdata.recording import channels, file_names
-from tacdata.recording.chunked_file import ChunkedFile
 from tacdata.recording.episode import Phase
+from tacdata.recording.files import file_names, topics
+from tacdata.recording.files.chunked_file import ChunkedFile
 from tacdata.sensor import Sensor
 
 STATE = "Imported"
@@ -74,10 +74,10 @@ def write(path: Path, imported: ImportedPress) -> None:
         UsageError: If it exists.
     """
     file = ChunkedFile(file_names.partial(path))
-    for topic, message in channels.FIXED.items():
+    for topic, message in topics.FIXED.items():
         file.register(topic, message)
     for stream in imported.measured:
-        file.register(channels.measured(stream.name), pb.Measured)
+        file.register(topics.measured(stream.name), pb.Measured)
         file.describe(f"measured/{stream.name}", {"unit": stream.unit, "names": json.dumps(stream.names)})
     begin = int(imported.taxels.time_ns[0])
     for name, document in imported.attachments.items():
@@ -85,7 +85,7 @@ def write(path: Path, imported: ImportedPress) -> None:
     for text in imported.record["notes"]:
         note = Log(level=Log.Level.WARNING, message=text, name="tacdata import")
         note.timestamp.FromNanoseconds(begin)
-        file.add(channels.LOG, begin, begin, 0, note.SerializeToString())
+        file.add(topics.LOG, begin, begin, 0, note.SerializeToString())
     for topic, time_ns, data in _messages(imported):
         file.add(topic, time_ns, time_ns, 0, data)
     counts = {
@@ -102,13 +102,13 @@ def write(path: Path, imported: ImportedPress) -> None:
 def _messages(imported: ImportedPress) -> Iterator[tuple[str, int, bytes]]:
     """Yield topic, time and bytes of every row of every stream, in the order of time."""
     makers: list[tuple[str, Stream, Callable[[int, list[float]], bytes]]] = [
-        (channels.TAXELS, imported.taxels, _taxels), (channels.STATUS, imported.position, _status),
-        *((channels.measured(stream.name), stream, _measured) for stream in imported.measured),
+        (topics.TAXELS, imported.taxels, _taxels), (topics.STATUS, imported.position, _status),
+        *((topics.measured(stream.name), stream, _measured) for stream in imported.measured),
     ]  # fmt: skip
     marks = [(p.start_ns, p.name) for p in imported.phases]
     marks += [(imported.phases[-1].end_ns, "")] if imported.phases else []
     for time_ns, name in marks:
-        yield channels.PHASE, time_ns, pb.Phase(name=name, start_ns=time_ns).SerializeToString()
+        yield topics.PHASE, time_ns, pb.Phase(name=name, start_ns=time_ns).SerializeToString()
     times = np.concatenate([stream.time_ns for _, stream, _ in makers])
     kind = np.repeat(np.arange(len(makers)), [len(stream.time_ns) for _, stream, _ in makers])
     row = np.concatenate([np.arange(len(stream.time_ns)) for _, stream, _ in makers])

@@ -11,7 +11,7 @@ import numpy as np
 from tacdata.demonstrations.compensation import contact_depth
 from tacdata.devices.device import TaxelFrame
 from tacdata.errors import DeviceError, UsageError
-from tacdata.recording.stream_clock import StreamClock
+from tacdata.recording.clocks.running_clock import StreamClock
 from tacdata.sensor import DepthMap
 
 REGION = 0.4

@@ -34,7 +34,7 @@ class LiveLoop:
             stream: Makes estimates of its frames.
             network: Identity of the network, for messages.
             server: Takes messages.
-            watch: Is shown every estimate (`viewers.live_view`); must return at once.
+            watch: Is shown every estimate (`viewers.live.window`); must return at once.
             maps: Whether messages hold whole maps.
         """
         self._source, self._stream, self._server, self._watch, self._maps = source, stream, server, watch, maps

@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from tacdata.clock import Clock
-from tacdata.demonstrations.demo_rig import read_demo_rig
+from tacdata.demonstrations.recording.rig import read_demo_rig
 from tacdata.devices.device import TaxelBoard, create
 from tacdata.errors import UsageError
 from tacdata.rig import read_rig

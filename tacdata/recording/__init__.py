@@ -1,7 +1,7 @@
 """Recording: devices in, one MCAP file per episode out, and back again."""
 
 from tacdata.recording.episode import PHASES, Episode
-from tacdata.recording.reader import read_episode
+from tacdata.recording.files.reader import read_episode
 from tacdata.recording.session import Session, read_session
 
 __all__ = ["PHASES", "Episode", "Session", "read_episode", "read_session"]

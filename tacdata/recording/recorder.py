@@ -11,21 +11,23 @@ import numpy as np
 
 from tacdata.errors import DeviceError, TacdataError, UsageError
 from tacdata.plans import Plan, Press
-from tacdata.recording import file_names, sync_tap, sync_tap_motion
-from tacdata.recording.clock_model import Latency
-from tacdata.recording.detection_process import Detect
-from tacdata.recording.guarded_motion import WATCH, GuardedMotion
-from tacdata.recording.interruption import Interruption
-from tacdata.recording.live_feed import Watch
-from tacdata.recording.motion_profile import AxisLimits
-from tacdata.recording.preflight import Preflight, preflight, safe_height
-from tacdata.recording.press_steps import Position, Step, steps
-from tacdata.recording.reader import read_recording
-from tacdata.recording.rig_devices import RigDevices
+from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.files import file_names
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.files.writer import EpisodeWriter, Header
+from tacdata.recording.live.detection_process import Detect
+from tacdata.recording.live.guarded_motion import WATCH, GuardedMotion
+from tacdata.recording.live.interruption import Interruption
+from tacdata.recording.live.live_feed import Watch
+from tacdata.recording.live.rig_devices import RigDevices
+from tacdata.recording.live.rig_streams import Streams
+from tacdata.recording.motion import sync_tap as tap_motion
+from tacdata.recording.motion.preflight import Preflight, preflight, safe_height
+from tacdata.recording.motion.press_steps import Position, Step, steps
+from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.recording.session import Session, create_session, refresh, resume_session
-from tacdata.recording.session_sync import add_sync, changes, latencies
-from tacdata.recording.streams import Streams
-from tacdata.recording.writer import EpisodeWriter, Header
+from tacdata.recording.sync_tap import delays
+from tacdata.recording.sync_tap.session_delays import add_sync, changes, latencies
 from tacdata.rig import Rig
 from tacdata.sensor import Sensor
 
@@ -82,7 +84,7 @@ class Recorder:
         self._height = safe_height(plan, rig)
         self._interruption = interruption or Interruption()
         self._motion = GuardedMotion(self.devices.cnc, rig.clock, self._interruption)
-        self._tap = sync_tap_motion.touch(plan, sensor) if sync_tap else None
+        self._tap = tap_motion.touch(plan, sensor) if sync_tap else None
         self._say, self._watch = say or (lambda words: None), watch
         self._latencies: dict[str, Latency] = {}
 
@@ -219,9 +221,9 @@ class Recorder:
         before, self._latencies = self._latencies, {}
         streams.set_latencies({})
         path = file_names.next_sync_tap(self.out)
-        course = sync_tap_motion.steps(tap, self.plan, self.rig.registration_for(tap.indenter_name))
+        course = tap_motion.steps(tap, self.plan, self.rig.registration_for(tap.indenter_name))
         position = self._record(tap, position, streams, limits, path, course)
-        found = sync_tap.measure(read_recording(path))
+        found = delays.measure(read_recording(path))
         for words in (*found.words, *changes(session, found.latencies)):
             self._say(words)
         session = add_sync(session, path, found)

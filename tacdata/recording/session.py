@@ -12,7 +12,7 @@ import schemas
 from tacdata import documents, provenance
 from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.plans import Plan
-from tacdata.recording import file_names
+from tacdata.recording.files import file_names
 from tacdata.sensor import Sensor
 
 FILE = "session.json"

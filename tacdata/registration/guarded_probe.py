@@ -13,11 +13,11 @@ import numpy as np
 
 from tacdata.devices.device import CncStatus, TaxelFrame
 from tacdata.errors import DeviceError, FormatError, TacdataError
-from tacdata.recording.guarded_motion import GuardedMotion
-from tacdata.recording.interruption import Interruption
-from tacdata.recording.press_steps import Step
-from tacdata.recording.rig_devices import RigDevices
-from tacdata.recording.streams import Streams
+from tacdata.recording.live.guarded_motion import GuardedMotion
+from tacdata.recording.live.interruption import Interruption
+from tacdata.recording.live.rig_devices import RigDevices
+from tacdata.recording.live.rig_streams import Streams
+from tacdata.recording.motion.press_steps import Step
 from tacdata.registration.probe import Position, Probe, Reading
 from tacdata.rig import Rig
 

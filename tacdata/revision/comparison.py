@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from tacdata.chain import Course, Response, predict
-from tacdata.discrepancy.frame import Frame, frame
-from tacdata.discrepancy.refine import Refined, corrected, refine
-from tacdata.discrepancy.sealed import without_readings
-from tacdata.discrepancy.setting import Setting
-from tacdata.discrepancy.spec import Spec
-from tacdata.discrepancy.streams import Streams
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.model.spec import Spec
+from tacdata.discrepancy.noise.null_model import Frame, frame
+from tacdata.discrepancy.search.gauss_newton import Refined, corrected, refine
+from tacdata.discrepancy.verdict.sealed import without_readings
 from tacdata.effects import Placed
 from tacdata.revision.episodes import part
 

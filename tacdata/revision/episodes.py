@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.sealed import chosen
+from tacdata.discrepancy.verdict.sealed import chosen
 
 SHARE = 0.25
 """Share of the episodes that is sealed where the verdict sealed none [1]."""

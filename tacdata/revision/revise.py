@@ -12,29 +12,29 @@ from typing import Any
 import schemas
 from label_farm.labelling import FarmSettings
 from tacdata import documents, provenance
-from tacdata.discrepancy.recordings import course_of
+from tacdata.discrepancy.data.recordings import course_of
+from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.run import VERDICT, recording_hash
-from tacdata.discrepancy.spec import Spec
 from tacdata.effects import Placed
 from tacdata.errors import UsageError
 from tacdata.plans import Plan
 from tacdata.recording import read_session
 from tacdata.recording.session import FILE
-from tacdata.revision import table
-from tacdata.revision.card import card
 from tacdata.revision.comparison import Comparison
-from tacdata.revision.confirm import Confirmed, confirm, touches_fem
-from tacdata.revision.curves import EpisodeCurves, curves
 from tacdata.revision.episodes import sealed
-from tacdata.revision.gap import Change, Gap, gap
-from tacdata.revision.next_presses import choose, plan_of
-from tacdata.revision.picture import draw
-from tacdata.revision.realised import TipError, tip_error
-from tacdata.revision.relabel import Moved, moves_labels, paths_moved, relabelled
-from tacdata.revision.retrain import Recipe, Retrained, retrained
-from tacdata.revision.rivals import named, rivals
-from tacdata.revision.worst_slice import sealed_slices
-from tacdata.skin.mesher import MeshSettings
+from tacdata.revision.evidence import table
+from tacdata.revision.evidence.card import card
+from tacdata.revision.evidence.curves import EpisodeCurves, curves
+from tacdata.revision.evidence.gap import Change, Gap, gap
+from tacdata.revision.evidence.picture import draw
+from tacdata.revision.evidence.worst_slice import sealed_slices
+from tacdata.revision.labels.confirm import Confirmed, confirm, touches_fem
+from tacdata.revision.labels.realised import TipError, tip_error
+from tacdata.revision.labels.relabel import Moved, moves_labels, paths_moved, relabelled
+from tacdata.revision.labels.retrain import Recipe, Retrained, retrained
+from tacdata.revision.next_presses.plan import choose, plan_of
+from tacdata.revision.next_presses.rivals import named, rivals
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.surrogate.pressed import pressed
 
 REVISION, SPEC, CARD, PICTURE, TABLE, CSV, PLAN, LABELS = (
@@ -64,7 +64,7 @@ class Wishes:
     retrain: Recipe | None = None
     """How to train networks before and after; None to train none."""
     truth: Path | None = None
-    """File of the tip's true path (`tacdata.revision.realised.COLUMNS`); else what a tag or gauge saw."""
+    """File of the tip's true path (`tacdata.revision.labels.realised.COLUMNS`); else what a tag or gauge saw."""
 
 
 @dataclass(frozen=True)

@@ -17,29 +17,30 @@ from tacdata import provenance
 from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
-from tacdata.skin import fineness
 from tacdata.skin.adhesions import load_adhesion_law
-from tacdata.skin.attraction import AdhesiveContact
-from tacdata.skin.batch import Batch, Members, Press
-from tacdata.skin.companion import CoarsePress, blind_spot, companion_mesh, edge_ratio, press_coarsely
-from tacdata.skin.conditions import Conditions, conditions
-from tacdata.skin.contact import Contact, board_distance
-from tacdata.skin.elasticity import Elasticity
+from tacdata.skin.contact.adhesion import AdhesiveContact
+from tacdata.skin.contact.contact import Contact, board_distance
+from tacdata.skin.contact.first_touch import reach, rotation, touch
+from tacdata.skin.contact.press_limits import check_press
+from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
+from tacdata.skin.linear.coupled_dofs import in_order
+from tacdata.skin.linear.rest_stiffness import RestSolver, rest_solver
 from tacdata.skin.materials import load_law
-from tacdata.skin.mesh import SkinMesh
-from tacdata.skin.mesher import MeshSettings, build_mesh
-from tacdata.skin.newton import Newton, SolverSettings
-from tacdata.skin.numerical_error import Figures, NumericalError, estimate
-from tacdata.skin.patches import in_order
-from tacdata.skin.possible_press import check_press
+from tacdata.skin.member.conditions import Conditions, conditions
+from tacdata.skin.mesh.build import MeshSettings, build_mesh
+from tacdata.skin.mesh.coarser import blind_spot, companion_mesh, edge_ratio
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
-from tacdata.skin.raster import OuterFace
-from tacdata.skin.rest import RestSolver, rest_solver
-from tacdata.skin.stable_strain import StableStrain
-from tacdata.skin.state import Gauge, State
-from tacdata.skin.touch import reach, rotation, touch
-from tacdata.skin.walk import Walk
-from tacdata.skin.woodbury import ContactPreconditioner
+from tacdata.skin.solve.batch import Batch, Members, Press
+from tacdata.skin.solve.load_path import Walk
+from tacdata.skin.solve.newton import Newton, SolverSettings
+from tacdata.skin.solve.state import Gauge, State
+from tacdata.skin.surface.outer_face import OuterFace
+from tacdata.skin.validity import fineness
+from tacdata.skin.validity.coarse_press import CoarsePress, press_coarsely
+from tacdata.skin.validity.mesh_error import Figures, NumericalError, estimate
+from tacdata.skin.validity.stable_strain import StableStrain
 
 _ROWS = ("surface", "taxel_force", "taxel_closure", "force", "residual", "penetration")
 """What a path solution tells of every state."""
@@ -71,7 +72,8 @@ class ModelSettings:
     step: float = 0.25
     """Longest load step [mm]."""
     averaged_from: float = 0.0
-    """Poisson's ratio from which on volume changes are averaged at the corners (`tacdata.skin.averaged_volume`) [1]:
+    """Poisson's ratio from which on volume changes are averaged at the corners
+    (`tacdata.skin.elasticity.averaged_volume`) [1]:
     0 always, 0.5 never. Laws whose volumetric part is no term of its own take them at the points in any case."""
     error_estimate: bool = True
     """Whether `SkinModel.solve` also presses a coarser mesh, to say how far the mesh leaves the result off."""
@@ -330,7 +332,7 @@ class SkinModel:
     def numerical_error(
         self, request: PressRequest, fine: Figures, coarse: CoarsePress | None = None
     ) -> NumericalError:
-        """Estimate the error that the mesh leaves in a press's states (`tacdata.skin.numerical_error`).
+        """Estimate the error that the mesh leaves in a press's states (`tacdata.skin.validity.mesh_error`).
 
         Args:
             request: The press.

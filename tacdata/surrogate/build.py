@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.errors import SolveError
 from tacdata.sensor import Sensor
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 from tacdata.surrogate.grid import Grid, Reach, covering, request

@@ -13,7 +13,7 @@ import numpy as np
 from tacdata.errors import SolveError
 from tacdata.indenters import Indenter
 from tacdata.sensor import Sensor
-from tacdata.skin.possible_press import check_press
+from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.press import PressRequest
 from tacdata.surrogate.symmetry import foldable
 

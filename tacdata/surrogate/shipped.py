@@ -14,7 +14,7 @@ import numpy as np
 
 from tacdata import provenance
 from tacdata.sensor import Sensor
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.press import PressRequest
 from tacdata.surrogate.solved import Solved
 from tacdata.transduction import Loads

@@ -1,10 +1,10 @@
 """AprilTag cubes to poses."""
 
-from tacdata.tags.cube import Cube
-from tacdata.tags.detector import detect_tags
+from tacdata.tags.cube.cube import Cube
+from tacdata.tags.cube.pose import CubePose, detect_cube
+from tacdata.tags.detection.detector import detect_tags
+from tacdata.tags.detection.tag import Tag
 from tacdata.tags.fingers import Finger, fingers_of, read_fingers
-from tacdata.tags.pose import CubePose, detect_cube
-from tacdata.tags.tag import Tag
 from tacdata.tags.tips import TipPose, View, detect_fingers, look
 from tacdata.tags.tracker import FingerTracker
 

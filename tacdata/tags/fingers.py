@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.errors import FormatError
-from tacdata.tags.cube import Cube
+from tacdata.tags.cube.cube import Cube
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ import numpy as np
 from tacdata.tags.fingers import Finger
 
 if TYPE_CHECKING:
-    from tacdata.tags.pose import CubePose
+    from tacdata.tags.cube.pose import CubePose
 
 NEARER = 0.5
 """Share [1] of the way between two cubes that a jump may leave, at most, to count as a change of places."""

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from tacdata.tags.camera import Camera
-from tacdata.tags.detector import detect_tags, to_grey
+from tacdata.tags.cube.pose import CubePose, detect_cube, solve_cube
+from tacdata.tags.detection.detector import detect_tags, to_grey
+from tacdata.tags.detection.tag import Tag
 from tacdata.tags.fingers import Finger, fingers_of
 from tacdata.tags.mixups import mixups
-from tacdata.tags.pose import CubePose, detect_cube, solve_cube
-from tacdata.tags.tag import Tag
 
 
 @dataclass(frozen=True, eq=False)

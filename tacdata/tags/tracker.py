@@ -9,11 +9,11 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.tags.camera import Camera
-from tacdata.tags.detector import detect_tags, to_grey
+from tacdata.tags.cube.pose import CubePose, surroundings
+from tacdata.tags.detection.detector import detect_tags, to_grey
+from tacdata.tags.detection.tag import Tag
 from tacdata.tags.fingers import Finger
 from tacdata.tags.mixups import exchanged
-from tacdata.tags.pose import CubePose, surroundings
-from tacdata.tags.tag import Tag
 from tacdata.tags.tips import View, view_of
 
 SEARCH_EVERY = 6

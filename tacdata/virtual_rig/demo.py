@@ -17,10 +17,10 @@ from tacdata.indenters.sphere import Sphere
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import Board, draw_timing
-from tacdata.virtual_rig.camera import Camera
-from tacdata.virtual_rig.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, draw_hand
+from tacdata.virtual_rig.optics.camera import Camera
 from tacdata.virtual_rig.rig import BAUDS, board_format
-from tacdata.virtual_rig.world import World, draw
+from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, draw_hand
+from tacdata.virtual_rig.world.world import World, draw
 
 NAME = "virtual demonstration"
 INTRINSICS = {"width": 800, "height": 600, "fx": 880.0, "fy": 880.0, "cx": 399.5, "cy": 299.5}
@@ -183,7 +183,7 @@ class VirtualDemo:
         return read
 
     def _painter(self, eye: np.ndarray) -> Callable[[int], np.ndarray]:
-        from tacdata.virtual_rig.render import render_scene
+        from tacdata.virtual_rig.optics.render import render_scene
 
         world_to_eye, tip = np.linalg.inv(eye), _tip_on_cube()
 

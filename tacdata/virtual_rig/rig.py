@@ -19,14 +19,14 @@ from tacdata.errors import UsageError
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import Board, draw_timing
-from tacdata.virtual_rig.camera import Camera
-from tacdata.virtual_rig.controller import Controller
-from tacdata.virtual_rig.hidden import HiddenWorld
-from tacdata.virtual_rig.mounting import Mounted
-from tacdata.virtual_rig.scene import CUBE, INTRINSICS, draw_scene
-from tacdata.virtual_rig.world import World, draw
+from tacdata.virtual_rig.firmware.controller import Controller
+from tacdata.virtual_rig.optics.camera import Camera
+from tacdata.virtual_rig.optics.scene import CUBE, INTRINSICS, draw_scene
+from tacdata.virtual_rig.world.hidden import HiddenWorld
+from tacdata.virtual_rig.world.mounting import Mounted
+from tacdata.virtual_rig.world.world import World, draw
 from tacdata.wire import default_format
-from tacdata.wire.frame_format import FrameFormat, from_document
+from tacdata.wire.frames.frame_format import FrameFormat, from_document
 
 NAME = "virtual rig"
 NOMINAL = Registration((-96.0, -61.5, -38.0), 1.2)
@@ -176,7 +176,7 @@ class VirtualRig:
         return self.world.readings(tip, self.mounted.indenter, self.mounted.yaw, sampled_ns)
 
     def _picture(self, exposed_ns: int) -> np.ndarray:
-        from tacdata.virtual_rig.render import render_cube
+        from tacdata.virtual_rig.optics.render import render_cube
 
         pose = self.scene.camera_cube(self.controller.position_at(exposed_ns))
         return render_cube(pose, INTRINSICS, CUBE, self._rng)

@@ -1,7 +1,7 @@
 """What goes over the serial lines: a board's frames as data, and GRBL's answers and codes."""
 
-from tacdata.wire.decoder import Decoder
-from tacdata.wire.encoder import Encoder
-from tacdata.wire.frame_format import FrameFormat, default_format, read_format
+from tacdata.wire.frames.decoder import Decoder
+from tacdata.wire.frames.encoder import Encoder
+from tacdata.wire.frames.frame_format import FrameFormat, default_format, read_format
 
 __all__ = ["Decoder", "Encoder", "FrameFormat", "default_format", "read_format"]

@@ -32,7 +32,7 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path):
 
 
 def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
-    from tacdata.recording.reader import read_episode
+    from tacdata.recording.files.reader import read_episode
     from tacdata.recording.session import read_session
 
     log = tmp_path / "log"

@@ -8,7 +8,8 @@ import numpy as np
 import press_example as example
 import pytest
 
-from tacdata.dataset import LostProvenanceWarning, card, coverage_picture, metadata, pack, read_dataset
+from tacdata.dataset import LostProvenanceWarning, card, coverage_picture, pack, read_dataset
+from tacdata.dataset.format import metadata
 from tacdata.sensor import default_sensor
 
 

@@ -9,7 +9,8 @@ import pyarrow as pa
 import pytest
 from PIL import Image
 
-from tacdata.dataset import features, frames, statistics, tiff
+from tacdata.dataset import frames
+from tacdata.dataset.format import features, statistics, tiff
 from tacdata.errors import FormatError
 from tacdata.sensor import default_sensor
 

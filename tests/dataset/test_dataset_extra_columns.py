@@ -6,7 +6,8 @@ import numpy as np
 import press_example as example
 import pytest
 
-from tacdata.dataset import features, read_dataset
+from tacdata.dataset import read_dataset
+from tacdata.dataset.format import features
 from tacdata.dataset.pack import pack
 from tacdata.errors import UsageError
 

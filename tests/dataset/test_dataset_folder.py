@@ -14,17 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from tacdata import documents
-from tacdata.dataset import (
-    DatasetWriter,
-    LostProvenanceWarning,
-    features,
-    folder,
-    frames,
-    metadata,
-    pack,
-    read_dataset,
-    restore,
-)
+from tacdata.dataset import DatasetWriter, LostProvenanceWarning, frames, pack, read_dataset, restore
+from tacdata.dataset.format import features, folder, metadata
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import default_sensor
 

@@ -11,16 +11,8 @@ import press_example as example
 import pytest
 import torch
 
-from tacdata.dataset import (
-    LostProvenanceWarning,
-    features,
-    folder,
-    frames,
-    metadata,
-    pack,
-    read_dataset,
-    restore,
-)
+from tacdata.dataset import LostProvenanceWarning, frames, pack, read_dataset, restore
+from tacdata.dataset.format import features, folder, metadata
 from tacdata.dataset.windows import WindowDataset, centred
 from tacdata.errors import FormatError
 from tacdata.sensor import default_sensor

@@ -12,7 +12,8 @@ from tacdata import cli, documents, provenance
 from tacdata.dataset import read_dataset
 from tacdata.dataset.flags import carry_flags, flagged_episodes, read_flags, set_flag
 from tacdata.labels import write_label
-from tacdata.recording import reader, session
+from tacdata.recording import session
+from tacdata.recording.files import reader
 
 
 @pytest.fixture

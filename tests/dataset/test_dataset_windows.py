@@ -9,7 +9,8 @@ import press_example as example
 import pytest
 import torch
 
-from tacdata.dataset import features, pack, read_dataset
+from tacdata.dataset import pack, read_dataset
+from tacdata.dataset.format import features
 from tacdata.dataset.windows import WindowDataset, centred
 from tacdata.errors import FormatError, UsageError
 

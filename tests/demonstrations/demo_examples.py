@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tacdata.demonstrations.demo_reader import DemoRecording
-from tacdata.demonstrations.demo_rig import demo_rig_of
-from tacdata.demonstrations.sightings import Sightings
+from tacdata.demonstrations.paths.sightings import Sightings
+from tacdata.demonstrations.recording.reader import DemoRecording
+from tacdata.demonstrations.recording.rig import demo_rig_of
 from tacdata.recording.episode import TagStream, TaxelStream
 from tacdata.virtual_rig.demo import FINGERS, INTRINSICS
-from tacdata.virtual_rig.hand import draw_hand
+from tacdata.virtual_rig.world.hand import draw_hand
 
 HAND = draw_hand(1)
 START = 1_700_000_000_000_000_000

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from tacdata.clock import Clock
-from tacdata.demonstrations.demo_streams import DemoStreams
+from tacdata.demonstrations.recording.streams import DemoStreams
 from tacdata.devices.device import StreamCounts, TaxelBoard, TaxelFrame
 from tacdata.errors import DeviceError
 

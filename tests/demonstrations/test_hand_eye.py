@@ -9,14 +9,14 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from tacdata.cli import main
-from tacdata.demonstrations.board_pose import board_poses
+from tacdata.demonstrations.camera_pose.board_pose import board_poses
+from tacdata.demonstrations.camera_pose.hand_eye import board_world, hand_eye
+from tacdata.demonstrations.camera_pose.hand_eye_pairs import solve_pairs
 from tacdata.demonstrations.camera_world import CameraWorld
-from tacdata.demonstrations.hand_eye import board_world, hand_eye
-from tacdata.demonstrations.hand_eye_pairs import solve_pairs
 from tacdata.errors import FormatError, UsageError
-from tacdata.tags.board import Board, draw_squares
-from tacdata.virtual_rig.render import render_cube
-from tacdata.virtual_rig.sheet import render_sheet
+from tacdata.tags.calibration.board import Board, draw_squares
+from tacdata.virtual_rig.optics.render import render_cube
+from tacdata.virtual_rig.optics.sheet import render_sheet
 
 
 def pose(turn, place):

@@ -9,13 +9,13 @@ import yaml
 from demo_examples import rig
 
 from tacdata.cli import main
-from tacdata.demonstrations.demo_reader import read_demo
-from tacdata.demonstrations.demo_recorder import DemoRecorder
-from tacdata.demonstrations.demo_rig import read_demo_rig
-from tacdata.demonstrations.demo_session import open_demo_session, read_demo_session
-from tacdata.demonstrations.tracks_file import path_of, read_tracks
+from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks
+from tacdata.demonstrations.recording.reader import read_demo
+from tacdata.demonstrations.recording.recorder import DemoRecorder
+from tacdata.demonstrations.recording.rig import read_demo_rig
+from tacdata.demonstrations.recording.session import open_demo_session, read_demo_session
 from tacdata.errors import FormatError, UsageError
-from tacdata.recording.check import check
+from tacdata.recording.check.report import check
 from tacdata.tags import look
 from tacdata.virtual_rig.demo import FINGERS, VirtualDemo
 

@@ -6,13 +6,13 @@ import pytest
 from demo_examples import HAND, START, rig
 
 from tacdata.clock import Clock
-from tacdata.demonstrations.demo_reader import read_demo
-from tacdata.demonstrations.demo_recorder import DemoHeader
-from tacdata.demonstrations.second_look import look_again
-from tacdata.recording.writer import EpisodeWriter
+from tacdata.demonstrations.paths.second_look import look_again
+from tacdata.demonstrations.recording.reader import read_demo
+from tacdata.demonstrations.recording.recorder import DemoHeader
+from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.tags import look
 from tacdata.virtual_rig.demo import FINGERS, INTRINSICS, _look_at, _tip_on_cube
-from tacdata.virtual_rig.render import render_scene
+from tacdata.virtual_rig.optics.render import render_scene
 
 EYE = _look_at((0.10, -0.36, 0.36))
 TIMES = 0.2 + 0.05 * np.arange(8)

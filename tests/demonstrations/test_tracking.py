@@ -8,11 +8,11 @@ import pytest
 from demo_examples import START, changed, recording, rig, taxels, truth_at, view
 from scipy.spatial.transform import Rotation
 
-from tacdata.demonstrations.motion_filter import exponential, logarithm, smooth
-from tacdata.demonstrations.sightings import sightings_of
-from tacdata.demonstrations.tracking import Estimator, track
-from tacdata.demonstrations.tracks_file import path_of, read_tracks, write_tracks
-from tacdata.demonstrations.wandering import choose
+from tacdata.demonstrations.paths.motion_density import choose
+from tacdata.demonstrations.paths.motion_filter import exponential, logarithm, smooth
+from tacdata.demonstrations.paths.sightings import sightings_of
+from tacdata.demonstrations.paths.tracking import Estimator, track
+from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks, write_tracks
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import default_sensor
 from tacdata.virtual_rig.demo import FINGERS

@@ -11,7 +11,7 @@ from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.virtual_rig.board import Board, Timing, draw_timing
 from tacdata.virtual_rig.port import VirtualPort
 from tacdata.wire import default_format
-from tacdata.wire.frame_format import from_document
+from tacdata.wire.frames.frame_format import from_document
 
 RATE = 8.0
 S = 1_000_000_000

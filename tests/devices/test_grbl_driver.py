@@ -10,7 +10,7 @@ from tacdata.clock import Clock
 from tacdata.devices.device import MotionController, create
 from tacdata.devices.grbl import Grbl
 from tacdata.errors import DeviceError, UsageError
-from tacdata.virtual_rig.controller import Controller
+from tacdata.virtual_rig.firmware.controller import Controller
 
 RATE = 8.0
 START = (-50.0, -50.0, -20.0)

@@ -11,12 +11,12 @@ import yaml
 from pressing import course
 
 from tacdata import documents
-from tacdata.discrepancy.amiss import stuck
-from tacdata.discrepancy.channels import Readings, in_source, usable
+from tacdata.discrepancy.data.channels import Readings, in_source, usable
+from tacdata.discrepancy.data.sufficiency import stuck
+from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.run import run
-from tacdata.discrepancy.spec import read_spec
 from tacdata.importing.imported_session import import_session
-from tacdata.recording.reader import Recording
+from tacdata.recording.files.reader import Recording
 
 
 def unknown(counts):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from tacdata.discrepancy.clusters import Clustered, Lent, clustered, lent, of_kinds
+from tacdata.discrepancy.statistics.cluster_robust import Clustered, Lent, clustered, lent, of_kinds
 
 
 def gram_of(rng, episodes, tails):

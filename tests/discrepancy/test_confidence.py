@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tacdata.discrepancy.confidence import fit
+from tacdata.discrepancy.verdict.confidence import fit
 
 
 def test_a_map_ranks_names_and_claims_no_more_than_its_sample_can_tell():

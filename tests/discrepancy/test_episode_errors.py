@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy import search
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.frame import frame
-from tacdata.discrepancy.nuisances import FITTED_GAIN, jitter
-from tacdata.discrepancy.problem import prepare
-from tacdata.discrepancy.setting import Setting
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.nuisances import FITTED_GAIN, jitter
+from tacdata.discrepancy.noise.null_model import frame
+from tacdata.discrepancy.search import screen
+from tacdata.discrepancy.search.problem import prepare
 from tacdata.effects import load
 
 CLOCKED = ("wear_in", "gain_drift", "thermal_growth", "lost_steps", "softening", "permanent_set")
@@ -45,7 +45,7 @@ def test_an_episodes_own_gain_and_depth_are_told(gain):
 def test_own_gains_are_no_effect():
     made = course(episodes=48)
     setting = set_of(scaled(made, 1 + 0.02 * np.random.default_rng(3).normal(size=48)))
-    tested = search.test(prepare(setting, frame(setting)))
+    tested = screen.test(prepare(setting, frame(setting)))
     assert tested.p.min() > 0.01 and tested.p_generic > 0.01
 
 
@@ -57,7 +57,7 @@ def test_strokes_of_a_recording_share_its_set_up():
     least = []
     for recording in (None, which):
         setting = set_of(replace(apart, recording=recording))
-        least.append(search.test(prepare(setting, frame(setting))).p.min())
+        least.append(screen.test(prepare(setting, frame(setting))).p.min())
     assert least[0] <= 0.01 < least[1]
 
 
@@ -69,4 +69,4 @@ def test_how_a_skin_is_first_touched_is_no_adhesion(knots, seen):
     noise = 0.3 * np.random.default_rng(5).normal(size=made.readings.shape)
     setting = set_of(replace(made, readings=5000 + 800 * depth * [1.0, 0.5, 0.2] + noise), ("adhesion",), knots)
     problem = prepare(setting, frame(setting))
-    assert (search.test(problem).z.max() > 3.0) == seen
+    assert (screen.test(problem).z.max() > 3.0) == seen

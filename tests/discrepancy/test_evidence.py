@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.evidence import Noise, whiten
+from tacdata.discrepancy.noise.gram import Noise, whiten
 
 
 def coloured(white, reduced, noise):

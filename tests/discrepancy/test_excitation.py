@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.amiss import amiss, one_rate
-from tacdata.discrepancy.excitation import inseparable
-from tacdata.discrepancy.motion import longest_hold, speeds, stairs
+from tacdata.discrepancy.data.identifiability import inseparable
+from tacdata.discrepancy.data.sufficiency import amiss, one_rate
+from tacdata.discrepancy.data.tip_motion import longest_hold, speeds, stairs
 
 
 def test_two_rates_of_pressing_are_told_from_one():

@@ -7,12 +7,12 @@ import pytest
 from pressing import course
 
 from tacdata.chain import predict
-from tacdata.discrepancy.episode_errors import EpisodeErrors, Sizes
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.frame import as_large, frame
-from tacdata.discrepancy.refine import refine
-from tacdata.discrepancy.setting import Setting
-from tacdata.discrepancy.spline_response import taken_up
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.response_splines import taken_up
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, Sizes
+from tacdata.discrepancy.noise.null_model import as_large, frame
+from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.effects import Placed, load
 
 

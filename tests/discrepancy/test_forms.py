@@ -7,13 +7,13 @@ import pytest
 from pressing import course
 
 from tacdata.chain import predict
-from tacdata.discrepancy import search
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.forms import forms, modulations, variants
-from tacdata.discrepancy.frame import frame
-from tacdata.discrepancy.problem import prepare
-from tacdata.discrepancy.setting import Setting
-from tacdata.discrepancy.streams import Streams
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import frame
+from tacdata.discrepancy.regressors.model_error import forms, modulations, variants
+from tacdata.discrepancy.search import screen
+from tacdata.discrepancy.search.problem import prepare
 from tacdata.effects import Placed, load
 
 
@@ -91,8 +91,8 @@ def test_what_a_wrong_form_leaves_is_no_second_effect(pressed, monkeypatch):
     few = [load(name) for name in ("backlash", "relaxation", "proportional_hysteresis", "creep")]
     setting = Setting(wrong, response, few)
     problem = prepare(setting, frame(replace(setting, given=(late,))), [late])
-    slack = search.test(problem)
-    bare = search.test(replace(problem, forms=np.zeros(0, dtype=int)))
+    slack = screen.test(problem)
+    bare = screen.test(replace(problem, forms=np.zeros(0, dtype=int)))
     assert bare.gain.max() > 20
     assert slack.gain.max() < 0.3 * bare.gain.max()
 
@@ -113,8 +113,8 @@ def test_a_spectrum_of_time_constants_is_no_second_memory():
     few = [load(name) for name in ("backlash", "creep", "baseline_tracking", "proportional_hysteresis")]
     setting = Setting(replace(made, readings=readings), response, few)
     problem = prepare(setting, frame(replace(setting, given=(one,))), [one])
-    narrow = search.test(replace(problem, forms=problem.forms[:5]))
-    spread = search.test(problem)
+    narrow = screen.test(replace(problem, forms=problem.forms[:5]))
+    spread = screen.test(problem)
     assert narrow.gain.max() > 20
     assert spread.gain.max() < 0.1 * narrow.gain.max()
 

@@ -8,14 +8,14 @@ import pytest
 from pressing import course
 
 from tacdata import documents
-from tacdata.discrepancy import decide, verdict
-from tacdata.discrepancy.amiss import amiss
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.judge import _without_minor, judge, out
-from tacdata.discrepancy.judgement import Member
-from tacdata.discrepancy.located import residual, slices
-from tacdata.discrepancy.setting import Setting
-from tacdata.discrepancy.text import in_text
+from tacdata.discrepancy.data.sufficiency import amiss
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.search.findings import Member
+from tacdata.discrepancy.search.judge import _without_minor, judge, out
+from tacdata.discrepancy.verdict import decide, document
+from tacdata.discrepancy.verdict.residual_slices import residual, slices
+from tacdata.discrepancy.verdict.text import in_text
 from tacdata.effects import load
 
 FEW = ("latency", "low_pass_filter", "relaxation", "backlash", "proportional_hysteresis", "drift", "creep")
@@ -85,11 +85,11 @@ def test_an_effect_that_no_file_holds_is_not_named():
 def test_a_verdict_fits_its_schema_and_says_what_cannot_be_judged():
     answer = found(effects=("latency", "gain", "backlash"), episodes=12, delay=0.05)
     sliced = slices(answer.problem, residual(answer.problem))
-    document = verdict.document(answer, sliced, {})
-    documents.check(document, "verdict", "verdict")
-    assert "gain" in document["unjudgeable"]
-    assert document["limits"]["latency"] is not None
-    assert "latency" in in_text(document)
+    written = document.document(answer, sliced, {})
+    documents.check(written, "verdict", "verdict")
+    assert "gain" in written["unjudgeable"]
+    assert written["limits"]["latency"] is not None
+    assert "latency" in in_text(written)
 
 
 def test_two_presses_unlike_all_others_are_no_effect_and_not_nothing():
@@ -100,7 +100,7 @@ def test_two_presses_unlike_all_others_are_no_effect_and_not_nothing():
     wrong = replace(made, readings=readings)
     answer = judge(Setting(wrong, FittedResponse(wrong), [load(name) for name in FEW]))
     assert decide.status(answer) == "unknown"
-    told = verdict.why("unknown", answer, decide.members(answer), wrong)
+    told = document.why("unknown", answer, decide.members(answer), wrong)
     assert answer.gap or "press 0, press 1" in told
 
 
@@ -145,10 +145,10 @@ def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():
 
 def test_few_episodes_carry_no_verdict():
     answer = found(effects=("latency", "backlash"), episodes=5, delay=0.05)
-    document = verdict.document(answer, [], {})
-    assert document["status"] == "unknown"
-    assert "5 episodes" in document["why"]
-    assert {e["status"] for e in document["effects"]} <= {"suspected"}, "no name by the back door"
+    written = document.document(answer, [], {})
+    assert written["status"] == "unknown"
+    assert "5 episodes" in written["why"]
+    assert {e["status"] for e in written["effects"]} <= {"suspected"}, "no name by the back door"
 
 
 def test_a_fitted_response_cannot_learn_history():

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from pressing import course
 
-from tacdata.discrepancy.clocks import shifted
-from tacdata.discrepancy.judged import judged
-from tacdata.discrepancy.located import outstanding
-from tacdata.discrepancy.spec import read_spec
+from tacdata.discrepancy.data.clocks import shifted
+from tacdata.discrepancy.judge import judged
+from tacdata.discrepancy.model.spec import read_spec
+from tacdata.discrepancy.verdict.residual_slices import outstanding
 
 
 def test_episodes_that_stand_out_by_themselves_are_named():

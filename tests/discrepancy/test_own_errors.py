@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.own_errors import Factored, Own
+from tacdata.discrepancy.noise.episode_gls import Factored, Own
 
 STREAMS, LENGTHS, KINDS, FEATURES, WIDTH = 3, (7, 5, 9), 2, 4, 5
 

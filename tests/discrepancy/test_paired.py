@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.frame import frame
-from tacdata.discrepancy.noise import spread_of
-from tacdata.discrepancy.paired import Off, ahead
-from tacdata.discrepancy.setting import Setting
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import frame
+from tacdata.discrepancy.noise.readings import spread_of
+from tacdata.discrepancy.search.j_test import Off, ahead
 from tacdata.effects import load
 
 EPISODES, ROWS = 48, 40

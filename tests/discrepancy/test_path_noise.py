@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.path_noise import resolved, without_noise
+from tacdata.discrepancy.data.path_noise import resolved, without_noise
 
 RATE = 100.0
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy import noise, random_walk
-from tacdata.discrepancy.cleaner import Cleaner
-from tacdata.discrepancy.evidence import Noise
+from tacdata.discrepancy.noise import offset_random_walk, readings
+from tacdata.discrepancy.noise.gram import Noise
+from tacdata.discrepancy.noise.whitener import Cleaner
 
 RATE = 0.05  # noise scales squared a second
 
@@ -28,20 +28,21 @@ def shaken(seed, rate, episodes=60):
 
 
 def test_the_rate_is_told_where_nothing_presses():
-    told = [random_walk.told(rest, r, np.ones(3), 0.0, r.site) for r, rest in (shaken(k, RATE) for k in range(4))]
+    walks = (shaken(k, RATE) for k in range(4))
+    told = [offset_random_walk.told(rest, r, np.ones(3), 0.0, r.site) for r, rest in walks]
     assert np.mean(told) == pytest.approx(RATE, rel=0.3)
 
 
 def test_white_noise_does_not_wander():
     reduced, rest = shaken(5, 0.0)
-    assert random_walk.told(rest, reduced, np.ones(3), 0.0, reduced.site) < 0.1 * RATE
+    assert offset_random_walk.told(rest, reduced, np.ones(3), 0.0, reduced.site) < 0.1 * RATE
 
 
 def test_modes_add_up_to_a_brownian_motion_about_its_mean():
     rng = np.random.default_rng(2)
     reduced, rest = shaken(2, 3.0, 12)
-    modes = random_walk.modes(rest, reduced, np.ones(3), 0.0, reduced.site)
-    rate = random_walk.told(rest, reduced, np.ones(3), 0.0, reduced.site)
+    modes = offset_random_walk.modes(rest, reduced, np.ones(3), 0.0, reduced.site)
+    rate = offset_random_walk.told(rest, reduced, np.ones(3), 0.0, reduced.site)
     rows = np.flatnonzero(reduced.episode == 0)
     # Evenly in time: the mean over an episode is one over time, not over rows.
     walk = np.cumsum(rng.normal(size=(4000, 400)) * np.sqrt(rate * np.ptp(reduced.time[rows]) / 400), axis=1)
@@ -55,7 +56,7 @@ def test_modes_add_up_to_a_brownian_motion_about_its_mean():
 def test_what_is_slow_within_a_press_scatters_as_the_noise_says(told):
     """A column that grows while pressed: its scores scatter by what they know, unless the wander is not told."""
     reduced, rest = shaken(7, 0.5)
-    modes = random_walk.modes(rest, reduced, np.ones(3), 0.0, reduced.site) if told else None
+    modes = offset_random_walk.modes(rest, reduced, np.ones(3), 0.0, reduced.site) if told else None
     none = np.zeros((reduced.rows, 1), dtype=np.int64)[:, 0]
     cleaner = Cleaner(reduced, Noise(np.ones(3), 0.0, random_walk=modes), none, None, np.zeros((reduced.rows, 3, 1)))
     begin = reduced.time[np.flatnonzero(reduced.first)][np.cumsum(reduced.first) - 1]
@@ -68,7 +69,7 @@ def test_what_is_slow_within_a_press_scatters_as_the_noise_says(told):
 def test_means_of_a_hum_say_more_than_its_rows_let_one_think():
     reduced, rest = shaken(8, RATE)
     rest = rest + 2 * np.sin(2 * np.pi * 6.7 * reduced.time)[:, None] / np.minimum(reduced.averaged, 4)[:, None]
-    assert 0.25 < random_walk.told(rest, reduced, np.full(3, 1.7), 0.0, reduced.site) / (RATE / 1.7**2) < 1.6
+    assert 0.25 < offset_random_walk.told(rest, reduced, np.full(3, 1.7), 0.0, reduced.site) / (RATE / 1.7**2) < 1.6
 
 
 def test_noise_that_grows_with_the_load_is_told():
@@ -76,10 +77,10 @@ def test_noise_that_grows_with_the_load_is_told():
     rise = np.maximum(reduced.tip[:, 2:], 0) * np.array([1.0, 0.6, 0.3])
     true = 1 + 2 * rise / rise.max()
     rest = rng.normal(size=true.shape) * true
-    told = noise.relative_scale(rest, rise, reduced)
+    told = readings.relative_scale(rest, rise, reduced)
     deep = rise > 0.6 * rise.max()
     assert told[deep].mean() == pytest.approx(true[deep].mean(), rel=0.1)
-    assert noise.relative_scale(rng.normal(size=true.shape), rise, reduced) is None
+    assert readings.relative_scale(rng.normal(size=true.shape), rise, reduced) is None
 
 
 def _quiet_until_pressed(reduced, rng):
@@ -93,10 +94,10 @@ def _quiet_until_pressed(reduced, rng):
 def test_streams_that_say_nothing_when_idle_do_not_spoil_what_others_tell(what):
     reduced = course(episodes=60).reduced
     rise, rest = _quiet_until_pressed(reduced, np.random.default_rng(9))
-    whole = noise.relative_scale(rest, rise, reduced)
-    idle = rise[:, 1] <= noise.SHARES[1] * rise.max()
+    whole = readings.relative_scale(rest, rise, reduced)
+    idle = rise[:, 1] <= readings.SHARES[1] * rise.max()
     rest[idle if "idle" in what or what == "still" else slice(None), 1] = 0.0 if what in ("dead", "still") else np.nan
-    told = noise.relative_scale(rest, rise, reduced)
+    told = readings.relative_scale(rest, rise, reduced)
     assert np.isfinite(told).all()
     assert told[:, [0, 2]] == pytest.approx(whole[:, [0, 2]], rel=0.1)
 
@@ -105,4 +106,4 @@ def test_streams_that_say_nothing_when_idle_do_not_spoil_what_others_tell(what):
 def test_readings_that_all_stand_still_when_idle_tell_no_noise_that_grows():
     reduced = course(episodes=60).reduced
     rise, rest = _quiet_until_pressed(reduced, np.random.default_rng(9))
-    assert noise.relative_scale(np.where(rise > 0.03 * rise.max(), rest, 0.0), rise, reduced) is None
+    assert readings.relative_scale(np.where(rise > 0.03 * rise.max(), rest, 0.0), rise, reduced) is None

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.evidence import Evidence
-from tacdata.discrepancy.refine import _covariance
+from tacdata.discrepancy.noise.gram import Evidence
+from tacdata.discrepancy.search.gauss_newton import _covariance
 
 Z90 = 1.645
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.amiss import amiss
-from tacdata.discrepancy.beside_model import beside_model
-from tacdata.discrepancy.judged import judged
-from tacdata.discrepancy.residuals import read, write
-from tacdata.discrepancy.sealed import chosen
-from tacdata.discrepancy.spec import read_spec
+from tacdata.discrepancy.data.sufficiency import amiss
+from tacdata.discrepancy.judge import judged
+from tacdata.discrepancy.model.spec import read_spec
+from tacdata.discrepancy.verdict.before_and_after import beside_model
+from tacdata.discrepancy.verdict.residual_table import read, write
+from tacdata.discrepancy.verdict.sealed import chosen
 from tacdata.errors import FormatError
-from viewers.residual_curves import residual_curves
+from viewers.parts.residual_curves import residual_curves
 
 
 @pytest.fixture(scope="module")

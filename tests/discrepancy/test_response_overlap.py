@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy import judge
-from tacdata.discrepancy.candidates import StandIn
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.frame import frame
-from tacdata.discrepancy.overlap import overlap
-from tacdata.discrepancy.problem import prepare
-from tacdata.discrepancy.refine import refine
-from tacdata.discrepancy.setting import Setting
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import frame
+from tacdata.discrepancy.regressors.candidates import StandIn
+from tacdata.discrepancy.search import judge
+from tacdata.discrepancy.search.gauss_newton import refine
+from tacdata.discrepancy.search.overlap import overlap
+from tacdata.discrepancy.search.problem import prepare
 from tacdata.effects import Placed, load
 
 

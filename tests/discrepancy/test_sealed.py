@@ -6,10 +6,10 @@ import numpy as np
 from pressing import course
 
 from tacdata import documents
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.judged import judged
-from tacdata.discrepancy.sealed import ENOUGH, chosen, without_readings
-from tacdata.discrepancy.spec import read_spec
+from tacdata.discrepancy.judge import judged
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.spec import read_spec
+from tacdata.discrepancy.verdict.sealed import ENOUGH, chosen, without_readings
 from tacdata.effects import library
 
 FEW = ("latency", "low_pass_filter", "backlash")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tacdata.discrepancy.second_view import second_views
+from tacdata.discrepancy.data.tip_observation import second_views
 from tacdata.recording import Episode
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.spreads import positive, spreads
+from tacdata.discrepancy.noise.variance_components import positive, spreads
 
 
 def differences(sizes, known, count, seed=0):

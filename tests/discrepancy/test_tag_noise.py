@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy import decide
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.frame import frame
-from tacdata.discrepancy.judge import judge
-from tacdata.discrepancy.noise import beside_depth
-from tacdata.discrepancy.setting import Setting
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import frame
+from tacdata.discrepancy.noise.readings import beside_depth
+from tacdata.discrepancy.search.judge import judge
+from tacdata.discrepancy.verdict import decide
 from tacdata.effects import load
 
 SCALES = ("travel_scale", "view_scale")

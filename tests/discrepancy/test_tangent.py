@@ -4,9 +4,9 @@ import numpy as np
 from pressing import course
 
 from tacdata.chain import predict
-from tacdata.discrepancy.fitted_response import FittedResponse
-from tacdata.discrepancy.streams import Streams
-from tacdata.discrepancy.tangent import STEP, tangents
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.regressors.tangent import STEP, tangents
 from tacdata.effects import Placed, load
 
 

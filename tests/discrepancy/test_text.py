@@ -6,10 +6,10 @@ from typing import Any, cast
 import numpy as np
 from pressing import course
 
-from tacdata.discrepancy import verdict
-from tacdata.discrepancy.judgement import Judgement, Member
-from tacdata.discrepancy.sealed import Gap
-from tacdata.discrepancy.text import in_text
+from tacdata.discrepancy.search.findings import Judgement, Member
+from tacdata.discrepancy.verdict.document import why
+from tacdata.discrepancy.verdict.sealed import Gap
+from tacdata.discrepancy.verdict.text import in_text
 from tacdata.effects import Placed, load
 
 
@@ -85,7 +85,7 @@ def said(status, answer, before=None, after=None):
     """Return the sentence of a verdict."""
     found = SimpleNamespace(until="decide", share_left=0.1, left=SimpleNamespace(t=3.0))
     shown = Gap(np.array([before]), np.array([after]), np.array([1.0]), ("press",)) if before else None
-    return verdict.why(status, cast(Judgement, found), answer, course(episodes=8), shown)
+    return why(status, cast(Judgement, found), answer, course(episodes=8), shown)
 
 
 def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.wander import wander
+from tacdata.discrepancy.noise.offset_process import wander
 
 ROWS = 20
 """Quiet rows an episode."""

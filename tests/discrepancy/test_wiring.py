@@ -3,7 +3,7 @@
 import numpy as np
 
 from tacdata.chain import Course, Response, Tool
-from tacdata.discrepancy.wiring import miswired
+from tacdata.discrepancy.data.wiring import miswired
 
 CENTERS = np.array([(x, y) for y in (-1.5, 1.5) for x in (-3.0, 0.0, 3.0)])
 

@@ -23,7 +23,7 @@ from tacdata.grasping.study import Setup, strategy_names
 from tacdata.grasping.touch import Fingertip, OrangeTouch, Spread, mirrored
 from tacdata.grasping.trial import Protocol, approach, fused
 from tacdata.sensor import default_sensor
-from training.wilson import interval
+from training.scoring.wilson import interval
 
 PERFECT = Spread(0.0, 0.0, 0.0, 0.0)
 

@@ -7,8 +7,8 @@ from foreign import mapping, press_data, wide_csv
 
 from tacdata import documents
 from tacdata.importing.imported_session import import_session
-from tacdata.recording.check import check
-from viewers.check_picture import draw
+from tacdata.recording.check.report import check
+from viewers.pictures.check import draw
 
 
 def several(presses, begin=2.0, seed=0, spread=0.05):

@@ -12,9 +12,9 @@ from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.importing.imported_session import import_session
 from tacdata.importing.proposal import described, proposed_mapping
 from tacdata.recording import read_session
-from tacdata.recording.check import check
-from tacdata.recording.mcap_records import read_records
-from tacdata.recording.reader import read_episode
+from tacdata.recording.check.report import check
+from tacdata.recording.files.mcap_records import read_records
+from tacdata.recording.files.reader import read_episode
 
 
 def imported(tmp_path, mapping_path, source=None):

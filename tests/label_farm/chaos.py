@@ -18,8 +18,8 @@ from pathlib import Path
 from farm_examples import HERE
 from session_examples import session
 
-from label_farm import solution_file
-from label_farm.service.client import Client
+from label_farm.remote.client import Client
+from label_farm.store import solution_file
 from tacdata.errors import TacdataError
 from tacdata.labels import columns, read_label
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from label_farm.labelling import FarmSettings, Labelling
-from label_farm.store import Store
+from label_farm.store.store import Store
 from tacdata.indenters.sphere import Sphere
 from tacdata.plans import Press
 from tacdata.recording.episode import CncStream, Episode, TaxelStream

@@ -8,10 +8,10 @@ import time
 import pytest
 from farm_examples import HERE, SENSOR, label_episodes, press_episode
 
-from label_farm.ladder import Ladder
-from label_farm.ledger import DONE, Ledger
-from label_farm.plan import request
-from label_farm.store import STALE_SECONDS, Store
+from label_farm.labels.request import request
+from label_farm.ledger.ledger import DONE, Ledger
+from label_farm.presses.ladder import Ladder
+from label_farm.store.store import STALE_SECONDS, Store
 from tacdata.errors import TacdataError
 
 
@@ -140,7 +140,7 @@ def test_a_wall_clock_that_jumps_changes_no_lease(tmp_path, monkeypatch):
 
 def test_a_writer_whose_file_was_swept_after_a_clock_jump_writes_again(tmp_path, solves, monkeypatch):
     """Another process that believes it to be hours later takes the unfinished file for a dead writer's."""
-    from label_farm import store as module
+    from label_farm.store import store as module
 
     label_episodes(tmp_path / "labels", [press_episode(tmp_path)])
     store = Store(tmp_path / "labels" / "store")
@@ -167,7 +167,7 @@ def test_a_writer_whose_file_was_swept_after_a_clock_jump_writes_again(tmp_path,
         return true(path, beside, **how)
 
     monkeypatch.setattr(module, "replacement", sweeping)
-    from label_farm.failure import Failure
+    from label_farm.store.failure import Failure
 
     store.put_failure(job, Failure("solve", "a reason"))
     assert swept and store.failure(job.key).reason == "a reason"
@@ -205,7 +205,7 @@ def test_nothing_is_planned_twice_after_a_kill_in_mid_run(tmp_path, solves, monk
     monkeypatch.setenv("FAST_MODEL_SECONDS", "0.3")
     script = (
         "import sys, os, threading\nfrom pathlib import Path\nfrom farm_examples import press_episode\n"
-        "from label_farm.labelling import FarmSettings, Labelling\nfrom label_farm.store import Store\n"
+        "from label_farm.labelling import FarmSettings, Labelling\nfrom label_farm.store.store import Store\n"
         "folder = Path(sys.argv[1])\npresses = [press_episode(folder, k, x=float(k)) for k in range(6)]\n"
         "stop = lambda n, r: os.kill(os.getpid(), 9)\n"
         "run = Labelling(folder / 'labels', Store(folder / 'store'),\n"
@@ -215,7 +215,7 @@ def test_nothing_is_planned_twice_after_a_kill_in_mid_run(tmp_path, solves, monk
     path = os.pathsep.join([str(HERE), str(HERE.parent.parent)])
     killed = subprocess.run([sys.executable, "-c", script, str(tmp_path)], env={**os.environ, "PYTHONPATH": path})
     assert killed.returncode == -9
-    from label_farm.label_index import LabelIndex
+    from label_farm.labels.label_index import LabelIndex
 
     index = LabelIndex(tmp_path / "labels")
     assert index.open() and len(index.skins()) == 1

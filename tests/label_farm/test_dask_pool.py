@@ -11,10 +11,10 @@ from chaos import ROOT
 from farm_examples import HERE
 from session_examples import session
 
-from label_farm.dask_pool import DaskPool, _Task
-from label_farm.job import Job
-from label_farm.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING
-from label_farm.store import Store
+from label_farm.ledger.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING
+from label_farm.presses.job import Job
+from label_farm.store.store import Store
+from label_farm.workers.dask_pool import DaskPool, _Task
 from tacdata.sensor import default_sensor
 
 pytest.importorskip("distributed")

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from label_farm.fem import FemModel
-from label_farm.job import Job
-from label_farm.model import solve_each
-from label_farm.tolerance import Tolerance
+from label_farm.presses.fem import FemModel
+from label_farm.presses.job import Job
+from label_farm.presses.model import solve_each
+from label_farm.presses.tolerance import Tolerance
 from tacdata.errors import SolveError
 from tacdata.sensor import default_sensor
 

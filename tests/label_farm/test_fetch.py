@@ -9,8 +9,8 @@ import pytest
 from chaos import ROOT, Service, all_finished, record
 from farm_examples import HERE
 
-from label_farm.service.fetch import Fetch
-from label_farm.session_labels import SessionLabels
+from label_farm.labels.session_labels import SessionLabels
+from label_farm.remote.fetch import Fetch
 from tacdata.errors import UsageError
 from tacdata.labels import read_label
 
@@ -90,7 +90,7 @@ def test_a_label_made_from_something_else_is_replaced_only_if_asked(served, copy
 
     from farm_examples import label_episodes
 
-    from tacdata.recording.reader import read_episode
+    from tacdata.recording.files.reader import read_episode
 
     served.wait(all_finished)
     monkeypatch.setenv("FAST_MODEL_VERSION", "2")

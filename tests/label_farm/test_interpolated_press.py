@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from label_farm.interpolate import Branch
-from label_farm.ladder import Ladder
-from label_farm.tolerance import Tolerance
+from label_farm.presses.interpolate import Branch
+from label_farm.presses.ladder import Ladder
+from label_farm.presses.tolerance import Tolerance
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
@@ -15,7 +15,8 @@ from tacdata.sensor import default_sensor
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("indenter", [Sphere(3.0), FlatPunch(2.0, 0.2)], ids=lambda indenter: indenter.shape)
 def test_no_frame_is_further_off_than_a_state_left_out(indenter):
-    """The default skin's coarser mesh, both branches; prints with -s what stands in `label_farm/tolerance.py`."""
+    """The default skin's coarser mesh, both branches; prints with -s what stands in
+    `label_farm/presses/tolerance.py`."""
     from tacdata.skin.model import SkinModel
     from tacdata.skin.press import PressRequest
 

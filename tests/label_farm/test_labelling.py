@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from farm_examples import SENSOR, press_episode
 
-from label_farm.failure import Failure
 from label_farm.labelling import FarmSettings, Labelling
-from label_farm.store import Store
+from label_farm.store.failure import Failure
+from label_farm.store.store import Store
 from tacdata.errors import FormatError, SolveError, UsageError
 from tacdata.labels import read_label
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from farm_examples import SENSOR, press_episode
 
-from label_farm.fem import _request as pressed
-from label_farm.job import Job
-from label_farm.ladder import Ladder
-from label_farm.plan import request
+from label_farm.labels.request import request
+from label_farm.presses.fem import _request as pressed
+from label_farm.presses.job import Job
+from label_farm.presses.ladder import Ladder
 from tacdata.errors import FormatError, UsageError
 from tacdata.plans import Press
 

@@ -5,12 +5,12 @@ import sys
 import pytest
 from farm_examples import SENSOR, label_episodes, press_episode
 
-from label_farm import model
-from label_farm.ladder import Ladder
-from label_farm.ledger import WAITING, Ledger
-from label_farm.plan import request
-from label_farm.pool import Pool
-from label_farm.store import Store
+from label_farm.labels.request import request
+from label_farm.ledger.ledger import WAITING, Ledger
+from label_farm.presses import model
+from label_farm.presses.ladder import Ladder
+from label_farm.store.store import Store
+from label_farm.workers.pool import Pool
 from tacdata.errors import SolveError, UsageError
 
 

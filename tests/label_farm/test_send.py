@@ -11,8 +11,8 @@ from chaos import ROOT, Service, all_finished
 from farm_examples import HERE
 from session_examples import session
 
+from label_farm.remote import send as sending
 from label_farm.service import receiving
-from label_farm.service import send as sending
 from tacdata.errors import FormatError, TacdataError, UsageError
 
 

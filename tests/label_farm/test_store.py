@@ -11,10 +11,10 @@ import pytest
 from farm_examples import SENSOR
 from fast_model import path
 
-from label_farm import solution_file
-from label_farm.failure import Failure
-from label_farm.job import Job
-from label_farm.store import Store
+from label_farm.presses.job import Job
+from label_farm.store import solution_file
+from label_farm.store.failure import Failure
+from label_farm.store.store import Store
 from tacdata.errors import FormatError, SolveError, UsageError
 
 JOB = Job(

@@ -7,10 +7,10 @@ import pytest
 from farm_examples import SENSOR
 from fast_model import path
 
-from label_farm.fem import FemModel
-from label_farm.job import Job
-from label_farm.ladder import Ladder
-from label_farm.tolerance import Tolerance
+from label_farm.presses.fem import FemModel
+from label_farm.presses.job import Job
+from label_farm.presses.ladder import Ladder
+from label_farm.presses.tolerance import Tolerance
 from tacdata.errors import UsageError
 
 STRICT = Tolerance(0.01, 0.005)

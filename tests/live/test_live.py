@@ -15,7 +15,7 @@ from tacdata.live.latency_meter import LatencyMeter
 from tacdata.live.live_loop import LiveLoop
 from tacdata.live.message_server import WAITING, MessageServer, message
 from tacdata.live.source import Source, touched_board
-from tacdata.recording.stream_clock import StreamClock
+from tacdata.recording.clocks.running_clock import StreamClock
 from tacdata.sensor import default_sensor
 
 SENSOR = default_sensor()

@@ -9,8 +9,8 @@ from tacdata import cli
 from tacdata.errors import FormatError
 from tacdata.plans import Plan, read_plan
 from tacdata.plans.recipe import write_out
-from tacdata.recording.plan_time import plan_time
-from tacdata.recording.press_steps import steps
+from tacdata.recording.motion.plan_time import plan_time
+from tacdata.recording.motion.press_steps import steps
 from tacdata.rig import Registration
 from tacdata.sensor import default_sensor
 

@@ -5,11 +5,11 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
 from tacdata.plans import Plan
-from tacdata.recording import clock_fit
-from tacdata.recording.anchoring import Command
-from tacdata.recording.motion_profile import AxisLimits
-from tacdata.recording.press_steps import steps
-from tacdata.recording.writer import CubePoseRecord, EpisodeWriter, Header
+from tacdata.recording.clocks import envelope_fit
+from tacdata.recording.files.writer import CubePoseRecord, EpisodeWriter, Header
+from tacdata.recording.motion.move_times import Command
+from tacdata.recording.motion.press_steps import steps
+from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.rig import rig as rig_file
 from tacdata.sensor import default_sensor
 
@@ -141,7 +141,7 @@ class Press:
         """Write the recording; returns its path."""
         writer = EpisodeWriter(path, self.header, Clock(T0, 0, 1.0), ("side",) if self.camera else ())
         self.feed(writer)
-        model = clock_fit.fit(self.arrival, self.counter)
+        model = envelope_fit.fit(self.arrival, self.counter)
         models = {"taxels": model} if model else {}
         counts = {"taxels": StreamCounts(received=len(self.sample))}
         return writer.close(complete, reason, models, counts)

@@ -6,12 +6,12 @@ import numpy as np
 from recording_examples import SENSOR, T0, Press, header, plan
 
 from tacdata.devices.device import CncStatus
-from tacdata.recording import sync_tap_motion
-from tacdata.recording.anchoring import Command
-from tacdata.recording.motion_profile import AxisLimits
-from tacdata.recording.writer import CubePoseRecord
+from tacdata.recording.files.writer import CubePoseRecord
+from tacdata.recording.motion import sync_tap
+from tacdata.recording.motion.move_times import Command
+from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.rig import Registration
-from tacdata.virtual_rig.world import World, draw
+from tacdata.virtual_rig.world.world import World, draw
 
 MS = 1_000_000
 CAMERA_DELAY = 0.045
@@ -25,14 +25,14 @@ class Tap(Press):
         self.registration = Registration((10.0, 20.0, -30.0), 5.0)
         self.limits = AxisLimits(np.array([200.0, 200.0, acceleration]), np.array([50.0, 50.0, 15.0]))
         of = plan(1)
-        self.press = sync_tap_motion.touch(of, SENSOR)
+        self.press = sync_tap.touch(of, SENSOR)
         controller = {
             "settings": {}, "acceleration": self.limits.acceleration.tolist(),
             "max_rate": self.limits.max_rate.tolist(),
         }  # fmt: skip
         self.header = replace(header(0, camera), press=self.press, controller=controller)
         self.commands, self.path, self.views = [], [], []
-        self._touch(sync_tap_motion.steps(self.press, of, self.registration))
+        self._touch(sync_tap.steps(self.press, of, self.registration))
         self._sample(seed, rate, delay, timer, drift)
         self._report()
         if camera:

@@ -14,19 +14,19 @@ from scipy.spatial.transform import Rotation
 from tacdata.clock import Clock
 from tacdata.devices.device import ImageFrame, StreamCounts
 from tacdata.errors import FormatError
-from tacdata.recording.camera_stream import CameraStream
-from tacdata.recording.check import check
-from tacdata.recording.detection_process import in_background
-from tacdata.recording.mcap_records import read_records
-from tacdata.recording.reader import read_recording
+from tacdata.recording.check.report import check
+from tacdata.recording.files.mcap_records import read_records
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.files.writer import EpisodeWriter
+from tacdata.recording.live.camera_stream import CameraStream
+from tacdata.recording.live.detection_process import in_background
+from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
-from tacdata.recording.rig_devices import RigDevices
-from tacdata.recording.writer import EpisodeWriter
 from tacdata.rig import read_rig
 from tacdata.rig import rig as rig_file
 from tacdata.tags import fingers_of, look
-from tacdata.virtual_rig.look import Look
-from tacdata.virtual_rig.render import render_scene
+from tacdata.virtual_rig.optics.look import Look
+from tacdata.virtual_rig.optics.render import render_scene
 
 VIEW = {"width": 960, "height": 540, "fx": 900.0, "fy": 900.0, "cx": 479.5, "cy": 269.5}
 FACES = ("+x", "-x", "+y", "-y", "+z")

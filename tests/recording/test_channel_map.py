@@ -9,10 +9,10 @@ import pytest
 from tacdata.indenters import from_document
 from tacdata.plans.shipped.training import USUAL, training_plan
 from tacdata.plans.specimens import STANDARD
-from tacdata.recording.channel_map import Answers, gain_steps, misplaced, silent
+from tacdata.recording.check.channel_order import Answers, gain_steps, misplaced, silent
 from tacdata.rig import Registration
 from tacdata.sensor import default_sensor
-from tacdata.virtual_rig.world import World, draw
+from tacdata.virtual_rig.world.world import World, draw
 
 SENSOR = default_sensor()
 

@@ -10,9 +10,9 @@ from tacdata.cli import application
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus
 from tacdata.errors import UsageError
-from tacdata.recording.check import check
+from tacdata.recording.check.report import check
+from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.session import create_session, refresh
-from tacdata.recording.writer import EpisodeWriter
 
 
 def one(press, tmp_path, **options):

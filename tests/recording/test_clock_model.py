@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tacdata.clock import Clock
-from tacdata.recording.clock_fit import EnvelopeFit, fit
-from tacdata.recording.clock_model import ClockModel, Latency
-from tacdata.recording.polled_clock import polled_clock
-from tacdata.recording.stream_clock import StreamClock
+from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.envelope_fit import EnvelopeFit, fit
+from tacdata.recording.clocks.polled_clock import polled_clock
+from tacdata.recording.clocks.running_clock import StreamClock
 
 START = 1_760_000_000_000_000_000
 

@@ -17,10 +17,10 @@ from recording_examples import SENSOR, plan, rig
 from tacdata.clock import Clock
 from tacdata.devices.grbl import Grbl
 from tacdata.errors import DeviceError
-from tacdata.recording import file_names
-from tacdata.recording.reader import read_recording
+from tacdata.recording.files import file_names
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
-from tacdata.recording.rig_devices import RigDevices
 
 COMMAND = os.environ.get("TACDATA_GRBL_FIRMWARE", "")
 pytestmark = [

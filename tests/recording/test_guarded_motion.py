@@ -9,8 +9,8 @@ from device_doubles import Controller
 
 from tacdata.clock import Clock
 from tacdata.errors import DeviceError
-from tacdata.recording.guarded_motion import GuardedMotion
-from tacdata.recording.press_steps import Step
+from tacdata.recording.live.guarded_motion import GuardedMotion
+from tacdata.recording.motion.press_steps import Step
 
 AT = (10.0, 20.0, -20.0)
 PATH = (Step("press", (10.0, 20.0, -25.0), 2.0), Step("hold", seconds=5.0), Step("", (40.0, 20.0, -25.0), 5.0))

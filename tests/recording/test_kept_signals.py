@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from tacdata.recording.interruption import Interruption
+from tacdata.recording.live.interruption import Interruption
 
 
 def ctrl_c(number=signal.SIGINT):

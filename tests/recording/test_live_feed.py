@@ -5,10 +5,10 @@ from device_doubles import Board, Controller, Eye
 from recording_examples import SENSOR, plan, rig
 
 from tacdata.clock import Clock
-from tacdata.recording.live_feed import LiveFeed
-from tacdata.recording.reader import read_recording
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.live.live_feed import LiveFeed
+from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
-from tacdata.recording.rig_devices import RigDevices
 
 
 def test_a_feed_is_thinned_out():

@@ -7,7 +7,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from tacdata.recording.mcap_records import read_records, walk
+from tacdata.recording.files.mcap_records import read_records, walk
 
 PICTURES = [bytes([k]) * (100 + k) for k in range(20)]
 

@@ -4,9 +4,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tacdata.recording.anchoring import Command, StatusTimes, anchor, machine_path, phases, report_resolution
 from tacdata.recording.episode import CncStream
-from tacdata.recording.motion_profile import AxisLimits
+from tacdata.recording.motion.move_times import Command, StatusTimes, anchor, machine_path, phases, report_resolution
+from tacdata.recording.motion.trapezoid import AxisLimits
 
 LIMITS = AxisLimits(np.array([200.0, 200.0, 100.0]), np.array([50.0, 50.0, 10.0]))
 T0 = 1_760_000_000_000_000_000

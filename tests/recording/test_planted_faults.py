@@ -9,13 +9,13 @@ from recording_examples import SENSOR, T0, Press, plan_document, rig_document
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts
 from tacdata.plans import Plan
-from tacdata.recording import clock_fit
-from tacdata.recording.check import check
-from tacdata.recording.clock_model import Latency
-from tacdata.recording.polled_clock import polled_clock
-from tacdata.recording.reader import read_recording
+from tacdata.recording.check.report import check
+from tacdata.recording.clocks import envelope_fit
+from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.clocks.polled_clock import polled_clock
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.session import create_session, refresh
-from tacdata.recording.writer import EpisodeWriter
 
 BAD, WARN = "unusable", "warning"
 MS = 1_000_000
@@ -50,8 +50,8 @@ class Whole(Press):
                 writer.cube("side", time, time, k, self._pose())
         sent, arrival = (np.array([getattr(s, name) for s in self.statuses]) for name in ("sent_ns", "arrival_ns"))
         models = {
-            "taxels": clock_fit.fit(self.arrival, self.counter),
-            "camera side": clock_fit.fit(
+            "taxels": envelope_fit.fit(self.arrival, self.counter),
+            "camera side": envelope_fit.fit(
                 np.array(self.images),
                 np.array((self.numbers if self.own is None else self.own)[: len(self.images)]),
                 "order" if self.own is None else "device_ns",
@@ -62,7 +62,7 @@ class Whole(Press):
         return writer.close(self.complete, self.reason, {k: m for k, m in models.items() if m}, counts)
 
     def _pose(self):
-        from tacdata.recording.writer import CubePoseRecord
+        from tacdata.recording.files.writer import CubePoseRecord
 
         return CubePoseRecord((0.1, 0.2, 0.4), (0.0, 0.6, 0.0, 0.8), 0.25, self.faces) if self.faces else None
 
@@ -345,7 +345,7 @@ def test_clocks_are_shown_for_every_stream(tmp_path):
     path = tmp_path / "episode-000000.mcap"
     writer = EpisodeWriter(path, press.header, Clock(T0, 0, 1.0), ("side",))
     press.feed(writer)
-    model = clock_fit.fit(press.arrival, press.counter).with_latency(Latency(6_100_000, 300_000))
+    model = envelope_fit.fit(press.arrival, press.counter).with_latency(Latency(6_100_000, 300_000))
     writer.close(True, "", {"taxels": model, "cnc": polled_clock(np.array([0]), np.array([8 * MS]))})
     report = check(path)
     values = report.document["episodes"][0]

@@ -5,7 +5,7 @@ import pytest
 from recording_examples import LIMITS, SENSOR, plan, rig, rig_document
 
 from tacdata.errors import FormatError
-from tacdata.recording.preflight import preflight
+from tacdata.recording.motion.preflight import preflight
 from tacdata.rig import rig as rig_file
 
 TRAVEL = np.array([0.0, 0.0, -40.0]), np.array([200.0, 200.0, 0.0])

@@ -10,7 +10,8 @@ import pytest
 import yaml
 from recording_examples import plan_document
 
-from tacdata.recording import file_names, read_session
+from tacdata.recording import read_session
+from tacdata.recording.files import file_names
 from tacdata.virtual_rig.rig import running
 
 TACDATA = [sys.executable, "-m", "tacdata.cli"]

@@ -15,11 +15,12 @@ from recording_examples import SENSOR, plan, rig
 from tacdata import documents
 from tacdata.clock import Clock
 from tacdata.errors import DeviceError, FormatError, UsageError
-from tacdata.recording import file_names, read_session
-from tacdata.recording.detection_process import in_background
-from tacdata.recording.reader import read_recording
+from tacdata.recording import read_session
+from tacdata.recording.files import file_names
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.live.detection_process import in_background
+from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
-from tacdata.recording.rig_devices import RigDevices
 
 SPEED = 10.0
 PRESS = 9  # the move that presses in the second episode: 5 moves in the first, then travel, approach, press
@@ -258,7 +259,7 @@ def test_a_controller_that_no_longer_obeys_is_said_and_the_file_closed(bench):
 
 
 def test_a_full_disk_stops_the_motion_and_says_so(bench, monkeypatch):
-    from tacdata.recording.chunked_file import ChunkedFile
+    from tacdata.recording.files.chunked_file import ChunkedFile
 
     add, count = ChunkedFile.add, iter(range(10**9))
 

@@ -14,14 +14,15 @@ import yaml
 from recording_examples import SENSOR, plan, plan_document
 
 from tacdata.errors import DeviceError
-from tacdata.recording import file_names, read_session
-from tacdata.recording.check import check
-from tacdata.recording.reader import read_recording
+from tacdata.recording import read_session
+from tacdata.recording.check.report import check
+from tacdata.recording.files import file_names
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.files.recover import recover
 from tacdata.recording.recorder import Recorder
-from tacdata.recording.recover import recover
 from tacdata.rig import read_rig
-from tacdata.virtual_rig.mounting import mount
 from tacdata.virtual_rig.rig import VirtualRig
+from tacdata.virtual_rig.world.mounting import mount
 
 SPEED = 10.0
 CLEARANCE = 3.0

@@ -11,9 +11,9 @@ from tacdata.clock import Clock
 from tacdata.errors import DeviceError
 from tacdata.plans import Plan
 from tacdata.plans.recipe import write_out
-from tacdata.recording import file_names
+from tacdata.recording.files import file_names
+from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
-from tacdata.recording.rig_devices import RigDevices
 
 MOTION = {
     "clearance": 3.0, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 2.0, "hold": 0.2, "rest": 0.2,

@@ -12,11 +12,13 @@ from recording_examples import SENSOR, T0, Press, header
 
 from tacdata.clock import Clock
 from tacdata.errors import FormatError, UsageError
-from tacdata.recording import clock_fit, file_names, read_episode
-from tacdata.recording.mcap_records import read_records
-from tacdata.recording.reader import read_recording
-from tacdata.recording.recover import recover
-from tacdata.recording.writer import EpisodeWriter
+from tacdata.recording import read_episode
+from tacdata.recording.clocks import envelope_fit
+from tacdata.recording.files import file_names
+from tacdata.recording.files.mcap_records import read_records
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.files.recover import recover
+from tacdata.recording.files.writer import EpisodeWriter
 
 
 @pytest.fixture
@@ -34,7 +36,7 @@ def test_what_was_written_is_read_exactly(press, tmp_path):
     np.testing.assert_array_equal(episode.taxels.counts, press.counts)
     np.testing.assert_array_equal(episode.taxels.counter, press.counter)
     np.testing.assert_array_equal(episode.taxels.arrival_ns, press.arrival)
-    model = clock_fit.fit(press.arrival, press.counter)
+    model = envelope_fit.fit(press.arrival, press.counter)
     np.testing.assert_array_equal(episode.taxels.sample_ns, model.sample_ns(press.counter))
     np.testing.assert_array_equal(episode.cnc.position, [s.position for s in press.statuses])
     np.testing.assert_array_equal(episode.cnc.arrival_ns, [s.arrival_ns for s in press.statuses])
@@ -221,7 +223,7 @@ from pathlib import Path
 from recording_examples import header
 from tacdata.clock import Clock
 from tacdata.devices.device import TaxelFrame
-from tacdata.recording.writer import EpisodeWriter
+from tacdata.recording.files.writer import EpisodeWriter
 clock = Clock.start()
 writer = EpisodeWriter(Path(sys.argv[1]), header(), clock)
 for k in range(100000):

@@ -10,15 +10,16 @@ from sync_tap_example import CAMERA_DELAY, Tap
 
 from tacdata.errors import UsageError
 from tacdata.plans import Plan
-from tacdata.recording import sync_tap, sync_tap_motion
-from tacdata.recording.clock_model import Latency
-from tacdata.recording.reader import read_recording
+from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.motion import sync_tap
 from tacdata.recording.recorder import Recorder
 from tacdata.recording.session import create_session, read_session, refresh, resume_session
-from tacdata.recording.session_sync import add_sync, changes, latencies
+from tacdata.recording.sync_tap import delays
+from tacdata.recording.sync_tap.session_delays import add_sync, changes, latencies
 from tacdata.rig import read_rig
-from tacdata.virtual_rig.mounting import mount
 from tacdata.virtual_rig.rig import VirtualRig
+from tacdata.virtual_rig.world.mounting import mount
 
 MS = 1e6
 
@@ -58,7 +59,7 @@ def test_sample_times_are_right_after_a_sync_tap(tmp_path, rate, delay, timer, l
     recording = read_recording(tap.write(tmp_path / "sync_tap-000.mcap"))
     raw = (recording.episode.taxels.sample_ns - tap.true) / MS
     assert np.abs(raw).min() > 0.9 * delay * 1e3, "without the tap the constant delay stays"
-    latency = sync_tap.taxel_latency(recording)
+    latency = delays.taxel_latency(recording)
     assert isinstance(latency, Latency), latency
     error = raw - latency.latency_ns / MS
     assert np.abs(error).max() < limit
@@ -68,14 +69,14 @@ def test_sample_times_are_right_after_a_sync_tap(tmp_path, rate, delay, timer, l
 def test_a_slow_machine_will_do(tmp_path):
     tap = Tap(1, 30.0, 0.02, acceleration=15.0)
     recording = read_recording(tap.write(tmp_path / "sync_tap-000.mcap"))
-    latency = sync_tap.taxel_latency(recording)
+    latency = delays.taxel_latency(recording)
     assert isinstance(latency, Latency), latency
     assert np.abs((recording.episode.taxels.sample_ns - latency.latency_ns - tap.true) / MS).max() < 3.0
 
 
 def test_a_camera_is_matched_by_the_motion_of_its_tag(tmp_path):
     tap = Tap(2, camera=True)
-    found = sync_tap.measure(read_recording(tap.write(tmp_path / "sync_tap-000.mcap")))
+    found = delays.measure(read_recording(tap.write(tmp_path / "sync_tap-000.mcap")))
     assert set(found.latencies) == {"taxels", "camera side"}
     latency = found.latencies["camera side"]
     assert latency.latency_ns / 1e9 == pytest.approx(CAMERA_DELAY, abs=0.003)
@@ -86,7 +87,7 @@ def test_a_camera_is_matched_by_the_motion_of_its_tag(tmp_path):
 def test_touches_that_were_not_felt_give_words_and_no_delay(tmp_path):
     tap = Tap(3)
     tap.counts = np.round(9000 + tap.rng.normal(0, 5, tap.counts.shape))
-    found = sync_tap.measure(read_recording(tap.write(tmp_path / "sync_tap-000.mcap")))
+    found = delays.measure(read_recording(tap.write(tmp_path / "sync_tap-000.mcap")))
     assert found.latencies == {}
     assert "touch deeper" in found.remarks[0]
 
@@ -94,27 +95,27 @@ def test_touches_that_were_not_felt_give_words_and_no_delay(tmp_path):
 def test_dead_and_undefined_channels_do_not_matter(tmp_path):
     tap = Tap(4)
     tap.counts[:, 3], tap.counts[:, 20] = np.nan, 65535.0
-    latency = sync_tap.taxel_latency(read_recording(tap.write(tmp_path / "sync_tap-000.mcap")))
+    latency = delays.taxel_latency(read_recording(tap.write(tmp_path / "sync_tap-000.mcap")))
     assert isinstance(latency, Latency)
     assert latency.latency_ns / MS == pytest.approx(6.0, abs=1.0)
 
 
 def test_touches_are_no_deeper_than_the_plan_and_lie_on_a_taxel():
-    press = sync_tap_motion.touch(plan(2), SENSOR)
-    assert press.depth == sync_tap_motion.DEPTH
+    press = sync_tap.touch(plan(2), SENSOR)
+    assert press.depth == sync_tap.DEPTH
     assert [press.x, press.y] in SENSOR.taxels.centers.tolist()
     shallow = plan_document(1)
     shallow["presses"][0]["depth"] = 0.25
-    assert sync_tap_motion.touch(Plan.from_document(shallow, "p"), SENSOR).depth == 0.25
+    assert sync_tap.touch(Plan.from_document(shallow, "p"), SENSOR).depth == 0.25
     shallow["presses"][0]["depth"] = -0.5
     with pytest.raises(UsageError, match="sync tap"):
-        sync_tap_motion.touch(Plan.from_document(shallow, "p"), SENSOR)
+        sync_tap.touch(Plan.from_document(shallow, "p"), SENSOR)
 
 
 def test_the_session_keeps_the_delays_and_says_when_they_change(tmp_path):
     session = before = create_session(tmp_path / "session", plan(1), SENSOR, rig_document())
     assert latencies(session) == {}
-    first = sync_tap.SyncTap({"taxels": Latency(6_000_000, 300_000)}, ("camera side: no tag",))
+    first = delays.SyncTap({"taxels": Latency(6_000_000, 300_000)}, ("camera side: no tag",))
     session = add_sync(session, tmp_path / "sync_tap-000.mcap", first)
     assert latencies(read_session(session.folder)) == first.latencies
     assert changes(session, {"taxels": Latency(6_500_000, 300_000)}) == ()

@@ -5,7 +5,7 @@ import pytest
 from google.protobuf.message import DecodeError
 
 from schemas import tacdata_pb2 as pb
-from tacdata.recording.taxel_records import taxel_frames
+from tacdata.recording.files.taxel_arrays import taxel_frames
 
 START = 1_760_000_000_000_000_000
 

@@ -11,10 +11,10 @@ from tacdata.clock import Clock
 from tacdata.errors import FormatError, UsageError
 from tacdata.plans import Plan
 from tacdata.plans.recipe import write_out
-from tacdata.recording.preflight import preflight
-from tacdata.recording.reader import read_recording
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.live.rig_devices import RigDevices
+from tacdata.recording.motion.preflight import preflight
 from tacdata.recording.recorder import Recorder
-from tacdata.recording.rig_devices import RigDevices
 from tacdata.rig import registration_for
 
 OFFSET = (0.4, -0.3, -2.0)  # 2 mm longer than the registered one

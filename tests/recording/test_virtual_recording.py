@@ -12,15 +12,15 @@ from recording_examples import SENSOR, plan, plan_document
 
 from tacdata.errors import DeviceError
 from tacdata.plans import Plan
-from tacdata.recording import file_names
-from tacdata.recording.check import check
+from tacdata.recording.check.report import check
 from tacdata.recording.episode import PHASES
-from tacdata.recording.interruption import Interruption
-from tacdata.recording.reader import read_recording
+from tacdata.recording.files import file_names
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.recorder import Recorder
 from tacdata.rig import read_rig
-from tacdata.virtual_rig.mounting import mount
 from tacdata.virtual_rig.rig import VirtualRig
+from tacdata.virtual_rig.world.mounting import mount
 
 SPEED = 10.0
 

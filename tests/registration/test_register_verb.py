@@ -11,7 +11,7 @@ import yaml
 
 from tacdata import cli, documents
 from tacdata.errors import UsageError
-from tacdata.recording.reader import read_episode
+from tacdata.recording.files.reader import read_episode
 from tacdata.registration.chosen import FILE, chosen_registration
 from tacdata.rig import Registration, read_rig
 from tacdata.sensor import default_sensor

@@ -11,8 +11,8 @@ from tacdata.registration.procedure import reference_taxels
 from tacdata.registration.solution import fit_rigid_motion
 from tacdata.registration.symmetric_center import symmetric_center
 from tacdata.rig import Registration
-from tacdata.virtual_rig.world import draw
-from tacdata.virtual_rig.world import put_down as put_down_in_the_world
+from tacdata.virtual_rig.world.world import draw
+from tacdata.virtual_rig.world.world import put_down as put_down_in_the_world
 
 CORNERS = [(-4.75, -3.75), (4.75, -3.75), (4.75, 3.75), (-4.75, 3.75), (0.0, 0.0)]
 

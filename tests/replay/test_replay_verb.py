@@ -11,10 +11,10 @@ from test_scene import HAND, RATE
 from tacdata import documents
 from tacdata.cli import main
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
-from tacdata.demonstrations.tracks_file import write_tracks
+from tacdata.demonstrations.paths.tracks_file import write_tracks
 from tacdata.sensor import default_sensor
-from tacdata.virtual_rig.hand import DIRECTIONS, draw_hand
-from training.wilson import interval
+from tacdata.virtual_rig.world.hand import DIRECTIONS, draw_hand
+from training.scoring.wilson import interval
 
 
 def tracks(folder, hand, task, digest):

@@ -12,7 +12,7 @@ from tacdata.replay.grasp import cut, first_grasp, touching
 from tacdata.replay.outcome import ball_centre, replay_targets
 from tacdata.replay.scene import Scene, drawn
 from tacdata.replay.targets import Targets
-from tacdata.virtual_rig.hand import DIRECTIONS, HEIGHT, RADIUS, draw_hand
+from tacdata.virtual_rig.world.hand import DIRECTIONS, HEIGHT, RADIUS, draw_hand
 
 HAND, RATE = draw_hand(1), 30.0
 

@@ -5,8 +5,8 @@ import yaml
 
 import schemas
 from tacdata import documents, provenance
+from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.run import recording_hash
-from tacdata.discrepancy.spec import read_spec
 from tacdata.effects import load
 from tacdata.importing.imported_session import import_session
 

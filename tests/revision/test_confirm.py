@@ -12,9 +12,9 @@ from test_surrogate_table import BALL, SENSOR, FastModel, made
 
 from tacdata.chain import Course, Tool
 from tacdata.effects import Placed, load
-from tacdata.revision import confirm as room
-from tacdata.revision.confirm import confirm
-from tacdata.skin.mesher import MeshSettings
+from tacdata.revision.labels import confirm as room
+from tacdata.revision.labels.confirm import confirm
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.surrogate.grid import Reach
 from tacdata.surrogate.press_store import PressStore
 from tacdata.surrogate.shipped import Shipped

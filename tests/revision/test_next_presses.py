@@ -9,14 +9,14 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "discrepancy"))
 from pressing import course
 
-from tacdata.discrepancy.refine import refine
-from tacdata.discrepancy.spec import read_spec
+from tacdata.discrepancy.model.spec import read_spec
+from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.effects import Placed, load
 from tacdata.plans import Plan
 from tacdata.revision.comparison import Comparison
-from tacdata.revision.next_presses import choose, plan_of
-from tacdata.revision.rivals import Rival
-from tacdata.revision.trial import laid_out, trials
+from tacdata.revision.next_presses.plan import choose, plan_of
+from tacdata.revision.next_presses.rivals import Rival
+from tacdata.revision.next_presses.trial import laid_out, trials
 
 PLAN = Plan.from_document(
     {"version": "1.1", "name": "one speed", "indenters": {"ball": {"shape": "sphere", "radius": 4.0}},

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from revised_bench import verdict
 
-from tacdata.discrepancy.spec import read_spec
+from tacdata.discrepancy.model.spec import read_spec
 from tacdata.effects import Placed, load
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording import read_episode, read_session
-from tacdata.revision.realised import COLUMNS, tip_error
+from tacdata.revision.labels.realised import COLUMNS, tip_error
 from tacdata.revision.revise import Wishes, revise
 
 PLAY = 0.06

@@ -12,8 +12,8 @@ from farm_examples import HERE, SENSOR, label_episodes, press_episode
 
 from label_farm.labelling import FarmSettings
 from tacdata.effects import Placed, load
-from tacdata.revision import relabel
-from tacdata.revision.relabel import changed_skin, moves_labels, relabelled
+from tacdata.revision.labels import relabel
+from tacdata.revision.labels.relabel import changed_skin, moves_labels, relabelled
 
 SETTINGS = FarmSettings(factory="fast_model:FastModel", workers=1)
 

@@ -12,12 +12,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "label_farm"))
 from farm_examples import HERE
 
 from label_farm.labelling import FarmSettings, Labelling
-from label_farm.store import Store
-from tacdata.discrepancy.spec import read_spec
+from label_farm.store.store import Store
+from tacdata.discrepancy.model.spec import read_spec
 from tacdata.errors import UsageError
 from tacdata.importing.imported_session import import_session
 from tacdata.recording import read_episode, read_session
-from tacdata.revision.retrain import Recipe
+from tacdata.revision.labels.retrain import Recipe
 from tacdata.revision.revise import Wishes, revise
 from tacdata.sensor import default_sensor
 

@@ -8,7 +8,7 @@ import pytest
 from revised_bench import verdict
 
 from tacdata import documents
-from tacdata.discrepancy.spec import read_spec
+from tacdata.discrepancy.model.spec import read_spec
 from tacdata.errors import UsageError
 from tacdata.plans.plan import read_plan
 from tacdata.revision.revise import revise
@@ -56,7 +56,7 @@ def test_the_card_stands_alone_and_says_what_it_rests_on(right):
 
 
 def test_the_curves_go_into_a_rerun_file(right, tmp_path):
-    from viewers.gap_recording import write
+    from viewers.rerun.gap_recording import write
 
     # Of 80 ms 10 are left; the response itself took up nearly half of them before, as it cannot know the direction.
     assert right.shown and all(own.off(own.after) < 0.25 * own.off(own.before) for own in right.shown)
@@ -85,8 +85,8 @@ def test_an_undecided_verdict_adds_nothing_and_plans_presses_that_decide(loose, 
 def test_play_moves_the_paths_of_labels_on_the_way_back_alone(loose):
     from tacdata.effects import Placed, load
     from tacdata.recording import read_episode, read_session
-    from tacdata.revision.pose_path import moved_episodes
-    from tacdata.revision.relabel import paths_moved
+    from tacdata.revision.labels.pose_path import moved_episodes
+    from tacdata.revision.labels.relabel import paths_moved
 
     placed = [Placed(load("backlash"), {"b": np.array(0.06)})]
     moved = paths_moved(loose, placed)

@@ -1,7 +1,7 @@
 """One small model of each kind for the whole room; meshes go into a folder of the test run.
 
 The models' meshes lie in `meshes/`: fTetWild never gives the same one twice, and figures should not scatter. When
-`tacdata.skin.mesher.RECIPE` changes they are no longer found and are made anew at every run: replace them then.
+`tacdata.skin.mesh.build.RECIPE` changes they are no longer found and are made anew at every run: replace them then.
 """
 
 import shutil
@@ -12,7 +12,7 @@ import torch
 import warp as wp
 from skin_examples import bumps_sensor, slab_sensor
 
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 
 

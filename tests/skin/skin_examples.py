@@ -9,13 +9,13 @@ import warp as wp
 
 from tacdata.sensor import Material, Sensor, default_sensor
 from tacdata.sensor.sensor import Contact, DepthMap, Skin, Taxels
-from tacdata.skin import elements
-from tacdata.skin.conditions import Conditions
-from tacdata.skin.mesh import SkinMesh
-from tacdata.skin.mesher import quadratic
+from tacdata.skin.linear.rest_stiffness import rest_stiffness
+from tacdata.skin.member.conditions import Conditions
+from tacdata.skin.mesh import elements
+from tacdata.skin.mesh.build import quadratic
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.model import ModelSettings
-from tacdata.skin.newton import SolverSettings
-from tacdata.skin.rest import rest_stiffness
+from tacdata.skin.solve.newton import SolverSettings
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
 

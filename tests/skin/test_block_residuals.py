@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tacdata.skin.block_residuals import Space
+from tacdata.skin.linear.block_gcr import Space
 
 N = 40
 

@@ -9,11 +9,11 @@ from skin_examples import box_mesh, slab_sensor
 from tacdata.errors import SolveError, UsageError
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
-from tacdata.skin import path_uncertainty
+from tacdata.skin.derivatives import path_uncertainty
+from tacdata.skin.derivatives.path_uncertainty import check_spreads, spreads_of, with_uncertainty
+from tacdata.skin.derivatives.uncertainty import uncertainties
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.path_uncertainty import check_spreads, spreads_of, with_uncertainty
 from tacdata.skin.press import PressRequest
-from tacdata.skin.uncertainty import uncertainties
 
 SIZES = {"indenter/radius": 0.01, "indenter/length": 1.0}
 SPREADS = {"x": 0.05, "z": 0.02, "youngs_modulus": 0.03, "friction": 0.05, **SIZES}

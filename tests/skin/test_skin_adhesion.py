@@ -11,15 +11,15 @@ from tacdata import registry
 from tacdata.errors import FormatError, SolveError, UsageError
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import Adhesion, Sensor
-from tacdata.skin import fineness
 from tacdata.skin.adhesions import load_adhesion_law
 from tacdata.skin.adhesions.adhesion_law import BASE, ROOM
-from tacdata.skin.attraction import AdhesiveContact
+from tacdata.skin.contact.adhesion import AdhesiveContact
+from tacdata.skin.contact.press_limits import check_press
+from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.newton import SolverSettings
-from tacdata.skin.possible_press import check_press
 from tacdata.skin.press import PressRequest
-from tacdata.skin.sensitivity import sensitivities
+from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.validity import fineness
 
 LAWS = registry.names(ROOM, BASE)
 

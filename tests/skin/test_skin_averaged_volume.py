@@ -12,11 +12,11 @@ from skin_examples import batch, box_mesh, joined, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import Material
-from tacdata.skin.conditions import conditions
-from tacdata.skin.elasticity import Elasticity
+from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear.rest_stiffness import for_averaged
+from tacdata.skin.member.conditions import conditions
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.rest import for_averaged
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 

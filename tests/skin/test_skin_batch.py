@@ -11,12 +11,12 @@ from tacdata.errors import SolveError
 from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.batch import Batch
-from tacdata.skin.conditions import conditions
+from tacdata.skin.member.conditions import conditions
+from tacdata.skin.member.pose import turned
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.newton import SolverSettings
-from tacdata.skin.pose import turned
 from tacdata.skin.press import PressRequest
+from tacdata.skin.solve.batch import Batch
+from tacdata.skin.solve.newton import SolverSettings
 
 SENSOR = slab_sensor(size=4.0, friction=0.2, pixels=9)
 SETTINGS = ModelSettings(solver=SolverSettings(residual=1e-6), error_estimate=False)
@@ -139,7 +139,7 @@ def crushed(coarse):
 
     with pytest.MonkeyPatch.context() as patch:
         # Steps need not be halved to 0.01 mm to be given up.
-        patch.setattr("tacdata.skin.walk._LEAST_STEP", 0.1)
+        patch.setattr("tacdata.skin.solve.load_path._LEAST_STEP", 0.1)
         patch.setattr(coarse, "walk", walk)
         together = solved(coarse, [GOOD[0], CRUSHING, *GOOD[1:]], 3)
     return together, [state for state in found if state[0] == 1]
@@ -258,7 +258,7 @@ def test_more_presses_than_a_card_holds_are_refused_in_words(model, monkeypatch)
     def full(*_):
         raise torch.OutOfMemoryError("CUDA out of memory")
 
-    monkeypatch.setattr("tacdata.skin.newton.Newton.step", full)
+    monkeypatch.setattr("tacdata.skin.solve.newton.Newton.step", full)
     with pytest.raises(SolveError, match="presses at a time on a mesh of") as refusal:
         list(model.walk(PRESSES[:2], 2))
     assert "fewer at a time" in refusal.value.remedy

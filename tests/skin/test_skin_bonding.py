@@ -8,15 +8,15 @@ import torch
 from skin_examples import box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.bonding import Bonding, held_faces
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.derivatives.bonding import Bonding, held_faces
+from tacdata.skin.derivatives.parameters import known
+from tacdata.skin.derivatives.path_uncertainty import with_uncertainty
+from tacdata.skin.derivatives.press import sensitivities
+from tacdata.skin.derivatives.uncertainty import sampled_spread, uncertainties
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.newton import SolverSettings
-from tacdata.skin.parameter import known
-from tacdata.skin.path_uncertainty import with_uncertainty
 from tacdata.skin.press import PressRequest
-from tacdata.skin.sensitivity import sensitivities
-from tacdata.skin.uncertainty import sampled_spread, uncertainties
+from tacdata.skin.solve.newton import SolverSettings
 
 PRESS = PressRequest(Sphere(1.5), 0.13, -0.21, 0.0, (0.1, 0.2, 0.3))
 

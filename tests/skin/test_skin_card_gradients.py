@@ -6,15 +6,15 @@ import torch
 from skin_examples import MATERIAL, HeldSlab, batch, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin import card_gradients, woodbury
-from tacdata.skin.card_gradients import CardGradients
-from tacdata.skin.conditions import conditions
-from tacdata.skin.contact import Contact
-from tacdata.skin.elasticity import Elasticity
-from tacdata.skin.newton import Newton, SolverSettings
-from tacdata.skin.pose import Pose
-from tacdata.skin.rest import DenseRest
-from tacdata.skin.transfer import DenseTransfer
+from tacdata.skin.contact.contact import Contact
+from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear import contact_preconditioner, cuda_cg
+from tacdata.skin.linear.contact_transfer import DenseTransfer
+from tacdata.skin.linear.cuda_cg import CardGradients
+from tacdata.skin.linear.rest_stiffness import DenseRest
+from tacdata.skin.member.conditions import conditions
+from tacdata.skin.member.pose import Pose
+from tacdata.skin.solve.newton import Newton, SolverSettings
 
 MEMBERS = 40
 SPHERE = Sphere(2.0)
@@ -28,7 +28,7 @@ def held():
 @pytest.fixture
 def problem(held, monkeypatch):
     """Spheres pressed in differently deep, some not touching; right-hand sides of norm 1."""
-    monkeypatch.setattr(woodbury, "contact_transfer", lambda members, device: DenseTransfer(members))
+    monkeypatch.setattr(contact_preconditioner, "contact_transfer", lambda members, device: DenseTransfer(members))
     nodes, faces = torch.as_tensor(held.mesh.nodes), torch.as_tensor(held.mesh.outer)
     contact = Contact(nodes, faces, 1, SPHERE.distance_function(), True, 1e3, 30.0)
     own = conditions(slab_sensor().material, 0.2, SPHERE).repeat(MEMBERS)
@@ -40,7 +40,7 @@ def problem(held, monkeypatch):
     u = batch(*[squeezed * k / MEMBERS for k in range(MEMBERS)])
     body = Elasticity(held.mesh, "neo_hookean")
     rest = DenseRest(held.stiffness, held.free, held.loadable, "cpu")
-    preconditioner = woodbury.ContactPreconditioner(
+    preconditioner = contact_preconditioner.ContactPreconditioner(
         rest, [contact], torch.as_tensor(held.loadable), 3 * held.count, MATERIAL.youngs_modulus
     )
     newton = Newton(body, [contact], torch.as_tensor(held.mesh.bottom), preconditioner, SolverSettings())
@@ -77,7 +77,7 @@ def test_a_batch_that_shrinks_finds_what_one_that_does_not_finds(problem, monkey
     monkeypatch.setattr(CardGradients, "_iterate", watched)
     again, _ = solve(problem)
     assert widths[0] == MEMBERS and widths[-1] < MEMBERS, "it did shrink"
-    monkeypatch.setattr(card_gradients, "_SHRINK", 0.0)
+    monkeypatch.setattr(cuda_cg, "_SHRINK", 0.0)
     whole, _ = solve(problem)
     assert torch.allclose(shrunk, again, atol=1e-6)
     assert ((shrunk - whole).norm(dim=(0, 1)) < 5e-3 * whole.norm(dim=(0, 1))).all()

@@ -5,15 +5,16 @@ import pytest
 from skin_examples import PLAIN, box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin import model, woodbury
-from tacdata.skin.card_gradients import CardGradients
-from tacdata.skin.mesher import MeshSettings, build_mesh
+from tacdata.skin import model
+from tacdata.skin.linear import contact_preconditioner
+from tacdata.skin.linear.contact_transfer import DenseTransfer
+from tacdata.skin.linear.coupled_dofs import in_order
+from tacdata.skin.linear.cuda_cg import CardGradients
+from tacdata.skin.linear.rest_stiffness import DenseRest, rest_stiffness
+from tacdata.skin.mesh.build import MeshSettings, build_mesh
 from tacdata.skin.model import SkinModel
-from tacdata.skin.newton import Newton
-from tacdata.skin.patches import in_order
 from tacdata.skin.press import PressRequest
-from tacdata.skin.rest import DenseRest, rest_stiffness
-from tacdata.skin.transfer import DenseTransfer
+from tacdata.skin.solve.newton import Newton
 
 
 @pytest.fixture
@@ -36,8 +37,8 @@ def as_on_a_card(monkeypatch):
         monkeypatch.setattr(SkinModel, "_loadable", property(lambda own: in_order(loadable(own), own.mesh)))
         monkeypatch.setattr(Newton, "__init__", newton)
         monkeypatch.setattr(model, "rest_solver", rest)
-        monkeypatch.setattr(woodbury, "contact_transfer", lambda members, device: DenseTransfer(members))
-        monkeypatch.setitem(woodbury._WEAK, "cpu", woodbury._WEAK["cuda"])
+        monkeypatch.setattr(contact_preconditioner, "contact_transfer", lambda members, device: DenseTransfer(members))
+        monkeypatch.setitem(contact_preconditioner._WEAK, "cpu", contact_preconditioner._WEAK["cuda"])
 
     return switch
 

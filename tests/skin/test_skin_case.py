@@ -10,13 +10,13 @@ from skin_examples import bumps_sensor, slab_sensor
 from typer.testing import CliRunner
 
 from tacdata import cli, documents
+from tacdata.cases.case import read_case
+from tacdata.cases.mesh import mesh_for
 from tacdata.errors import FormatError, UsageError
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.ring import Ring
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.case import read_case
-from tacdata.skin.case_mesh import mesh_for
-from tacdata.skin.meshing.background import edge_length
+from tacdata.skin.mesh.generation.background import edge_length
 from tacdata.skin.press import PressRequest
 
 MESH = {"outer": 0.6, "interior": 1.0, "protrusion": 0.8}

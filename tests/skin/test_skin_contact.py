@@ -10,9 +10,9 @@ from skin_examples import batch, box_mesh, joined, random_rotation, slab_sensor
 from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor.sensor import Material
-from tacdata.skin.conditions import conditions
-from tacdata.skin.contact import Contact, board_distance, face_quadrature
-from tacdata.skin.pose import Pose, turned
+from tacdata.skin.contact.contact import Contact, board_distance, face_quadrature
+from tacdata.skin.member.conditions import conditions
+from tacdata.skin.member.pose import Pose, turned
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
 PENALTY, STICK = 300.0, 30.0

@@ -10,10 +10,10 @@ import torch
 from skin_examples import batch, box_mesh, conical_rule, slab_sensor, tetrahedron_shapes
 
 from tacdata.sensor.sensor import Material
-from tacdata.skin import elements
-from tacdata.skin.conditions import conditions
-from tacdata.skin.elasticity import Elasticity
-from tacdata.skin.rest import rest_solver
+from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear.rest_stiffness import rest_solver
+from tacdata.skin.member.conditions import conditions
+from tacdata.skin.mesh import elements
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
 PLACE = np.array([0.3, -0.2, -1.5])

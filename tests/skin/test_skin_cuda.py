@@ -15,14 +15,14 @@ from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import Adhesion
-from tacdata.skin.conditions import conditions
-from tacdata.skin.elasticity import Elasticity
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.derivatives.press import sensitivities
+from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear.contact_transfer import contact_transfer
+from tacdata.skin.linear.rest_stiffness import SparseRest, rest_solver
+from tacdata.skin.member.conditions import conditions
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.rest import SparseRest, rest_solver
-from tacdata.skin.sensitivity import sensitivities
-from tacdata.skin.transfer import contact_transfer
 
 pytestmark = [pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")]
 CARD = "cuda:0"

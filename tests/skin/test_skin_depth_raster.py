@@ -8,9 +8,9 @@ import torch
 from skin_examples import box_mesh, slab_sensor
 
 from tacdata.errors import UsageError
-from tacdata.skin.depth_raster import DepthRaster
-from tacdata.skin.meshing.bending import bend
-from tacdata.skin.raster import OuterFace
+from tacdata.skin.mesh.generation.bending import bend
+from tacdata.skin.surface.depth_map import DepthRaster
+from tacdata.skin.surface.outer_face import OuterFace
 
 SENSOR = slab_sensor(size=6.0, pixels=13)
 X, Y = SENSOR.map.x, SENSOR.map.y

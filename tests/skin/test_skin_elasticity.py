@@ -9,9 +9,9 @@ from skin_examples import batch, box_mesh, joined, random_rotation, slab_sensor
 
 from tacdata import registry
 from tacdata.sensor.sensor import Material
-from tacdata.skin.conditions import Conditions, conditions
-from tacdata.skin.elasticity import Elasticity
-from tacdata.skin.mesh import SkinMesh
+from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.member.conditions import Conditions, conditions
+from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 LAWS = registry.names("tacdata.skin.materials", "law")
 

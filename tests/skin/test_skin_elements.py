@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from skin_examples import tetrahedron_shapes
 
-from tacdata.skin import elements
+from tacdata.skin.mesh import elements
 
 RANDOM = np.random.default_rng(1)
 TRIANGLE_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]])

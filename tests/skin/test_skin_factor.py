@@ -9,9 +9,9 @@ import scipy.sparse as sp
 from skin_examples import HeldSlab
 
 from tacdata.errors import SolveError
-from tacdata.skin import pardiso
-from tacdata.skin.factor import CholmodFactor, factor_of
-from tacdata.skin.pardiso import PardisoFactor
+from tacdata.skin.linear import pardiso
+from tacdata.skin.linear.cholesky import CholmodFactor, factor_of
+from tacdata.skin.linear.pardiso import PardisoFactor
 
 installed = pytest.mark.skipif(pardiso.runtime() is None, reason="MKL is not installed")
 

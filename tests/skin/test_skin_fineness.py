@@ -6,9 +6,9 @@ from skin_examples import box_mesh, slab_sensor
 
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.fineness import edge_under, remark
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
+from tacdata.skin.validity.fineness import edge_under, remark
 
 SENSOR = slab_sensor()
 MESH = box_mesh(SENSOR, 10, 10, 2)

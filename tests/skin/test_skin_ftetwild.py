@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from tacdata.errors import SolveError
-from tacdata.skin.meshing.ftetwild import ftetwild
+from tacdata.skin.mesh.generation.ftetwild import ftetwild
 
 BOX = trimesh.creation.box()
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)

@@ -10,9 +10,9 @@ from skin_examples import random_rotation
 from tacdata import registry
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor.sensor import Material
-from tacdata.skin.law_evaluation import evaluate
 from tacdata.skin.materials import load_law
 from tacdata.skin.materials.law import Gradient
+from tacdata.skin.validity.law_evaluation import evaluate
 
 LAWS = registry.names("tacdata.skin.materials", "law")
 WITH_PARAMETERS = [n for n in LAWS if asdict(load_law(n))]

@@ -10,11 +10,11 @@ from skin_examples import bumps_sensor, slab_sensor
 from tacdata.errors import SolveError
 from tacdata.sensor import default_sensor
 from tacdata.sensor.sensor import Contact, Skin
-from tacdata.skin import elements
-from tacdata.skin.companion import RATIOS, coarser
-from tacdata.skin.contact import face_quadrature
-from tacdata.skin.mesh import SkinMesh, quality
-from tacdata.skin.mesher import PINNED, MeshSettings, build_mesh, make_mesh, mesh_key, surface
+from tacdata.skin.contact.contact import face_quadrature
+from tacdata.skin.mesh import elements
+from tacdata.skin.mesh.build import PINNED, MeshSettings, build_mesh, make_mesh, mesh_key, surface
+from tacdata.skin.mesh.coarser import RATIOS, coarser
+from tacdata.skin.mesh.skin_mesh import SkinMesh, quality
 from tacdata.skin.model import ModelSettings, SkinModel
 
 

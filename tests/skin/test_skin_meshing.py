@@ -10,11 +10,11 @@ from skin_examples import box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.errors import FormatError, SolveError, UsageError
 from tacdata.sensor import Sensor, Skin, read_sensor
-from tacdata.skin import mesher
-from tacdata.skin.mesh import quality
-from tacdata.skin.mesher import MeshSettings, make_mesh, mesh_key
-from tacdata.skin.meshing.protrusion import Protrusion
-from tacdata.skin.meshing.true_volume import true_volume, volume_error
+from tacdata.skin.mesh import build
+from tacdata.skin.mesh.build import MeshSettings, make_mesh, mesh_key
+from tacdata.skin.mesh.generation.protrusion import Protrusion
+from tacdata.skin.mesh.generation.true_volume import true_volume, volume_error
+from tacdata.skin.mesh.skin_mesh import quality
 
 COARSE = MeshSettings(outer=0.9, interior=1.5, protrusion=1.0, tip=None)
 
@@ -243,8 +243,8 @@ def test_a_mesh_that_does_not_take_the_true_faces_is_made_again(monkeypatch):
             raise SolveError("element 7 is flat", "positive volumes", "refine")
         return box_mesh(sensor, 2, 2, 2)
 
-    monkeypatch.setattr(mesher, "quadratic", quadratic)
-    monkeypatch.setattr(mesher, "tetrahedralize", lambda *_: (None, None))
+    monkeypatch.setattr(build, "quadratic", quadratic)
+    monkeypatch.setattr(build, "tetrahedralize", lambda *_: (None, None))
     wanted = 3
     assert len(make_mesh(sensor, COARSE).tets) == 48 and len(calls) == 3
     wanted = 99

@@ -8,11 +8,12 @@ from skin_examples import box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.errors import SolveError
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin import companion
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.mesh import coarser
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.numerical_error import CORRELATION, FORCE_ORDER, ORDER, Figures, estimate
 from tacdata.skin.press import PressRequest
+from tacdata.skin.validity import coarse_press
+from tacdata.skin.validity.mesh_error import CORRELATION, FORCE_ORDER, ORDER, Figures, estimate
 
 SENSOR = slab_sensor(pixels=35)
 DEPTH = np.array([0.0, 0.25, 0.5, 0.25, 0.0])
@@ -136,23 +137,23 @@ def test_a_coarser_mesh_is_chosen_by_what_the_mesher_made(monkeypatch):
             raise SolveError("the mesh holds nothing", "a volume", "refine")
         return box_mesh(sensor, *({1: (5, 5, 2), 2: (4, 4, 2), 3: (6, 6, 2)}[len(asked)]))
 
-    monkeypatch.setattr(companion, "build_mesh", mesher)
-    chosen = companion.companion_mesh(sensor, MeshSettings(outer=1.0, focus=(0.0, 0.0, 1.0, 0.2)), fine)
+    monkeypatch.setattr(coarser, "build_mesh", mesher)
+    chosen = coarser.companion_mesh(sensor, MeshSettings(outer=1.0, focus=(0.0, 0.0, 1.0, 0.2)), fine)
     assert chosen is not None
-    assert asked == [1.5, 2.0] and companion.edge_ratio(fine, chosen) == pytest.approx(1.5)
+    assert asked == [1.5, 2.0] and coarser.edge_ratio(fine, chosen) == pytest.approx(1.5)
     asked.clear()
-    assert companion.companion_mesh(sensor, MeshSettings(outer=4.0), fine) is None
-    assert companion.coarser(MeshSettings(focus=(0.0, 0.0, 1.0, 0.2)), 2.0).focus == (0.0, 0.0, 1.0, 0.4)
+    assert coarser.companion_mesh(sensor, MeshSettings(outer=4.0), fine) is None
+    assert coarser.coarser(MeshSettings(focus=(0.0, 0.0, 1.0, 0.2)), 2.0).focus == (0.0, 0.0, 1.0, 0.4)
 
 
 def test_the_loading_alone_is_pressed_on_the_coarser_mesh():
     whole = PressRequest(Sphere(1.0), 0.0, 0.0, 0.0, (0.0, 0.2, 0.4, 0.3, 0.5, 0.2, 0.0))
-    assert companion.loading(whole).depths == (0.2, 0.4, 0.5)
+    assert coarse_press.loading(whole).depths == (0.2, 0.4, 0.5)
 
 
 def test_the_words_say_that_protrusions_are_not_coarser(bumps):
-    assert "protrusions" in companion.blind_spot(bumps.mesh, bumps.mesh)
-    assert companion.blind_spot(*[box_mesh(slab_sensor(), 4, 4, 2)] * 2) == ""
+    assert "protrusions" in coarser.blind_spot(bumps.mesh, bumps.mesh)
+    assert coarser.blind_spot(*[box_mesh(slab_sensor(), 4, 4, 2)] * 2) == ""
     assert bumps_sensor().skin.protrusion_radius and isinstance(bumps.settings, ModelSettings)
 
 

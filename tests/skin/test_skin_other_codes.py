@@ -15,9 +15,9 @@ import pytest
 from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata import documents
+from tacdata.cases.case import read_case
 from tacdata.sensor.sensor import Contact, Skin
-from tacdata.skin.case import read_case
-from tacdata.skin.mesher import build_mesh
+from tacdata.skin.mesh.build import build_mesh
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 

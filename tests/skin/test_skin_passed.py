@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tacdata.skin.passed import PassedStates
+from tacdata.skin.solve.loading_states import PassedStates
 
 NODES, MEMBERS = 5, 3
 BOTH = torch.tensor([True, True, False])

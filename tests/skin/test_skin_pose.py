@@ -9,8 +9,8 @@ from skin_examples import MATERIAL, joined
 
 from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.conditions import conditions
-from tacdata.skin.pose import Pose, turned
+from tacdata.skin.member.conditions import conditions
+from tacdata.skin.member.pose import Pose, turned
 
 
 def turn(yaw=(0.0,), tilt_x=(0.0,), tilt_y=(0.0,)):

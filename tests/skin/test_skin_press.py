@@ -9,7 +9,7 @@ from skin_examples import batch
 
 from tacdata.errors import SolveError
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.conditions import conditions
+from tacdata.skin.member.conditions import conditions
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 

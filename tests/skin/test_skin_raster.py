@@ -5,7 +5,7 @@ import pytest
 from skin_examples import box_mesh, slab_sensor
 
 from tacdata.sensor import default_sensor
-from tacdata.skin.raster import OuterFace
+from tacdata.skin.surface.outer_face import OuterFace
 
 SENSOR = slab_sensor(size=6.0, pixels=13)
 X, Y = SENSOR.map.x, SENSOR.map.y

@@ -18,10 +18,10 @@ from scipy.interpolate import LinearNDInterpolator
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
 from tacdata.sensor.sensor import Contact, Skin
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.raster import OuterFace
+from tacdata.skin.surface.outer_face import OuterFace
 
 BESIDE = Path(__file__).resolve().parents[3] / "shared" / "reference"
 FOLDER = Path(os.environ.get("TACDATA_REFERENCE", BESIDE))

@@ -7,9 +7,9 @@ from skin_examples import MATERIAL, HeldSlab
 
 from tacdata import registry
 from tacdata.sensor.sensor import Material
-from tacdata.skin.conditions import conditions
-from tacdata.skin.elasticity import Elasticity
-from tacdata.skin.rest import DenseRest, rest_solver
+from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear.rest_stiffness import DenseRest, rest_solver
+from tacdata.skin.member.conditions import conditions
 
 
 @pytest.fixture(scope="module")

@@ -14,14 +14,14 @@ from skin_examples import box_mesh, slab_sensor
 from tacdata.errors import FormatError, UsageError
 from tacdata.indenters.ellipsoid import Ellipsoid
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.conditions import conditions
+from tacdata.skin.derivatives.parameters import known
+from tacdata.skin.derivatives.press import sensitivities
+from tacdata.skin.member.conditions import conditions
+from tacdata.skin.member.pose import turned
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.newton import SolverSettings
-from tacdata.skin.parameter import known
-from tacdata.skin.pose import turned
 from tacdata.skin.press import PressRequest
-from tacdata.skin.sensitivity import sensitivities
-from tacdata.skin.walk import Walk
+from tacdata.skin.solve.load_path import Walk
+from tacdata.skin.solve.newton import SolverSettings
 
 EGG = Ellipsoid(3.0, 2.0, 1.5)
 PATH = (0.1, 0.2, 0.3, 0.22)

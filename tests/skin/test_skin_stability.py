@@ -5,7 +5,7 @@ import pytest
 
 from tacdata import registry
 from tacdata.sensor.sensor import Material
-from tacdata.skin.law_stability import instabilities, stable_ranges
+from tacdata.skin.validity.law_stability import instabilities, stable_ranges
 
 STEP = 2 ** (1 / 60)
 """Ratio of neighbouring stretches that are tried."""

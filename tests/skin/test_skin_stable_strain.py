@@ -10,7 +10,7 @@ from tacdata.errors import SolveError
 from tacdata.indenters.sphere import Sphere
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.stable_strain import StableStrain
+from tacdata.skin.validity.stable_strain import StableStrain
 
 
 def softening(share):

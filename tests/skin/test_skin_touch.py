@@ -10,18 +10,18 @@ import pytest
 from skin_examples import box_mesh, slab_sensor
 
 from tacdata import documents
+from tacdata.cases.case import read_case
 from tacdata.errors import SolveError
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.ring import Ring
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor.sensor import Contact, Skin
-from tacdata.skin import touch as touching
-from tacdata.skin.case import read_case
+from tacdata.skin.contact import first_touch as touching
+from tacdata.skin.contact.first_touch import reach, rise, room, rotation, touch
+from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.model import ModelSettings, SkinModel
-from tacdata.skin.possible_press import check_press
 from tacdata.skin.press import PressRequest
-from tacdata.skin.raster import OuterFace
-from tacdata.skin.touch import reach, rise, room, rotation, touch
+from tacdata.skin.surface.outer_face import OuterFace
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 

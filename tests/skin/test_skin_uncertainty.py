@@ -9,10 +9,10 @@ from skin_examples import box_mesh, slab_sensor
 from tacdata.errors import FormatError, UsageError
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import Sensor, default_sensor
+from tacdata.skin.derivatives.press import sensitivities
+from tacdata.skin.derivatives.uncertainty import propagate, sampled_spread, uncertainties
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.sensitivity import sensitivities
-from tacdata.skin.uncertainty import propagate, sampled_spread, uncertainties
 
 SPREADS = {"x": 0.05, "z": 0.01, "tilt_x": 0.5, "thickness": 0.05, "youngs_modulus": 0.02, "poisson_ratio": 0.005}
 DEEP = PressRequest(Sphere(2.0), 0.13, -0.21, 0.0, (0.2, 0.4))

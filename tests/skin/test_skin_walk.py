@@ -5,8 +5,8 @@ import math
 import pytest
 
 from tacdata.errors import SolveError
-from tacdata.skin.newton import SolverSettings
-from tacdata.skin.walk import Walk
+from tacdata.skin.solve.load_path import Walk
+from tacdata.skin.solve.newton import SolverSettings
 
 LIMIT = SolverSettings()
 GOOD = (LIMIT.residual / 2, 0.0, 0.0, 1.0)

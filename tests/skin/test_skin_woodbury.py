@@ -9,15 +9,15 @@ import torch
 from skin_examples import MATERIAL, HeldSlab, batch, joined
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin import woodbury
-from tacdata.skin.batched_inverse import inverse, inverse_of_sum
-from tacdata.skin.conditions import conditions
-from tacdata.skin.contact import Contact
-from tacdata.skin.patches import coupling
-from tacdata.skin.pose import Pose
-from tacdata.skin.rest import rest_solver
-from tacdata.skin.transfer import DenseTransfer, FactoredTransfer
-from tacdata.skin.woodbury import ContactPreconditioner
+from tacdata.skin.contact.contact import Contact
+from tacdata.skin.linear import contact_preconditioner
+from tacdata.skin.linear.batched_inverse import inverse, inverse_of_sum
+from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
+from tacdata.skin.linear.contact_transfer import DenseTransfer, FactoredTransfer
+from tacdata.skin.linear.coupled_dofs import coupling
+from tacdata.skin.linear.rest_stiffness import rest_solver
+from tacdata.skin.member.conditions import conditions
+from tacdata.skin.member.pose import Pose
 
 PENALTY, STICK = 3000.0, 100.0
 """Over Young's modulus [1/mm]: stiff, so that the contact's share matters."""
@@ -94,7 +94,7 @@ def test_it_is_symmetric_and_positive_as_conjugate_gradients_need(body, rest):
 def test_degrees_of_freedom_that_hardly_feel_the_contact_are_left_out(body, rest, monkeypatch):
     """A share knows fewer of them then; conjugate gradients by it still take half as many iterations as without any."""
     contact, everything = pressed(body, rest, 0.2, [(0.1, -0.2, 1.9)], [0.30])
-    monkeypatch.setitem(woodbury._WEAK, "cpu", 0.1)
+    monkeypatch.setitem(contact_preconditioner._WEAK, "cpu", 0.1)
     _, fewer = pressed(body, rest, 0.2, [(0.1, -0.2, 1.9)], [0.30])
     known = [int((made._which < len(body.loadable)).sum()) for made in (everything, fewer)]
     assert 0.4 * known[0] < known[1] < 0.9 * known[0]

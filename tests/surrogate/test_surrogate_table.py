@@ -10,7 +10,7 @@ from tacdata.errors import SolveError, UsageError
 from tacdata.indenters import from_document
 from tacdata.labels import PathSolution
 from tacdata.sensor import default_sensor
-from tacdata.skin.mesher import MeshSettings
+from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings
 from tacdata.surrogate.build import TableSettings, Work, work
 from tacdata.surrogate.grid import Reach, covering

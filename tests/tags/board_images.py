@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tacdata.tags.board import Board, draw_squares
-from tacdata.virtual_rig.sheet import render_sheet, whole_lens
+from tacdata.tags.calibration.board import Board, draw_squares
+from tacdata.virtual_rig.optics.sheet import render_sheet, whole_lens
 
 BOARD = Board(9, 6, 25.0, 18.0, "4X4_50")
 TRUTH = {

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from tacdata import cli, documents
 from tacdata.errors import TacdataError
-from tacdata.tags.board import read_board
-from tacdata.tags.board_view import find_board
+from tacdata.tags.calibration.board import read_board
+from tacdata.tags.calibration.board_view import find_board
 from tacdata.tags.camera import Camera
 
 

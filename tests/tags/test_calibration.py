@@ -9,10 +9,10 @@ from board_images import BOARD, TRUTH, images
 from scipy.optimize import least_squares
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.tags.board import Board, draw_board, printable
-from tacdata.tags.board_view import BoardView, find_board
-from tacdata.tags.calibration import calibrate, coverage_of
-from tacdata.tags.calibration_picture import draw_calibration
+from tacdata.tags.calibration.board import Board, draw_board, printable
+from tacdata.tags.calibration.board_view import BoardView, find_board
+from tacdata.tags.calibration.intrinsics import calibrate, coverage_of
+from tacdata.tags.calibration.picture import draw_calibration
 
 SIZE = (640, 480)
 

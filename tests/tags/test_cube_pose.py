@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.tags import Cube, detect_cube, detect_tags
-from tacdata.virtual_rig.look import Look
-from tacdata.virtual_rig.render import FACES, render_cube, render_scene
+from tacdata.virtual_rig.optics.look import Look
+from tacdata.virtual_rig.optics.render import FACES, render_cube, render_scene
 
 INTRINSICS = {"width": 1280, "height": 720, "fx": 900.0, "fy": 900.0, "cx": 639.5, "cy": 359.5}
 CUBE = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}

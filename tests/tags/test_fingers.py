@@ -12,8 +12,8 @@ from tacdata.errors import FormatError
 from tacdata.tags import CubePose, FingerTracker, detect_fingers, fingers_of
 from tacdata.tags.mixups import exchanged, handedness
 from tacdata.tags.tips import tip_of
-from tacdata.virtual_rig.look import Look
-from tacdata.virtual_rig.render import render_scene
+from tacdata.virtual_rig.optics.look import Look
+from tacdata.virtual_rig.optics.render import render_scene
 
 INTRINSICS = {"width": 960, "height": 540, "fx": 900.0, "fy": 900.0, "cx": 479.5, "cy": 269.5}
 FACES = ("+x", "-x", "+y", "-y", "+z")

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tacdata.virtual_rig.look import Look
-from tacdata.virtual_rig.render import render_cube
+from tacdata.virtual_rig.optics.look import Look
+from tacdata.virtual_rig.optics.render import render_cube
 
 INTRINSICS = {"width": 640, "height": 480, "fx": 600.0, "fy": 600.0, "cx": 319.5, "cy": 239.5}
 CUBE = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}

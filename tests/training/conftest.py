@@ -7,7 +7,7 @@ import pytest
 
 from tacdata.recording.episode import PHASES
 from tacdata.sensor import default_sensor
-from training.frames import EpisodeSpan, Frames
+from training.frames.frames import EpisodeSpan, Frames
 
 SHAPES = ("sphere", "cylinder", "cone")
 

@@ -8,13 +8,15 @@ import torch
 
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
-from training import baselines, checkpoint, report
-from training.evaluate import METRICS
-from training.evaluate import evaluate as evaluate_on
+from training.inference import checkpoint
+from training.inference.prediction import read_prediction, write_prediction
 from training.networks.network import Network
-from training.prediction import read_prediction, write_prediction
-from training.published import TABLE_1
-from training.score_sheet import markdown
+from training.reports import report
+from training.reports.score_sheet import markdown
+from training.scoring import baselines
+from training.scoring.evaluate import METRICS
+from training.scoring.evaluate import evaluate as evaluate_on
+from training.scoring.published import TABLE_1
 from training.settings import Settings
 from training.train import train
 

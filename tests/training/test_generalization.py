@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 import pytest
 
 from tacdata.errors import UsageError
-from training import checkpoint
-from training.comparison import groups, verdicts
 from training.generalization import generalize
-from training.report_page import Scored, page
+from training.inference import checkpoint
+from training.reports.comparison import groups, verdicts
+from training.reports.report_page import Scored, page
 from training.settings import Settings
 
 RECIPE = Settings(network="direct", arguments={"hidden": 16}, epochs=2, batch_size=64)

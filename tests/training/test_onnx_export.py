@@ -7,10 +7,10 @@ import pytest
 
 from tacdata import registry
 from tacdata.errors import FormatError, UsageError
-from training import onnx_export
+from training.inference import onnx_export
+from training.inference.onnx_export import export
+from training.inference.sequence import window_map
 from training.networks.network import BASE, ROOM
-from training.onnx_export import export
-from training.sequence import window_map
 from training.settings import Settings
 from training.train import train
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tacdata.errors import FormatError
-from training import seen
+from training.metrics import seen
 from training.settings import Settings
 from training.train import train
 

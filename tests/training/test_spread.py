@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tacdata.errors import FormatError, UsageError
-from training import spread
-from training.spread import LEVELS, calibrate, reliability
+from training.metrics import spread
+from training.metrics.spread import LEVELS, calibrate, reliability
 
 PITCH = 0.4
 

@@ -3,8 +3,8 @@
 import pytest
 
 from tacdata.errors import FormatError, UsageError
-from training import published
-from training.success import counted, markdown, published_rates, rates, read_attempts
+from training.scoring import published
+from training.scoring.success import counted, markdown, published_rates, rates, read_attempts
 
 
 def written(tmp_path, text):

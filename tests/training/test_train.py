@@ -8,12 +8,12 @@ import pytest
 import torch
 
 from tacdata.errors import FormatError, TacdataError, UsageError
-from training import checkpoint
-from training.inference import predict
+from training.frames.windows import Windows
+from training.inference import checkpoint
+from training.inference.predictor import predict
 from training.loss import WeightedLoss
 from training.settings import Settings
 from training.train import normalization, train
-from training.windows import Windows
 
 SMALL = Settings(arguments={"hidden": 24, "channels": 8}, epochs=3)
 

@@ -7,12 +7,13 @@ import pytest
 from typer.testing import CliRunner
 
 from tacdata import cli
-from tacdata.dataset import DatasetWriter, features
-from tacdata.dataset.metadata import EpisodeRecord
+from tacdata.dataset import DatasetWriter
+from tacdata.dataset.format import features
+from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.indenters import from_document
 from tacdata.plans import Press
-from training.data import read_frames
+from training.frames.data import read_frames
 
 
 def write_dataset(root, frames, virtual=True):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tacdata.errors import UsageError
-from training.wilson import interval
+from training.scoring.wilson import interval
 
 PAPER = [(15, 40), (27, 40), (35, 40), (4, 20), (9, 20), (17, 20)]
 

@@ -3,8 +3,8 @@
 import numpy as np
 import torch
 
+from training.frames.windows import Windows
 from training.networks.paper import Paper
-from training.windows import Windows
 
 
 def reference(start, stop, frame):

@@ -4,8 +4,8 @@ import numpy as np
 
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
-from tacdata.recording.anchoring import Command
-from tacdata.recording.writer import CubePoseRecord, EpisodeWriter, Header
+from tacdata.recording.files.writer import CubePoseRecord, EpisodeWriter, Header
+from tacdata.recording.motion.move_times import Command
 from tacdata.rig import Registration
 
 

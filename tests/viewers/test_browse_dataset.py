@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from tacdata.commands import browse
-from tacdata.dataset import features
 from tacdata.dataset.flags import flagged_episodes
+from tacdata.dataset.format import features
 from tacdata.dataset.frames import recording_hash
 from tacdata.dataset.pack import pack
 from tacdata.dataset.reader import read_dataset
 from tacdata.errors import UsageError
-from training.data import frames_of
-from training.prediction import write_prediction
-from viewers import single_episode
-from viewers.list_sources import episodes_at
-from viewers.prediction_files import first_predicted
+from training.frames.data import frames_of
+from training.inference.prediction import write_prediction
+from viewers.browse.list_sources import episodes_at
+from viewers.parts.prediction_files import first_predicted
+from viewers.scenes import single_episode
 from viewers.source import scene_at
 
 APART = 10**11

@@ -9,14 +9,14 @@ from recorded_press import write_recording
 
 from tacdata.errors import UsageError
 from tacdata.labels import write_label
-from tacdata.recording.reader import read_episode
-from training.prediction import write_prediction
-from viewers.comparison_scene import readings_comparison
-from viewers.comparison_sources import labels_at, predictions_at, telling_names
-from viewers.episode_scene import episode_scene
-from viewers.film_backend import FilmBackend, film_times
-from viewers.picture_backend import PictureBackend
-from viewers.rerun_backend import RerunBackend
+from tacdata.recording.files.reader import read_episode
+from training.inference.prediction import write_prediction
+from viewers.comparison import labels_at, predictions_at, telling_names
+from viewers.pictures.backend import PictureBackend
+from viewers.pictures.film import FilmBackend, film_times
+from viewers.rerun.backend import RerunBackend
+from viewers.scenes.comparison import readings_comparison
+from viewers.scenes.episode import episode_scene
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_names_tell_folders_apart(tmp_path):
 
 @pytest.mark.parametrize("ending", [".gif", ".mp4"])
 def test_a_film_shows_the_press_from_approach_to_release(episode, label, tmp_path, monkeypatch, ending):
-    monkeypatch.setattr("viewers.film_backend.MOST", {".gif": 3, ".mp4": 3})
+    monkeypatch.setattr("viewers.pictures.film.MOST", {".gif": 3, ".mp4": 3})
     scene = episode_scene(episode, label)
     FilmBackend(tmp_path / f"film{ending}", resolution=30).draw(scene)
     if ending == ".gif":

@@ -10,10 +10,10 @@ import pytest
 
 from tacdata import documents
 from tacdata.errors import UsageError
-from viewers.browse_server import Pages, _handler
-from viewers.episode_list import Entry, EpisodeList, errors_of
-from viewers.flagging import flag_episode, unflag_episode
-from viewers.list_table import list_table
+from viewers.browse.episode_list import Entry, EpisodeList, errors_of
+from viewers.browse.flagging import flag_episode, unflag_episode
+from viewers.browse.list_table import list_table
+from viewers.browse.server import Pages, _handler
 
 ENTRIES = (
     Entry(0, "episode-000000.mcap", "ball", "sphere", 0, 0, 0.4, 1.0, 1.0, "complete", "test", 0.01),

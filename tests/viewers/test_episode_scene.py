@@ -5,10 +5,10 @@ import pytest
 
 from tacdata.errors import FormatError
 from tacdata.recording.episode import CncStream, TaxelStream
-from viewers.episode_scene import episode_scene
 from viewers.null_backend import NullBackend
-from viewers.picture_backend import PictureBackend
-from viewers.rerun_backend import RerunBackend
+from viewers.pictures.backend import PictureBackend
+from viewers.rerun.backend import RerunBackend
+from viewers.scenes.episode import episode_scene
 
 DEEPEST = 1.2
 

@@ -13,10 +13,10 @@ from recorded_press import write_recording
 from rerun.chunk import RrdReader
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.recording import chunked_file
-from tacdata.recording.growing_file import GrowingFile
-from tacdata.recording.reader import read_recording, recording_of
-from viewers.following import Follower, is_growing, meant
+from tacdata.recording.files import chunked_file
+from tacdata.recording.files.growing_file import GrowingFile
+from tacdata.recording.files.reader import read_recording, recording_of
+from viewers.live.following import Follower, is_growing, meant
 
 
 @pytest.fixture(scope="module")

@@ -9,19 +9,19 @@ from rerun.chunk import RrdReader
 import schemas
 from tacdata import documents, registry
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
-from tacdata.demonstrations.tracks_file import read_tracks, write_tracks
-from tacdata.discrepancy.residuals import Residuals
-from tacdata.discrepancy.residuals import write as write_residuals
+from tacdata.demonstrations.paths.tracks_file import read_tracks, write_tracks
+from tacdata.discrepancy.verdict.residual_table import Residuals
+from tacdata.discrepancy.verdict.residual_table import write as write_residuals
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import exporter
 from tacdata.replay.targets import targets_of
-from training.prediction import write_prediction
-from viewers.bar_table import bar_table
-from viewers.gap_recording import write as write_gap
+from training.inference.prediction import write_prediction
 from viewers.kinds.kind import BASE, ROOM, kinds
-from viewers.picture_backend import PictureBackend
-from viewers.rerun_backend import LAYOUTS, RerunBackend
-from viewers.scene import Bars, Trail
+from viewers.pictures.backend import PictureBackend
+from viewers.rerun.backend import LAYOUTS, RerunBackend
+from viewers.rerun.bar_table import bar_table
+from viewers.rerun.gap_recording import write as write_gap
+from viewers.scene.scene import Bars, Trail
 from viewers.source import scene_at
 
 START = 1_760_000_000_000_000_000
@@ -175,7 +175,7 @@ def test_damaged_files_are_named(verdict, tracks, tmp_path):
 def test_the_curves_of_a_revision_are_read_back(tmp_path):
     from types import SimpleNamespace
 
-    from viewers.gap_curves import read_gap_curves
+    from viewers.rerun.gap_curves import read_gap_curves
 
     time = np.linspace(0, 2, 30)
     values = np.outer(np.sin(time), [1.0, 2.0])
@@ -222,7 +222,7 @@ def test_the_layout_for_foxglove_names_only_what_the_recording_has(episode, imag
     from recorded_press import write_recording
 
     from schemas import tacdata_pb2
-    from tacdata.recording.mcap_records import read_records
+    from tacdata.recording.files.mcap_records import read_records
     from viewers.foxglove_layout import write_foxglove_layout
 
     recording = write_recording(tmp_path / "episode-000003.mcap", episode, images)

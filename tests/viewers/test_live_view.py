@@ -9,8 +9,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tacdata.errors import UsageError
-from viewers import live_view as room
-from viewers.live_view import live_view
+from viewers.live import window as room
+from viewers.live.window import live_view
 
 
 def test_what_is_shown_is_in_the_file(tmp_path):

@@ -8,9 +8,9 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tacdata.errors import UsageError
-from viewers.episode_scene import episode_scene
-from viewers.rerun_backend import RerunBackend
-from viewers.rerun_window import executable
+from viewers.rerun.backend import RerunBackend
+from viewers.rerun.window import executable
+from viewers.scenes.episode import episode_scene
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 
 from tacdata.errors import UsageError
-from viewers import rerun_window
-from viewers.episode_scene import episode_scene
-from viewers.rerun_backend import RerunBackend
+from viewers.rerun import window
+from viewers.rerun.backend import RerunBackend
+from viewers.scenes.episode import episode_scene
 
 
 def listens(host, port):
@@ -35,7 +35,7 @@ def other_address():
 
 def test_the_web_viewer_serves_on_the_loopback_only(episode, tmp_path):
     RerunBackend(tmp_path / "e.rrd").draw(episode_scene(episode))
-    with rerun_window.web_server(tmp_path / "e.rrd") as (server, address):
+    with window.web_server(tmp_path / "e.rrd") as (server, address):
         parts = urlsplit(address)
         grpc = urlsplit(parse_qs(parts.query)["url"][0].removeprefix("rerun+"))
         assert parts.hostname == grpc.hostname == "127.0.0.1"
@@ -55,9 +55,9 @@ def test_the_web_viewer_serves_on_the_loopback_only(episode, tmp_path):
 
 def test_usage_statistics_are_off_and_the_users_setting_is_left_alone():
     before = os.environ.get("XDG_CONFIG_HOME")
-    with rerun_window.quiet_environment() as environment:
+    with window.quiet_environment() as environment:
         told = subprocess.run(
-            [rerun_window.executable(), "analytics", "config"],
+            [window.executable(), "analytics", "config"],
             env=environment,
             capture_output=True,
             text=True,
@@ -74,8 +74,8 @@ def test_a_port_in_use_is_avoided():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        assert rerun_window.free_port(port) != port
-    assert rerun_window.free_port(port) == port
+        assert window.free_port(port) != port
+    assert window.free_port(port) == port
 
 
 def test_without_a_display_no_window_is_tried(monkeypatch, tmp_path):
@@ -83,4 +83,4 @@ def test_without_a_display_no_window_is_tried(monkeypatch, tmp_path):
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr("sys.platform", "linux")
     with pytest.raises(UsageError, match="no display"):
-        rerun_window.window(tmp_path / "e.rrd")
+        window.window(tmp_path / "e.rrd")

@@ -11,8 +11,8 @@ from tacdata.dataset.frames import recording_hash
 from tacdata.dataset.pack import pack
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import write_label
-from tacdata.recording.reader import read_episode
-from training.prediction import write_prediction
+from tacdata.recording.files.reader import read_episode
+from training.inference.prediction import write_prediction
 from viewers.source import scene_at
 
 
@@ -115,7 +115,7 @@ def test_a_recording_that_is_still_being_written(session, tmp_path):
 
 
 def test_of_many_images_some_are_read_at_equal_distance(session):
-    from viewers.recorded_images import recorded_images
+    from viewers.parts.recorded_images import recorded_images
 
     path = session / "episode-000003.mcap"
     whole = list(recorded_images(path, ("top",)))

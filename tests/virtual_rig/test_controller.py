@@ -7,7 +7,7 @@ import pytest
 import serial
 
 from tacdata.clock import Clock
-from tacdata.virtual_rig.controller import Controller
+from tacdata.virtual_rig.firmware.controller import Controller
 
 START = (-50.0, -50.0, -20.0)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.virtual_rig.hand import DIRECTIONS, ERASER, LIFT, STROKE, TASKS, TIMES, draw_hand
+from tacdata.virtual_rig.world.hand import DIRECTIONS, ERASER, LIFT, STROKE, TASKS, TIMES, draw_hand
 
 MOMENTS = np.arange(TIMES[2], TIMES[5], 0.02)
 

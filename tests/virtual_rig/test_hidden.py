@@ -9,8 +9,8 @@ from tacdata.errors import UsageError
 from tacdata.indenters.sphere import Sphere
 from tacdata.rig import Registration
 from tacdata.sensor import default_sensor
-from tacdata.virtual_rig.hidden import TIP_PATH, HiddenWorld, hidden_from
-from tacdata.virtual_rig.world import World, draw
+from tacdata.virtual_rig.world.hidden import TIP_PATH, HiddenWorld, hidden_from
+from tacdata.virtual_rig.world.world import World, draw
 
 NOMINAL = Registration((0.0, 0.0, 0.0), 0.0)
 SENSOR = default_sensor()

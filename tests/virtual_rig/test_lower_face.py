@@ -4,8 +4,8 @@ import numpy as np
 
 from tacdata.indenters import from_document
 from tacdata.virtual_rig import mount
-from tacdata.virtual_rig.lower_face import FAR, LowerFace
-from tacdata.virtual_rig.mounting import Mounted
+from tacdata.virtual_rig.world.lower_face import FAR, LowerFace
+from tacdata.virtual_rig.world.mounting import Mounted
 
 BALL = {"shape": "sphere", "radius": 2.0}
 PIN = {"shape": "cylinder", "radius": 1.0, "length": 6.0, "edge_radius": 0.2}

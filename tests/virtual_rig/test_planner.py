@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tacdata.virtual_rig.planner import Block, Planner, axis_limit
+from tacdata.virtual_rig.firmware.planner import Block, Planner, axis_limit
 
 S = 1_000_000_000
 

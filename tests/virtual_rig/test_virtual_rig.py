@@ -13,10 +13,10 @@ from tacdata.indenters import from_document
 from tacdata.rig import read_rig
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig import mount
-from tacdata.virtual_rig.lower_face import LowerFace
-from tacdata.virtual_rig.mounting import Mounted
+from tacdata.virtual_rig.optics.scene import CUBE, INTRINSICS, draw_scene
 from tacdata.virtual_rig.rig import NOMINAL, VirtualRig, board_format, running
-from tacdata.virtual_rig.scene import CUBE, INTRINSICS, draw_scene
+from tacdata.virtual_rig.world.lower_face import LowerFace
+from tacdata.virtual_rig.world.mounting import Mounted
 
 SPHERE = {"shape": "sphere", "radius": 4.0}
 

@@ -8,7 +8,7 @@ import pytest
 from tacdata.indenters import from_document
 from tacdata.rig import Registration
 from tacdata.sensor import default_sensor
-from tacdata.virtual_rig.world import World, draw
+from tacdata.virtual_rig.world.world import World, draw
 
 SENSOR = default_sensor()
 NOMINAL = Registration((-96.0, -61.5, -38.0), 1.2)

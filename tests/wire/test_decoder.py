@@ -8,8 +8,8 @@ import pytest
 
 from tacdata.errors import FormatError
 from tacdata.wire import Decoder, Encoder, default_format
-from tacdata.wire.checksum import checksum
-from tacdata.wire.frame_format import from_document
+from tacdata.wire.frames.checksum import checksum
+from tacdata.wire.frames.frame_format import from_document
 
 # One frame of cap24 by hand: sync, counter 258, channels 1000..1023 little endian, CRC of what follows sync.
 GOLDEN_BODY = bytes.fromhex(

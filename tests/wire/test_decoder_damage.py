@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tacdata.wire import Decoder, Encoder
-from tacdata.wire.checksum import checksum
-from tacdata.wire.frame_format import from_document
-from tacdata.wire.packets import packed, unpacked
+from tacdata.wire.frames.checksum import checksum
+from tacdata.wire.frames.frame_format import from_document
+from tacdata.wire.frames.packets import packed, unpacked
 
 MS = 1_000_000
 BASE = {"version": "1.1", "name": "t", "counter": "uint32", "channels": {"count": 24, "type": "uint16"}, "rate": 100}

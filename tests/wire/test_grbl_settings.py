@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tacdata.errors import DeviceError
-from tacdata.wire.grbl_settings import GrblSettings
+from tacdata.wire.grbl.settings import GrblSettings
 
 TRAVEL = {"$20": "1", "$22": "1", "$23": "0", "$130": "200.000", "$131": "150.000", "$132": "60.000", "$1": "255"}
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tacdata.clock import Clock
-from tacdata.wire import grbl_statuses
-from tacdata.wire.grbl_lines import parse_status
-from tacdata.wire.grbl_statuses import REPORT_LAG_NS, Statuses
+from tacdata.wire.grbl import statuses as grbl_statuses
+from tacdata.wire.grbl.lines import parse_status
+from tacdata.wire.grbl.statuses import REPORT_LAG_NS, Statuses
 
 MACHINE = parse_status("<Run|MPos:1,2,3|FS:60,0>")
 WORK = parse_status("<Run|WPos:1,2,3|FS:60,0>")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tacdata.wire.grbl_codes import ALARMS, ERRORS, alarm_in_words, error_in_words
-from tacdata.wire.grbl_lines import ALARM, MESSAGE, RESPONSE, SETTING, WELCOME, parse_status
+from tacdata.wire.grbl.codes import ALARMS, ERRORS, alarm_in_words, error_in_words
+from tacdata.wire.grbl.lines import ALARM, MESSAGE, RESPONSE, SETTING, WELCOME, parse_status
 
 
 def test_every_code_has_words():

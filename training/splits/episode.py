@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.sensor import Sensor
-from training.frames import EpisodeSpan
+from training.frames.frames import EpisodeSpan
 from training.splits.split import TEST_SHARE, share
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.sensor import Sensor
-from training.frames import EpisodeSpan
+from training.frames.frames import EpisodeSpan
 from training.splits.split import TEST_SHARE, share
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from tacdata import registry
 from tacdata.errors import UsageError
-from training.frames import Frames
+from training.frames.frames import Frames
 
 ROOM, BASE = "training.splits", "split"
 TEST_SHARE = 0.15

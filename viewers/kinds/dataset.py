@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import UsageError
-from viewers.asked import Asked
 from viewers.kinds.kind import Kind
-from viewers.scene import Scene
+from viewers.scene.request import Asked
+from viewers.scene.scene import Scene
 
 MARK = Path("meta/info.json")
 
@@ -25,10 +25,10 @@ class Dataset(Kind):
 
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one episode, the first if none is named."""
-        from tacdata.dataset import features
-        from viewers.dataset_scene import dataset_scene
-        from viewers.recording_scene import prediction_for
-        from viewers.single_episode import read_single
+        from tacdata.dataset.format import features
+        from viewers.scenes.dataset import dataset_scene
+        from viewers.scenes.recording import prediction_for
+        from viewers.scenes.single_episode import read_single
 
         if asked.labels is not None:
             raise UsageError("--labels with a dataset", "a dataset holds its labels", "leave it out")
@@ -46,9 +46,9 @@ class Dataset(Kind):
 
 def _predicted(path: Path, predictions: Path) -> int:
     """Return the first episode of which there is a prediction; else the first of all."""
-    from tacdata.dataset import features
-    from viewers.prediction_files import first_predicted, prediction_paths
-    from viewers.single_episode import read_single
+    from tacdata.dataset.format import features
+    from viewers.parts.prediction_files import first_predicted, prediction_paths
+    from viewers.scenes.single_episode import read_single
 
     for file in prediction_paths(predictions):  # named by the episode of the dataset that was predicted
         number = int(file.stem.rsplit("-", 1)[-1])

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tacdata.errors import TacdataError
-from viewers.asked import Asked
 from viewers.kinds.kind import Kind, refuse
-from viewers.scene import Scene
+from viewers.scene.request import Asked
+from viewers.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from tacdata.demonstrations.demo_reader import DemoRecording
+    from tacdata.demonstrations.recording.reader import DemoRecording
 
 HEAD = 1 << 20
 """Bytes at a recording's beginning in which its attachments are looked for."""
@@ -24,8 +24,8 @@ class Demonstration(Kind):
 
     def claims(self, path: Path) -> bool:
         """A folder of demonstrations, a tracks file, or a recording with a demo rig."""
-        from tacdata.demonstrations.demo_session import FILE
-        from tacdata.demonstrations.tracks_file import ENDING
+        from tacdata.demonstrations.paths.tracks_file import ENDING
+        from tacdata.demonstrations.recording.session import FILE
 
         if path.is_dir():
             return (path / FILE).is_file()
@@ -36,9 +36,9 @@ class Demonstration(Kind):
 
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one demonstration, the first of a folder if none is named."""
-        from tacdata.demonstrations.tracks_file import ENDING, path_of, read_tracks
-        from viewers.hand_scene import demonstration_scene
-        from viewers.recorded_images import recorded_images
+        from tacdata.demonstrations.paths.tracks_file import ENDING, path_of, read_tracks
+        from viewers.parts.recorded_images import recorded_images
+        from viewers.scenes.hand import demonstration_scene
 
         refuse(asked, "a demonstration", *(("episode",) if path.is_dir() else ()))
         recording = _recording(path, asked.episode)
@@ -51,7 +51,7 @@ class Demonstration(Kind):
 
 
 def _recording(path: Path, episode: int | None) -> Path:
-    from tacdata.demonstrations.tracks_file import ENDING
+    from tacdata.demonstrations.paths.tracks_file import ENDING
     from viewers.kinds.session import episode_of
 
     if path.is_dir():
@@ -61,7 +61,7 @@ def _recording(path: Path, episode: int | None) -> Path:
 
 def _read(recording: Path, tracked: bool) -> tuple[DemoRecording | None, tuple[str, ...]]:
     """Return the recording; where the tracks alone can be shown, why they are alone."""
-    from tacdata.demonstrations.demo_reader import read_demo
+    from tacdata.demonstrations.recording.reader import read_demo
 
     if not tracked:
         return read_demo(recording), ()

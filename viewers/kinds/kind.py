@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 
 from tacdata import registry
 from tacdata.errors import UsageError
-from viewers.asked import Asked
-from viewers.scene import Scene
+from viewers.scene.request import Asked
+from viewers.scene.scene import Scene
 
 ROOM, BASE = "viewers.kinds", "kind"
 

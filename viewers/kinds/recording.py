@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewers.asked import Asked
 from viewers.kinds.kind import Kind, refuse
-from viewers.scene import Scene
+from viewers.scene.request import Asked
+from viewers.scene.scene import Scene
 
 
 class Recording(Kind):
@@ -20,7 +20,7 @@ class Recording(Kind):
 
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return the press; of a file that is still being written what has reached the disk."""
-        from viewers.recording_scene import recording_scene
+        from viewers.scenes.recording import recording_scene
 
         refuse(asked, "one recording", "labels", "predictions")
         return recording_scene(path, asked)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from tacdata.errors import UsageError
-from viewers.asked import Asked
 from viewers.kinds.kind import Kind, refuse
-from viewers.scene import Scene
+from viewers.scene.request import Asked
+from viewers.scene.scene import Scene
 
 MARKS = {
     "lerobot": "meta/tacdata_targets.json",
@@ -33,7 +33,7 @@ class Targets(Kind):
         """Return the targets of one demonstration, the first if none is named."""
         from tacdata.exporters.exporter import exporter
         from tacdata.exporters.joints import read_joints
-        from viewers.hand_scene import targets_scene
+        from viewers.scenes.hand import targets_scene
 
         refuse(asked, "targets", "episode")
         name, number = _format(path) or "", asked.episode or 0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewers.asked import Asked
 from viewers.kinds.kind import Kind, refuse
-from viewers.scene import Scene
+from viewers.scene.request import Asked
+from viewers.scene.scene import Scene
 
 FILE, RESIDUALS = "verdict.json", "residuals.parquet"
 
@@ -23,9 +23,9 @@ class Verdict(Kind):
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return it in words and bars, with the readings beside the model before and after."""
         from tacdata import documents
-        from tacdata.discrepancy.residuals import read
-        from viewers.residual_curves import residual_curves
-        from viewers.verdict_scene import verdict_scene
+        from tacdata.discrepancy.verdict.residual_table import read
+        from viewers.parts.residual_curves import residual_curves
+        from viewers.scenes.verdict import verdict_scene
 
         refuse(asked, "a verdict")
         file = path if path.is_file() else path / FILE

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import torch
 
-from tacdata.skin.case import read_case, solve_case
+from tacdata.cases.case import read_case, solve_case
 
 
 def main(case: Path, out: Path) -> None:

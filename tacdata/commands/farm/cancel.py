@@ -17,7 +17,7 @@ def run(
     token: service.Token = "",
 ) -> None:
     """Take a submission back; labels that are finished stay."""
-    from label_farm.service.client import Client
+    from label_farm.remote.client import Client
 
     client = Client(url, token)
     entry = client.post(f"{client.submission(number)}/cancel")

@@ -23,8 +23,8 @@ def run(
     """Bring the labels that are finished into SESSION/labels; run again, it brings what is new."""
     from time import sleep
 
-    from label_farm.service.client import Client
-    from label_farm.service.fetch import Fetch
+    from label_farm.remote.client import Client
+    from label_farm.remote.fetch import Fetch
     from tacdata.errors import SolveError
 
     client = Client(url, token)

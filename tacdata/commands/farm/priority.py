@@ -18,7 +18,7 @@ def run(
     token: service.Token = "",
 ) -> None:
     """Change a submission's priority; its waiting presses move at once."""
-    from label_farm.service.client import Client
+    from label_farm.remote.client import Client
 
     client = Client(url, token)
     client.post(f"{client.submission(number)}/priority", {"priority": priority})

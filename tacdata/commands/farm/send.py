@@ -23,8 +23,8 @@ def run(
     """Send a session's recordings to the service; run again, it goes on. Not needed where it sees the same disk."""
     from shlex import quote
 
-    from label_farm.service.client import Client
-    from label_farm.service.send import send
+    from label_farm.remote.client import Client
+    from label_farm.remote.send import send
 
     name = to or session.resolve().name
     sent = send(Client(url, token), session, name)

@@ -20,7 +20,7 @@ def run(
     """Say what was submitted, how far it is, who works, and why presses failed."""
     from time import sleep
 
-    from label_farm.service.client import Client
+    from label_farm.remote.client import Client
     from tacdata.errors import SolveError, UsageError
 
     client = Client(url, token)

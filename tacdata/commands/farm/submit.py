@@ -30,7 +30,7 @@ def run(
     unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
 ) -> None:
     """Ask for the labels of a session and walk away; `tacdata farm status` says how far they are."""
-    from label_farm.service.client import Client
+    from label_farm.remote.client import Client
 
     wish = {
         "session": session, "by": by or f"{getpass.getuser()}@{socket.gethostname()}", "priority": priority,

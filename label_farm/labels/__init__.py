@@ -1,0 +1,1 @@
+"""Labels of a session: requested, made, current or stale."""

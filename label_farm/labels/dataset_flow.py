@@ -1,0 +1,135 @@
+"""Finished labels flow into a LeRobot dataset, one whole episode at a time, while others are still computed."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from label_farm.labels.label_index import stamp
+from tacdata.dataset import frames, label_states
+from tacdata.dataset.format import folder, metadata
+from tacdata.dataset.pack import append_episode
+from tacdata.dataset.writer import DatasetWriter
+from tacdata.errors import UsageError
+from tacdata.labels import read_label, table
+from tacdata.recording.files.reader import read_episode
+from tacdata.sensor import Sensor
+
+SAY_SECONDS = 2.0
+"""How often at most the dataset's list of what is not in it is written anew."""
+
+
+class DatasetFlow:
+    """One session's way into a dataset. Several sessions may flow into one, of several processes: each append locks."""
+
+    def __init__(
+        self, out: Path, session: Path, recordings: Sequence[Path], sensor: Sensor | None = None,
+        labels: Path | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare; the dataset is made by the first episode.
+
+        Args:
+            out: Folder of the dataset.
+            session: Folder of the recordings, by which the dataset names it.
+            recordings: Files of its recordings.
+            sensor: The skin that labels are of, if not each recording's own.
+            labels: Folder of the labels; None for ``session/labels``.
+
+        Raises:
+            UsageError: If ``out`` is something else than a dataset.
+        """
+        if out.exists() and not ((out / folder.INFO).exists() or (out / metadata.MAIN).exists()):
+            raise UsageError(f"{out} is no dataset of tacdata", "a dataset, or a new folder", "name another folder")
+        self._out, self._sensor, self._labels = out, sensor, labels or session / "labels"
+        self._recordings = {int(path.stem[-6:]): path for path in recordings}
+        self._state = label_states.SessionLabels(session.name, tuple(path.name for path in recordings))
+        self._writer: DatasetWriter | None = None
+        self._stamp, self._said = "", 0.0
+        self._models: dict[str, str] = {}
+
+    def deliver(self, number: int, reason: str) -> None:
+        """Take an episode in whose label lies there, or note why it has none.
+
+        Raises:
+            UsageError: If the dataset holds labels of another model version.
+            FormatError: If the dataset is damaged or has other columns.
+        """
+        path = self._recordings[number]
+        if not reason:
+            with self._locked():
+                reason = self._append(path)
+        if reason:
+            self._state.failed[path.name] = reason.splitlines()[0]
+        else:
+            self._state.failed.pop(path.name, None)
+            self._state.packed.add(path.name)
+        if time.monotonic() - self._said > SAY_SECONDS:
+            self.say()
+
+    def say(self) -> None:
+        """Write down which episodes of the session are not in the dataset."""
+        if not self._out.exists():
+            return
+        with self._locked():
+            label_states.update(self._out, self._state, self._models)
+        self._said = time.monotonic()
+
+    def _append(self, path: Path) -> str:
+        """Append an episode; return why it cannot be packed, or ""."""
+        label_path = self._labels / f"{path.stem}.parquet"
+        header = table.read_header(label_path)["provenance"]["parents"]
+        writer = self._current_writer(header["sensor"])
+        self._models[header["sensor"]] = header["model"]
+        if writer is not None and header["recording"] in writer.recordings:
+            return ""
+        episode, label = read_episode(path), read_label(label_path)
+        recording, skin = frames.recording_hash(episode), self._sensor or episode.sensor
+        if header["recording"] != recording:
+            return "the recording changed after it was labelled: label it again"
+        frames.check_pair(
+            episode, label, {"recording": recording, "sensor": skin.content_hash, "model": header["model"]}
+        )
+        if writer is None:
+            writer = DatasetWriter.create(self._out, skin)
+        elif writer.sensor != skin:
+            writer = DatasetWriter.open(self._out, skin)
+        self._refuse_other_model(writer, skin, header["model"])
+        reason = append_episode(writer, episode, label, recording)
+        self._writer, self._stamp = writer, stamp(self._out / folder.INFO)
+        return reason
+
+    def _current_writer(self, sensor: str) -> DatasetWriter | None:
+        """Return the writer of the dataset as it stands; another process may have appended meanwhile."""
+        now = stamp(self._out / folder.INFO)
+        if self._writer is not None and now == self._stamp and self._writer.sensor.content_hash == sensor:
+            return self._writer
+        if not self._out.exists():
+            return None
+        main = metadata.read_main(self._out)
+        known = Sensor.from_document(next(iter((main or {"sensors": {"": None}})["sensors"].values())), "dataset")
+        return DatasetWriter.open(self._out, known)
+
+    def _refuse_other_model(self, writer: DatasetWriter, skin: Sensor, model: str) -> None:
+        if writer is self._writer:
+            return
+        held = label_states.models_in(self._out).get(skin.content_hash, model)
+        if held != model:
+            raise UsageError(
+                f"{self._out} holds labels of model {held[:12]}… of this sensor",
+                f"labels of one model version in a dataset; these are of {model[:12]}…",
+                "let them flow into a new dataset; `tacdata farm dataset` says what is stale in the old one",
+            )
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        self._out.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(self._out.parent / f".{self._out.name}.lock", os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(handle)

@@ -1,0 +1,153 @@
+"""From a request and the solution of its path to the episode's label."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from label_farm.labels.request import LabelRequest, Planned
+from label_farm.presses.interpolate import Branch
+from tacdata import provenance
+from tacdata.errors import SolveError
+from tacdata.labels import Label, PathSolution, columns
+from tacdata.sensor import Sensor
+from tacdata.transduction import Loads, Transducer
+
+ERROR = (
+    "of each pixel: root sum of squares of (interpolation between states + offset from the solved configuration) and "
+    "of the mesh's estimate; error is its root mean square over the pixels"
+)
+TAXEL = ("taxel_force", "taxel_closure", "taxel_area")
+"""What a label says of each protrusion."""
+ALWAYS = ("signed", "error_map", "force", "force_error", "interpolation_error")
+"""What it says of map and force."""
+UNCERTAIN = ("uncertainty", "force_uncertainty", "taxel_force_uncertainty", "taxel_closure_uncertainty")
+"""Standard deviations that a label takes over from its path, where the path has them."""
+
+
+def make_label(request: LabelRequest, solution: PathSolution | None) -> Label:
+    """Return the label of an episode: each frame takes its map from the prescribed configuration at its time.
+
+    Frames up to the deepest point follow the loading branch, later ones the unloading branch; frames whose
+    nominal pose does not touch have a zero map. Readings are those that the sensor file's transduction makes of the
+    frame's loads. `Label.error_map` joins what is lost by interpolating and by
+    sharing one path among nearly equal presses, a bound, with the error that the mesh leaves, an estimate: as the root
+    of the sum of their squares, since neither knows of the other. The solver's tolerances are not in it.
+
+    Args:
+        request: The frames.
+        solution: The solved path of ``request.job``; None if that is None.
+
+    Raises:
+        SolveError: If there is a job and no solution.
+    """
+    if request.job is not None and solution is None:
+        raise SolveError(f"episode {request.episode} has no solution", "a solved path", "run `tacdata label` again")
+    values = _along_path(request, solution) if solution else _untouched(request)
+    error_map = values["error_map"]
+    readings, remarks = _readings(request.sensor, values)
+    values |= readings
+    return Label(
+        episode=request.episode,
+        time_ns=np.asarray(request.time_ns, dtype=np.int64),
+        tip=request.tip,
+        error=np.sqrt((error_map**2).mean(axis=(1, 2))).astype(np.float32),
+        provenance=_provenance(request, solution, remarks),
+        **{name: values[name].astype(columns.DTYPES[name]) for name in values},
+    )
+
+
+def _untouched(request: LabelRequest) -> dict[str, np.ndarray]:
+    """Return zeros; a frame that touches after all is in doubt by its whole depth.
+
+    Without contact nothing that has a spread acts; that of height is not followed into contact.
+    """
+    zeros = _zeros(request, UNCERTAIN if request.sensor.uncertainty else ())
+    doubt = np.maximum(request.tip[:, 2], 0.0)
+    return zeros | {"error_map": np.broadcast_to(doubt[:, None, None], zeros["signed"].shape)}
+
+
+def _zeros(request: LabelRequest, uncertain: Sequence[str]) -> dict[str, np.ndarray]:
+    frames, shape, taxels = len(request.time_ns), request.sensor.map.shape, request.sensor.taxels.count
+    wanted = [*ALWAYS, *TAXEL, *uncertain]
+    return {name: np.zeros(columns.shape(name, frames, shape, taxels)) for name in wanted}
+
+
+def _along_path(request: LabelRequest, solution: PathSolution) -> dict[str, np.ndarray]:
+    """Return each frame's values from the neighbouring states of its branch."""
+    known = [name for name in UNCERTAIN if getattr(solution, name) is not None]
+    values = _zeros(request, known)
+    for loading in (True, False):
+        chosen = ((request.time_ns <= request.deepest_ns) == loading) & (request.tip[:, 2] > 0)
+        if not chosen.any():
+            continue
+        depth, shape = request.tip[chosen, 2], (-1, *request.sensor.map.shape)
+        surface, force = Branch.of(solution, "surface", loading), Branch.of(solution, "force", loading)
+        mesh, mesh_force = (Branch.of(solution, name, loading).at(depth) for name in ("numerical", "force_error"))
+        signed = values["signed"][chosen] = surface.at(depth).reshape(shape)
+        bound = surface.bound(depth).reshape(shape) + _offset(request, signed, chosen)
+        values["error_map"][chosen] = np.hypot(bound, mesh.reshape(shape))
+        values["force"][chosen] = force.at(depth)
+        lost = np.linalg.norm(force.bound(depth), axis=1)
+        values["force_error"][chosen] = np.hypot(lost, mesh_force[:, 0])
+        values["interpolation_error"][chosen] = surface.left_out_beside(depth)
+        for name in (*TAXEL, *known):
+            found = Branch.of(solution, name, loading).at(depth)
+            values[name][chosen] = found.reshape(-1, *values[name].shape[1:])
+    return values
+
+
+def _readings(sensor: Sensor, values: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Return what the taxels read, and in words what saturates; nothing if the sensor says nothing of it."""
+    if sensor.transduction is None:
+        return {}, ()
+    readings = Transducer.of(sensor).read(Loads(*(values[name] for name in TAXEL)))
+    return {"taxel_capacitance": readings.capacitance, "taxel_counts": readings.counts}, readings.remarks
+
+
+_SOURCES = ("presses/interpolate.py", "labels/make_label.py", "labels/request.py")
+"""Files of the farm that decide what a label makes of a solution; who computes it where does not."""
+
+
+@cache
+def source_hash() -> str:
+    """Return the hash of the code that turns recordings and solutions into labels (hex, 64 characters)."""
+    here = Path(__file__).parents[1]
+    return provenance.content_hash([provenance.file_hash(here / name) for name in _SOURCES])
+
+
+def parents(request: LabelRequest | Planned) -> dict[str, str]:
+    """Return what a label of this request is made from, by name and hash; equal parents, equal label."""
+    made_from = {
+        "recording": request.recording,
+        "sensor": request.sensor.content_hash,
+        "model": request.model,
+        "label_farm": source_hash(),
+    }
+    if request.sensor.transduction is not None:
+        made_from["transduction"] = request.sensor.transduction.content_hash
+    return made_from if request.job is None else {**made_from, "solution": request.job.key}
+
+
+def _offset(request: LabelRequest, signed: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Change of the map [mm] if it is moved from the solved place to the frame's own."""
+    if request.job is None:
+        return np.zeros_like(signed)
+    moved = request.tip[chosen, :2] - np.array([request.job.x, request.job.y])
+    along_x, along_y = np.gradient(signed, request.sensor.map.pixel_pitch, axis=(1, 2))
+    return np.abs(along_x * moved[:, 0, None, None] + along_y * moved[:, 1, None, None])
+
+
+def _provenance(request: LabelRequest, solution: PathSolution | None, remarks: tuple[str, ...]) -> dict:
+    transduction = request.sensor.transduction
+    parameters = {
+        "error": ERROR,
+        "job": request.job.document if request.job else None,
+        "solver": solution.provenance if solution else None,
+        "transduction": transduction.document if transduction else None,
+        "readings": list(remarks),
+    }
+    return provenance.stamp("tacdata label", parents(request), parameters)

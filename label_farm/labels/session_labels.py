@@ -1,0 +1,122 @@
+"""The labels of one session: which are current, which must not be touched, and why some are missing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from label_farm.labels.make_label import make_label, parents
+from label_farm.labels.request import LabelRequest, Planned
+from label_farm.presses.job import Job
+from label_farm.store.failure import Failure
+from label_farm.store.store import STALE_SECONDS
+from tacdata import documents
+from tacdata.errors import FormatError, UsageError
+from tacdata.labels import Label, PathSolution, read_label, table, write_label
+
+
+class SessionLabels:
+    """The folder ``SESSION/labels``: one label file an episode, or the reason why there is none."""
+
+    def __init__(self, folder: Path) -> None:
+        """Name the folder; it is made when the first file is written."""
+        self.folder = folder
+        self._parents: dict[int, dict[str, str] | None] = {}
+
+    def sweep(self) -> None:
+        """Remove what killed writers left; a young file may belong to a living one."""
+        for path in self.folder.glob(".episode-*"):
+            with suppress(FileNotFoundError):
+                if time.time() - path.stat().st_mtime > STALE_SECONDS:
+                    path.unlink()
+
+    def path(self, episode: int) -> Path:
+        """Return where an episode's label lies, or would lie."""
+        return self.folder / f"episode-{episode:06d}.parquet"
+
+    def failure_path(self, episode: int) -> Path:
+        """Return where the reason lies if an episode has no label."""
+        return self.folder / f"episode-{episode:06d}.failure.json"
+
+    def numbers(self, ending: str) -> list[int]:
+        """Return the episodes that have a file of an ending, ``.parquet`` or ``.failure.json``."""
+        return sorted(
+            int(path.name[8:14]) for path in self.folder.glob(f"episode-[0-9][0-9][0-9][0-9][0-9][0-9]{ending}")
+        )
+
+    def failures(self, most: int) -> dict[str, str]:
+        """Return the reasons of up to ``most`` episodes that have no label, by episode number."""
+        found = {}
+        for path in sorted(self.folder.glob("episode-*.failure.json"))[:most]:
+            with suppress(FormatError):
+                found[str(int(path.name[8:14]))] = Failure.read(path).reason
+        return found
+
+    def parents(self, episode: int) -> dict[str, str] | None:
+        """Return what the present label was made from; None if there is no readable label."""
+        if episode not in self._parents:
+            found = self._read_parents(self.path(episode))
+            # None is not kept: most episodes of a large session have no label yet.
+            if found is None:
+                return None
+            self._parents[episode] = found
+        return self._parents[episode]
+
+    def forget(self, episode: int) -> None:
+        """Keep no longer in memory what a label was made from."""
+        self._parents.pop(episode, None)
+
+    def _read_parents(self, path: Path) -> dict[str, str] | None:
+        try:
+            return dict(read_label(path).provenance["parents"]) if path.exists() else None
+        except table.VersionError as error:
+            # Not damaged: it must not be replaced unasked.
+            return {"model": error.given.rpartition(": ")[2]}
+        except FormatError:
+            return None
+
+    def refuse_other_models(self, requests: Sequence[Planned]) -> None:
+        """Refuse to mix model versions within the folder.
+
+        Raises:
+            UsageError: If a label there is of another model version than the request's.
+        """
+        others = []
+        for request in requests:
+            found = self.parents(request.episode)
+            if found is not None and found.get("model") != request.model:
+                others.append((request, str(found.get("model"))))
+        if others:
+            request, model = others[0]
+            raise UsageError(
+                f"{self.folder} is a label store from another model version: {len(others)} of "
+                f"{len(requests)} labels, first {self.path(request.episode).name}, are of {_short(model)}",
+                f"labels of the current model {request.model[:12]}… (sensor, law, mesh, settings, code)",
+                "give --redo to replace them, or use the tacdata release and sensor file that made them",
+            )
+
+    def current(self, request: LabelRequest | Planned) -> bool:
+        """Return whether the label lies there, made from exactly what this request would be made from."""
+        return self.parents(request.episode) == parents(request)
+
+    def write(self, request: LabelRequest, solution: PathSolution | None) -> Label:
+        """Make and write a label, and forget an earlier failure; return the label."""
+        label = make_label(request, solution)
+        write_label(self.path(request.episode), label)
+        self._parents.pop(request.episode, None)
+        self.failure_path(request.episode).unlink(missing_ok=True)
+        return label
+
+    def write_failure(self, episode: int, failure: Failure, job: Job | None) -> None:
+        """Write why an episode has no label; an older label, no longer current, becomes ``.superseded``."""
+        documents.write(self.failure_path(episode), failure.document(job), "label_failure")
+        if self.path(episode).exists():
+            self.path(episode).replace(self.path(episode).with_suffix(".superseded"))
+        self._parents.pop(episode, None)
+
+
+def _short(model: str) -> str:
+    """Return the start of a hash; words as they are."""
+    return model if " " in model else f"{model[:12]}…"

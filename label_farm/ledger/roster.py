@@ -1,0 +1,77 @@
+"""Who works: workers of a ledger, what they have done, and whether they are still there."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from label_farm.ledger.ledger import Ledger, boot_name, is_dead
+
+
+@dataclass(frozen=True)
+class WorkerRow:
+    """One worker as the ledger knows it."""
+
+    owner: str
+    """Host and process."""
+    device: str
+    """What it solves on, such as "cpu" or "cuda:0"."""
+    done: int
+    """Presses solved."""
+    failed: int
+    """Presses given up."""
+    busy: float
+    """Time spent on them [s]."""
+    up: float
+    """Time since it began [s]."""
+    silent: float
+    """Time since its last sign of life [s]."""
+    holds: int
+    """Presses that it works on."""
+    note: str
+    """Why it does not work, in words, or ""."""
+
+
+class Roster:
+    """Workers of one ledger."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        """Look at a ledger."""
+        self._ledger = ledger
+
+    def enter(self, owner: str, device: str) -> None:
+        """Note that a worker begins."""
+        now = time.monotonic()
+        self._ledger.rows(
+            "INSERT OR REPLACE INTO worker (owner, device, began, seen, boot) VALUES (?, ?, ?, ?, ?)",
+            (owner, device, now, now, boot_name()),
+        )
+
+    def count(self, owner: str, done: int, failed: int, busy: float) -> None:
+        """Count what a worker did whose jobs another process claims for it; ``busy`` in s."""
+        self._ledger.rows(
+            "UPDATE worker SET done = done + ?, failed = failed + ?, busy = busy + ?, seen = ? WHERE owner = ?",
+            (done, failed, busy, time.monotonic(), owner),
+        )
+
+    def note(self, owner: str, text: str) -> None:
+        """Say why a worker does not work."""
+        self._ledger.rows("UPDATE worker SET note = ? WHERE owner = ?", (text, owner))
+
+    def leave(self, owner: str) -> None:
+        """Strike a worker off."""
+        self._ledger.rows("DELETE FROM worker WHERE owner = ?", (owner,))
+
+    def listing(self, forget: float = 600.0) -> list[WorkerRow]:
+        """Return the workers; strike off the dead, those of before a restart and the long silent [s]."""
+        now, boot, found = time.monotonic(), boot_name(), []
+        rows = self._ledger.rows(
+            "SELECT owner, device, done, failed, busy, began, seen, coalesce(note, ''), boot,"
+            " (SELECT count(*) FROM job WHERE state = 1 AND job.owner = worker.owner) FROM worker ORDER BY owner"
+        )
+        for owner, device, done, failed, busy, began, seen, note, its_boot, holds in rows:
+            if its_boot != boot or now - seen > forget or is_dead(owner):
+                self.leave(owner)
+            else:
+                found.append(WorkerRow(owner, device, done, failed, busy, now - began, now - seen, holds, note))
+        return found

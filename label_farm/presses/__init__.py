@@ -1,0 +1,1 @@
+"""Presses to solve, as jobs, and the model that solves them."""

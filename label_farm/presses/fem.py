@@ -1,0 +1,153 @@
+"""The FEM skin as the farm's model."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from label_farm import environment
+from label_farm.presses.job import Job
+from label_farm.presses.tolerance import Tolerance
+from tacdata import provenance
+from tacdata.errors import SolveError
+from tacdata.indenters import from_document
+from tacdata.labels import PathSolution
+from tacdata.sensor import Sensor
+
+if TYPE_CHECKING:
+    from tacdata.skin.press import PressRequest
+    from tacdata.skin.validity.coarse_press import CoarsePress
+
+_ROUNDS = 2
+"""How often a path is solved at most until its states are near enough to each other; the coarser mesh said before where
+they are needed."""
+
+_AGAIN = 1.5
+"""By which factor a state must miss the tolerance for its path to be solved again [1]: what it misses is what its
+neighbours would say without it, several times what they leave out with it."""
+
+_AT_A_TIME = {"cpu": 4, "cuda": 256}
+"""How many presses a device solves at a time [1] (benchmarks/skin_throughput.py): a CPU reads its factor once for 4."""
+
+_SOURCES = ("fem.py", "interpolate.py", "tolerance.py")
+"""Files of the farm that decide which states a path gets."""
+
+
+class FemModel:
+    """One skin model, kept by a worker for all jobs of its sensor."""
+
+    def __init__(self, sensor: Sensor) -> None:
+        """Mesh the skin, or take its mesh from the cache; costs seconds.
+
+        Raises:
+            SolveError: If the sensor cannot be modelled.
+            UsageError: If its file states spreads of what the model does not know.
+        """
+        from tacdata.indenters.sphere import Sphere
+        from tacdata.skin.derivatives.path_uncertainty import check_spreads
+        from tacdata.skin.model import SkinModel
+
+        check_spreads(sensor, Sphere(1.0))
+        device = os.environ.get(environment.DEVICE, "cpu")
+        self._model = SkinModel(sensor, device=device)
+        self.batch = _AT_A_TIME[device.split(":")[0]]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """In words, what a user should know of this skin."""
+        return self._model.remarks
+
+    @property
+    def content_hash(self) -> str:
+        """Hash of everything in the model that decides a result, the spreads that its uncertainty comes from too."""
+        here = Path(__file__).parent
+        sources = [provenance.file_hash(here / name) for name in _SOURCES]
+        return provenance.content_hash([self._model.content_hash, self._model.sensor.uncertainty, sources])
+
+    def solve(self, job: Job) -> PathSolution:
+        """Solve one path, with states added where the job's tolerance asks for them.
+
+        Raises:
+            SolveError: If the press is impossible or an equilibrium is not found.
+        """
+        [(_, outcome)] = self.solve_many([job])
+        if isinstance(outcome, SolveError):
+            raise outcome
+        return outcome
+
+    def solve_many(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
+        """Solve paths together; each is yielded as soon as its states are near enough to each other.
+
+        The coarser mesh, which is asked for the error in any case, says first where states are needed: a path that is
+        solved again is solved whole, since friction remembers it.
+        """
+        requests = [_request(job) for job in jobs]
+        coarse = self._model.solve_coarsely(requests, self._together(requests))
+        requests = [_foreseen(*each) for each in zip(jobs, requests, coarse, strict=True)]
+        open_ones = list(range(len(jobs)))
+        for round_ in range(_ROUNDS):
+            again = []
+            asked = [requests[k] for k in open_ones]
+            known = [coarse[k] for k in open_ones]
+            for index, solution in self._model.solve_many(asked, self._together(asked), known):
+                number = open_ones[index]
+                job, request = jobs[number], requests[number]
+                if isinstance(solution, SolveError):
+                    yield job, solution
+                    continue
+                if job.tolerance is None or round_ == _ROUNDS - 1 or not _far_apart(job.tolerance, solution):
+                    yield job, self._finished(job, request, solution)
+                else:
+                    depths = job.tolerance.refined(solution.depth, solution.surface)
+                    requests[number] = replace(request, depths=depths)
+                    again.append(number)
+            open_ones = again
+            if not again:
+                return
+
+    def _together(self, requests: Sequence[PressRequest]) -> int:
+        return max(1, min(len(requests), self.batch))
+
+    def _finished(self, job: Job, request: PressRequest, solution: PathSolution) -> PathSolution | SolveError:
+        from tacdata.skin.derivatives.path_uncertainty import with_uncertainty
+
+        try:
+            # Spreads are smooth in depth: the states that were asked for are enough.
+            return with_uncertainty(self._model, _request(job), _with_ladder(job, request, solution))
+        except SolveError as error:
+            return error
+
+
+def _far_apart(tolerance: Tolerance, solution: PathSolution) -> bool:
+    return tolerance.exceeded(solution.depth, solution.surface) > _AGAIN
+
+
+def _foreseen(job: Job, request: PressRequest, coarse: CoarsePress | None) -> PressRequest:
+    """Return a request with the states that the coarser mesh asks for."""
+    if job.tolerance is None or coarse is None:
+        return request
+    return replace(request, depths=job.tolerance.foretold(request.depths, coarse.figures.depth, coarse.figures.surface))
+
+
+def _request(job: Job) -> PressRequest:
+    from tacdata.skin.press import PressRequest
+
+    indenter = from_document(job.indenter, f"job {job.key[:12]}")
+    return PressRequest(
+        indenter=indenter, x=job.x, y=job.y, yaw=job.yaw, depths=job.depths, tilt_x=job.tilt_x, tilt_y=job.tilt_y
+    )
+
+
+def _with_ladder(job: Job, request: PressRequest, solution: PathSolution) -> PathSolution:
+    """Say in the solution's provenance how its states were chosen."""
+    if job.tolerance is None:
+        return solution
+    ladder = {
+        "asked": len(job.depths),
+        "states": len(request.depths),
+        "left_out_over_tolerance": round(job.tolerance.exceeded(solution.depth, solution.surface), 3),
+    }
+    return replace(solution, provenance={**solution.provenance, "ladder": ladder})

@@ -1,0 +1,61 @@
+"""The depths at which a press is solved: fine where contact begins, then in steps of at most a limit.
+
+The model adds states where these turn out too few (`Tolerance`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from label_farm.presses.tolerance import Tolerance
+from tacdata.errors import UsageError
+
+FINEST = 0.001
+"""Least step that may be asked for [mm]: far below what any mesh resolves, and a path has few enough states."""
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """How a path's states are spaced. Steps grow geometrically from the first contact up to the limit."""
+
+    first_step: float = 0.05
+    """Step next to zero depth [mm]: contact grows fastest there, so the map bends most."""
+    growth: float = 1.6
+    """Ratio of one step to the step before [1]."""
+    load_step: float = 0.25
+    """Largest step while loading [mm]."""
+    unload_step: float = 0.25
+    """Largest step while unloading [mm]."""
+    tolerance: Tolerance | None = field(default_factory=Tolerance)
+    """Where states are to be added; None for nowhere."""
+
+    def __post_init__(self) -> None:
+        """Refuse settings that make no ladder.
+
+        Raises:
+            UsageError: If a step is below `FINEST` or the steps would shrink.
+        """
+        steps = (self.first_step, self.load_step, self.unload_step)
+        if not (min(steps) >= FINEST and np.isfinite(steps).all() and 1 <= self.growth < np.inf):
+            raise UsageError(
+                f"depth steps {steps} mm growing by {self.growth}",
+                f"steps of {FINEST:g} mm or more and a growth of at least 1",
+                "correct the steps",
+            )
+
+    def depths(self, deepest: float) -> tuple[float, ...]:
+        """Return the states of a path from 0 down to ``deepest`` [mm] and back to 0."""
+        load = self._rungs(deepest, self.load_step)
+        unload = self._rungs(deepest, self.unload_step)
+        return (0.0, *load, *unload[-2::-1], 0.0)
+
+    def _rungs(self, deepest: float, limit: float) -> list[float]:
+        steps, step = [], min(self.first_step, limit)
+        while sum(steps) < deepest * (1 - 1e-12):
+            steps.append(step)
+            step = min(step * self.growth, limit)
+        # Shrinking all steps alike meets the deepest point exactly and keeps every step within its limit.
+        rungs = np.cumsum(steps) * (deepest / sum(steps))
+        return [*(round(float(rung), 6) for rung in rungs[:-1]), round(deepest, 6)]

@@ -1,0 +1,145 @@
+"""The skin model as the farm sees it: something built once per process from a sensor, which solves jobs."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import tacdata.errors
+from label_farm import environment
+from label_farm.presses.job import Job
+from tacdata.errors import SolveError, TacdataError, UsageError
+from tacdata.labels import PathSolution
+from tacdata.sensor import Sensor
+
+FACTORY = "label_farm.presses.fem:FemModel"
+"""Dotted path of what builds the model from a sensor."""
+
+
+_TRIES = 3
+"""How often a process that is killed is started again."""
+
+
+class ProcessDied(SolveError):
+    """The process that was to build a model was killed: by whom or for what memory ever, not by the sensor's fault."""
+
+
+class Model(Protocol):
+    """What a factory builds. The farm knows of a solver only this: a stand-in is one class with these names.
+
+    A model may also have ``batch``, how many jobs it likes at a time (1 without it), and ``solve_many(jobs)``, which
+    yields each job with its solution or its SolveError as they are found, whatever became of the others.
+    """
+
+    @property
+    def content_hash(self) -> str:
+        """Hash of everything in the model that decides a result."""
+        ...
+
+    def solve(self, job: Job) -> PathSolution:
+        """Solve one job; raises SolveError with the reason if it fails."""
+        ...
+
+
+def build(factory: str, sensor: Sensor) -> Model:
+    """Build a model in this process; costs seconds.
+
+    Raises:
+        UsageError: If ``factory`` names nothing ("package.module:name").
+        SolveError: If the sensor cannot be modelled.
+    """
+    module, _, name = factory.partition(":")
+    try:
+        return getattr(importlib.import_module(module), name)(sensor)
+    except (ImportError, AttributeError) as error:
+        raise UsageError(f"no model {factory!r}: {error}", "package.module:name", "check the name") from error
+
+
+def batch_size(model: Model) -> int:
+    """Return how many jobs a model likes to be given at a time."""
+    return max(1, int(getattr(model, "batch", 1)))
+
+
+def solve_each(model: Model, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
+    """Yield each job with its solution or with why it has none: one bad press does not stop the others.
+
+    Errors of other kinds end it: what the process holds is not trusted any more.
+    """
+    if len(jobs) > 1 and hasattr(model, "solve_many"):
+        yield from model.solve_many(jobs)  # pyright: ignore[reportAttributeAccessIssue]
+        return
+    for job in jobs:
+        try:
+            yield job, model.solve(job)
+        except SolveError as error:
+            yield job, error
+
+
+@dataclass(frozen=True)
+class Version:
+    """What is known of a model before anything is solved."""
+
+    content_hash: str
+    """Hash of everything in the model that decides a result."""
+    remarks: tuple[str, ...] = ()
+    """In words, what a user should know of it, such as strains at which its material law is unstable."""
+
+
+def version(factory: str, sensor: Sensor) -> Version:
+    """Return the model's version, found by a process of its own.
+
+    The caller stays free of the solver's libraries, and the mesh is cached before the workers ask for it.
+
+    Raises:
+        SolveError: If the sensor cannot be modelled.
+    """
+    asked = json.dumps({"factory": factory, "sensor": sensor.document})
+    for _ in range(_TRIES):
+        finished = subprocess.run(
+            environment.python("label_farm.presses.model"),
+            env=environment.variables(),
+            input=asked,
+            capture_output=True,
+            text=True,
+        )
+        if finished.returncode >= 0:
+            break
+    try:
+        answer = json.loads(finished.stdout)
+    except ValueError:
+        kind = ProcessDied if finished.returncode < 0 else SolveError
+        raise kind(
+            f"the skin model of {sensor.name} cannot be built{_how(finished.returncode)}:\n{finished.stderr[-2000:]}",
+            "a model that can be built on this machine",
+            "see the last lines above",
+        ) from None
+    if "error" in answer:
+        raise getattr(tacdata.errors, answer["kind"], SolveError)(*answer["error"])
+    return Version(answer["version"], tuple(answer["remarks"]))
+
+
+def _how(code: int) -> str:
+    return f", its process was ended by signal {-code} {_TRIES} times" if code < 0 else ""
+
+
+def main() -> None:
+    """Answer one question of `version` on standard input and output."""
+    answer_to = os.dup(1)
+    os.dup2(2, 1)  # what libraries print while they load must not mix with the answer
+    asked = json.load(sys.stdin)
+    try:
+        model = build(asked["factory"], Sensor.from_document(asked["sensor"], "sensor"))
+        answer = {"version": model.content_hash, "remarks": list(getattr(model, "remarks", ()))}
+    except TacdataError as error:
+        answer = {"kind": type(error).__name__, "error": [error.given, error.allowed, error.remedy]}
+    os.write(answer_to, json.dumps(answer).encode())
+
+
+if __name__ == "__main__":
+    main()

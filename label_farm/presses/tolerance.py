@@ -1,0 +1,115 @@
+"""What may be lost between the states of a path, and where states are added so that no more is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from label_farm.presses.interpolate import Branch
+from tacdata.errors import UsageError
+
+_SHARPEST = 1.2
+"""Power of the spacing with which a left-out state's error falls at the least [1]: where the edge of the contact
+passes a pixel, its depth has a kink. Elsewhere it is 2 to 3."""
+
+_DENTED = 0.1
+"""Share of the nominal depth from which a pixel counts as dented [1]."""
+
+_MOST_PARTS = 4
+"""Into how many steps one is split at most."""
+
+_LEAST_STEP = 0.02
+"""Step that is not split [mm]."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far a state may lie from what its neighbours say of it, as root mean square over the dented pixels.
+
+    Not at the worst pixel: where the contact's edge passes, a map goes on by whole elements, and no number of states
+    makes that smooth (a sphere of 3 mm radius, 1 mm deep: 8 to 15 states take the root mean square from 2.3 to 1.9 um,
+    the largest from 10 to 11; tests/label_farm/test_interpolated_press.py). That is the mesh's error, which
+    `tacdata.skin.validity.mesh_error` estimates.
+    """
+
+    share: float = 0.01
+    """Of the depth [1]."""
+    least: float = 0.005
+    """What is allowed at any depth [mm]."""
+
+    def __post_init__(self) -> None:
+        """Refuse tolerances that nothing can meet.
+
+        Raises:
+            UsageError: If one is negative or no number.
+        """
+        if not (0 <= self.share < np.inf and 0 < self.least < np.inf):
+            raise UsageError(
+                f"a tolerance of {self.share:g} of the depth, at least {self.least:g} mm",
+                "a share of 0 or more and a positive least [mm]",
+                "correct the tolerance",
+            )
+
+    def at(self, depth: np.ndarray) -> np.ndarray:
+        """Return what is allowed at depths [mm], as [mm]."""
+        return np.maximum(self.least, self.share * depth)
+
+    def refined(self, depth: np.ndarray, surface: np.ndarray) -> tuple[float, ...]:
+        """Return the path with states added on both sides of each that its neighbours do not foretell.
+
+        Args:
+            depth: Depths of the states [mm], shape (k,): rising to the deepest, then falling.
+            surface: Maps of these states [mm], shape (k, pixels_x, pixels_y).
+        """
+        peak = int(np.argmax(depth))
+        load = self._split(depth[: peak + 1], surface[: peak + 1])
+        unload = self._split(depth[peak:][::-1], surface[peak:][::-1])
+        return (*load, *unload[-2::-1])
+
+    def foretold(self, path: tuple[float, ...], depth: np.ndarray, surface: np.ndarray) -> tuple[float, ...]:
+        """Return a path with states added, down and up, where a rougher model's loading asks for them.
+
+        Args:
+            path: Depths of the states [mm]: rising from 0 to the deepest, then falling.
+            depth: Depths that the rougher model reached while loading [mm], shape (k,), some of those of ``path``.
+            surface: Its maps [mm], shape (k, pixels_x, pixels_y).
+        """
+        some = depth > 0
+        if not some.any():
+            return path
+        depth = np.concatenate([[0.0], depth[some]])
+        surface = np.concatenate([np.zeros_like(surface[:1]), surface[some]])
+        split = set(self._split(depth, surface)) - set(depth.tolist())
+        result = list(path[:1])
+        for before, after in pairwise(path):
+            low, high = min(before, after) + _LEAST_STEP, max(before, after) - _LEAST_STEP
+            result += [*sorted((d for d in split if low <= d <= high), reverse=after < before), after]
+        return tuple(result)
+
+    def exceeded(self, depth: np.ndarray, surface: np.ndarray) -> float:
+        """Return by which factor the worst state of a path misses the tolerance [1]; at most 1 where all keep it."""
+        peak = int(np.argmax(depth))
+        load = self._missed(depth[: peak + 1], surface[: peak + 1])
+        unload = self._missed(depth[peak:][::-1], surface[peak:][::-1])
+        return float(max(load.max(), unload.max()))
+
+    def _missed(self, depth: np.ndarray, surface: np.ndarray) -> np.ndarray:
+        """Return the error of each state of a branch if left out, over what is allowed there [1], shape (k,)."""
+        flat = surface.reshape(len(depth), -1)
+        square = Branch(depth, flat).left_out() ** 2
+        dented = flat > _DENTED * np.maximum(depth, depth[1])[:, None]
+        # A shape between the pixels dents none: then all count.
+        dented |= ~dented.any(axis=1, keepdims=True)
+        return np.sqrt((square * dented).sum(axis=1) / dented.sum(axis=1)) / self.at(depth)
+
+    def _split(self, depth: np.ndarray, surface: np.ndarray) -> list[float]:
+        missed = self._missed(depth, surface)
+        worst = np.maximum(missed[:-1], missed[1:])
+        parts = np.clip(np.ceil(worst ** (1 / _SHARPEST)), 1, _MOST_PARTS).astype(int)
+        parts = np.minimum(parts, np.maximum(1, np.floor(np.diff(depth) / _LEAST_STEP + 1e-9)).astype(int))
+        found = [float(depth[0])]
+        for low, high, count in zip(depth[:-1], depth[1:], parts, strict=True):
+            found += [round(float(low + (high - low) * k / count), 6) for k in range(1, count)] + [float(high)]
+        return found

@@ -1,0 +1,1 @@
+"""What other computers run to submit, fetch and solve."""

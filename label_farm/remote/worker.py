@@ -1,0 +1,67 @@
+"""A worker process for a service elsewhere: ``python -m label_farm.remote.worker``, as `crew.py` starts it.
+
+It reads one line of JSON from standard input and ends when that closes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+import time
+
+from label_farm.ledger.ledger import owner_name
+from label_farm.remote.client import Client
+from label_farm.remote.desk import RemoteDesk
+from label_farm.workers.worker import BROKEN, Worker, beat, work
+from tacdata.errors import DeviceError, TacdataError
+
+AGAIN_SECONDS = 2.0
+
+
+def main() -> int:
+    """Work until standard input closes; return the exit code."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    asked = json.loads(sys.stdin.readline())
+    client = Client(asked["url"], asked["token"])
+
+    def desk() -> RemoteDesk:
+        return RemoteDesk(client, owner_name(), asked["device"])
+
+    mine = desk()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    seconds = _enter(mine)
+    threading.Thread(target=beat, args=(desk, seconds), daemon=True).start()
+    worker = Worker(mine, asked["factory"], strict=False)
+    while True:
+        try:
+            return work(worker)
+        except DeviceError as error:  # the line is cut: what was in work is claimed again by someone
+            print(error, file=sys.stderr)
+            time.sleep(AGAIN_SECONDS)
+            _enter(mine)
+        except TacdataError as error:
+            print(error, file=sys.stderr)
+            return BROKEN
+
+
+def _enter(desk: RemoteDesk) -> float:
+    while True:
+        try:
+            return desk.enter()
+        except DeviceError as error:
+            print(error, file=sys.stderr)
+            time.sleep(AGAIN_SECONDS)
+
+
+def _end_with_parent() -> None:
+    sys.stdin.read()
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    code = main()
+    sys.stderr.flush()
+    os._exit(code)

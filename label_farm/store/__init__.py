@@ -1,0 +1,1 @@
+"""Solved paths, filed by content."""

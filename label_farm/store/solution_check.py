@@ -1,0 +1,58 @@
+"""What a solution must be before it may enter the store."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from label_farm.presses.job import Job
+from label_farm.store import solution_file
+from tacdata.errors import SolveError
+from tacdata.labels import PathSolution
+from tacdata.sensor import Sensor
+
+
+def check_solution(job: Job, solution: PathSolution, sensor: Sensor) -> None:
+    """Refuse what must not become a label.
+
+    Raises:
+        SolveError: If a value is not finite, a shape is not the sensor's, or the path is not the job's.
+    """
+    states = len(solution.depth)
+    shapes = {
+        "depth": (states,),
+        "surface": (states, *sensor.map.shape),
+        "numerical": (states, *sensor.map.shape),
+        "taxel_force": (states, sensor.taxels.count),
+        "taxel_force_error": (states, sensor.taxels.count),
+        "taxel_closure": (states, sensor.taxels.count),
+        "taxel_area": (states, sensor.taxels.count),
+        "force": (states, 3),
+        "force_error": (states,),
+        "residual": (states,),
+        "penetration": (states,),
+        "uncertainty": (states, *sensor.map.shape),
+        "force_uncertainty": (states, 3),
+        "taxel_force_uncertainty": (states, sensor.taxels.count),
+        "taxel_closure_uncertainty": (states, sensor.taxels.count),
+    }
+    for name, shape in shapes.items():
+        if name in solution_file.OPTIONAL and getattr(solution, name) is None:
+            continue
+        values = np.asarray(getattr(solution, name))
+        if values.shape != shape or not np.isfinite(values).all():
+            raise SolveError(
+                f"the solver returned {name} of shape {values.shape}, {int(np.isfinite(values).sum())} of "
+                f"{values.size} values finite",
+                f"finite values of shape {shape}",
+                "report this press: it is kept as a failure, never as a label",
+            )
+    steps = np.diff(solution.depth)
+    peak = int(np.argmax(solution.depth)) if states else 0
+    single = states >= 3 and bool((steps[:peak] > 0).all() and (steps[peak:] < 0).all())
+    ends = single and solution.depth[0] == 0 and solution.depth[-1] == 0
+    if not ends or abs(solution.depth.max() - job.deepest) > 1e-6:
+        raise SolveError(
+            f"the solver returned the depths {np.round(solution.depth, 3).tolist()} mm",
+            f"a path from 0 to {job.deepest:g} mm and back to 0",
+            "report this press: it is kept as a failure, never as a label",
+        )

@@ -1,0 +1,129 @@
+"""A path solution as bytes: an npz file with a header (`schemas/path_solution.schema.json`) and checksums."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+import zlib
+from typing import Any
+
+import numpy as np
+
+import schemas
+from label_farm.presses.job import Job
+from tacdata import documents
+from tacdata.errors import FormatError
+from tacdata.labels import PathSolution
+
+HEADER = "header.json"
+UNITS = {
+    "depth": "mm",
+    "surface": "mm",
+    "numerical": "mm",
+    "taxel_force": "N",
+    "taxel_force_error": "N",
+    "taxel_closure": "mm",
+    "taxel_area": "mm^2",
+    "force": "N",
+    "force_error": "N",
+    "residual": "1",
+    "penetration": "mm",
+}
+OPTIONAL = {
+    "uncertainty": "mm",
+    "force_uncertainty": "N",
+    "taxel_force_uncertainty": "N",
+    "taxel_closure_uncertainty": "mm",
+}
+"""Units of arrays that are there where the sensor file states spreads."""
+REMEDY = "remove it and run `tacdata label` again: results can always be made anew"
+EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+class VersionError(FormatError):
+    """A result was written by a release with another major version of the format; it is not damaged."""
+
+
+def encode(job: Job, solution: PathSolution) -> bytes:
+    """Return the file's bytes; the same arrays give the same members whenever they are written."""
+    members, arrays = {}, {}
+    for name, unit in {**UNITS, **OPTIONAL}.items():
+        if name in OPTIONAL and getattr(solution, name) is None:
+            continue
+        values = np.ascontiguousarray(getattr(solution, name), dtype=np.float64)
+        stream = io.BytesIO()
+        np.save(stream, values, allow_pickle=False)
+        members[f"{name}.npy"] = stream.getvalue()
+        digest = hashlib.sha256(stream.getvalue()).hexdigest()
+        arrays[name] = {"unit": unit, "dtype": "float64", "shape": list(values.shape), "sha256": digest}
+    header = {
+        "version": schemas.version("path_solution"),
+        "key": job.key,
+        "job": job.document,
+        "arrays": arrays,
+        "provenance": solution.provenance,
+    }
+    documents.check(header, "path_solution", f"result {job.key[:12]}")
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        text = json.dumps(header, indent=1, allow_nan=False).encode()
+        for name, content in {HEADER: text, **members}.items():
+            # Not compressed: the digits of maps hardly shrink, and trying cost more than all else that is done here.
+            archive.writestr(zipfile.ZipInfo(name, EPOCH), content)
+    return stream.getvalue()
+
+
+def decode(data: bytes, origin: str) -> tuple[Job, PathSolution]:
+    """Read a file's bytes back, checking every array against its checksum.
+
+    Raises:
+        FormatError: If the file is damaged, or of another format version.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            header = json.loads(archive.read(HEADER))
+            _check_version(header, origin)
+            documents.check(header, "path_solution", origin)
+            names = [*UNITS, *(name for name in OPTIONAL if name in header["arrays"])]
+            arrays = {name: _array(archive, name, header["arrays"][name], origin) for name in names}
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        KeyError,
+        TypeError,
+        ValueError,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,
+    ) as error:
+        raise FormatError(f"{origin} is damaged: {error}", "a result of the label store", REMEDY) from None
+    job = Job.from_document(header["job"], origin)
+    if job.key != header["key"]:
+        raise FormatError(f"{origin}: its job has the key {job.key[:12]}…", f"{header['key'][:12]}…", REMEDY)
+    return job, PathSolution(**arrays, provenance={**header["provenance"], "key": job.key})
+
+
+def _check_version(header: Any, origin: str) -> None:
+    found, known = str(header["version"]), schemas.version("path_solution")
+    if found.split(".")[0] != known.split(".")[0]:
+        raise VersionError(
+            f"{origin}: result of format version {found}",
+            f"version {known}",
+            "use the tacdata release that wrote it, or name a new folder with --store",
+        )
+
+
+def _array(archive: zipfile.ZipFile, name: str, entry: dict[str, Any], origin: str) -> np.ndarray:
+    content = archive.read(f"{name}.npy")
+    if hashlib.sha256(content).hexdigest() != entry["sha256"]:
+        raise FormatError(f"{origin}: {name} does not match its checksum", "an undamaged result", REMEDY)
+    values = np.load(io.BytesIO(content), allow_pickle=False)
+    if list(values.shape) != entry["shape"] or str(values.dtype) != entry["dtype"]:
+        raise FormatError(
+            f"{origin}: {name} is {values.dtype} {values.shape}",
+            f"{entry['dtype']} {tuple(entry['shape'])}",
+            REMEDY,
+        )
+    return values

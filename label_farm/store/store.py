@@ -1,0 +1,161 @@
+"""Content-addressed results: a job's key names its file, and a job whose intact file exists is done."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import schemas
+from label_farm.presses.job import Job
+from label_farm.store import solution_file
+from label_farm.store.failure import Failure
+from label_farm.store.solution_check import check_solution
+from tacdata import documents
+from tacdata.errors import FormatError, UsageError
+from tacdata.labels import PathSolution
+from tacdata.replacement import replacement
+from tacdata.sensor import Sensor
+
+MARK = "store.json"
+KIND = "tacdata label store"
+WRITING = "writing"
+STALE_SECONDS = 3600.0
+
+
+class Store:
+    """A folder of results. Any number of processes may read and write it at once."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open a store, or make one where the folder is missing or empty.
+
+        Raises:
+            UsageError: If the folder holds something else.
+            FormatError: If it is a store of another format version.
+        """
+        self.folder = folder
+        mark = folder / MARK
+        if not mark.exists():
+            if folder.exists() and (not folder.is_dir() or {p.name for p in folder.iterdir()} - {WRITING}):
+                raise UsageError(
+                    f"{folder} is no label store (no {MARK})",
+                    "a label store, an empty folder or a new one",
+                    "name another folder with --store",
+                )
+            self._create(mark)
+        documents.read(mark, "label_store")
+        self._sweep()
+
+    def _create(self, mark: Path) -> None:
+        try:
+            (self.folder / WRITING).mkdir(parents=True, exist_ok=True)
+            documents.write(mark, {"version": schemas.version("label_store"), "kind": KIND}, "label_store")
+        except OSError as error:
+            raise UsageError(
+                f"cannot make a label store in {self.folder}: {error.strerror}",
+                "a folder that can be written",
+                "name another folder with --store",
+            ) from None
+
+    @property
+    def ledger_path(self) -> Path:
+        """Where the queue of this store lies."""
+        return self.folder / "ledger.sqlite"
+
+    def path(self, key: str) -> Path:
+        """Return where the result of a key lies, or would lie."""
+        return self.folder / key[:2] / f"{key}.npz"
+
+    def failure_path(self, key: str) -> Path:
+        """Return where the failure of a key lies, or would lie."""
+        return self.folder / key[:2] / f"{key}.failure.json"
+
+    def intact(self, job: Job) -> bool:
+        """Return whether the result exists and is whole; a damaged one is put aside, to be made again.
+
+        Raises:
+            FormatError: If it was written by another major format version.
+        """
+        return self.get(job) is not None
+
+    def get(self, job: Job) -> PathSolution | None:
+        """Return a job's solution, or None if there is none; a damaged one is put aside as ``KEY.damaged``.
+
+        Raises:
+            FormatError: If it was written by another major format version.
+        """
+        path = self.path(job.key)
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        try:
+            found, solution = solution_file.decode(data, str(path))
+            if found.key == job.key:
+                return solution
+        except solution_file.VersionError:
+            raise
+        except FormatError:
+            pass
+        path.replace(path.with_suffix(".damaged"))
+        return None
+
+    def put(self, job: Job, solution: PathSolution, sensor: Sensor) -> None:
+        """Store a solution and forget an earlier failure.
+
+        Raises:
+            SolveError: If it is not finite, not the path asked for, or of other shapes than the sensor's.
+        """
+        check_solution(job, solution, sensor)
+        self._write(self.path(job.key), solution_file.encode(job, solution))
+        self.failure_path(job.key).unlink(missing_ok=True)
+
+    def put_failure(self, job: Job, failure: Failure) -> None:
+        """Store why a job failed."""
+        document = failure.document(job)
+        documents.check(document, "label_failure", f"failure of {job.key[:12]}")
+        self._write(self.failure_path(job.key), (json.dumps(document, indent=1) + "\n").encode())
+
+    def keys(self) -> set[str]:
+        """Return the keys of all results that lie here, whole or not; a million take seconds."""
+        found: set[str] = set()
+        for entry in os.scandir(self.folder):
+            if len(entry.name) == 2 and entry.is_dir():
+                found.update(e.name[:-4] for e in os.scandir(entry.path) if e.name.endswith(".npz"))
+        return found
+
+    def failure(self, key: str) -> Failure | None:
+        """Return why a job failed, or None; an unreadable reason counts as none: the job is tried again."""
+        path = self.failure_path(key)
+        if not path.exists():
+            return None
+        try:
+            return Failure.read(path)
+        except FormatError:
+            return None
+
+    def forget_failure(self, key: str) -> None:
+        """Remove a failure, so that the job is tried again."""
+        self.failure_path(key).unlink(missing_ok=True)
+
+    def _write(self, path: Path, data: bytes) -> None:
+        beside = self.folder / WRITING
+        # Not settled: what a loss of power takes is solved again, and waiting for it was a third of a job's overhead.
+        try:
+            with replacement(path, beside, settled=False) as stream:
+                stream.write(data)
+        except FileNotFoundError:
+            # Another's sweep took it for old: a clock that jumps ages a file by hours.
+            beside.mkdir(exist_ok=True)
+            with replacement(path, beside, settled=False) as stream:
+                stream.write(data)
+
+    def _sweep(self) -> None:
+        """Remove what killed writers left; a young file may belong to a living one."""
+        for path in (self.folder / WRITING).glob("*"):
+            try:
+                if time.time() - path.stat().st_mtime > STALE_SECONDS:
+                    path.unlink()
+            except FileNotFoundError:
+                continue

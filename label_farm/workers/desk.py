@@ -1,0 +1,143 @@
+"""Where a worker gets its jobs and leaves what came of them: the store and the ledger of this machine, or a service."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from label_farm.ledger.ledger import Lease, Ledger
+from label_farm.ledger.roster import Roster
+from label_farm.presses.job import Job
+from label_farm.store.failure import Failure
+from label_farm.store.store import Store
+from tacdata.errors import UsageError
+from tacdata.labels import PathSolution
+from tacdata.sensor import Sensor
+
+
+class Desk(Protocol):
+    """What a worker needs of whoever gives it jobs."""
+
+    def offers(self) -> list[str]:
+        """Return the model versions that there is work for, the most urgent first."""
+        ...
+
+    def sensor(self, version: str) -> Sensor:
+        """Return the sensor that a model is of."""
+        ...
+
+    def claim(self, version: str, count: int) -> list[Lease]:
+        """Take up to ``count`` jobs that share model and indenter."""
+        ...
+
+    def has(self, job: Job) -> bool:
+        """Return whether a job's result lies there already, whole."""
+        ...
+
+    def put(self, job: Job, solution: PathSolution) -> None:
+        """Leave a result; raises SolveError if it must not become a label."""
+        ...
+
+    def finish(self, job: Job, seconds: float) -> None:
+        """Say that a job's result lies there."""
+        ...
+
+    def fail(self, job: Job, failure: Failure, seconds: float = 0.0) -> None:
+        """Say why a job has no result."""
+        ...
+
+    def beat(self) -> None:
+        """Give a sign of life, by which claims stay valid."""
+        ...
+
+    def note(self, text: str) -> None:
+        """Say in words why this worker does not work."""
+        ...
+
+    def leave(self) -> None:
+        """Give back what was claimed, without blame, and go."""
+        ...
+
+
+class LocalDesk:
+    """The store's folder on this machine."""
+
+    def __init__(
+        self, store: Path, owner: str, lease_seconds: float, versions: list[str] | None = None, device: str = "cpu"
+    ) -> None:
+        """Open store and ledger.
+
+        Args:
+            store: Folder of the store.
+            owner: Under which name jobs are claimed.
+            lease_seconds: For how long a claim holds without a sign of life [s].
+            versions: Model versions to work for; None for all that are offered.
+            device: What the worker solves on, for the roster.
+        """
+        self.store, self.owner, self._versions = Store(store), owner, versions
+        self.ledger = Ledger(self.store.ledger_path, lease_seconds)
+        self._sensors: dict[str, Sensor] = {}
+        self._roster = Roster(self.ledger)
+        self._device = device
+
+    def enter(self) -> None:
+        """Put the worker on the roster."""
+        self._roster.enter(self.owner, self._device)
+
+    def offers(self) -> list[str]:
+        """Return the model versions that there is work for, the most urgent first."""
+        if self._versions is not None:
+            return [version for version in self._versions if self.ledger.has_work(version)]
+        return self.ledger.offered()
+
+    def sensor(self, version: str) -> Sensor:
+        """Return the sensor that a model is of.
+
+        Raises:
+            UsageError: If nobody registered the model.
+        """
+        if version not in self._sensors:
+            document = self.ledger.sensor(version)
+            if document is None:
+                raise UsageError(f"model {version[:12]}… is not registered", "a registered model", "submit again")
+            self._sensors[version] = Sensor.from_document(document, "sensor")
+        return self._sensors[version]
+
+    def claim(self, version: str, count: int) -> list[Lease]:
+        """Take up to ``count`` jobs that share model and indenter."""
+        return self.ledger.claim(self.owner, version, count)
+
+    def has(self, job: Job) -> bool:
+        """Return whether a job's result lies there already, whole."""
+        return self.store.intact(job)
+
+    def put(self, job: Job, solution: PathSolution) -> None:
+        """Leave a result.
+
+        Raises:
+            SolveError: If it must not become a label.
+        """
+        self.store.put(job, solution, self.sensor(job.model))
+
+    def finish(self, job: Job, seconds: float) -> None:
+        """Say that a job's result lies there."""
+        self.ledger.finish(job.key, self.owner, seconds)
+
+    def fail(self, job: Job, failure: Failure, seconds: float = 0.0) -> None:
+        """Say why a job has no result."""
+        self.store.put_failure(job, failure)
+        self.ledger.fail(job.key, self.owner, failure.reason, seconds)
+
+    def beat(self) -> None:
+        """Give a sign of life, by which claims stay valid."""
+        self.ledger.heartbeat(self.owner)
+
+    def note(self, text: str) -> None:
+        """Say in words why this worker does not work."""
+        self._roster.note(self.owner, text)
+
+    def leave(self) -> None:
+        """Give back what was claimed, without blame, and go."""
+        self.ledger.release(self.owner, blame=False)
+        self._roster.leave(self.owner)
+        self.ledger.close()

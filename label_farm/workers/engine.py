@@ -1,0 +1,110 @@
+"""What runs jobs: the loop that every engine shares, and what each must do itself."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from label_farm.ledger.ledger import Change, Ledger
+from label_farm.store.store import Store
+from tacdata.errors import UsageError
+from tacdata.sensor import Sensor
+
+POLL_SECONDS = 0.1
+
+
+class StoreFull(UsageError):
+    """The store's disk is full or refuses; what is finished is kept, and the jobs are back in the queue."""
+
+
+class Engine(ABC):
+    """Runs the jobs of a ledger. Another engine needs its own `tend` and `stop`, and its own name for an option."""
+
+    def __init__(self, store: Store, sensors: dict[str, Sensor] | None, lease_seconds: float) -> None:
+        """Open the ledger of a store.
+
+        Args:
+            store: Where results and the ledger lie.
+            sensors: Content hash of a model -> the sensor that it models; None to work for every model that the
+                ledger offers.
+            lease_seconds: How long a silent worker keeps its job [s].
+        """
+        self.store, self._ledger = store, Ledger(store.ledger_path, lease_seconds)
+        self._versions = None if sensors is None else list(sensors)
+        if sensors is not None:
+            self._ledger.register({version: sensor.document for version, sensor in sensors.items()})
+
+    def run(self, keys: set[str], since: int, on_change: Callable[[Change], None]) -> int:
+        """Work until every key is settled, by these workers or by those of another run on the same store.
+
+        Args:
+            keys: Keys of the jobs, already in the ledger.
+            since: The ledger's last change before the store was asked for results.
+            on_change: Called for each of the keys as it is finished or failed.
+
+        Returns:
+            Number of the last change that was told.
+
+        Raises:
+            UsageError: If the workers' code is of another version.
+            StoreFull: If the store's disk refuses.
+            SolveError: If workers cannot start or keep dying.
+            DeviceError: If the workers' cluster cannot be reached.
+        """
+        pending, settled = set(keys), False
+        self._ledger.release_dead()
+        try:
+            while pending:
+                self.tend(len(pending), settled)
+                time.sleep(POLL_SECONDS)
+                settled = False
+                for change in self._ledger.changes(since):
+                    since, settled = change.number, True
+                    if change.key in pending:
+                        pending.remove(change.key)
+                        on_change(change)
+        finally:
+            self.stop()
+        return since
+
+    @abstractmethod
+    def tend(self, wanted: int, settled: bool = False) -> None:
+        """See to it that the jobs are worked on, once; called several times a second.
+
+        Args:
+            wanted: How many jobs wait.
+            settled: Whether a job was settled since the last call.
+
+        Raises:
+            UsageError: If the workers' code is of another version (only where the models were named).
+            StoreFull: If the store's disk refuses.
+            SolveError: If workers cannot start or keep dying.
+            DeviceError: If the workers' cluster cannot be reached.
+        """
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Stop the workers and give their jobs back to the queue; may be called twice."""
+
+    def close(self) -> None:
+        """Stop and let go of the ledger."""
+        self.stop()
+        self._ledger.close()
+
+
+class EngineMaker(Protocol):
+    """What makes an engine: a class such as `pool.Pool`, or a function that knows what else it needs."""
+
+    def __call__(
+        self,
+        store: Store,
+        factory: str,
+        sensors: dict[str, Sensor] | None,
+        workers: int,
+        lease_seconds: float,
+        devices: Sequence[str],
+    ) -> Engine:
+        """Prepare; arguments as of `pool.Pool`. Nothing is started before the first `tend`."""
+        ...

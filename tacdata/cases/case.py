@@ -1,0 +1,99 @@
+"""A case: one press for the skin model alone, from a file; its results are files to hold other codes against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tacdata import documents
+from tacdata.cases.answer import CaseAnswer, answer
+from tacdata.cases.mesh import mesh_for
+from tacdata.errors import UsageError
+from tacdata.indenters import from_document
+from tacdata.sensor import Sensor, default_sensor, read_sensor
+from tacdata.skin.mesh.build import MeshSettings
+from tacdata.skin.model import ModelSettings
+from tacdata.skin.press import PressRequest
+
+
+@dataclass(frozen=True)
+class Case:
+    """A press and the skin that it is pressed into."""
+
+    name: str
+    sensor: Sensor
+    request: PressRequest
+    settings: ModelSettings
+    document: dict[str, Any]
+    """The file's document."""
+    error_estimate: bool = True
+    """Whether the numerical error is wanted as well; costs about a third more, and a coarser mesh once."""
+
+
+def read_case(path: Path) -> Case:
+    """Read a case file.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: If it is damaged or contradicts itself.
+    """
+    document = documents.read(path, "case")
+    given = document.get("sensor")
+    if given is None:
+        sensor = default_sensor()
+    elif isinstance(given, str):
+        sensor = read_sensor(path.parent / given)
+    else:
+        sensor = Sensor.from_document(given, f"{path}: sensor", path.parent)
+    request = PressRequest(
+        from_document(document["indenter"], f"{path}: indenter", path.parent), float(document.get("x", 0.0)),
+        float(document.get("y", 0.0)), float(document.get("yaw", 0.0)), tuple(float(d) for d in document["depths"]),
+        float(document.get("tilt_x", 0.0)), float(document.get("tilt_y", 0.0)),
+    )
+    mesh = mesh_for(sensor, request)
+    if "mesh" in document:
+        given = dict(document["mesh"])
+        mesh = MeshSettings(**{**given, "focus": tuple(given["focus"]) if "focus" in given else None})
+    # The estimate is made apart from the states, so that their times are their own.
+    pointwise = document.get("volumes") == "points"
+    settings = ModelSettings(mesh=mesh, error_estimate=False, averaged_from=0.5 if pointwise else 0.0)
+    return Case(document["name"], sensor, request, settings, document, document.get("error_estimate", True))
+
+
+def solve_case(
+    case: Case, out: Path, done: Callable[[float], None] = lambda depth: None, picture: bool = False
+) -> Path:
+    """Solve a case and write ``<name>.parquet`` and ``<name>.json`` into ``out``, and ``<name>.png`` if wanted.
+
+    Args:
+        case: What to solve.
+        out: Folder for the results.
+        done: Called with each depth [mm] that is solved.
+        picture: Whether to draw the deepest state.
+
+    Returns:
+        The JSON file.
+
+    Raises:
+        UsageError: If results of that name lie there already.
+        SolveError: If the press is impossible or an equilibrium is not found.
+    """
+    report, table, drawing = (out / f"{case.name}.{ending}" for ending in ("json", "parquet", "png"))
+    for path in (report, table, *([drawing] if picture else [])):
+        if path.exists():
+            raise UsageError(
+                f"{path} exists", "a folder without it: results are never overwritten", "choose another --out"
+            )
+    found: CaseAnswer = answer(case.sensor, case.request, case.settings, case.error_estimate, done)
+    out.mkdir(parents=True, exist_ok=True)
+    found.write_table(table, case.name)
+    document = {**found.document, "case": case.document, "displacements": table.name}
+    if picture:
+        from tacdata.cases.picture import draw
+
+        draw(drawing, case.name, found)
+        document["picture"] = drawing.name
+    documents.write(report, document, "case_result")
+    return report

@@ -1,0 +1,1 @@
+"""The files and columns of a LeRobot v3.0 folder."""

@@ -1,0 +1,155 @@
+"""Where a camera stands: from a robot that carries a tag cube, or from a board that lies at the world's origin.
+
+Hand-eye: gripper_i X = Y cube_i, with the cube in the gripper X and the camera in the robot's base Y unknown
+(F. Dornaika and R. Horaud, IEEE Trans. Robotics and Automation 14 (1998) 617: robot-world, hand-eye). OpenCV's closed
+form (`cv2.calibrateRobotWorldHandEye`) begins it, least squares over all pairs, rotations and places weighted
+by what a tag pose is known to, ends it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tacdata.demonstrations.camera_world import CameraWorld
+from tacdata.demonstrations.paths.motion_filter import exponential, logarithm
+from tacdata.errors import FormatError, UsageError
+
+WEIGHTS = 0.0003, float(np.radians(0.2))
+"""Standard deviation of a tag cube's place [m] and rotation [rad] by which residuals are weighted."""
+LEAST_TURN = np.radians(15.0)
+"""The gripper must have turned by so much, about two axes, or the answer is not determined [rad]."""
+OUTLYING = 5.0
+"""A pair is left out if its residual is so many times the median one [1]."""
+
+
+def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -> CameraWorld:
+    """Return where a camera stands in a robot's base.
+
+    Args:
+        camera: Name of the camera.
+        frame: Name of the base's frame.
+        grippers: Gripper in the base, shape (n, 4, 4) [m].
+        cubes: Cube in the camera at the same moments, shape (n, 4, 4) [m].
+
+    Raises:
+        UsageError: If there are fewer than three pairs, or the gripper hardly turned.
+        FormatError: If the pairs contradict each other altogether.
+    """
+    if len(grippers) != len(cubes) or len(grippers) < 3:
+        given = f"{len(grippers)} gripper and {len(cubes)} cube poses"
+        raise UsageError(given, "as many of each, three or more", "take ten or more, turned about different axes")
+    _check_turns(grippers)
+    kept, remarks = np.ones(len(grippers), bool), []
+    for _ in range(3):
+        base, held = _refined(*_begun(grippers[kept], cubes[kept]), grippers[kept], cubes[kept])
+        off = np.linalg.norm(_residuals(base, held, grippers, cubes).reshape(-1, 6), axis=1)
+        good = off <= OUTLYING * max(float(np.median(off)), 1.0)
+        if good.sum() < 3 or np.array_equal(good, kept):
+            break
+        kept = good
+    left_out = np.flatnonzero(~kept)
+    if len(left_out):
+        remarks.append(f"pairs {', '.join(map(str, left_out))} contradict the others and were left out")
+    raw = _residuals(base, held, grippers[kept], cubes[kept]).reshape(-1, 6) * np.repeat(WEIGHTS[::-1], 3)
+    turn, place = (float(np.sqrt((raw[:, part] ** 2).sum(axis=1).mean())) for part in (slice(0, 3), slice(3, 6)))
+    if place > 0.02 or turn > 0.1:
+        raise FormatError(
+            f"hand-eye pairs that leave {1000 * place:.1f} mm and {np.degrees(turn):.1f} deg",
+            "pairs of the same moments",
+            "check the order of the pairs, the units (metres), xyzw, and that the cube sits firmly on the gripper",
+        )  # fmt: skip
+    spread = _spread(base, held, grippers[kept], cubes[kept])
+    method = "hand-eye (calibrateRobotWorldHandEye, then least squares)"
+    return CameraWorld(camera, frame, base, method, int(kept.sum()), (place, turn), spread, held, tuple(remarks))
+
+
+def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float, spread: float) -> CameraWorld:
+    """Return where a camera stands in the frame of a board, from the board's pose in one or more images.
+
+    Args:
+        camera: Name of the camera.
+        frame: Name of the board's frame.
+        poses: Board in the camera, shape (4, 4) [m], one an image; the board and the camera were at rest.
+        rms: Distance of the board's corners from where the pose puts them [m], root mean square.
+        spread: Standard uncertainty of the camera's place from one image [m].
+    """
+    from scipy.spatial.transform import Rotation
+
+    inverse = np.array([np.linalg.inv(pose) for pose in poses])
+    mean = np.eye(4)
+    rotations = Rotation.from_matrix(inverse[:, :3, :3])
+    mean[:3, :3], mean[:3, 3] = rotations.mean().as_matrix(), inverse[:, :3, 3].mean(axis=0)
+    turns = (rotations * Rotation.from_matrix(mean[:3, :3]).inv()).magnitude()
+    remarks = () if turns.max() < 0.01 else (f"the images differ by up to {np.degrees(turns.max()):.1f} deg: it moved",)
+    distance = max(float(np.linalg.norm(mean[:3, 3])), 0.1)
+    known = spread / np.sqrt(len(poses)), spread / distance / np.sqrt(len(poses))
+    residual = rms, float(np.sqrt((turns**2).mean()))
+    return CameraWorld(camera, frame, mean, "board", len(poses), residual, known, None, remarks)
+
+
+def _check_turns(grippers: np.ndarray) -> None:
+    from scipy.spatial.transform import Rotation
+
+    turns = (Rotation.from_matrix(grippers[1:, :3, :3]) * Rotation.from_matrix(grippers[0, :3, :3]).inv()).as_rotvec()
+    about = np.linalg.svd(turns, compute_uv=False)
+    if len(about) < 2 or np.abs(turns).max() < LEAST_TURN or about[1] < LEAST_TURN:
+        raise UsageError(
+            f"a gripper that turned by {np.degrees(np.linalg.norm(turns, axis=1).max()):.0f} deg, and by "
+            f"{np.degrees(about[1] if len(about) > 1 else 0):.0f} deg about a second axis",
+            f"{np.degrees(LEAST_TURN):.0f} deg or more about two axes", "take poses that are turned to all sides",
+        )  # fmt: skip
+
+
+def _begun(grippers: np.ndarray, cubes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return camera in base and cube in gripper, shapes (4, 4) [m], by OpenCV's closed form."""
+    import cv2
+
+    # OpenCV thinks of a camera on the gripper: its world is our cube, its base our gripper, its gripper our base.
+    found = cv2.calibrateRobotWorldHandEye(
+        list(cubes[:, :3, :3]), list(cubes[:, :3, 3]), list(grippers[:, :3, :3]), list(grippers[:, :3, 3])
+    )
+    cube_gripper, camera_base = np.eye(4), np.eye(4)
+    cube_gripper[:3, :3], cube_gripper[:3, 3] = found[0], np.ravel(found[1])
+    camera_base[:3, :3], camera_base[:3, 3] = found[2], np.ravel(found[3])
+    return np.linalg.inv(camera_base), np.linalg.inv(cube_gripper)
+
+
+def _refined(
+    base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    from scipy.optimize import least_squares
+
+    def moved(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _nudged(base, x[:6]), _nudged(held, x[6:])
+
+    # A single wrong pair must not pull the others: residuals beyond two deviations count linearly.
+    found = least_squares(lambda x: _residuals(*moved(x), grippers, cubes), np.zeros(12), loss="soft_l1", f_scale=2.0)
+    return moved(found.x)
+
+
+def _spread(base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.ndarray) -> tuple[float, float]:
+    """Return the standard uncertainty of the camera's place [m] and rotation [rad] from what the pairs leave."""
+    start, step = _residuals(base, held, grippers, cubes), 1e-6
+    jacobian = np.empty((len(start), 12))
+    for k in range(12):
+        x = step * np.eye(12)[k]
+        jacobian[:, k] = (_residuals(_nudged(base, x[:6]), _nudged(held, x[6:]), grippers, cubes) - start) / step
+    variance = float(start @ start) / max(len(start) - 12, 1)
+    covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
+    return float(np.sqrt(np.trace(covariance[3:6, 3:6]))), float(np.sqrt(np.trace(covariance[:3, :3])))
+
+
+def _nudged(pose: np.ndarray, x: np.ndarray) -> np.ndarray:
+    moved = pose.copy()
+    moved[:3, :3], moved[:3, 3] = exponential(x[:3]) @ pose[:3, :3], pose[:3, 3] + x[3:]
+    return moved
+
+
+def _residuals(base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.ndarray) -> np.ndarray:
+    """Return turn and shift of each pair over `WEIGHTS` [1], shape (6 n,)."""
+    rows = []
+    for left, right in zip(grippers @ held, base @ cubes, strict=True):
+        rows += [logarithm(left[:3, :3] @ right[:3, :3].T) / WEIGHTS[1], (left[:3, 3] - right[:3, 3]) / WEIGHTS[0]]
+    return np.concatenate(rows)

@@ -1,0 +1,1 @@
+"""Fingertip paths from sightings."""

@@ -1,0 +1,45 @@
+"""How freely a finger moves, chosen by the likelihood of what was seen of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from tacdata.demonstrations.paths.motion_filter import Wander, smooth
+from tacdata.demonstrations.paths.sightings import Sightings
+
+VELOCITIES = (0.0001, 0.001, 0.01, 0.1, 1.0, 10.0, 100.0)
+"""Densities of the acceleration that are tried [(m/s^2)^2 s]."""
+TURNINGS = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)
+"""Densities of the angular acceleration that are tried [(rad/s^2)^2 s]."""
+ENOUGH = 250
+"""Sightings from which the choice is made."""
+
+
+def choose(seen: Sightings) -> Wander:
+    """Return the densities, out of `VELOCITIES` and `TURNINGS`, under which the sightings are likeliest."""
+    kept = np.zeros(len(seen), bool)
+    kept[:ENOUGH] = True
+    part, nothing = seen.where(kept), np.zeros(0, np.int64)
+
+    def likelihood(velocity: float, turning: float) -> float:
+        return smooth(part, nothing, Wander(velocity, turning), back=False).log_likelihood
+
+    velocity = _climb(VELOCITIES, lambda value: likelihood(value, TURNINGS[len(TURNINGS) // 2]))
+    return Wander(velocity, _climb(TURNINGS, lambda value: likelihood(velocity, value)))
+
+
+def _climb(values: Sequence[float], worth: Callable[[float], float]) -> float:
+    """Return the value of largest worth, going uphill from the middle: the likelihood has one summit."""
+    known: dict[int, float] = {}
+
+    def at(k: int) -> float:
+        if k not in known:
+            known[k] = worth(values[k]) if 0 <= k < len(values) else -np.inf
+        return known[k]
+
+    best = len(values) // 2
+    while (better := max((best - 1, best, best + 1), key=at)) != best:
+        best = better
+    return values[best]

@@ -1,0 +1,214 @@
+"""Fixed-interval smoothing of a pose: an error-state Kalman filter forth and Rauch, Tung and Striebel's pass back.
+
+State: position p [m], rotation R, velocity v [m/s], turn rate w [rad/s, world]. Between two times p' = p + v dt,
+R' = exp(w dt) R, and v and w wander as integrated white noise (a constant-velocity model, Bar-Shalom, Li and
+Kirubarajan, Estimation with Applications to Tracking and Navigation, section 6.2). Errors are a small turn in the
+world, dp, dw, dv in this order, so that a rotation never leaves SO(3) and a sighting's covariance is used as it is.
+The backward pass is H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965) 1445, on those errors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.demonstrations.paths.sightings import Sightings
+
+GATE = 27.9
+"""Squared Mahalanobis distance in six dimensions beyond which a sighting is an outlier (chi-squared, 0.9999)."""
+FIRST_SPEED = 1.0, 10.0
+"""Standard deviation of the velocity [m/s] and turn rate [rad/s] before anything is known of them."""
+NS = 1e-9
+
+
+@dataclass(frozen=True)
+class Wander:
+    """How freely a finger moves."""
+
+    velocity: float
+    """Density of the white acceleration [(m/s^2)^2 s]."""
+    turning: float
+    """Density of the white angular acceleration [(rad/s^2)^2 s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """A pose at every time asked for, from all sightings."""
+
+    position: np.ndarray
+    """[m], shape (n, 3)."""
+    rotation: np.ndarray
+    """From the finger's frame to the world's [1], shape (n, 3, 3)."""
+    covariance: np.ndarray
+    """Of a small turn in the world [rad] and the position [m], shape (n, 6, 6)."""
+    velocity: np.ndarray
+    """[m/s], shape (n, 3)."""
+    accepted: np.ndarray
+    """Which sightings were used, shape (p,), bool; the others contradict them."""
+    distance: np.ndarray
+    """Squared Mahalanobis distance of each sighting from what was expected [1], shape (p,)."""
+    log_likelihood: float
+    """Of the sightings; an outlier counts as one at the gate's edge."""
+
+
+@dataclass(eq=False)
+class _Node:
+    """One time: as expected, and as known after its sighting."""
+
+    expected: _State
+    spread: np.ndarray
+    step: np.ndarray
+    state: _State
+    known: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    rotation: np.ndarray
+    position: np.ndarray
+    turning: np.ndarray
+    velocity: np.ndarray
+
+    def plus(self, error: np.ndarray) -> _State:
+        return _State(
+            exponential(error[:3]) @ self.rotation, self.position + error[3:6], self.turning + error[6:9],
+            self.velocity + error[9:],
+        )  # fmt: skip
+
+    def minus(self, other: _State) -> np.ndarray:
+        turn = logarithm(self.rotation @ other.rotation.T)
+        rest = self.position - other.position, self.turning - other.turning, self.velocity - other.velocity
+        return np.concatenate([turn, *rest])
+
+
+def smooth(seen: Sightings, times_ns: np.ndarray, wander: Wander, back: bool = True) -> Smoothed:
+    """Return the pose at given times.
+
+    Args:
+        seen: At least two sightings.
+        times_ns: Times [ns], shape (n,), ascending; poses outside the sightings' span are NaN.
+        wander: How freely the finger moves.
+        back: Whether to go back too; without it poses rest on the past alone.
+
+    Returns:
+        Poses, and which sightings were used.
+    """
+    first = _beginning(seen)
+    inside = (times_ns >= seen.time_ns[first]) & (times_ns <= seen.time_ns[-1])
+    moments = np.concatenate([seen.time_ns[first:], times_ns[inside]])
+    which = np.concatenate([np.arange(first, len(seen)), np.full(int(inside.sum()), -1)])
+    order = np.lexsort((which < 0, moments))
+    accepted, distance, likelihood, nodes = np.zeros(len(seen), bool), np.full(len(seen), np.nan), 0.0, []
+    state, known, now = _first(seen, first)
+    for k in order:
+        expected, spread, step = _predicted(state, known, float(moments[k] - now) * NS, wander)
+        state, known, now = expected, spread, moments[k]
+        if which[k] >= 0:
+            n = int(which[k])
+            state, known, distance[n], gained = _updated(expected, spread, seen, n)
+            accepted[n] = distance[n] < GATE
+            likelihood += gained
+        nodes.append(_Node(expected, spread, step, state, known))
+    if back:
+        _go_back(nodes)
+    poses = [node for node, k in zip(nodes, order, strict=True) if which[k] < 0]
+    return _collected(poses, inside, accepted, distance, likelihood)
+
+
+def _collected(
+    poses: list[_Node], inside: np.ndarray, accepted: np.ndarray, distance: np.ndarray, likelihood: float
+) -> Smoothed:
+    count = len(inside)
+    result = {
+        "position": np.full((count, 3), np.nan), "rotation": np.full((count, 3, 3), np.nan),
+        "covariance": np.full((count, 6, 6), np.nan), "velocity": np.full((count, 3), np.nan),
+    }  # fmt: skip
+    for row, node in zip(np.flatnonzero(inside), poses, strict=True):
+        result["position"][row], result["rotation"][row] = node.state.position, node.state.rotation
+        result["covariance"][row], result["velocity"][row] = node.known[:6, :6], node.state.velocity
+    return Smoothed(**result, accepted=accepted, distance=distance, log_likelihood=likelihood)
+
+
+def _beginning(seen: Sightings) -> int:
+    """Return the first sighting that the two after it do not contradict: a mirrored pose must not begin a path."""
+    for k in range(min(len(seen) - 2, 20)):
+        near = [
+            np.linalg.norm(logarithm(seen.rotation[k] @ seen.rotation[j].T)) < 0.5
+            and np.linalg.norm(seen.position[k] - seen.position[j]) < 0.05
+            for j in (k + 1, k + 2)
+        ]
+        if all(near):
+            return k
+    return 0
+
+
+def _first(seen: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
+    known = np.zeros((12, 12))
+    known[:6, :6] = 100 * seen.covariance[k]  # its own sighting comes next and must not count twice
+    known[6:9, 6:9], known[9:, 9:] = FIRST_SPEED[1] ** 2 * np.eye(3), FIRST_SPEED[0] ** 2 * np.eye(3)
+    return _State(seen.rotation[k], seen.position[k], np.zeros(3), np.zeros(3)), known, int(seen.time_ns[k])
+
+
+def _predicted(state: _State, known: np.ndarray, dt: float, wander: Wander) -> tuple[_State, np.ndarray, np.ndarray]:
+    turn = exponential(state.turning * dt)
+    step = np.eye(12)
+    step[:3, :3] = turn
+    step[:3, 6:9] = step[3:6, 9:] = dt * np.eye(3)
+    noise = np.zeros((12, 12))
+    for begin, density in ((0, wander.turning), (3, wander.velocity)):
+        at, rate = slice(begin, begin + 3), slice(begin + 6, begin + 9)
+        noise[at, at] = density * dt**3 / 3 * np.eye(3)
+        noise[at, rate] = noise[rate, at] = density * dt**2 / 2 * np.eye(3)
+        noise[rate, rate] = density * dt * np.eye(3)
+    expected = _State(turn @ state.rotation, state.position + state.velocity * dt, state.turning, state.velocity)
+    return expected, step @ known @ step.T + noise, step
+
+
+def _updated(expected: _State, spread: np.ndarray, seen: Sightings, n: int) -> tuple[_State, np.ndarray, float, float]:
+    """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes none."""
+    surprise = np.concatenate([
+        logarithm(seen.rotation[n] @ expected.rotation.T), seen.position[n] - expected.position
+    ])  # fmt: skip
+    total = spread[:6, :6] + seen.covariance[n]
+    inverse = np.linalg.inv(total)
+    distance = float(surprise @ inverse @ surprise)
+    gained = -0.5 * (min(distance, GATE) + np.linalg.slogdet(total)[1])
+    if distance >= GATE:
+        return expected, spread, distance, gained
+    gain = spread[:, :6] @ inverse
+    known = spread - gain @ spread[:6]
+    return expected.plus(gain @ surprise), (known + known.T) / 2, distance, gained
+
+
+def _go_back(nodes: list[_Node]) -> None:
+    for k in range(len(nodes) - 2, -1, -1):
+        here, after = nodes[k], nodes[k + 1]
+        gain = np.linalg.solve(after.spread, after.step @ here.known).T
+        moved = gain @ after.state.minus(after.expected)
+        known = here.known + gain @ (after.known - after.spread) @ gain.T
+        here.state, here.known = here.state.plus(moved), (known + known.T) / 2
+
+
+def exponential(vector: np.ndarray) -> np.ndarray:
+    """Return the rotation matrix, shape (3, 3), of a rotation vector [rad], shape (3,) (Rodrigues)."""
+    angle = float(np.sqrt(vector @ vector))
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-8:
+        return np.eye(3) + cross + cross @ cross / 2
+    return np.eye(3) + np.sin(angle) / angle * cross + (1 - np.cos(angle)) / angle**2 * cross @ cross
+
+
+def logarithm(matrix: np.ndarray) -> np.ndarray:
+    """Return the rotation vector [rad], shape (3,), of a rotation matrix, shape (3, 3)."""
+    axis = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    sine, cosine = float(np.sqrt(axis @ axis)) / 2, (float(np.trace(matrix)) - 1) / 2
+    angle = float(np.arctan2(sine, cosine))
+    if sine > 1e-4:
+        return axis * (angle / (2 * sine))
+    if cosine > 0:
+        return axis / 2
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(matrix).as_rotvec()

@@ -1,0 +1,156 @@
+"""What is wrong with a finger's sightings, in words: gaps, poses that contradict the path, fingers exchanged."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from tacdata.demonstrations.paths.motion_filter import Smoothed, logarithm
+from tacdata.demonstrations.paths.sightings import Sightings
+from tacdata.tags.cube.pose import CubePose
+from tacdata.tags.fingers import Finger
+from tacdata.tags.mixups import handedness
+
+GAP = 0.25
+"""A finger unseen for longer has a gap there [s]."""
+TURNED = np.radians(20.0)
+"""A sighting that is turned by more against the path, at its place, is a flip [rad]."""
+LEAST = 5
+"""Sightings of one tag alone from which it is judged [count]."""
+NEAR = 0.5
+"""Share of the way between two fingers that a contradicting sighting may be off the other one's path [1]."""
+STANDING = 0.2
+"""Share of the time for which fingers must stand as the other hand's before that is said [1]."""
+
+
+def gaps(time_ns: np.ndarray, begin_ns: int, end_ns: int) -> list[tuple[int, int]]:
+    """Return where a finger is not seen for longer than `GAP`: beginnings and ends [ns].
+
+    Args:
+        time_ns: Times of sightings that were used [ns], shape (p,), ascending.
+        begin_ns: Beginning of the demonstration [ns].
+        end_ns: Its end [ns].
+    """
+    edges = np.concatenate([[begin_ns], time_ns, [end_ns]])
+    return [(int(a), int(b)) for a, b in pairwise(edges) if b - a > GAP * 1e9]
+
+
+def turn_against(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> np.ndarray:
+    """Return the angle between each sighting and the path at the nearest grid time [rad], shape (p,); NaN outside."""
+    nearest, angles = _nearest(times_ns, seen.time_ns), np.full(len(seen), np.nan)
+    for k, (own, there) in enumerate(zip(seen.rotation, path.rotation[nearest], strict=True)):
+        if np.isfinite(there).all():
+            angles[k] = np.linalg.norm(logarithm(own @ there.T))
+    return angles
+
+
+def wrong_tags(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> tuple[dict[int, float], tuple[int, ...]]:
+    """Return tags that, seen alone, contradict the other tags, and by which angle [rad]: turned, or with wrong numbers.
+
+    The path may rest on the wrong tag, if that is seen most. So tags are grouped by how they are turned against the
+    path; the group of most tags is right, of two such groups the one that is seen more often. In that case nothing but
+    frequency speaks for it, and its tags are returned too; otherwise no tags are.
+    """
+    nearest = _nearest(times_ns, seen.time_ns)
+    turns: dict[int, list[np.ndarray]] = {}
+    for k, ids in enumerate(seen.ids):
+        there = path.rotation[nearest[k]]
+        if len(ids) == 1 and np.isfinite(there).all():
+            turns.setdefault(ids[0], []).append(there.T @ seen.rotation[k])
+    means = {tag: _mean(found) for tag, found in turns.items() if len(found) >= LEAST}
+    groups = [[b for b in means if _angle(means[a], means[b]) < TURNED] for a in means]
+    if not groups:
+        return {}, ()
+    right = max(groups, key=lambda group: (len(group), sum(len(turns[tag]) for tag in group)))
+    wrong = {tag: _angle(means[tag], means[right[0]]) for tag in sorted(means) if tag not in right}
+    tied = any(len(group) == len(right) for group in groups if group[0] in wrong)
+    return wrong, tuple(sorted(right)) if tied else ()
+
+
+def _nearest(times_ns: np.ndarray, wanted_ns: np.ndarray) -> np.ndarray:
+    """Return the index of the grid time nearest to each time."""
+    after = np.clip(np.searchsorted(times_ns, wanted_ns), 1, len(times_ns) - 1)
+    return after - ((wanted_ns - times_ns[after - 1]) < (times_ns[after] - wanted_ns))
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(logarithm(a @ b.T)))
+
+
+def _mean(rotations: list[np.ndarray]) -> np.ndarray:
+    """Return the rotation nearest to most of some, shape (3, 3): the one with the smallest sum of angles to others."""
+    few = rotations[:: max(len(rotations) // 30, 1)]
+    return few[int(np.argmin([sum(_angle(a, b) for b in few) for a in few]))]
+
+
+def flips(seen: Sightings, accepted: np.ndarray, angle: np.ndarray, name: str) -> list[str]:
+    """Say how many sightings were turned against the path, and by how much."""
+    turned = ~accepted & (angle > TURNED)
+    if not turned.any():
+        return []
+    low, high = np.degrees(np.nanquantile(angle[turned], [0.1, 0.9]))
+    tags = Counter(t for ids, bad in zip(seen.ids, turned, strict=True) if bad for t in ids)
+    which = ", ".join(f"tag {tag} in {count}" for tag, count in tags.most_common(3))
+    return [
+        f"{name}: {int(turned.sum())} of {len(seen)} sightings are turned by {low:.0f} to {high:.0f} deg against the "
+        f"path and were left out ({which}): a mirrored pose of a single face, or a tag glued on turned"
+    ]
+
+
+def exchanges(seen: dict[str, Sightings], paths: dict[str, Smoothed], times_ns: np.ndarray, begin_ns: int) -> list[str]:
+    """Say where sightings of one finger lie on another's path and the other way round: numbers exchanged."""
+    remarks = []
+    for one, other in combinations(seen, 2):
+        found = [_on_the_others_path(seen[a], paths[a], paths[b], times_ns) for a, b in ((one, other), (other, one))]
+        if all(len(times) >= 2 for times in found):
+            both = np.sort(np.concatenate(found))
+            first, last = (both[[0, -1]] - begin_ns) * 1e-9
+            remarks.append(
+                f"{one} and {other} change places {first:.1f} s after the beginning (seen so until {last:.1f} s): "
+                "the numbers of their cubes are exchanged"
+            )
+    return remarks
+
+
+def _on_the_others_path(seen: Sightings, own: Smoothed, other: Smoothed, times_ns: np.ndarray) -> np.ndarray:
+    """Return the times [ns] of refused sightings that lie much nearer to another finger's path than to the own."""
+    refused = ~own.accepted & (seen.time_ns >= times_ns[0]) & (seen.time_ns <= times_ns[-1])
+    times = seen.time_ns[refused]
+    here, there = (
+        np.stack([np.interp(times, times_ns, path.position[:, k]) for k in range(3)], -1) for path in (own, other)
+    )
+    apart = np.linalg.norm(here - there, axis=1)
+    off = np.linalg.norm(seen.position[refused] - there, axis=1)
+    return times[off < NEAR * apart]
+
+
+def other_hand(paths: dict[str, Smoothed], fingers: dict[str, Finger], rate: float) -> list[str]:
+    """Say for which hand index and middle finger stand, along the whole path, as those of the other one."""
+    remarks = []
+    for hand in ("left", "right"):
+        own = {n: replace(f, tip=np.eye(4)) for n, f in fingers.items() if f.hand == hand and n in paths}
+        if not {"index", "middle"} <= {f.kind for f in own.values()}:
+            continue
+        step = max(round(rate / 10), 1)
+        found = Counter(_stands(own, paths, k) for k in range(0, len(next(iter(paths.values())).position), step))
+        wrong = found["left" if hand == "right" else "right"]
+        if wrong > STANDING * max(wrong + found[hand], 1):
+            remarks.append(
+                f"index and middle finger of the {hand} hand stand as those of the other hand in "
+                f"{wrong / (wrong + found[hand]):.0%} of the time: the hands' cubes are swapped, or these two fingers'"
+            )
+    return remarks
+
+
+def _stands(fingers: dict[str, Finger], paths: dict[str, Smoothed], k: int) -> str:
+    from scipy.spatial.transform import Rotation
+
+    cubes = {
+        name: CubePose(paths[name].position[k], Rotation.from_matrix(paths[name].rotation[k]).as_quat(), 0.0, 1, ())
+        for name in fingers
+        if np.isfinite(paths[name].position[k]).all()
+    }
+    return handedness(fingers, cubes)

@@ -1,0 +1,86 @@
+"""Every stored image searched for tags: a recorder on a busy host only searches those that it has time for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+
+from tacdata.demonstrations.recording.reader import DemoRecording
+from tacdata.recording.clocks.clock_model import ClockModel
+from tacdata.recording.episode import TagStream
+from tacdata.recording.files import topics
+from tacdata.recording.files.camera_arrays import image_times
+from tacdata.recording.files.mcap_records import read_records
+from tacdata.tags.tips import TipPose
+from tacdata.tags.tracker import FingerTracker
+
+
+def look_again(recording: DemoRecording, told: Callable[[int], None] = lambda done: None) -> DemoRecording:
+    """Return a demonstration with the fingertips of every image in it, instead of those seen while it was recorded.
+
+    Args:
+        recording: As read.
+        told: Is told how many images have been searched.
+
+    Raises:
+        UsageError: If the file is gone.
+        FormatError: If an image has another size than the camera's intrinsics say.
+    """
+    trackers = {
+        name: FingerTracker(entry["intrinsics"], recording.rig.fingers)
+        for name, entry in recording.rig.cameras.items() if "intrinsics" in entry
+    }  # fmt: skip
+    image_topics = {topics.image(name): name for name in trackers}
+    seen: dict[str, list[dict[str, TipPose]]] = {name: [] for name in trackers}
+    remarks: list[str] = []
+
+    def search(topic: str, message: bytes | memoryview) -> None:
+        if topic not in image_topics:
+            return
+        name, image = image_topics[topic], _image(bytes(message))
+        view = None if image is None else trackers[name].update(image)
+        seen[name].append(view.tips if view else {})
+        remarks.extend(f"camera {name}: {words}" for words in (view.remarks if view else ()))
+        told(sum(map(len, seen.values())))
+
+    records = read_records(recording.path, images=False, digests=False, seen=search)
+    views: list[TagStream] = []
+    for name, found in seen.items():
+        stored = records.metadata.get(f"clock_model/camera {name}")
+        times = image_times(records, name, ClockModel.from_document(stored) if stored else None).sample_ns
+        views += [_stream(name, finger, times, found) for finger in recording.rig.fingers]
+    notes = tuple(note for note in recording.notes if not note.startswith("camera ") or "failed" in note)
+    searched = f"all {sum(map(len, seen.values()))} images"
+    return replace(
+        recording, views=tuple(views), notes=(*notes, *dict.fromkeys(remarks)), searched=searched
+    )  # fmt: skip
+
+
+def _image(message: bytes) -> np.ndarray | None:
+    """Return a stored image, grey, uint8, shape (height, width); None if it is damaged."""
+    import cv2
+
+    data = np.frombuffer(CompressedImage.FromString(message).data, np.uint8)
+    return cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
+
+
+def _stream(camera: str, finger: str, times_ns: np.ndarray, found: list[dict[str, TipPose]]) -> TagStream:
+    count = min(len(times_ns), len(found))
+    position, quaternion = np.full((count, 3), np.nan), np.full((count, 4), np.nan)
+    covariance, reprojection = np.full((count, 6, 6), np.nan), np.full(count, np.nan)
+    faces, ambiguous = np.zeros(count, np.int64), np.zeros(count, bool)
+    ids: list[tuple[int, ...]] = [()] * count
+    for row in range(count):
+        tip = found[row].get(finger)
+        if tip is None:
+            continue
+        position[row], quaternion[row] = tip.position, tip.quaternion
+        covariance[row] = tip.covariance if np.isfinite(tip.covariance).all() else np.nan
+        reprojection[row], faces[row] = tip.cube.reprojection, tip.cube.faces
+        ambiguous[row], ids[row] = tip.cube.ambiguous, tip.cube.ids
+    return TagStream(
+        camera, times_ns[:count], position, quaternion, reprojection, faces, covariance, ambiguous, tuple(ids), finger
+    )

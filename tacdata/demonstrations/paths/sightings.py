@@ -1,0 +1,132 @@
+"""What the cameras saw of one finger, in the world, in the order of time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.demonstrations.recording.rig import DemoRig
+from tacdata.recording.episode import TagStream
+
+FLOOR = 0.0002, float(np.radians(0.2))
+"""Standard deviation [m], [rad] that every sighting has beyond its image noise: print, mounting, calibration."""
+UNKNOWN = 0.002, float(np.radians(3.0))
+"""Standard deviation [m], [rad] of a sighting whose covariance was not stored."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sightings:
+    """Poses of one fingertip from all cameras, in the world's frame."""
+
+    finger: str
+    time_ns: np.ndarray
+    """Times of exposure [ns], shape (p,), int64, ascending."""
+    position: np.ndarray
+    """Fingertip's origin [m], shape (p, 3)."""
+    rotation: np.ndarray
+    """Rotation from the fingertip's frame to the world's [1], shape (p, 3, 3)."""
+    covariance: np.ndarray
+    """Of a small turn in the world [rad] and the position [m], shape (p, 6, 6)."""
+    ambiguous: np.ndarray
+    """Whether a second pose explained the image about as well, shape (p,), bool."""
+    camera: tuple[str, ...]
+    """Camera of each."""
+    ids: tuple[tuple[int, ...], ...]
+    """Tags of each, ascending."""
+
+    def __len__(self) -> int:
+        """Number of sightings."""
+        return len(self.time_ns)
+
+    def where(self, kept: np.ndarray) -> Sightings:
+        """Return some of them; ``kept`` has shape (p,), bool."""
+        chosen = np.flatnonzero(kept)
+        return Sightings(
+            self.finger, self.time_ns[kept], self.position[kept], self.rotation[kept], self.covariance[kept],
+            self.ambiguous[kept], tuple(self.camera[k] for k in chosen), tuple(self.ids[k] for k in chosen),
+        )  # fmt: skip
+
+
+def sightings_of(
+    finger: str, views: Iterable[TagStream], rig: DemoRig, timing: dict[str, float] | None = None
+) -> Sightings:
+    """Return a finger's sightings from the streams of all cameras, in the rig's world.
+
+    A covariance knows the image's noise only; the cameras' own uncertainty, `FLOOR` and what a doubtful time means for
+    a finger that moves are added.
+
+    Args:
+        finger: Name of the finger.
+        views: What the cameras saw.
+        rig: Where they stand.
+        timing: Camera -> standard uncertainty of its images' times [s].
+    """
+    parts = [_of_camera(view, rig, (timing or {}).get(view.camera, 0.0)) for view in views if view.finger == finger]
+    parts = [part for part in parts if len(part)]
+    if not parts:
+        empty = np.zeros((0, 3))
+        return Sightings(
+            finger, np.zeros(0, np.int64), empty, np.zeros((0, 3, 3)), np.zeros((0, 6, 6)), np.zeros(0, bool), (), ()
+        )
+    time_ns = np.concatenate([part.time_ns for part in parts])
+    order = np.argsort(time_ns, kind="stable")
+    cameras = [camera for part in parts for camera in part.camera]
+    ids = [entry for part in parts for entry in part.ids]
+
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts])[order]
+
+    return Sightings(
+        finger, time_ns[order], joined("position"), joined("rotation"), joined("covariance"), joined("ambiguous"),
+        tuple(cameras[k] for k in order), tuple(ids[k] for k in order),
+    )  # fmt: skip
+
+
+def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
+    from scipy.spatial.transform import Rotation
+
+    pose = rig.camera_pose(view.camera)
+    seen = np.isfinite(view.position).all(axis=1) & (view.faces > 0)
+    if pose is None:
+        seen[:] = False
+        pose = np.eye(4)
+    chosen, turn = np.flatnonzero(seen), pose[:3, :3]
+    count = len(chosen)
+    covariance = np.full((count, 6, 6), np.nan) if view.covariance is None else view.covariance[seen].copy()
+    both = np.kron(np.eye(2), turn)
+    covariance = both @ covariance @ both.T
+    lost = ~np.isfinite(covariance).all(axis=(1, 2))
+    covariance[lost] = _diagonal(*UNKNOWN)
+    world = rig.worlds.get(view.camera)
+    if world is not None and world.spread is not None:
+        covariance = covariance + _diagonal(*world.spread)
+    covariance = covariance + timing**2 * _motion(view.sample_ns[seen], view.position[seen] @ turn.T)
+    ambiguous = np.zeros(len(seen), bool) if view.ambiguous is None else view.ambiguous
+    ids: list[tuple[int, ...]] = list(view.ids) if view.ids else [()] * len(seen)
+    matrices = Rotation.from_quat(view.quaternion[seen]).as_matrix() if count else np.zeros((0, 3, 3))
+    return Sightings(
+        view.finger, view.sample_ns[seen], view.position[seen] @ turn.T + pose[:3, 3], turn @ matrices,
+        covariance + _diagonal(*FLOOR), ambiguous[seen], (view.camera,) * count, tuple(ids[k] for k in chosen),
+    )  # fmt: skip
+
+
+def _motion(time_ns: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Return v v^T of a path [m^2/s^2] in the lower right of (p, 6, 6): what a second of doubt about time would add.
+
+    The velocity is that of a straight line through five neighbours, so that noise hardly counts as motion.
+    """
+    result, count = np.zeros((len(position), 6, 6)), len(position)
+    for k in range(count):
+        rows = slice(max(k - 2, 0), min(k + 3, count))
+        t = (time_ns[rows] - time_ns[k]) * 1e-9
+        t = t - t.mean()
+        if t @ t > 0:
+            velocity = t @ position[rows] / (t @ t)
+            result[k, 3:, 3:] = np.outer(velocity, velocity)
+    return result
+
+
+def _diagonal(position: float, rotation: float) -> np.ndarray:
+    return np.diag([rotation**2] * 3 + [position**2] * 3)

@@ -1,0 +1,1 @@
+"""Demonstrations by hand, recorded."""

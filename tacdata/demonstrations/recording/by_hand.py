@@ -1,0 +1,91 @@
+"""Recording demonstrations as a person at a terminal does it: Enter begins one, Enter ends it."""
+
+from __future__ import annotations
+
+import select
+import signal
+import sys
+from pathlib import Path
+
+from tacdata.demonstrations.recording.recorder import DemoRecorder
+from tacdata.demonstrations.recording.rig import read_demo_rig
+from tacdata.demonstrations.recording.session import DemoSession, open_demo_session
+from tacdata.errors import UsageError
+from tacdata.recording.live.detection_process import in_background
+from tacdata.tags import look
+
+
+def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count: int, resume: bool) -> DemoSession:
+    """Record demonstrations into a folder, and say meanwhile what a person should know.
+
+    Args:
+        rig: Demo rig file.
+        out: Folder to create, or to add to with ``resume``.
+        task: What is demonstrated.
+        seconds: Length of each demonstration [s of the rig's clock]; None: until Enter or Ctrl-C.
+        count: How many; with ``seconds`` they follow each other without being asked.
+        resume: Add to an existing folder.
+
+    Raises:
+        UsageError: If an argument does not fit, or the folder exists.
+        DeviceError: If a finger or camera is missing or silent, or the disk refuses the recording.
+    """
+    if seconds is not None and seconds <= 0:
+        raise UsageError(f"--seconds {seconds:g}", "more than 0", "leave it out to end each demonstration by Enter")
+    bench = read_demo_rig(rig)
+    asks = sys.stdin.isatty() and seconds is None
+    session = open_demo_session(out, bench, task, resume)
+    stop = _Stop()
+    with in_background(look) as detect:
+        try:
+            with DemoRecorder(session, bench, detect, lambda words: print(f"  {words}", flush=True)) as recorder, stop:
+                for number in range(count):
+                    if asks:
+                        input(f"demonstration {number + 1} of {count}: Enter begins, Enter ends ")
+                    else:
+                        length = f"{seconds:g} s" if seconds is not None else "until Ctrl-C"
+                        print(f"demonstration {number + 1} of {count}: recording {length}", flush=True)
+                    path = recorder.record(stop.asked if not asks else lambda: stop.asked() or _enter(), seconds)
+                    print(f"  {path.name}", flush=True)
+                    if stop.asked():
+                        break
+                return recorder.session
+        except BaseException:
+            _forget_if_empty(out, resume)
+            raise
+
+
+def _enter() -> bool:
+    """Return whether Enter was pressed."""
+    ready, _, _ = select.select([sys.stdin], [], [], 0.0)
+    return bool(ready and sys.stdin.readline() is not None)
+
+
+def _forget_if_empty(out: Path, resume: bool) -> None:
+    """Take a new folder without any recording away again, so that the same command can be repeated."""
+    if not resume and out.is_dir() and len(list(out.iterdir())) == 1:
+        for path in out.iterdir():
+            path.unlink()
+        out.rmdir()
+
+
+class _Stop:
+    """The first Ctrl-C ends the demonstration and keeps it whole; the second breaks it off."""
+
+    def __init__(self) -> None:
+        self._asked = False
+        self._before = None
+
+    def asked(self) -> bool:
+        return self._asked
+
+    def __enter__(self) -> None:
+        self._before = signal.signal(signal.SIGINT, self._take)
+
+    def __exit__(self, *exception: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _take(self, number: int, frame: object) -> None:
+        if self._asked:
+            raise KeyboardInterrupt
+        self._asked = True

@@ -1,0 +1,145 @@
+"""Records demonstrations: boards on fingers and cameras on their cubes, nothing moved by a machine."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tacdata.demonstrations.recording.rig import DemoRig
+from tacdata.demonstrations.recording.session import DemoSession, refresh
+from tacdata.demonstrations.recording.streams import DemoStreams
+from tacdata.devices.device import Camera, TaxelBoard, create
+from tacdata.errors import DeviceError, UsageError
+from tacdata.recording.files.writer import EpisodeWriter
+from tacdata.recording.live.detection_process import Detect
+
+FIRST_FRAME = 5.0
+"""How long the streams may take to begin [s of real time]."""
+FIRST_SEARCH = 20.0
+"""How long the recording waits for the tag detector to load [s of real time]; then it goes on without."""
+WATCH = 0.05
+"""How often the recorder looks whether it is to end [s of real time]."""
+
+
+@dataclass(frozen=True)
+class DemoHeader:
+    """What is attached to every demonstration."""
+
+    rig: dict[str, Any]
+    """The demo rig's document with everything in it."""
+    boards: dict[str, dict[str, Any]]
+    """Finger -> its board's description of itself."""
+    task: str
+
+    @property
+    def attachments(self) -> dict[str, Any]:
+        """Name of each attachment and its document."""
+        return {"demo_rig.json": self.rig, "boards.json": self.boards, "task.json": {"task": self.task}}
+
+
+class DemoRecorder:
+    """One session of recording by hand.
+
+    Example:
+        ``with DemoRecorder(session).opened() as recorder: recorder.record(lambda: False, seconds=10.0)``
+    """
+
+    def __init__(
+        self, session: DemoSession, rig: DemoRig, detect: Detect | None = None,
+        say: Callable[[str], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Build the drivers; nothing is opened yet.
+
+        Args:
+            session: The folder that recordings go to.
+            rig: The rig as it is now; its ports may be others than when the folder was begun.
+            detect: Searches an image for the cubes; without it images are only stored.
+            say: Is told in words what a person should know meanwhile.
+        """
+        self.session, self.rig, self._detect, self._say = session, rig, detect, say or (lambda words: None)
+        self._boards: dict[str, TaxelBoard] = {n: create(e, TaxelBoard, rig.clock) for n, e in rig.boards.items()}
+        self._cameras: dict[str, Camera] = {n: create(e, Camera, rig.clock) for n, e in rig.cameras.items()}
+        self._stack = ExitStack()
+        self._streams: DemoStreams | None = None
+
+    def __enter__(self) -> DemoRecorder:
+        """Open boards and cameras and wait until all of them speak.
+
+        Raises:
+            DeviceError: If one of them is missing or silent, naming the finger or the camera.
+        """
+        try:
+            for kind, devices in (("board of", self._boards), ("camera", self._cameras)):
+                for name, device in devices.items():
+                    self._open(f"{kind} {name}", device)
+            rig = self.rig
+            streams = DemoStreams(
+                self._boards, self._cameras, rig.cameras, rig.document["fingers"], self._detect, self._say,
+                rig.latencies,
+            )  # fmt: skip
+            self._streams = self._stack.enter_context(streams)
+            self._wait(self._streams)
+        except BaseException:
+            self._stack.close()
+            raise
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Close everything."""
+        self._stack.close()
+
+    def record(self, ended: Callable[[], bool], seconds: float | None = None) -> Path:
+        """Record one demonstration until ``ended()``, or for so long [s of the rig's clock].
+
+        Raises:
+            DeviceError: If writing fails, or no stream speaks any more; what was written is kept.
+            KeyboardInterrupt: On Ctrl-C; what was recorded so far is kept as an interrupted recording.
+        """
+        if self._streams is None:
+            raise UsageError("the recorder is not open", "a recorder inside a with statement", "open it first")
+        described = {name: board.describe() for name, board in self._boards.items()}
+        header = DemoHeader(self.rig.document, described, self.session.task)
+        names = tuple(self._cameras), tuple(self.rig.fingers), tuple(self._boards)
+        writer = EpisodeWriter(self.session.next, header, self.rig.clock, *names)
+        self._streams.record_into(writer)
+        begun, reason = self.rig.clock.now_ns(), "stopped by Ctrl-C"
+        try:
+            while not ended() and (seconds is None or self.rig.clock.now_ns() - begun < seconds * 1e9):
+                if writer.failure is not None:
+                    break  # closing says what the disk refused
+                if len(self._streams.silent) == len(self._boards) + len(self._cameras):
+                    reason = "; ".join(f"{k}: {v}" for k, v in self._streams.silent.items())
+                    given = f"every stream fell silent ({reason})"
+                    raise DeviceError(given, "a stream that goes on", "check the cables")
+                time.sleep(WATCH)
+            reason = ""
+        finally:
+            self._streams.catch_up()
+            counts = self._streams.counts
+            self._streams.record_into(None)
+            path = writer.close(not reason, reason, self._streams.clock_models, counts)
+            self.session = refresh(self.session)
+        return path
+
+    def _open(self, what: str, device: TaxelBoard | Camera) -> None:
+        try:
+            self._stack.enter_context(device)
+        except DeviceError as error:
+            raise DeviceError(f"{what}: {error.given}", error.allowed, error.remedy) from None
+
+    def _wait(self, streams: DemoStreams) -> None:
+        wanted = {f"taxels {name}" for name in self._boards} | {f"camera {name}" for name in self._cameras}
+        end = time.monotonic() + FIRST_FRAME
+        while missing := wanted - streams.heard:
+            if streams.silent or time.monotonic() > end:
+                why = "; ".join(f"{name}: {streams.silent.get(name, 'nothing received')}" for name in sorted(missing))
+                remedy = "check cable and power, then start again"
+                raise DeviceError(why, "a signal from every finger and camera", remedy)
+            time.sleep(WATCH)
+        end = time.monotonic() + FIRST_SEARCH
+        while not streams.searching and time.monotonic() < end:
+            time.sleep(WATCH)

@@ -1,0 +1,85 @@
+"""Streams of a demonstration: one that falls silent is said aloud and never costs the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from tacdata.devices.device import Camera, TaxelBoard
+from tacdata.errors import TacdataError
+from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.files.writer import EpisodeWriter
+from tacdata.recording.live.detection_process import Detect
+from tacdata.recording.live.device_streams import DeviceStreams
+
+
+class DemoStreams(DeviceStreams):
+    """Runs as a context; what arrives goes into the open recording."""
+
+    silence = 1.5
+
+    def __init__(
+        self, boards: dict[str, TaxelBoard], cameras: dict[str, Camera], entries: dict[str, dict[str, Any]],
+        fingers: dict[str, Any], detect: Detect | None, say: Callable[[str], None],
+        latencies: dict[str, Latency] | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare the threads.
+
+        Args:
+            boards: The opened boards, by finger.
+            cameras: The opened cameras.
+            entries: The rig file's camera entries.
+            fingers: The fingers' document.
+            detect: Searches an image for the cubes; without it images are only stored.
+            say: Is told when a stream falls silent or speaks again.
+            latencies: Constant delay of each stream, where it is known.
+        """
+        super().__init__(boards, cameras, entries, fingers, detect)
+        self._say = say
+        self._why: dict[str, str] = {}
+        self._heard: set[str] = set()
+        self.set_latencies(latencies or {})
+
+    def __enter__(self) -> DemoStreams:
+        """Start the threads."""
+        super().__enter__()
+        return self
+
+    @property
+    def silent(self) -> dict[str, str]:
+        """Stream -> why nothing comes from it at the moment, in words."""
+        return dict(self._why)
+
+    @property
+    def heard(self) -> frozenset[str]:
+        """The streams from which anything has come since the start."""
+        return frozenset(self._heard)
+
+    def record_into(self, sink: EpisodeWriter | None) -> None:
+        """Send everything that arrives from now on into a recording, or nowhere."""
+        super().record_into(sink)
+        for name, why in self.silent.items():
+            if sink:
+                sink.note(f"{name}: {why}", "error")
+
+    def _spoke(self, name: str, count: int) -> None:
+        self._heard.add(name)
+        if self._why.pop(name, None):
+            self._tell(f"{name} speaks again", "warning")
+
+    def _silent(self, name: str) -> None:
+        if name not in self._why:
+            self._fall_silent(name, f"nothing received for {self.silence:g} s; check cable and power")
+
+    def _broken(self, name: str, error: TacdataError) -> None:
+        self._fall_silent(name, f"{error.given}; {error.remedy}")
+
+    def _fall_silent(self, name: str, why: str) -> None:
+        self._why[name] = why
+        self._tell(why if why.startswith(name) else f"{name}: {why}", "error")
+
+    def _tell(self, words: str, level: str) -> None:
+        self._say(words)
+        with self._lock:
+            if self._sink:
+                self._sink.note(words, level)

@@ -1,0 +1,1 @@
+"""Recordings as a course, and what they can and cannot tell."""

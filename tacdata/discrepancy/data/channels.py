@@ -1,0 +1,133 @@
+"""Which channels can be used, which are clipped, what their source calls them: by the recording's own numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.recording.files.reader import Recording
+
+MISSING = 0.3
+"""A channel that lacks a larger share of its readings is left out [1]."""
+DEEPER = 0.01
+"""A tip goes on deeper when it goes by so much of the stroke [1]..."""
+LONG = 3
+"""...over so many readings."""
+FLAT = 12.0
+"""A reading that stops changed by so many times its noise, or its steps, over as much depth just before [1]."""
+SEVERAL = 2
+"""A channel is clipped if it stops so often..."""
+ENOUGH = 10
+"""...or over so many readings."""
+MANY = 64
+"""Names of more channels are not listed."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """One recording."""
+
+    counts: np.ndarray
+    """In the order of time [the source's unit], shape (n, channels); NaN where missing."""
+    depth: np.ndarray
+    """Of the tip at those times [mm], shape (n,); NaN where nobody knows."""
+
+
+def readings(recording: Recording) -> Readings:
+    """Return what a recording read, and how deep the tip was."""
+    episode = recording.episode
+    order = np.argsort(episode.taxels.sample_ns, kind="stable")
+    time_ns = episode.taxels.sample_ns[order]
+    depth = episode.tip_at(time_ns)[:, 2] if len(episode.tip_ns) else np.full(len(order), np.nan)
+    return Readings(episode.taxels.counts[order], depth)
+
+
+def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, list[str]]:
+    """Return which channels can be used, shape (k,), int64, and in words why others cannot, and which are clipped.
+
+    Raises:
+        FormatError: If none can.
+    """
+    notes, kept, counts = [], [], np.concatenate([r.counts for r in recorded])
+    still = np.all([np.fmax.reduce(r.counts) == np.fmin.reduce(r.counts) for r in recorded if len(r.counts)], axis=0)
+    for channel, values in enumerate(counts.T):
+        good = values[np.isfinite(values)]
+        if len(good) < (1 - MISSING) * len(values):
+            notes.append(f"channel {channel}: {100 * (1 - len(good) / len(values)):.0f} % missing, left out")
+        elif len(good) == 0 or np.ptp(good) == 0:
+            notes.append(f"channel {channel}: always {good[0] if len(good) else 'nothing'}, stuck or dead, left out")
+        elif still[channel]:
+            notes.append(f"channel {channel}: one reading throughout each recording, stuck or dead, left out")
+        else:
+            kept.append(channel)
+    if not kept:
+        raise FormatError(
+            f"no channel with usable readings ({'; '.join(notes[:3])})", "at least one that changes",
+            "mend the board, or name other columns in the import's mapping, and record or import again",
+        )  # fmt: skip
+    return np.array(kept), notes + _clipped(recorded, kept)
+
+
+def _clipped(recorded: Sequence[Readings], channels: list[int]) -> list[str]:
+    """Return in words which channels stop at their largest or smallest reading while the tip goes on deeper."""
+    told = []
+    for name, extreme in (("largest", np.nanmax), ("smallest", np.nanmin)):
+        found = []
+        for channel in channels:
+            values = np.concatenate([r.counts[:, channel] for r in recorded])
+            limit = float(extreme(values))
+            steps = np.diff(np.unique(values[np.isfinite(values)]))
+            runs = [run for r in recorded for run in _stops(r.counts[:, channel], r.depth, limit, float(steps.min()))]
+            if len(runs) >= SEVERAL or sum(runs) >= ENOUGH:
+                found.append(f"channel {channel} at {limit:g} ({100 * np.mean(values == limit):.2g} %)")
+        if found:
+            told.append(
+                f"clipped at the {name} reading (share of its readings): {', '.join(found)}; it stays while the tip "
+                "goes on deeper: press less deep, or give it a wider range"
+            )
+    return told
+
+
+def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> list[int]:
+    """Return how many readings each stop at a limit holds; holds of the tip, play and late readings are none.
+
+    Args:
+        values: Of one channel in one recording, shape (n,).
+        depth: Of the tip [mm], shape (n,).
+        limit: The reading at which it may stop.
+        step: Smallest difference of two readings.
+    """
+    known = np.isfinite(values) & np.isfinite(depth)
+    values, depth = values[known], depth[known]
+    if len(values) < LONG:
+        return []
+    noise = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], values == limit, [False]]).astype(int)))
+    told = []
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        on = float(depth[begin:end].max() - depth[begin])
+        if begin == 0 or end - begin < LONG or on < DEEPER * float(np.ptp(depth)):
+            continue
+        before = np.flatnonzero(depth[:begin] <= depth[begin] - on)
+        at = int(before[-1]) if len(before) else int(np.argmin(depth[:begin]))
+        way = float(depth[begin] - depth[at])
+        if way > 0 and abs(limit - values[at]) * min(on / way, 1.0) > FLAT * max(noise, step):
+            told.append(end - begin)
+    return told
+
+
+def in_source(recordings: Sequence[Recording], channels: int) -> list[str]:
+    """Return in words which columns of the source the channels are; nothing where names say no more than numbers."""
+    known = {tuple(recording.board.get("names", ()))[:channels] for recording in recordings}
+    names = list(next(iter(known))) if len(known) == 1 else []
+    parts = [re.fullmatch(r"(.*?)(\d+)", name) for name in names]
+    if len(names) != channels or all(p and int(p[2]) == k for k, p in enumerate(parts)):
+        return []
+    if len({(p[1], int(p[2]) - k) for k, p in enumerate(parts) if p}) == 1 and all(parts) and channels > 2:
+        return [f"channels 0 to {channels - 1} are the source's {names[0]} to {names[-1]}, in this order"]
+    listed = ", ".join(f"{k} {name}" for k, name in enumerate(names[:MANY]))
+    return [f"channels by the names that their source gives them: {listed}" + (", ..." if channels > MANY else "")]

@@ -1,0 +1,249 @@
+"""Recordings (MCAP) become a course."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.chain import Course, Tool
+from tacdata.chain.rows import Rows, rows_of
+from tacdata.discrepancy.data.channels import in_source, readings, usable
+from tacdata.discrepancy.data.path_noise import resolved, without_noise
+from tacdata.discrepancy.data.strokes import strokes
+from tacdata.discrepancy.data.tip_observation import Views, second_views
+from tacdata.errors import FormatError, UsageError
+from tacdata.recording import Episode, read_session
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.session import FILE
+
+SAME_PLACE = 0.15
+"""Presses no farther apart count as one place [mm]."""
+FEW_ROWS = 8
+"""A stroke with fewer readings is left out."""
+UNKNOWN = "unknown"
+"""What an import calls an indenter that its source does not name."""
+HELD = 1.0
+"""Gaps of a measured quantity up to so long are bridged by a straight line [s]."""
+LONG_PAUSE = 36000.0
+"""Sessions farther apart are laid end to end as if so far apart [s]."""
+
+
+@dataclass(frozen=True)
+class _Stroke:
+    name: str
+    session: int
+    recording: int
+    begin: float
+    rows: Rows
+    tool: Tool
+    place: np.ndarray
+
+
+def course_of(paths: list[Path]) -> Course:
+    """Read recordings, in the order of their time.
+
+    Args:
+        paths: Recordings, or folders of sessions.
+
+    Raises:
+        UsageError: If there is none, or a path is neither.
+        FormatError: If they do not have the same channels, or hold no readings.
+    """
+    every = [(number, read_recording(file)) for number, path in enumerate(paths) for file in _files(path)]
+    every = [(number, r) for number, r in every if len(r.episode.taxels.sample_ns) > 1]
+    every.sort(key=lambda item: int(item[1].episode.taxels.sample_ns[0]))
+    found = [(number, r.episode) for number, r in every]
+    notes: list[str] = []
+    if not found:
+        raise UsageError(
+            f"no readings in {', '.join(map(str, paths))}", "recordings with taxel readings", "record some"
+        )
+    notes += _of_one_sensor([e for _, e in found])
+    counts = {e.taxels.counts.shape[1] for _, e in found}
+    if len(counts) > 1:
+        raise FormatError(
+            f"recordings of {', '.join(map(str, sorted(counts)))} channels", "the same channels throughout",
+            "judge sensors one at a time",
+        )  # fmt: skip
+    recordings = [r for _, r in every]
+    kept, left_out = usable([readings(r) for r in recordings])
+    notes += in_source(recordings, min(counts)) + left_out
+    names = sorted({m.name for _, e in found for m in e.measured})
+    force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
+    views: dict[int, Views] = {}
+    for number in sorted({n for n, _ in found}):
+        own = [k for k, (n, _) in enumerate(found) if n == number]
+        views |= {own[k]: v for k, v in second_views([found[k][1] for k in own]).items()}
+    parts: list[_Stroke] = []
+    for k, (number, episode) in enumerate(found):
+        parts += _strokes_of(episode, (number, k), kept, force, temperature, views.get(k), bool(views))
+    if not parts:
+        raise FormatError("no stretch with enough readings", f"{FEW_ROWS} or more readings a press", "record again")
+    if len(parts) > len(found):
+        held = "one recording holds" if len(found) == 1 else f"{len(found)} recordings hold"
+        notes.append(f"{held} {len(parts)} strokes; each counts as an episode")
+    if any(e.tags for _, e in found) and not views:
+        notes.append("the tag was seen too seldom to tell of the guide: let it be in view during the presses")
+    return _joined(parts, kept, found[0][1], (bool(force), bool(temperature), bool(views)), notes)
+
+
+def _of_one_sensor(episodes: list[Episode]) -> list[str]:
+    """Return in words whether recordings name several sensors.
+
+    Raises:
+        FormatError: If they are of several kinds.
+    """
+    names = sorted({e.sensor.name for e in episodes})
+    if len(names) < 2:
+        return []
+    kinds = {(t.columns, t.rows, t.pitch_x, t.pitch_y) for t in (e.sensor.taxels for e in episodes)}
+    if len(kinds) > 1:
+        raise FormatError(
+            f"recordings of sensors of several kinds: {', '.join(names)}", "one sensor in one verdict",
+            "judge them one at a time",
+        )  # fmt: skip
+    return [f"recordings name {len(names)} sensors ({', '.join(names[:4])}): judge them apart, unless they are one"]
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        if not (path / FILE).is_file():
+            loose = sorted(path.glob("*.mcap"))
+            if loose:
+                return loose
+        return list(read_session(path).episodes)
+    if not path.is_file():
+        raise UsageError(f"no file or folder {path}", "a recording (.mcap) or a session's folder", "check the path")
+    return [path]
+
+
+def _named(names: list[str], *words: str) -> str:
+    return next((name for word in words for name in names if word in name), "")
+
+
+def _measured(episode: Episode, name: str, time_ns: np.ndarray) -> np.ndarray:
+    """Return a measured quantity at the readings' times, NaN where it is too far away."""
+    stream = next((m for m in episode.measured if m.name == name), None)
+    if stream is None or len(stream.sample_ns) < 2:
+        return np.full(len(time_ns), np.nan)
+    values = stream.values
+    column = next(
+        (k for k, n in enumerate(stream.names) if n.lower().endswith("z")), int(np.argmax(np.nanstd(values, 0)))
+    )
+    good = np.isfinite(values[:, column])
+    if good.sum() < 2:
+        return np.full(len(time_ns), np.nan)
+    at, value = stream.sample_ns[good], values[good, column]
+    result = np.interp(time_ns, at, value)
+    behind = np.clip(np.searchsorted(at, time_ns), 1, len(at) - 1)
+    far = np.minimum(np.abs(time_ns - at[behind - 1]), np.abs(time_ns - at[behind])) > HELD * 1e9
+    result[far] = np.nan
+    return result
+
+
+def _strokes_of(
+    episode: Episode, of: tuple[int, int], kept: np.ndarray, force: str, temperature: str, views: Views | None,
+    tag: bool,
+) -> list[_Stroke]:  # fmt: skip
+    time_ns = episode.taxels.sample_ns
+    order = np.argsort(time_ns, kind="stable")
+    time_ns = time_ns[order]
+    columns = [episode.taxels.counts[order][:, kept]]
+    columns += [_measured(episode, name, time_ns)[:, None] for name in (force, temperature) if name]
+    if tag:
+        columns.append(np.full((len(time_ns), 3), np.nan) if views is None else views.at(time_ns))
+    values = np.column_stack(columns)
+    good = np.isfinite(columns[0]).all(axis=1) & np.concatenate([[True], np.diff(time_ns) > 0])
+    time_ns, values = time_ns[good], values[good]
+    if len(time_ns) < FEW_ROWS or len(episode.tip_ns) < 2:
+        return []
+    tool = _tool(episode)
+    made = []
+    tip, _ = without_noise(episode.tip_ns, episode.tip)
+    known = resolved(episode.tip_ns, tip[:, 2], time_ns)
+    spans = _to_the_end(strokes(episode.tip_ns, tip[:, 2]), tip[:, 2], time_ns)
+    for number, (first, last) in enumerate(spans):
+        rows = known & (time_ns >= first) & (time_ns < last)
+        if rows.sum() < FEW_ROWS:
+            continue
+        origin = time_ns[0]
+        path_time = (episode.tip_ns - origin) * 1e-9
+        laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, tip, len(kept))
+        deepest = laid.tip[np.argmax(laid.tip[:, 2])]
+        name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
+        made.append(_Stroke(name, *of, float(origin) * 1e-9, laid, tool, deepest[:2]))
+    return made
+
+
+def _to_the_end(spans: list[tuple[int, int]], depth: np.ndarray, time_ns: np.ndarray) -> list[tuple[int, int]]:
+    """Return spans with what was read before the tip began to move and after it came to rest, off the skin."""
+    away = depth <= max(0.0, float(depth.min()) + 0.05 * float(np.ptp(depth)))
+    if away[0]:
+        spans = [(min(spans[0][0], int(time_ns[0])), spans[0][1]), *spans[1:]]
+    if away[-1]:
+        spans = [*spans[:-1], (spans[-1][0], max(spans[-1][1], int(time_ns[-1]) + 1))]
+    return spans
+
+
+def _tool(episode: Episode) -> Tool:
+    """Return the indenter; a stand-in for one that nobody named has neither shape nor radius."""
+    name, solid = episode.press.indenter_name, episode.press.indenter
+    if name == UNKNOWN:
+        return Tool(name, UNKNOWN, np.nan)  # one object: equal to itself
+    return Tool(name, solid.shape, float(getattr(solid, "radius", np.nan)))
+
+
+def _joined(
+    parts: list[_Stroke], kept: np.ndarray, example: Episode, extra: tuple[bool, bool, bool], notes: list[str]
+) -> Course:
+    force, temperature, tag = extra
+    tools = tuple(dict.fromkeys(p.tool for p in parts))
+    clock, last = [], None
+    for part in parts:
+        begin = part.begin + part.rows.time[0]
+        if last is not None and not 0 <= begin - last[0] < LONG_PAUSE:
+            begin = last[0] + (LONG_PAUSE if begin - last[0] >= LONG_PAUSE else 1.0)
+        shift = begin - part.rows.time[0] if last is None else last[1] + (begin - last[0]) - part.rows.time[0]
+        clock.append(part.rows.time + shift)
+        last = part.begin + part.rows.time[-1], float(clock[-1][-1])
+    count = [len(p.rows.time) for p in parts]
+    episode = np.repeat(np.arange(len(parts)), count)
+    values = np.concatenate([p.rows.values for p in parts])
+    channels = len(kept)
+    centers = example.sensor.taxels.centers
+    numbers = {s: k for k, s in enumerate(dict.fromkeys(p.session for p in parts))}
+    time = np.concatenate(clock)
+    recording = np.unique([p.recording for p in parts], return_inverse=True)[1]
+    return Course(
+        time=time - time[0], episode=episode, tip=np.concatenate([p.rows.tip for p in parts]),
+        tool=np.array([tools.index(p.tool) for p in parts])[episode], readings=values[:, :channels],
+        averaged=np.concatenate([p.rows.averaged for p in parts]),
+        session=np.array([numbers[p.session] for p in parts]), site=places(np.array([p.place for p in parts])),
+        tools=tools, names=tuple(p.name for p in parts),
+        centers=centers[kept] if len(centers) > int(kept.max()) else None,
+        force=values[:, channels] if force else None,
+        temperature=_filled(values[:, channels + force]) if temperature else None, notes=tuple(notes),
+        tag=values[:, channels + force + temperature :] if tag else None,
+        recording=recording if recording.max() + 1 < len(parts) else None, numbers=tuple(int(k) for k in kept),
+    )  # fmt: skip
+
+
+def _filled(values: np.ndarray) -> np.ndarray:
+    good = np.flatnonzero(np.isfinite(values))
+    return np.interp(np.arange(len(values)), good, values[good])
+
+
+def places(at: np.ndarray) -> np.ndarray:
+    """Return the number of the place of each press: those within `SAME_PLACE` of a place's first belong to it."""
+    known: list[np.ndarray] = []
+    result = np.zeros(len(at), dtype=np.int64)
+    for k, place in enumerate(at):
+        near = [n for n, other in enumerate(known) if np.linalg.norm(place - other) < SAME_PLACE]
+        if near:
+            result[k] = near[0]
+        else:
+            result[k] = len(known)
+            known.append(place)
+    return result

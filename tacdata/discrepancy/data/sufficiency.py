@@ -1,0 +1,123 @@
+"""What recordings cannot carry, and what to record next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.discrepancy.data.clocks import shifted
+from tacdata.discrepancy.data.tip_motion import HOLD, longest_hold, speeds
+
+FEWEST = 8
+"""Fewer episodes carry no name."""
+RATES = 2.5
+"""Rates of pressing must differ by such a factor for lags to be told from play and friction [1]."""
+
+
+def amiss(course: Course) -> list[str]:
+    """Return in words what is missing from recordings, each with its remedy."""
+    told = list(course.notes)
+    if course.episodes < FEWEST:
+        told.append(
+            f"{course.episodes} episodes are too few for a verdict: record {FEWEST} or more, better 40, presses of "
+            "several depths and rates (`tacdata plan diagnostic`)"
+        )
+    if course.episodes > 1 and one_rate(course):
+        told.append(
+            "one rate only: delay, filter, backlash and relaxation look alike; record three rates over a decade"
+        )
+    if longest_hold(course) < HOLD:
+        told.append("no hold of a second or more: relaxation and baseline tracking show in holds; hold for 60 s")
+    elif not _recovers(course):
+        told.append("no rest after release: record the recovery, as long as the longest hold")
+    depths = np.array([course.tip[course.episode == e, 2].max() for e in range(course.episodes)])
+    reach = float(depths.max()) if depths.max() > 0 else course.stroke
+    if len(depths) > 1 and np.ptp(depths) < 0.15 * reach:
+        told.append("one depth only: record three")
+    if course.tip[:, 2].min() > 0.05 * course.stroke and course.tip[:, 2].max() > 0:
+        told.append("never without contact: idle readings are not known; begin and end every press off the skin")
+    if _tared(course):
+        told.append("every episode begins at the same reading, as if tared: drift and set are lost; record un-tared")
+    if any(t.shape == "unknown" or not np.isfinite(t.radius) for t in course.tools):
+        told.append("an indenter without a known radius: what depends on it is not judged")
+    if len(course.tools) < 2:
+        told.append("one indenter: compliance, stiffening and poroelasticity need a second radius")
+    told += shifted(course)
+    told += units(course)
+    told += stuck(course)
+    if course.force is None:
+        told.append("no force: stiffness and gain, relaxing skin and relaxing taxel cannot be told apart")
+    if course.tag is None:
+        told.append("no second observation of the pose: the guide and the skin are told apart by their response alone")
+    return told
+
+
+def one_rate(course: Course) -> bool:
+    """Return whether all episodes press at about the same rate, and all let go at about the same.
+
+    How they come to the skin does not count.
+    """
+    return not any(_varies(told) for told in speeds(course))
+
+
+def _varies(rates: np.ndarray) -> bool:
+    known = rates[np.isfinite(rates)]
+    low, high = np.quantile(known, [0.1, 0.9]) if len(known) else (0.0, 0.0)
+    return bool(low > 0 and high >= RATES * low)
+
+
+STROKE, RATE, RADIUS, EVERY = (0.02, 60.0), 500.0, 200.0, (2e-5, 5.0)
+"""Strokes [mm], rates [mm/s], radii [mm] and intervals of readings [s] beyond these are hardly of their unit."""
+
+
+def units(course: Course) -> list[str]:
+    """Return in words what is of another size than its unit lets expect."""
+    told = []
+    if not STROKE[0] < course.stroke < STROKE[1]:
+        told.append(f"strokes of {course.stroke:.3g} mm: is the depth in mm? Say its unit in the import mapping")
+    if float(np.abs(course.speed).max()) > RATE:
+        told.append(f"presses of {np.abs(course.speed).max():.3g} mm/s: are times in s and lengths in mm?")
+    if any(np.isfinite(t.radius) and t.radius > RADIUS for t in course.tools):
+        told.append(f"an indenter of {max(t.radius for t in course.tools):.3g} mm radius: is it in mm?")
+    reduced = course.reduced
+    every = float(np.median(reduced.step[~reduced.first])) if not reduced.first.all() else 0.0
+    if not EVERY[0] < every < EVERY[1]:
+        told.append(f"a reading every {every:.3g} s: are times in s?")
+    return told
+
+
+def stuck(course: Course) -> list[str]:
+    """Return in words which channels, or the second observation, say nothing in some episodes."""
+    told, reduced = [], course.reduced
+    episodes = np.unique(reduced.episode)
+    still = np.array([np.ptp(reduced.readings[reduced.episode == e], axis=0) == 0 for e in episodes])
+    for channel in np.flatnonzero(still.any(axis=0) & ~still.all(axis=0)):
+        count = int(still[:, channel].sum())
+        if count > 0.1 * len(episodes) and still[:, channel].mean() > 2 * np.median(still.mean(axis=0)):
+            called = course.channel_names[channel]
+            told.append(f"{called}: the same reading throughout {count} of {len(episodes)} episodes: stuck at times; "
+                        "mend its contact, or leave it out")  # fmt: skip
+    for name, values in (("force", course.force), ("tag", None if course.tag is None else course.tag[:, 2])):
+        if values is not None and np.isfinite(values[course.read]).mean() < 0.5:
+            share = 100 * (1 - np.isfinite(values[course.read]).mean())
+            told.append(f"{name}: missing at {share:.0f} % of the readings")
+    return told
+
+
+def _recovers(course: Course) -> bool:
+    for e in range(course.episodes):
+        rows = np.flatnonzero(course.episode == e)
+        top = rows[np.argmax(course.tip[rows, 2])]
+        away = max(0.0, float(course.tip[rows, 2].min()) + 0.02 * course.stroke)
+        after = rows[(rows > top) & (course.tip[rows, 2] <= away)]
+        if len(after) > 1 and course.time[after[-1]] - course.time[after[0]] > 2.0:
+            return True
+    return False
+
+
+def _tared(course: Course) -> bool:
+    reduced = course.reduced
+    starts = np.array([reduced.readings[np.flatnonzero(reduced.episode == e)[:3]].mean(axis=0)
+                       for e in np.unique(reduced.episode)])  # fmt: skip
+    level = np.abs(starts).max()
+    return bool(course.episodes > 3 and level < 1e-3 * np.ptp(reduced.readings))

@@ -1,0 +1,1 @@
+"""The model under test: its response, its effects, its file."""

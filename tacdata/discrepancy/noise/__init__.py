@@ -1,0 +1,1 @@
+"""Noise, nuisances and offsets: the null model that effects are tested against."""

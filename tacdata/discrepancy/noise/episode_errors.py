@@ -1,0 +1,143 @@
+"""How far episodes err by themselves, and how readings scatter, told from a residual beside an over-rich fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.discrepancy.noise import offset_random_walk, readings
+from tacdata.discrepancy.noise.gram import Noise
+from tacdata.discrepancy.noise.offset_process import wander
+from tacdata.discrepancy.noise.variance_components import positive, spreads
+from tacdata.discrepancy.noise.whitener import Cleaner
+from tacdata.discrepancy.statistics.gram_fit import solve
+
+LEAST, MOST = 0.1, 10.0
+"""Errors of pose are told to be between these, in standard deviations of the prior [1]."""
+UNTOLD = 1e-4
+"""Information added to what an episode tells of its errors: what it tells nothing of is not known, not nil [1]."""
+ODD = 6.0
+"""An episode is unlike all others whose errors are larger than theirs by so many standard deviations [1]."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How far episodes err by themselves."""
+
+    sizes: np.ndarray
+    """Standard deviation of each kind of error [its prior's], shape (kinds,)."""
+    odd: np.ndarray
+    """Episodes that err by far more than the others, shape (k,), int64."""
+
+
+@dataclass(frozen=True)
+class EpisodeErrors:
+    """What tells how far episodes err: a residual, and what any response may have besides."""
+
+    residual: np.ndarray
+    """Measured less predicted [each stream's unit], shape (m, streams); NaN where missing."""
+    rich: np.ndarray
+    """Columns that belong to no effect [each stream's unit], shape (m, streams, k)."""
+    course: Course
+    """Of the rows read."""
+    context: np.ndarray
+    """Group of rows that share features, shape (m,), int64."""
+    features: np.ndarray | None
+    """What the response may take up [1], shape (m, k)."""
+    rise: np.ndarray
+    """What presses add to each stream [its unit], shape (m, streams)."""
+
+    def noise(self, errors: np.ndarray) -> Noise:
+        """Return the noise beside errors of pose, shape (m, streams, kinds)."""
+        course, relative = self.course, readings.relative_scale(self.residual, self.rise, self.course)
+        residual = readings.beside_depth(self.residual, course)
+        known = readings.first_guess(residual, course, relative)
+        columns = np.concatenate([residual[:, :, None], self.rich], axis=2)
+        best = np.zeros(self.rich.shape[2])
+        for _ in range(2):
+            best = self._best(columns, Cleaner(course, known, self.context, self.features, errors))
+            left = (residual - self.rich @ best.astype(np.float32)) / known.scale
+            still = readings.still(known, left.shape[1])
+            cleaner = Cleaner(course, still, self.context, self.features, errors / known.scale[None, :, None])
+            bare = cleaner.cleaned(left[:, :, None])[:, :, 0]
+            bare[~np.isfinite(residual)] = np.nan
+            known = readings.refined(bare * known.scale, course, known)
+        rest = residual - self.rich @ best.astype(np.float32)
+        kinds = levels(course, self.context, self.features is not None)
+        wandering = wander(rest, course, known.scale, known.memory, kinds)
+        walk = offset_random_walk.modes(rest, course, known.scale, known.memory, self._places())
+        return replace(known, wander=wandering, random_walk=walk, tag=readings.tag_wander(rest, course, known))
+
+    def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> Sizes:
+        """Return how large episodes' own errors of pose are.
+
+        An episode's errors are told by generalized least squares as if they were free, all kinds together, beside all
+        others' at the sizes that they have so far: their covariance is that of such errors and that of what is known.
+        Told by successive episodes of the same place, as an offset that differs from place to place is no error of an
+        episode's own; by successive ones anywhere where places are not visited again.
+
+        Args:
+            known: Noise.
+            errors: What errors of one standard deviation of their prior change, shape (m, streams, kinds).
+            sizes: Sizes so far [prior's], shape (kinds,).
+        """
+        cleaner = Cleaner(self.course, known, self.context, self.features, errors * sizes)
+        score, information = cleaner.moved(self._left(cleaner), errors)
+        # Sealed episodes say nothing.
+        there = np.flatnonzero(np.diagonal(information, axis1=1, axis2=2).min(axis=1) > 0)
+        place, score, information = self._places()[there], score[there], information[there]
+        order = np.argsort(place, kind="stable")
+        again = np.diff(place[order]) == 0
+        if again.sum() < readings.FEW_GAPS:
+            order, again = np.arange(len(place)), np.ones(max(len(place) - 1, 0), dtype=bool)
+        before, after = order[:-1][again], order[1:][again]
+        if len(before) < readings.FEW_GAPS:
+            return Sizes(np.ones(len(sizes)), np.zeros(0, dtype=np.int64))
+        unsure = np.linalg.inv(information + UNTOLD * np.eye(len(sizes)))
+        found = np.einsum("ekl,el->ek", unsure, score)
+        unsure = positive(unsure - np.diag(np.square(sizes)))
+        told = spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST, MOST)
+        middle = np.stack([np.median(found[place == p], axis=0) for p in place])
+        off = found - middle
+        far = np.einsum("ek,ek->e", off, np.linalg.solve(unsure + np.diag(np.square(told)), off[:, :, None])[:, :, 0])
+        return Sizes(told, there[far > ODD**2])
+
+    def gains(self, known: Noise, errors: np.ndarray) -> float:
+        """Return how far an episode's gain of a stream is off the next one's at its place [1].
+
+        Args:
+            known: Noise without own gains.
+            errors: Of pose, shape (m, streams, kinds).
+        """
+        cleaner = Cleaner(self.course, known, self.context, self.features, errors)
+        score, information = cleaner.told(self._left(cleaner), self.rise)
+        return readings.gain_spread(score, information, self._places())
+
+    def _places(self) -> np.ndarray:
+        place = np.zeros(self.course.episodes, dtype=np.int64)
+        place[self.course.episode] = self.context
+        return place
+
+    def _best(self, columns: np.ndarray, cleaner: Cleaner) -> np.ndarray:
+        """Return the weights of the over-rich columns that fit best, shape (k,)."""
+        count = self.rich.shape[2]
+        gram = cleaner.collected(columns).of(np.arange(self.course.episodes))
+        free = np.full(count, np.inf)
+        return solve(gram, np.arange(count), np.ones(count), -free, free)
+
+    def _left(self, cleaner: Cleaner) -> np.ndarray:
+        """Return what an over-rich fit leaves of the residual, shape (m, streams), float32."""
+        columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
+        return (self.residual - self.rich @ self._best(columns, cleaner).astype(np.float32)).astype(np.float32)
+
+
+def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray]:
+    """Return the kinds of levels that offsets have, each as a number an episode, shape (episodes,).
+
+    A session has a level of its own; where the response is fitted, each of its places has one too.
+    """
+    place = np.zeros(course.episodes, dtype=np.int64)
+    place[course.episode] = context
+    return [course.session, place] if fitted else [course.session]

@@ -1,0 +1,90 @@
+"""What recordings may be off by that is no effect: calibration, an episode's own errors, a recording's set-up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tacdata.chain import predict
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.regressors.candidates import build
+from tacdata.discrepancy.regressors.generic import depth_slope
+from tacdata.discrepancy.regressors.stack import side_by_side
+from tacdata.effects import Placed, load
+
+IDLE = 0.01
+"""Standard deviation of what is known of the readings without load, of the largest rise [1]."""
+JITTER = (0.02, 0.02, 0.01)
+"""Standard deviation of an episode's own errors of x, y and depth [mm] where the response is not fitted."""
+FITTED_JITTER = 0.01
+"""The same of depth for a fitted response, over the stroke [1]."""
+FITTED_GAIN = 0.01
+"""Standard deviation of an episode's own gain, the same for all streams, beside a fitted response [1]."""
+SET_UP = 2.0
+"""How far recordings of several strokes are off one another, in the same standard deviations [1]."""
+FEW = 24
+"""In more recordings than so many a set-up's errors are left to their strokes' own [1]."""
+
+
+def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nuisances' columns (n, streams, k) and the weights of their priors (k,).
+
+    Calibration's (a gain of each channel, then what is known of each without load) unless the response is fitted; then
+    what recordings of several strokes are off one another.
+    """
+    course, response = setting.course, setting.response
+    if response.fitted:
+        return set_ups(setting, placed)
+    effects = [load(name) for name in setting.nuisance]
+    board = build(course, response, placed, effects)
+    idle = np.zeros((len(course.read), board.columns[0].shape[1], course.channels), dtype=np.float32)
+    rise = Streams.of(course).rise(predict(course, response, placed), response)[:, : course.channels]
+    idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * float(np.abs(rise).max())
+    weights = [
+        (p.typical / setting.nuisance[c.effect.name]) ** 2
+        for c in board.candidates
+        for p in c.effect.amplitudes
+        for _ in range(len(c.columns) // len(c.effect.amplitudes))
+    ]
+    own, ridge = set_ups(setting, placed)
+    columns = np.concatenate([side_by_side(board.columns)[:, :, 1:], idle, own], axis=2)
+    return columns, np.array([*weights, *np.ones(course.channels), *ridge])
+
+
+def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
+    """Return what recordings that hold several strokes are off one another (n, streams, k), and weights (k,).
+
+    A recording is set up once: its strokes share errors of pose and gain, which are no drift from one to the next.
+    """
+    own = jitter(setting, placed)
+    recording = setting.course.recording
+    if recording is None or not 1 < recording.max() + 1 <= FEW:
+        return np.zeros((*own.shape[:2], 0), dtype=np.float32), np.zeros(0)
+    of = recording[setting.course.reduced.episode]
+    each = [SET_UP * own * (of == number)[:, None, None] for number in range(recording.max() + 1)]
+    columns = np.concatenate(each, axis=2).astype(np.float32)
+    return columns, np.ones(columns.shape[2])
+
+
+def calibrated(setting: Setting) -> bool:
+    """Return whether the first nuisances are gains of channels, and then what is known of them without load."""
+    return not setting.response.fitted and "channel_gain" in setting.nuisance
+
+
+def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
+    """Return what an episode's own errors of pose change, at one standard deviation, shape (n, streams, kinds)."""
+    course, response = setting.course, setting.response
+    slope = depth_slope(course, response, list(placed))
+    if response.fitted:
+        # Where the response follows what was read, gains are as much each episode's own as depths.
+        rise = Streams.of(course).rise(predict(course, response, list(placed)), response)
+        rise[:, course.channels :] = 0.0
+        return np.stack([slope * FITTED_JITTER * course.stroke, rise * FITTED_GAIN], axis=2)
+    sideways = build(course, response, placed, [load("xy_offset")])
+    shift = sideways.candidates[0].effect.amplitudes[0].typical if sideways.candidates else 1.0
+    parts = [slope[:, :, None] * JITTER[2]]
+    if sideways.candidates:
+        parts.append(side_by_side(sideways.columns)[:, :, 1:] * (JITTER[0] / shift))
+    return np.concatenate(parts, axis=2)

@@ -1,0 +1,100 @@
+"""How offsets go on within an episode: the modes of a Brownian motion, and its rate.
+
+Electronics do not stand still while a finger is pressed: their noise is larger the slower it is. About the mean over
+an episode of length T a Brownian motion of rate q is a sum of cos(k pi t / T) with independent amplitudes of variance
+2 q T / (k pi)^2 (its Karhunen-Loeve series). Whatever a press remembers looks much like the first few of them. The rate
+is told where nothing presses, by how far an offset after a press is off the one before it.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.discrepancy.noise import readings
+
+MOST = 8
+"""Most modes [1]."""
+SHOWS = 0.03
+"""A mode counts while its variance is so much of the one that rows know of it [1]."""
+HEARD = (0.05, 1.5)
+"""Means scatter by so much of what independent rows would make of them, in variance [1]."""
+AT_LEAST = 3
+"""Quiet rows that an offset before or after a press is read from."""
+
+
+def modes(
+    rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray
+) -> np.ndarray | None:  # fmt: skip
+    """Return what one standard deviation of each mode changes [noise scales], shape (m, modes); None for none.
+
+    Args:
+        rest: What an over-rich fit leaves [each stream's unit], shape (m, streams); NaN where nothing was read.
+        course: With the rows read alone.
+        scale: Standard deviation of the innovations of rows, shape (streams,).
+        memory: Correlation of successive rows [1].
+        place: Of each episode, shape (episodes,).
+    """
+    rate = told(rest, course, scale, memory, place)
+    count = np.bincount(course.episode, minlength=course.episodes)
+    begin = np.full(course.episodes, np.inf)
+    np.minimum.at(begin, course.episode, course.time)
+    end = np.full(course.episodes, -np.inf)
+    np.maximum.at(end, course.episode, course.time)
+    there = count > 1
+    length = np.where(there, end - begin, 1.0)
+    number = np.arange(1, MOST + 1)
+    variance = 2 * rate * length[:, None] / (np.pi * number) ** 2
+    known = 0.5 * count[:, None] * (1 - memory) ** 2
+    shown = np.median((variance * known)[there], axis=0) > SHOWS
+    most = int(np.argmin(shown)) if not shown.all() else MOST
+    if not most:
+        return None
+    share = (course.time - begin[course.episode]) / np.maximum(length, 1e-9)[course.episode]
+    size = np.sqrt(variance[:, :most])[course.episode]
+    return (size * np.cos(np.pi * number[:most] * share[:, None])).astype(np.float32)
+
+
+def told(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray) -> float:
+    """Return the rate of the wander [noise scales squared a second], 0 where it cannot be told; as for `modes`."""
+    quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
+    streams = rest[:, : course.channels] / scale[: course.channels]
+    quiet &= np.isfinite(streams).all(axis=1)
+    steps, known, of, halves = [], [], [], []
+    edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
+    for episode, (first, last) in enumerate(pairwise(edges)):
+        rows = np.arange(first, last)
+        pressed = rows[~quiet[rows]]
+        if not len(pressed):
+            continue
+        before, after = rows[quiet[rows] & (rows < pressed[0])], rows[quiet[rows] & (rows > pressed[-1])]
+        if min(len(before), len(after)) < AT_LEAST:
+            continue
+        t0, t1 = course.time[before], course.time[after]
+        # Means over stretches of a Brownian motion: a third of each stretch counts.
+        apart = float(t1[0] - t0[-1] + (np.ptp(t0) + np.ptp(t1)) / 3)
+        steps.append((streams[after].mean(axis=0) - streams[before].mean(axis=0)) / np.sqrt(apart))
+        known.append((1 / len(before) + 1 / len(after)) / ((1 - memory) ** 2 * apart))
+        of.append(place[episode])
+        halves += [_halved(streams[part]) for part in (before, after) if len(part) >= 2 * AT_LEAST]
+    if not steps:
+        return 0.0
+    step, error, where = np.array(steps), np.array(known), np.array(of)
+    if halves:
+        # A hum makes rows scatter, and means hardly.
+        heard = float(np.median(np.square(np.concatenate(halves))) / readings.HALF) * (1 - memory) ** 2
+        error *= np.clip(heard, *HEARD)
+    gaps, unsure = [], []
+    for key in np.unique(where):
+        own = np.diff(step[where == key], axis=0)
+        gaps.append(own.ravel())
+        unsure.append(np.repeat(error[where == key][1:] + error[where == key][:-1], step.shape[1]))
+    return readings.spread_of(np.concatenate(gaps), np.concatenate(unsure)) ** 2
+
+
+def _halved(values: np.ndarray) -> np.ndarray:
+    """Return by how much the means of two halves (n, streams) differ, over what white noise of 1 makes of that [1]."""
+    first, second = np.array_split(values, 2)
+    return (second.mean(axis=0) - first.mean(axis=0)) / np.sqrt(1 / len(first) + 1 / len(second))

@@ -1,0 +1,252 @@
+"""How much readings scatter, told from the recordings themselves."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.discrepancy.noise.gram import Noise
+
+SHARES = (0.0, 0.03, 0.1, 0.25, 0.5, 0.75, 1.0)
+"""Edges of the shares of the largest rise in which noise is told apart [1]."""
+SAME = 1.2
+"""Noise that is nowhere larger than so many times what it is without load is the same everywhere [1]."""
+LARGEST = 5.0
+"""It is told to be no larger than so many times that [1]."""
+ENOUGH = 150
+"""Fewer values tell no spread."""
+
+
+def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np.ndarray | None:
+    """Return how much larger noise is in each value than without load [1], shape (n, streams); None: it is not.
+
+    Told by second differences, which what a model lacks hardly touches.
+
+    Args:
+        residual: Shape (n, streams).
+        rise: What presses add to each stream, shape (n, streams).
+        course: Whose rows.
+    """
+    own = np.abs(rise[:, : course.channels])
+    share = own / max(float(own.max(initial=0.0)), 1e-12)
+    second, inside = _second(residual[:, : course.channels], course)
+    at, read = share[1:-1][inside], np.isfinite(second)
+    quiet = read & (at <= SHARES[1])
+    count, power = quiet.sum(axis=0), np.sum(np.square(second), axis=0, where=quiet)
+    # A stream that mostly stands still without load, or was not read, tells nothing.
+    told = np.sum(quiet & (second != 0), axis=0) > 0.5 * count
+    if count[told].sum() < ENOUGH:
+        return None
+    second, at, known = second[:, told] / np.sqrt(power[told] / count[told]), at[:, told], read[:, told]
+    nodes, levels = [0.0], [_spread(second[known & (at <= SHARES[1])])]
+    for low, high in itertools.pairwise(SHARES[1:]):
+        inside = known & (at > low) & (at <= high)
+        if inside.sum() >= ENOUGH:
+            nodes.append(float(np.mean(at[inside])))
+            levels.append(_spread(second[inside]))
+    size = np.clip(np.array(levels) / max(levels[0], 1e-12), 1.0, LARGEST)
+    if size.max() < SAME:
+        return None
+    result = np.ones(residual.shape, dtype=np.float32)
+    result[:, : course.channels] = np.interp(share, nodes, size)
+    return result
+
+
+def _spread(values: np.ndarray) -> float:
+    """Return the standard deviation of values, half by their median: neither few outliers nor coarse steps decide."""
+    return 0.5 * float(1.4826 * np.median(np.abs(values)) + np.sqrt(np.mean(np.square(values))))
+
+
+def _second(residual: np.ndarray, course: Course) -> tuple[np.ndarray, np.ndarray]:
+    """Return second differences (m, streams) where an episode has a row before and after; where that is, (n - 2,)."""
+    inner = (~course.first & ~np.roll(course.first, -1) & ~np.roll(course.first, 1))[1:-1]
+    return (residual[1:-1] - 0.5 * (residual[:-2] + residual[2:]))[inner], inner
+
+
+def first_guess(residual: np.ndarray, course: Course, relative: np.ndarray | None = None) -> Noise:
+    """Return white noise by second differences.
+
+    Args:
+        residual: Shape (n, streams).
+        course: Whose rows.
+        relative: How much larger it is in each value than without load [1], shape (n, streams).
+    """
+    residual = residual if relative is None else residual / relative
+    second, _ = _second(residual, course)
+    seen = np.isfinite(residual).any(axis=0)  # a gauge sees the depth alone
+    whole = np.ones(residual.shape[1])
+    whole[seen] = np.nanstd(residual[:, seen], axis=0)
+    known = np.isfinite(second).sum(axis=0) > 10
+    scale = whole.copy()
+    if known.any():
+        scale[known] = 1.4826 * np.nanmedian(np.abs(second[:, known]), axis=0) / np.sqrt(1.5)
+    missing = ~np.isfinite(residual)
+    tag = np.inf if course.tag is not None else None
+    found = np.maximum(scale, 1e-3 * whole + 1e-12)
+    return Noise(found, 0.0, missing=missing if missing.any() else None, tag=tag, relative_scale=relative)
+
+
+def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
+    """Return noise with memory, told from what an over-rich fit leaves.
+
+    Args:
+        leftover: Shape (n, streams).
+        course: Whose rows.
+        before: The guess so far.
+    """
+    seen = np.isfinite(leftover).any(axis=0)
+    if not seen.all():
+        own = replace(before, scale=before.scale[seen], missing=None)
+        told = refined(leftover[:, seen], course, own)
+        scale = before.scale.copy()
+        scale[seen] = told.scale
+        return replace(before, scale=scale, memory=told.memory)
+    inside = ~course.first
+    median = float(np.median(course.step[inside])) if inside.any() else 1.0
+    pairs = inside & (course.step < 1.5 * median)
+    later, earlier = leftover[pairs], leftover[np.flatnonzero(pairs) - 1]
+    weight = 1 / np.maximum(np.nanmean(np.square(leftover), axis=0), 1e-24)
+    products = float(np.nansum(later * earlier * weight))
+    squares = float(np.nansum(np.where(np.isfinite(later * earlier), 0.5 * (later**2 + earlier**2) * weight, 0.0)))
+    memory = float(np.clip(products / max(squares, 1e-12), 0.0, 0.98))
+    spread = 1.4826 * np.nanmedian(np.abs(leftover - np.nanmedian(leftover, axis=0)), axis=0)
+    mixed = np.maximum(0.5 * (spread + np.nanstd(leftover, axis=0)), before.scale * 0.3)
+    return replace(before, scale=mixed * np.sqrt(max(1 - memory**2, 0.02)), memory=memory)
+
+
+def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -> float:
+    """Return how far an episode's gain of a stream is off the next one's at its place, as a standard deviation [1].
+
+    Presses that miss their place by a little read a little more here and less there: random to every model without
+    a gradient.
+
+    Args:
+        score: What the residual says of each episode's gain of each stream, shape (episodes, streams).
+        information: How much it knows of it, shape (episodes, streams).
+        place: Of each episode, shape (episodes,).
+    """
+    gaps, known = [], []
+    said = information.max(axis=1) > 0  # sealed episodes say nothing
+    for key in np.unique(place[said]):
+        power = information[said & (place == key)]
+        gain = score[said & (place == key)] / np.maximum(power, 1e-9)
+        both = (power[1:] > 1.0) & (power[:-1] > 1.0)
+        gaps.append(np.diff(gain, axis=0)[both])
+        known.append((1 / np.maximum(power[1:], 1e-9) + 1 / np.maximum(power[:-1], 1e-9))[both])
+    return spread_of(np.concatenate(gaps), np.concatenate(known))
+
+
+HALF = 0.4549
+"""Median of the square of a standard normal number [1]."""
+FEW_GAPS = 6
+"""Fewer differences tell no spread."""
+SHARED = 40
+"""The best known differences, so many, count alike: no few of them decide [1]."""
+
+
+def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
+    """Return the standard deviation that numbers have beyond their known errors, 0 or more.
+
+    Told from differences of successive ones by their median: neither a slow change nor a step makes it larger. Each
+    counts by what it says of the spread (the Fisher information of a variance), so that many that are hardly known do
+    not drown the few that are.
+
+    Args:
+        gaps: Differences of successive numbers, shape (n,).
+        known: Variance of each that is known, shape (n,).
+    """
+    if len(gaps) < FEW_GAPS:
+        return 0.0
+    square = np.square(gaps)
+    floor = float(np.partition(known, min(SHARED, len(known)) - 1)[min(SHARED, len(known)) - 1])
+
+    def beyond(power: float) -> bool:
+        ratio = square / np.maximum(2 * power + known, 1e-30)
+        weight = 1 / np.square(2 * power + np.maximum(known, floor) + 1e-30)
+        return float(weight[ratio > HALF].sum()) > 0.5 * float(weight.sum())
+
+    low, high = 0.0, float(np.max(square)) + 1e-30
+    if not beyond(0.0):
+        return 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if beyond(middle) else (low, middle)
+    return float(np.sqrt(high))
+
+
+INTERVALS = 10
+"""Of the function of depth that a tag's noise is told beside [1]."""
+FEW_VIEWS = 100
+"""Fewer views tell no function of depth beside an offset each episode [1]."""
+
+
+def beside_depth(residual: np.ndarray, course: Course) -> np.ndarray:
+    """Return residuals in which a tag's are without what goes with depth, shape (n, streams).
+
+    Splines take that out of readings beside a fitted response, and nothing does it for a tag: a frame that gives way
+    would be noise of the gauge that sees it, a hundred times what it is. Each way has a function of its own.
+
+    Args:
+        residual: Shape (n, streams).
+        course: Whose rows.
+    """
+    if course.tag is None:
+        return residual
+    result, depth = residual.copy(), np.clip(course.tip[:, 2] / max(float(course.tip[:, 2].max()), 1e-12), 0.0, 1.0)
+    hats = np.maximum(1 - np.abs(depth[:, None] * INTERVALS - np.arange(1, INTERVALS + 1)), 0.0)
+    leaving = (course.speed < 0)[:, None]
+    columns = np.concatenate([np.where(leaving, 0.0, hats), np.where(leaving, hats, 0.0)], axis=1)
+    for k in range(residual.shape[1] - 3, residual.shape[1]):
+        there = np.isfinite(residual[:, k])
+        if there.sum() < FEW_VIEWS:
+            continue
+        own = [_about_mean(x, course.episode[there]) for x in (columns[there], residual[there, k : k + 1])]
+        gram = own[0].T @ own[0]
+        gram += 1e-6 * max(float(np.trace(gram)) / len(gram), 1e-12) * np.eye(len(gram))
+        result[:, k] -= columns @ np.linalg.solve(gram, own[0].T @ own[1])[:, 0]
+    return result
+
+
+def _about_mean(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Return values, shape (n, k), less the mean of their group."""
+    count = np.maximum(np.bincount(group), 1)
+    means = np.stack([np.bincount(group, column) / count for column in values.T], axis=1)
+    return values - means[group]
+
+
+def tag_wander(residual: np.ndarray, course: Course, known: Noise) -> float | None:
+    """Return how far an episode's offset of the tag is off the next one's, in noise scales [1]; None without a tag.
+
+    Args:
+        residual: Shape (n, streams).
+        course: Whose rows.
+        known: Noise so far.
+    """
+    if course.tag is None:
+        return None
+    gaps, error = [], []
+    for column in (residual[:, -3:] / known.scale[-3:]).T:
+        there = np.isfinite(column)
+        count = np.bincount(course.episode[there], minlength=course.episodes)
+        mean = np.bincount(course.episode[there], column[there], minlength=course.episodes) / np.maximum(count, 1)
+        both = (count[1:] > 2) & (count[:-1] > 2) & (course.site[1:] == course.site[:-1])
+        gaps.append(np.diff(mean)[both])
+        error.append((1 / np.maximum(count[1:], 1) + 1 / np.maximum(count[:-1], 1))[both])
+    return max(spread_of(np.concatenate(gaps), np.concatenate(error)), 0.2)
+
+
+def number_within(context: np.ndarray, episode: np.ndarray) -> np.ndarray:
+    """Return the number of each row's episode among those of its place, from 0, shape (n,), int64."""
+    result = np.zeros(len(context), dtype=np.int64)
+    for key in np.unique(context):
+        rows = context == key
+        result[rows] = np.unique(episode[rows], return_inverse=True)[1]
+    return result
+
+
+def still(known: Noise, streams: int) -> Noise:
+    """Return noise that whitens nothing, so that what is left keeps its memory and size."""
+    return replace(known, scale=np.ones(streams), memory=0.0)

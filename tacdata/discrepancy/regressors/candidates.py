@@ -1,0 +1,180 @@
+"""What every effect would add to these recordings, as columns beside the residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from tacdata.chain import Chain, Course, Response
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.effects import Effect, Placed
+
+MOST_CHANNELS = 32
+"""Up to so many channels, parameters that every channel has of its own get a column each; beyond, one for all."""
+
+
+SMALL = (0.1, 0.02)
+"""An effect with a threshold looks otherwise where it is small: it is tried at these shares of its size too..."""
+ALIKE = 0.95
+"""...if what it changes there is no more alike than this [cosine] to what it does at the larger size."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at one choice of its shapes."""
+
+    effect: Effect
+    shapes: dict[str, float]
+    columns: np.ndarray
+    """Its columns, from 0, shape (k,), int64."""
+    low: np.ndarray
+    """Least coefficients [typical sizes], shape (k,)."""
+    high: np.ndarray
+    """Largest coefficients [typical sizes], shape (k,)."""
+
+    @property
+    def called(self) -> str:
+        """The mechanism's name."""
+        return self.effect.called
+
+    def placed(self, coefficients: np.ndarray, channels: int) -> Placed:
+        """Return the effect with the parameters that coefficients stand for."""
+        values = {name: np.array(value) for name, value in self.shapes.items()}
+        at = 0
+        for p in self.effect.amplitudes:
+            width = channels if p.per_channel and channels <= MOST_CHANNELS else 1
+            taken = coefficients[at : at + width] * p.typical
+            if p.per_channel:
+                values[p.name] = np.broadcast_to(taken, (channels,)).copy()
+            else:
+                values[p.name] = np.array(float(taken[0]))
+            at += width
+        return Placed(self.effect, values)
+
+
+@dataclass(frozen=True)
+class Board:
+    """All candidates with their columns."""
+
+    columns: list[np.ndarray]
+    """Residual first, then columns [each stream's unit], shape (n, streams) each, float32."""
+    candidates: list[Candidate]
+    unjudgeable: dict[str, str]
+    """Effect -> why these recordings cannot tell of it."""
+
+
+def build(
+    course: Course,
+    response: Response,
+    placed: Sequence[Placed],
+    effects: Sequence[Effect],
+    nuisance: Sequence[str] = (),
+) -> Board:
+    """Predict, and differentiate the chain by every effect at its typical size.
+
+    Args:
+        course: The recordings.
+        response: What the chain starts from.
+        placed: Effects that the model has already.
+        effects: Effects to try.
+        nuisance: Effects that calibration takes up.
+    """
+    streams = Streams.of(course)
+    chain = Chain(course, response, placed)
+    now = streams.predicted(chain.prediction)
+    columns = [(streams.measured(course) - now).astype(np.float32)]
+    candidates: list[Candidate] = []
+    unjudgeable: dict[str, str] = {}
+    for effect in effects:
+        reason = _unjudgeable(effect, course, response) or _absorbed(effect, nuisance)
+        if reason:
+            unjudgeable[effect.name] = reason
+            continue
+        shares = SMALL
+        for shapes in _shapes(effect):
+            made, low, high = _columns(effect, shapes, course, chain, placed, streams, now)
+            sizes = [made]
+            for share in shares:
+                small, _, _ = _columns(effect, shapes, course, chain, placed, streams, now, share)
+                if not _unlike(sizes[-1], small):
+                    shares = shares[: shares.index(share)]  # A threshold is one at all times and lengths, or at none.
+                    break
+                sizes.append(small)
+            for columns_of in sizes:
+                index = np.arange(len(columns) - 1, len(columns) - 1 + len(columns_of))
+                columns += columns_of
+                candidates.append(Candidate(effect, shapes, index, np.array(low), np.array(high)))
+    return Board(columns, candidates, unjudgeable)
+
+
+class StandIn(Response):
+    """A response without channels, to ask effects what they think of fitted ones and others."""
+
+    def __init__(self, fitted: bool) -> None:
+        """Say whether it was fitted."""
+        self.fitted = fitted
+
+    def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return nothing."""
+        return np.zeros((len(pose), 1))
+
+    def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """Return nothing."""
+        return np.zeros(len(pose))
+
+    def signal(self, load: np.ndarray) -> np.ndarray:
+        """Return the loads."""
+        return load
+
+
+def _unjudgeable(effect: Effect, course: Course, response: Response) -> str:
+    """Return why an effect cannot be judged; a tag sees what a fitted response would take up."""
+    if response.fitted and course.tag is not None and effect.seen_by_tag:
+        return effect.unjudgeable(course, StandIn(False))
+    return effect.unjudgeable(course, response)
+
+
+def _absorbed(effect: Effect, nuisance: Sequence[str]) -> str:
+    """Return why an effect is not tried by itself: what calibration takes up cannot be tested beside it."""
+    return "read off the calibration of each channel's gain" if effect.name in nuisance else ""
+
+
+def _unlike(first: list[np.ndarray], second: list[np.ndarray]) -> bool:
+    """Return whether two sets of columns of one effect point elsewhere."""
+    both = sum(float(np.vdot(a, b)) for a, b in zip(first, second, strict=True))
+    sizes = [sum(float(np.vdot(a, a)) for a in columns) for columns in (first, second)]
+    return both < ALIKE * float(np.sqrt(sizes[0] * sizes[1]))
+
+
+def _shapes(effect: Effect) -> list[dict[str, float]]:
+    names = [p.name for p in effect.shapes]
+    return [dict(zip(names, values, strict=True)) for values in product(*(p.grid for p in effect.shapes))]
+
+
+def _columns(
+    effect: Effect, shapes: dict[str, float], course: Course, chain: Chain, placed: Sequence[Placed],
+    streams: Streams, now: np.ndarray, share: float = 1.0,
+) -> tuple[list[np.ndarray], list[float], list[float]]:  # fmt: skip
+    """Return what an effect changes at a share of its typical sizes, over that share, and the bounds."""
+    made, low, high = [], [], []
+    rest = {p.name: np.full(course.channels, p.default) if p.per_channel else np.array(p.default)
+            for p in effect.amplitudes}  # fmt: skip
+    rest |= {name: np.array(value) for name, value in shapes.items()}
+    for p in effect.amplitudes:
+        values = {**rest, p.name: rest[p.name] + share * p.typical}
+        change = streams.predicted(chain.again([*placed, Placed(effect, values)])) - now
+        change = (change / share).astype(np.float32)
+        if p.per_channel and course.channels <= MOST_CHANNELS:
+            for channel in range(course.channels):
+                own = np.zeros_like(change)
+                own[:, channel] = change[:, channel]
+                made.append(own)
+        else:
+            made.append(change)
+        count = len(made) - len(low)
+        low += [p.low / p.typical] * count
+        high += [p.high / p.typical] * count
+    return made, low, high

@@ -1,0 +1,84 @@
+"""Columns that belong to no effect: patterns times histories, to see whether anything is left to explain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.chain import Course, Response, predict
+from tacdata.chain.memory import low_pass, play, running_max
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.effects import Placed
+
+CLOCK = (3, 4, -1)
+"""Histories that follow the clock: a slow wander of the electronics does too, so a gap needs more than them."""
+TIMES = (0.1, 0.4, 1.5, 6.0, 25.0, 100.0)
+"""Time constants of leaky means of depth [s]."""
+
+
+def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
+    """Return columns, shape (n, streams, k), float32: patterns of the streams times histories of the path."""
+    streams = Streams.of(course)
+    rise = streams.rise(predict(course, response, placed), response)
+    slope = depth_slope(course, response, placed)
+    level = np.zeros_like(rise)
+    level[:, : course.channels] = np.abs(rise[:, : course.channels]).max()
+    own = np.delete(histories(course), CLOCK, axis=1)[streams.rows]
+    parts = [rise[:, :, None] * own[:, None, :], slope[:, :, None] * own[:, None, :] * 0.1]
+    parts.append(level[:, :, None] * own[:, None, ::2])
+    return np.concatenate(parts, axis=2).astype(np.float32)
+
+
+def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
+    """Return columns of what changes over a session, shape (n, streams, k), float32: gains and depths with the clock.
+
+    They tell slow changes from what differs from one visit of a place to the next; they are no evidence themselves.
+    """
+    streams = Streams.of(course)
+    rise = streams.rise(predict(course, response, placed), response)
+    own = [histories(course)[:, k] for k in CLOCK]
+    if course.temperature is not None:
+        own.append((course.temperature - course.temperature.mean()) / max(float(np.std(course.temperature)), 1e-9))
+    follow = np.stack(own, axis=-1)[streams.rows][:, None, :]
+    slope = depth_slope(course, response, placed)[:, :, None] * (0.1 * course.stroke)
+    return np.concatenate([rise[:, :, None] * follow, slope * follow], axis=2).astype(np.float32)
+
+
+def histories(course: Course) -> np.ndarray:
+    """Return what a path remembers, each of size about 1, shape (n, k)."""
+    depth = np.maximum(course.tip[:, 2], 0.0)
+    if depth.max() <= 0:
+        depth = course.tip[:, 2] - course.tip[:, 2].min()
+    share = depth / max(float(depth.max()), 1e-9)
+    speed = course.speed
+    fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)
+    clock = course.time / max(float(course.time[-1]), 1e-9) - 0.5
+    most = running_max(share, course.row_site)
+    recent = np.maximum.accumulate(np.where(course.first, 0.0, share))
+    stroke = _since_start(course, share)
+    columns = [
+        np.sign(speed), np.sign(speed) * fast, fast, clock, clock**2 - 1 / 12, most - share, stroke - share,
+        most - recent * 0.0 - stroke, *(low_pass(share, course.step, tau) for tau in TIMES),
+        *(np.square(low_pass(share, course.step, tau)) for tau in TIMES[1::2]),
+        *(play(share, r) - share for r in (0.03, 0.1, 0.3)),
+        share * (speed < 0), np.exp(-np.square(share / 0.1)) * (speed < 0),
+        course.session[course.episode] - float(np.mean(course.session)),
+    ]  # fmt: skip
+    return np.stack(columns, axis=-1)
+
+
+def depth_slope(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
+    """Return the change of every stream with depth [1/mm], shape (n, streams); 0 for the tag's."""
+    from dataclasses import replace
+
+    streams, step = Streams.of(course), 0.005 * course.stroke
+    down = np.array([0.0, 0.0, step])
+    deeper, higher = replace(course, tip=course.tip + down), replace(course, tip=course.tip - down)
+    change = streams.predicted(predict(deeper, response, placed)) - streams.predicted(predict(higher, response, placed))
+    if streams.tag:
+        change[:, -3:] = 0.0
+    return change / (2 * step)
+
+
+def _since_start(course: Course, values: np.ndarray) -> np.ndarray:
+    """Return the largest value so far in each episode, shape (n,)."""
+    return running_max(values, course.episode)

@@ -1,0 +1,108 @@
+"""What an effect's equation may be off about: its own contribution, a little larger here and smaller there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from tacdata.chain import Chain, Course, Response
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.effects import Placed, library
+
+SPREAD = 3.0
+"""How far a mechanism may be spread over its other forms and shapes, over what one equation is off about [1]."""
+SIZES = (0.25, 0.5, 2.0, 4.0)
+"""Other sizes of what has no shape, whose time constant or width is its size [1]."""
+NEAR = (0.5, 2.0)
+"""Shapes beside an effect's own: what goes with a period has harmonics, what relaxes has times on either side [1]."""
+NOTHING = 1e-9
+"""What changes less than this share of what the effect does is no form of it [1]."""
+
+
+def forms(course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()) -> np.ndarray:
+    """Return columns at one standard deviation, shape (n, streams, k), float32; k is 0 without placed effects.
+
+    A large effect whose equation is a little wrong leaves what small effects explain: what lies along these columns is
+    no evidence of another one.
+    """
+    streams, every = Streams.of(course), list(given)
+    if not placed:
+        return np.zeros((len(course.read), streams.count, 0), dtype=np.float32)
+    columns: list[np.ndarray] = []
+    for at, one in enumerate(placed):
+        rest = [*every, *(p for k, p in enumerate(placed) if k != at)]
+        chain = Chain(course, response, rest)
+        bare = streams.predicted(chain.prediction)
+        own = streams.predicted(chain.again([*rest, one])) - bare
+        columns += [one.effect.form_error * own * by for by in modulations(course, streams, own)]
+        size = float(np.linalg.norm(own))
+        for other in variants(one, course.channels):
+            if other.effect.name != one.effect.name and other.effect.unjudgeable(course, response):
+                continue
+            change = streams.predicted(chain.again([*rest, other])) - bare
+            large = float(np.linalg.norm(change))
+            if large > NOTHING * size:
+                columns.append(SPREAD * one.effect.form_error * size / large * change)
+    return np.stack(columns, axis=-1).astype(np.float32)
+
+
+def variants(one: Placed, channels: int) -> list[Placed]:
+    """Return a mechanism in its other forms and shapes: no polymer relaxes with one time constant.
+
+    Args:
+        one: An effect with its numbers.
+        channels: How many channels there are.
+    """
+    made = []
+    for effect in library():
+        if effect.called != one.effect.called:
+            continue
+        if not effect.shapes and effect.name == one.effect.name:
+            made += [_sized(one, by) for by in SIZES]
+            continue
+        sizes = [
+            {
+                p.name: np.full(channels if p.per_channel else (), p.default + p.typical * (p is own), dtype=float)
+                for p in effect.amplitudes
+            }
+            for own in effect.amplitudes
+        ]
+        every = list(product(*(p.grid for p in effect.shapes)))
+        if effect.name == one.effect.name:
+            now = [float(one.values[p.name]) for p in effect.shapes]
+            beside = [(k, by * value) for k, value in enumerate(now) for by in NEAR]
+            every += [(*now[:k], value, *now[k + 1 :]) for k, value in beside]
+        for shapes in every:
+            own = {p.name: np.clip(value, p.low, p.high) for p, value in zip(effect.shapes, shapes, strict=True)}
+            made += [Placed(effect, alone | own) for alone in sizes]
+    return made
+
+
+def _sized(one: Placed, by: float) -> Placed:
+    """Return an effect of another size, within its bounds."""
+    return Placed(one.effect, {
+        p.name: np.clip(p.default + by * (one.values[p.name] - p.default), p.low, p.high) for p in one.effect.parameters
+    })  # fmt: skip
+
+
+def modulations(course: Course, streams: Streams, own: np.ndarray) -> list[np.ndarray]:
+    """Return how a contribution, shape (n, streams), may differ: with depth, rate, direction, time and its own size.
+
+    Each has a mean of 0 and a root mean square of 1, weighted by the square of the contribution; shape (n, 1) or that
+    of the contribution.
+    """
+    depth = np.clip(course.tip[:, 2] / max(float(course.tip[:, 2].max()), 1e-9), 0.0, 1.0)
+    speed = np.abs(course.speed) / max(float(np.abs(course.speed).max()), 1e-9)
+    clock = course.time / max(float(course.time[-1]), 1e-9)
+    rows = [h[streams.rows][:, None] for h in (depth, speed, np.sign(course.speed), clock)]
+    size = np.linalg.norm(own, axis=1, keepdims=True)
+    weight = np.square(size)
+    total = max(float(weight.sum()), 1e-30)
+    result = []
+    for row in (*rows, size):
+        apart = row - float((row * weight).sum()) / total
+        spread = float(np.sqrt((np.square(apart) * weight).sum() / total))
+        result.append(apart / spread if spread > 1e-9 else np.zeros_like(apart))
+    return result

@@ -1,0 +1,1 @@
+"""Which effects the residual asks for: gate, race, elimination, rivals, leftovers."""

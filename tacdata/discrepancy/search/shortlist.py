@@ -1,0 +1,96 @@
+"""Which effects, and which pair of them, are worth refining beside what a model has."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.discrepancy.data.identifiability import lookalikes
+from tacdata.discrepancy.regressors.candidates import Candidate
+from tacdata.discrepancy.search.problem import Problem
+from tacdata.discrepancy.search.screen import Tested, best_shapes, fitted, held_out
+from tacdata.discrepancy.statistics.gram_fit import clipped_t, gains
+
+ALPHA = 0.01
+"""Share of decoys that may do as well, over all candidates together."""
+TOP = 8
+"""How many effects are tried as members of pairs and as rivals."""
+RIVAL = 2.33
+"""A rival as likely beforehand is out when the winner is better by so many standard errors over episodes: one in a
+hundred, one-sided [1]."""
+BEAM = 5
+"""Sets that a search for pairs keeps [1]."""
+SURE_PAIR = 3.0
+"""A pair of which neither is significant must help by so many standard errors over episodes [1]."""
+
+
+def shortlist(problem: Problem, tested: Tested) -> list[list[Candidate]]:
+    """Return sets of effects worth adding: up to three single ones, and the pair that does better than any of them."""
+    taken = {p.effect.called for p in (*problem.setting.given, *problem.placed)}
+    best = best_shapes(problem)
+    # Two that these presses cannot split are a set, not a pair.
+    taken |= {name for p in problem.placed for name in lookalikes(problem.setting.course, p.effect, p.values)}
+    free = [c for c in best.values() if c.called not in taken]
+
+    singles = sorted(((_gain(problem, [c]), c) for c in free), key=lambda item: -item[0])[:TOP]
+    significant = {c.effect.name for c, p in zip(problem.candidates, tested.p, strict=True) if p <= ALPHA}
+    held = {c.effect.name: held_out(problem, [c]) for _, c in singles}
+    order = [c for _, c in singles if c.effect.name in significant and held[c.effect.name].sum() > 0]
+    pair = _pair(problem, [c for _, c in singles], free)
+    if order:
+        alone = max((held[c.effect.name] for c in order), key=lambda h: h.sum())
+        better = pair and clipped_t(held_out(problem, pair) - alone) > RIVAL
+        return [[c] for c in _tried(order)] + ([pair] if better else [])
+    if tested.p_generic <= ALPHA and pair and clipped_t(held_out(problem, pair)) > SURE_PAIR:
+        return [pair[:1], pair]
+    return []
+
+
+def _tried(order: list[Candidate]) -> list[Candidate]:
+    """Return which of some candidates, best first, are tried: the best form of three mechanisms, two of the best."""
+    forms: dict[str, list[Candidate]] = {}
+    for candidate in order:
+        forms.setdefault(candidate.called, []).append(candidate)
+    return [form for k, same in enumerate(list(forms.values())[:3]) for form in same[: 2 if k == 0 else 1]]
+
+
+def _gain(problem: Problem, chosen: list[Candidate]) -> float:
+    everything = np.arange(len(problem.folds))
+    columns, values = fitted(problem, chosen, everything)
+    fee = 0.5 * sum(len(c.columns) for c in chosen) * float(np.log(max(len(problem.folds), 2)))
+    return float(gains(problem.evidence.of(everything)[None], columns, values)[0]) - fee
+
+
+def _beside(problem: Problem, first: Candidate, others: list[Candidate]) -> list[float]:
+    """Return the gain of a first effect with each of others, without bounds, less half a log of episodes a number."""
+    fixed = np.concatenate([problem.fixed, first.columns]).astype(int) + 1
+    total = problem.evidence.of(np.arange(len(problem.folds)))
+    ridge = np.concatenate([problem.fixed_ridge(1.0), np.zeros(len(first.columns))])
+    matrix = total[np.ix_(fixed, fixed)] + np.diag(ridge + 1e-9 * max(float(np.trace(total)), 1e-12) / len(total))
+    rest = total - total[:, fixed] @ np.linalg.solve(matrix, total[fixed])
+    alone, fee = _gain(problem, [first]), 0.5 * float(np.log(max(len(problem.folds), 2)))
+    result = []
+    for c in others:
+        index = c.columns + 1
+        inner = rest[np.ix_(index, index)]
+        weight = 1e-6 * max(float(np.trace(total[np.ix_(index, index)])) / len(index), 1e-12)
+        more = 0.5 * rest[index, 0] @ np.linalg.solve(inner + weight * np.eye(len(index)), rest[index, 0])
+        result.append(alone + float(more) - fee * len(index))
+    return result
+
+
+def _pair(problem: Problem, first: list[Candidate], free: list[Candidate]) -> list[Candidate]:
+    """Return the pair that predicts left-out episodes best, of the best few of a beam; empty if there is none.
+
+    One effect may hide another: each of the first few is joined with every other effect, whatever that does alone.
+    """
+    made = []
+    for a in first[:BEAM]:
+        alike = (a.called, *lookalikes(problem.setting.course, a.effect, a.shapes))
+        others = [c for c in free if c.called not in alike]
+        made += [(gain, [a, c]) for gain, c in zip(_beside(problem, a, others), others, strict=True)]
+    made.sort(key=lambda item: -item[0])
+    told = [(float(held_out(problem, pair).sum()), pair) for _, pair in made[:BEAM]]
+    if not told:
+        return []
+    pair = max(told, key=lambda item: item[0])[1]
+    return sorted(pair, key=lambda c: -_gain(problem, [c]))

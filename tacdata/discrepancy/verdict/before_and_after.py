@@ -1,0 +1,52 @@
+"""Readings laid beside what the model of a verdict says of them, without and with its effects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.chain import Course, predict
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.search.findings import Judgement
+from tacdata.discrepancy.verdict.residual_slices import PHASES, phases
+from tacdata.discrepancy.verdict.residual_table import Residuals
+
+MOST = 2_000_000
+"""Values that a file holds of each kind; of more, every second, third, ... reading is kept [1]."""
+
+
+def beside_model(course: Course, found: Judgement, sealed: np.ndarray, most: int = MOST) -> Residuals:
+    """Lay the readings beside the model before and after.
+
+    Args:
+        course: All recordings, the sealed ones with their readings.
+        found: What was found without those.
+        sealed: Which episodes were sealed.
+        most: Values of each kind that are kept at most.
+    """
+    streams, reduced, first, last = Streams.of(course), course.reduced, found.problem, found.final
+    measured = streams.measured(course)
+    before = streams.predicted(predict(course, first.setting.response, list(first.setting.given)))
+    after = streams.predicted(predict(course, last.setting.response, [*last.setting.given, *last.placed]))
+    scale = first.frame.noise
+    every = max(int(np.ceil(measured.size / most)), 1)
+    kept = slice(None, None, every)
+    return Residuals(
+        episode=reduced.episode[kept].astype(np.int32), time=reduced.time[kept],
+        phase=phases(reduced)[kept].astype(np.int8), depth=reduced.tip[kept, 2].astype(np.float32),
+        rate=reduced.speed[kept].astype(np.float32), measured=measured[kept].astype(np.float32),
+        before=_level(measured, before, reduced.episode)[kept].astype(np.float32),
+        after=_level(measured, after, reduced.episode)[kept].astype(np.float32),
+        noise=scale.scale / np.sqrt(max(1 - scale.memory**2, 0.02)), streams=streams.names(course), phases=PHASES,
+        names=course.names, sealed=tuple(int(k) for k in sealed), every=every,
+    )  # fmt: skip
+
+
+def _level(measured: np.ndarray, said: np.ndarray, episode: np.ndarray) -> np.ndarray:
+    """Return what is said, moved by the median of what it is off in each episode: offsets are no one's fault."""
+    result = said.copy()
+    for number in np.unique(episode):
+        own = episode == number
+        off = measured[own] - said[own]
+        known = np.isfinite(off).any(axis=0)
+        result[np.ix_(own, known)] += np.nanmedian(off[:, known], axis=0)
+    return result

@@ -1,0 +1,84 @@
+"""How sure a name is: a probability, by a map fitted to worlds of which the truth was known."""
+
+from __future__ import annotations
+
+import json
+from functools import lru_cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from tacdata.discrepancy.search.findings import Judgement, Member
+
+FILE = "confidence.json"
+"""The map: weights, and the worlds and the command that they come from."""
+MOST = 12.0
+"""Margins beyond so many standard errors are all the same [1]."""
+
+
+def features(found: Judgement, member: Member, members: int) -> dict[str, float]:
+    """Return what the confidence in a member rests on, each about 0 to 1.
+
+    Args:
+        found: What was found.
+        member: One effect of the answer.
+        members: How many there are.
+    """
+    margin = min((float(v) for v in member.margins.values()), default=MOST)
+    return {
+        "margin": float(np.clip(margin, 0, MOST)) / MOST,
+        "need": float(np.clip(member.necessity, 0, MOST)) / MOST,
+        "selected": member.selected,
+        "decoys": 1.0 if member.decoys is None else float(np.clip(-np.log10(max(member.decoys, 1e-3)) / 3, 0, 1)),
+        "explained": 1 - float(np.clip(found.share_left, 0, 1)),
+        "left": float(np.clip(found.left.t, 0, MOST)) / MOST,
+        "others": (members - 1) / 3,
+        "episodes": float(np.clip(np.log10(len(found.energy[0])) / 2, 0, 1)),
+    }
+
+
+def confidence(values: dict[str, float]) -> float | None:
+    """Return the probability that a name with such features is right; None without a map."""
+    given = known()
+    if given is None:
+        return None
+    score = given["intercept"] + sum(w * values.get(name, 0.0) for name, w in given["weights"].items())
+    low, high = given["range"]
+    return float(np.clip(1 / (1 + np.exp(-score)), low, high))
+
+
+@lru_cache(maxsize=1)
+def known() -> dict[str, Any] | None:
+    """Return the map, None if there is none."""
+    path = resources.files("tacdata.discrepancy.verdict").joinpath(FILE)
+    return json.loads(path.read_text()) if path.is_file() else None
+
+
+def fit(rows: list[dict[str, float]], right: list[bool], weight: float = 1.0) -> dict[str, Any]:
+    """Return a map fitted to names of which it is known whether they were right.
+
+    A logistic regression with a ridge of ``weight`` on every weight; what it says stays within what so many names can
+    tell: between 1 / (n + 2) and 1 - 1 / (n + 2) (rule of succession).
+
+    Args:
+        rows: Features of each name.
+        right: Whether it was right.
+        weight: Of the ridge [1].
+    """
+    from scipy.optimize import minimize
+
+    names = sorted(rows[0])
+    table = np.array([[row[name] for name in names] for row in rows])
+    truth = np.array(right, dtype=float)
+
+    def loss(values: np.ndarray) -> float:
+        score = values[0] + table @ values[1:]
+        return float(np.sum(np.logaddexp(0, score) - truth * score) + 0.5 * weight * np.sum(values[1:] ** 2))
+
+    best = minimize(loss, np.zeros(len(names) + 1), method="BFGS").x
+    n = len(rows)
+    return {
+        "version": "1.0", "intercept": float(best[0]), "weights": dict(zip(names, map(float, best[1:]), strict=True)),
+        "range": [1 / (n + 2), 1 - 1 / (n + 2)], "names": n, "right": int(truth.sum()),
+    }  # fmt: skip

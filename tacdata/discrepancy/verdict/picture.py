@@ -1,0 +1,98 @@
+"""One page: the residual before and after, where it lives, how the rivals did."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.search.findings import Judgement
+from tacdata.discrepancy.verdict.residual_slices import Slice, residual
+
+MOST_ROWS = 1200
+"""Rows drawn of the worst episodes."""
+
+WIDEST = 120
+"""Characters in a line of the title: more do not fit."""
+
+
+def draw(found: Judgement, before: list[Slice], after: list[Slice], verdict: dict[str, Any], path: Path) -> None:
+    """Draw the page into a PNG file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(2, 2, figsize=(12, 8), constrained_layout=True)
+    said = textwrap.fill(f"{verdict['status']}: {verdict['why']}", WIDEST)
+    figure.suptitle(said, fontsize=11)
+    added = bool(verdict["effects"])  # without an effect there is no after
+    _streams(axes[0, 0], found, added)
+    _slices(axes[0, 1], before, after, added)
+    _rivals(axes[1, 0], found)
+    _episodes(axes[1, 1], found, added)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _streams(axis: Any, found: Judgement, added: bool) -> None:
+    course = found.problem.setting.course.reduced
+    first, last = residual(found.problem), residual(found.final)
+    power = np.square(first).mean(axis=1)
+    # Sealed episodes have no rows here.
+    read = np.unique(course.episode)
+    worst = read[np.argsort([-power[course.episode == e].mean() for e in read])[:3]]
+    stream = int(np.argmax(np.square(first).mean(axis=0)))
+    at = 0.0
+    for number, e in enumerate(worst):
+        rows = np.flatnonzero(course.episode == e)[:MOST_ROWS]
+        time = course.time[rows] - course.time[rows[0]] + at
+        at = float(time[-1]) + 0.5
+        axis.plot(time, first[rows, stream], color="tab:red", lw=0.8, label="before" if not number else None)
+        if added:
+            axis.plot(time, last[rows, stream], color="tab:blue", lw=0.8, label="after" if not number else None)
+    axis.axhspan(-2, 2, color="0.9", zorder=0)
+    called = Streams.of(course).names(course)[stream]
+    axis.set(title=f"{called} in the three worst episodes", xlabel="time [s]", ylabel="residual / noise")
+    if added:
+        axis.legend()
+
+
+def _slices(axis: Any, before: list[Slice], after: list[Slice], added: bool) -> None:
+    shown = [(b, a) for b, a in zip(before, after, strict=True) if b.by != "stream"]
+    names = [f"{b.by}: {b.name}" for b, _ in shown]
+    where = np.arange(len(shown))
+    axis.barh(where - 0.2 * added, [b.mean_square for b, _ in shown], 0.4, color="tab:red", label="before")
+    if added:
+        axis.barh(where + 0.2, [a.mean_square for _, a in shown], 0.4, color="tab:blue", label="after")
+    axis.axvline(1.0, color="k", lw=0.8)
+    axis.set_yticks(where, names, fontsize=7)
+    axis.invert_yaxis()
+    axis.set(xscale="log", xlabel="mean square over the noise floor", title="where it lives")
+
+
+def _rivals(axis: Any, found: Judgement) -> None:
+    best: dict[str, float] = {}
+    for candidate, gain in zip(found.problem.candidates, found.tested.gain, strict=True):
+        best[candidate.effect.name] = max(best.get(candidate.effect.name, 0.0), float(gain))
+    order = sorted(best, key=lambda name: -best[name])[:12]
+    chosen = {m.placed.effect.name for m in found.members}
+    colors = ["tab:blue" if name in chosen else "0.6" for name in order]
+    axis.barh(order, [best[name] for name in order], color=colors)
+    axis.invert_yaxis()
+    axis.tick_params(axis="y", labelsize=7)
+    axis.set(xlabel="gain of each effect alone, to first order [nats]", title="candidates")
+    axis.locator_params(axis="x", nbins=5)
+    axis.ticklabel_format(axis="x", style="sci", scilimits=(-1, 4))
+
+
+def _episodes(axis: Any, found: Judgement, added: bool) -> None:
+    floor = np.maximum(found.values, 1)
+    axis.plot(2 * found.energy[0] / floor, "o", color="tab:red", ms=3, label="before")
+    if added:
+        axis.plot(2 * found.energy[1] / floor, "o", color="tab:blue", ms=3, label="after")
+    axis.axhline(1.0, color="k", lw=0.8)
+    axis.set(yscale="log", xlabel="episode", ylabel="mean square over the noise floor", title="every episode")

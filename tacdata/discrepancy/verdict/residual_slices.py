@@ -1,0 +1,137 @@
+"""Where a residual lives, in words and as a table for pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.discrepancy.search.problem import Problem
+from tacdata.discrepancy.statistics.gram_fit import t_value
+
+NOTABLE = 1.3
+"""A slice is told of when its mean square is so many times the noise floor [1]..."""
+SURE = 3.0
+"""...and so many standard errors over episodes above it [1]."""
+NOWHERE = "nowhere does the residual stand out from the noise"
+
+
+@dataclass(frozen=True)
+class Slice:
+    """The whitened residual in one part of the recordings."""
+
+    by: str
+    name: str
+    mean_square: float
+    """Over the noise floor [1]; 1 is noise alone."""
+    t: float
+    """How far above 1, in standard errors over episodes."""
+
+
+def residual(problem: Problem) -> np.ndarray:
+    """Return the whitened residual without nuisances, shape (m, streams)."""
+    return problem.frame.known.cleaned(problem.board.columns[0][:, :, None])[:, :, 0]
+
+
+PHASES = ("without contact", "loading", "hold", "unloading")
+"""What a tip may be doing."""
+
+
+def phases(course: Course) -> np.ndarray:
+    """Return what the tip does at each row, as an index into `PHASES`, shape (rows,), int64."""
+    speed, depth = course.speed, course.tip[:, 2]
+    inside = depth > 0 if depth.max() > 0 else depth > depth.min() + 0.1 * course.stroke
+    still = np.abs(speed) < 1e-3 * max(float(np.abs(speed).max()), 1e-9)
+    return np.where(~inside, 0, np.where(still, 2, np.where(speed > 0, 1, 3)))
+
+
+def slices(problem: Problem, white: np.ndarray) -> list[Slice]:
+    """Return the residual by phase, depth, rate, place, indenter, clock and channel."""
+    course = problem.setting.course.reduced
+    square = np.square(white).astype(float)
+    each = square.mean(axis=1)
+    speed, depth, phase = course.speed, course.tip[:, 2], phases(course)
+    inside, still = phase != PHASES.index("without contact"), phase == PHASES.index("hold")
+    parts = [("phase", name, phase == k) for k, name in enumerate(PHASES)]
+    edges = np.quantile(depth[inside], [0, 1 / 3, 2 / 3, 1]) if inside.any() else np.zeros(4)
+    for name, low, high in zip(("shallow", "middle", "deep"), edges[:-1], edges[1:], strict=True):
+        parts.append(("depth", f"{name} ({low:.2g} to {high:.2g} mm)", inside & (depth >= low) & (depth <= high)))
+    moving = inside & ~still
+    if moving.any():
+        rates = np.quantile(np.abs(speed[moving]), [0, 1 / 3, 2 / 3, 1])
+        for name, low, high in zip(("slow", "medium", "fast"), rates[:-1], rates[1:], strict=True):
+            within = moving & (np.abs(speed) >= low) & (np.abs(speed) <= high)
+            parts.append(("rate", f"{name} ({low:.2g} to {high:.2g} mm/s)", within))
+    clock = course.time / max(float(course.time[-1]), 1e-9)
+    parts += [
+        ("clock", n, (clock >= k / 3) & (clock <= (k + 1) / 3)) for k, n in enumerate(("first", "second", "last"))
+    ]
+    parts += [("indenter", t.name, course.tool == k) for k, t in enumerate(course.tools) if len(course.tools) > 1]
+    made = [_slice(by, name, each, course.episode, rows) for by, name, rows in parts if rows.sum() > 10]
+    kinds = [*course.channel_names, *["force"] * (course.force is not None)]
+    for k, name in enumerate(kinds[: square.shape[1]]):
+        made.append(_slice("stream", name, square[:, k], course.episode, np.ones(len(each), dtype=bool)))
+    return made
+
+
+def _slice(by: str, name: str, each: np.ndarray, episode: np.ndarray, rows: np.ndarray) -> Slice:
+    numbers = np.unique(episode[rows])
+    means = np.array([each[rows & (episode == n)].mean() for n in numbers])
+    return Slice(by, name, float(each[rows].mean()), t_value(means - 1))
+
+
+def beside(before: list[Slice], after: list[Slice]) -> list[dict[str, Any]]:
+    """Return slices of the same parts before and after, as in the verdict's file."""
+    return [
+        {"by": b.by, "name": b.name, "before": b.mean_square, "after": a.mean_square}
+        for b, a in zip(before, after, strict=True)
+    ]
+
+
+ALONE = 9.0
+"""An episode stands out by itself when its mean square is so many times the median of the others [1]."""
+FEW_ALONE = 0.2
+"""Largest share of the episodes that can stand out by themselves [1]."""
+
+
+def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) -> list[str]:
+    """Return in words which few episodes hold most of the residual: no statistic over episodes sees them.
+
+    Args:
+        names: Of the episodes.
+        energy: Half the whitened energy of each [nats], shape (episodes,).
+        values: Whitened values behind each [1], shape (episodes,).
+    """
+    there = np.flatnonzero(values > 0)
+    if len(there) < 4:
+        return []
+    square = 2 * energy[there] / values[there]
+    usual = float(np.median(square))
+    high = there[square > ALONE * max(usual, 1.0)]
+    if not 0 < len(high) <= FEW_ALONE * len(there):
+        return []
+    order = sorted(high.tolist(), key=lambda k: -energy[k] / values[k])
+    told = ", ".join(f"{names[k]} {2 * energy[k] / values[k]:.3g}" for k in order[:5])
+    return [
+        f"episode: {told} times the noise, the others {usual:.3g}: {len(high)} of {len(there)} stand out by "
+        "themselves; look at them, or record what they did again"
+    ]
+
+
+def in_words(found: list[Slice]) -> list[str]:
+    """Return sentences on the slices that stand out, each kind of slice by itself."""
+    told = []
+    for by in dict.fromkeys(s.by for s in found):
+        own = [s for s in found if s.by == by]
+        high = [s for s in own if s.mean_square > NOTABLE and s.t > SURE]
+        if not high:
+            continue
+        if len(high) == len(own) > 2 and max(s.mean_square for s in high) < 2 * min(s.mean_square for s in high):
+            told.append(f"{by}: everywhere alike, {np.median([s.mean_square for s in high]):.3g} times the noise floor")
+        else:
+            high.sort(key=lambda s: -s.mean_square)
+            told.append(f"{by}: " + ", ".join(f"{s.name} {s.mean_square:.3g}" for s in high[:4]) + " times the noise")
+    return told or [NOWHERE]

@@ -1,0 +1,150 @@
+"""Episodes that are put aside before anything is looked at, and the gap on them before and after."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tacdata.chain import Course, Response, predict
+from tacdata.discrepancy.regressors.generic import histories
+from tacdata.discrepancy.search.findings import Judgement
+
+SHARE = 0.1
+"""Share of the episodes that is sealed [1]..."""
+FEWEST = 4
+"""...and no fewer: a handful shows the gap, all the others are needed to say what it is."""
+ENOUGH = 20
+"""With fewer episodes none is sealed: all are needed for the verdict."""
+KEPT = 2
+"""Episodes of a place and indenter that stay open at least."""
+WITHIN = 0.02
+"""By how much a sealed episode may go deeper than all open ones of its place [1]."""
+RESAMPLED = 2000
+STRENGTHS = (1e-3, 1e-2, 1e-1, 1.0)
+"""Weights of the ceiling's ridge to choose from, over the mean diagonal [1]."""
+
+
+def chosen(course: Course) -> np.ndarray:
+    """Return which episodes are sealed, by the hash of session and name, shape (k,), int64.
+
+    An episode deeper than all that stay open at its place is left open: a response fitted to the others says nothing of
+    such depths.
+    """
+    if course.episodes < ENOUGH:
+        return np.zeros(0, dtype=np.int64)
+    keys = [f"{course.session[k]}/{course.names[k]}" for k in range(course.episodes)]
+    order = sorted(range(course.episodes), key=lambda k: hashlib.sha256(keys[k].encode()).digest())
+    tool = np.array([course.tool[course.episode == k][0] for k in range(course.episodes)])
+    depth = np.array([course.tip[course.episode == k, 2].max() for k in range(course.episodes)])
+    left: dict[tuple[int, int], list[int]] = {}
+    for k in range(course.episodes):
+        left.setdefault((int(course.site[k]), int(tool[k])), []).append(k)
+    found: list[int] = []
+    for k in order:
+        others = [other for other in left[int(course.site[k]), int(tool[k])] if other != k]
+        enough = len(others) >= KEPT and depth[others].max() >= (1 - WITHIN) * depth[k]
+        if len(found) < max(int(SHARE * course.episodes), FEWEST) and enough:
+            found.append(k)
+            left[int(course.site[k]), int(tool[k])] = others
+    return np.sort(np.array(found, dtype=np.int64))
+
+
+def without_readings(course: Course, episodes: np.ndarray) -> Course:
+    """Return the course with the path of some episodes alone: what they did to the skin is known, not what was read."""
+    return replace(course, averaged=np.where(course.of(episodes), 0.0, course.averaged))
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Mean squares of what a model leaves of sealed episodes, over the noise [1]; an offset an episode is taken off."""
+
+    before: np.ndarray
+    """Of each sealed episode [1], shape (k,)."""
+    after: np.ndarray
+    """The same with the effects in place [1], shape (k,)."""
+    ceiling: np.ndarray
+    """The same with what histories of the path predict of the residual, whatever its name [1], shape (k,)."""
+    names: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Return it as in the verdict."""
+        if not len(self.before):
+            return {"episodes": 0, "share": SHARE, "rule": f"none of fewer than {ENOUGH} episodes"}
+        best = min(float(self.ceiling.mean()), float(self.after.mean()))
+        worst = int(np.argmax(self.after))
+        pick = np.random.default_rng(0).integers(len(self.before), size=(RESAMPLED, len(self.before)))
+        before, after, ceiling = (v[pick].mean(axis=1) for v in (self.before, self.after, self.ceiling))
+        share = _closed(before, after, np.minimum(ceiling, after))
+        low, high = np.quantile(share, [0.05, 0.95])
+        return {
+            "episodes": len(self.before), "share": SHARE, "rule": f"least SHA-256 of session/name, {FEWEST} at least",
+            "before": float(self.before.mean()), "after": float(self.after.mean()), "floor": 1.0, "ceiling": best,
+            "closed": float(_closed(self.before.mean(), self.after.mean(), np.array(best))),
+            "interval": [float(low), float(high)],
+            "worst": {"episode": self.names[worst], "after": float(self.after[worst])},
+        }  # fmt: skip
+
+
+def _closed(before: np.ndarray, after: np.ndarray, best: np.ndarray) -> np.ndarray:
+    """Return the share of what any model could close that is closed; 0 where there is nothing to close."""
+    room = np.asarray(before - best)
+    return np.where(room > 1e-3 * np.asarray(before), (before - after) / np.maximum(room, 1e-12), 0.0)
+
+
+def gap(course: Course, response: Response, found: Judgement, episodes: np.ndarray) -> Gap:
+    """Return the gap on sealed episodes.
+
+    Args:
+        course: All recordings, the sealed ones with their readings.
+        response: What the judgement started from.
+        found: What was found without the sealed episodes.
+        episodes: The sealed ones.
+    """
+    if not len(episodes):
+        return Gap(np.zeros(0), np.zeros(0), np.zeros(0), ())
+    given = list(found.problem.setting.given)
+    rows = course.read
+    first = course.readings[rows] - predict(course, response, given).signal[rows]
+    model = found.final
+    placed = [*model.setting.given, *model.placed]
+    last = course.readings[rows] - predict(course, model.setting.response, placed).signal[rows]
+    rest = first - _predicted(course, first, episodes)
+    noise = found.problem.frame.noise
+    scale = noise.scale[: course.channels] / np.sqrt(max(1 - noise.memory**2, 0.02))
+    number = course.episode[rows]
+    before, after, ceiling = (_squares(r / scale, number, episodes) for r in (first, last, rest))
+    return Gap(before, after, ceiling, tuple(course.names[k] for k in episodes))
+
+
+def _squares(residual: np.ndarray, number: np.ndarray, episodes: np.ndarray) -> np.ndarray:
+    made = []
+    for k in episodes:
+        own = residual[number == k]
+        made.append(float(np.mean(np.square(own - np.median(own, axis=0)))))
+    return np.array(made)
+
+
+def _predicted(course: Course, residual: np.ndarray, episodes: np.ndarray) -> np.ndarray:
+    """Return what a ridge regression on histories of the path, fitted to the open episodes, says of a residual."""
+    own = histories(course)[course.read]
+    share = np.clip(course.tip[course.read, 2] / course.span, 0.0, None)[:, None]
+    columns = np.column_stack([own * np.minimum(share * 10, 1), own * share, own])
+    columns = columns / np.maximum(columns.std(axis=0), 1e-9)
+    number = course.episode[course.read]
+    sealed = np.isin(number, episodes)
+    test = ~sealed & (number % 4 == 0)
+    best, chosen_weight = np.inf, STRENGTHS[-1]
+    for strength in STRENGTHS:
+        error = residual[test] - columns[test] @ _ridge(columns[~sealed & ~test], residual[~sealed & ~test], strength)
+        if float(np.mean(np.square(error))) < best:
+            best, chosen_weight = float(np.mean(np.square(error))), strength
+    return columns @ _ridge(columns[~sealed], residual[~sealed], chosen_weight)
+
+
+def _ridge(columns: np.ndarray, target: np.ndarray, strength: float) -> np.ndarray:
+    gram = columns.T @ columns
+    weight = strength * float(np.mean(np.diag(gram)))
+    return np.linalg.solve(gram + weight * np.eye(len(gram)), columns.T @ target)

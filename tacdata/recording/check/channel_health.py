@@ -1,0 +1,165 @@
+"""What the readings of one recording say of each channel: stuck, at a limit, undefined, tied to another, jumping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tacdata.recording.check.idle import idle_rows
+from tacdata.recording.episode import PHASES, Episode
+
+RUN = 12
+"""Identical readings in a row that a live, noisy channel does not give [frames]."""
+LIVE = 0.3
+"""Noise from which the channels of a board count as live [counts]."""
+EDGE = 2
+"""Frames at both ends of a still stretch that are not looked at: its bounds are estimates [frames]."""
+JUMP = 12.0
+"""Change between neighbouring frames of a still stretch that noise does not give [times the noise]."""
+JUMP_SHARE = 0.05
+"""... and no relaxation either [of the channel's answer to the press]."""
+LASTS = 3
+"""Frames before and after a jump over which it must last: a spike is none [frames]."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A sudden, lasting change of a reading while nothing moves."""
+
+    channel: int
+    time_ns: int
+    """When [ns]."""
+    size: float
+    """By how much [counts]."""
+
+
+def in_phase(episode: Episode, name: str) -> np.ndarray:
+    """Return the readings of a phase [counts], shape (n, taxels); those of rest also where no phase is marked."""
+    if name == "rest":
+        return episode.taxels.counts[idle_rows(episode)]
+    return episode.taxels.counts[episode.phase_at(episode.taxels.sample_ns) == PHASES.index(name)]
+
+
+def idle_noise(episode: Episode) -> np.ndarray:
+    """Return each channel's noise without contact [counts], shape (taxels,); NaN with under 5 frames of rest.
+
+    The standard deviation of neighbouring differences over sqrt(2): slow drift and recovery do not enter, and a
+    single jump does not either, as the middle half of the differences decides (interquartile range / 1.349).
+    """
+    rest = in_phase(episode, "rest")
+    if len(rest) < 5:
+        return np.full(episode.taxels.counts.shape[1], np.nan)
+    changes = np.diff(rest, axis=0)
+    spread, quartiles = changes.std(axis=0), np.percentile(changes, [25, 75], axis=0)
+    middle = (quartiles[1] - quartiles[0]) / 1.349
+    # Quantised readings have quartiles of whole counts; the plain deviation is right for them.
+    return np.where(spread > 3 * np.maximum(middle, 1.0), middle, spread) / np.sqrt(2)
+
+
+def undefined_channels(counts: np.ndarray) -> list[int]:
+    """Return the channels with readings that are no numbers; ``counts`` has shape (n, taxels)."""
+    return np.flatnonzero(~np.isfinite(counts).all(axis=0)).tolist()
+
+
+def tied_channels(counts: np.ndarray) -> list[list[int]]:
+    """Return the pairs of live channels whose readings are the same throughout."""
+    pairs, count = [], counts.shape[1]
+    if len(counts) < RUN:
+        return pairs
+    live = [k for k in range(count) if np.isfinite(counts[:, k]).all() and np.ptp(counts[:, k]) > 0]
+    seen: dict[bytes, int] = {}
+    for channel in live:
+        first = seen.setdefault(counts[:, channel].tobytes(), channel)
+        if first != channel:
+            pairs.append([first, channel])
+    return pairs
+
+
+def frozen_channels(counts: np.ndarray, noise: np.ndarray, limits: tuple[float, float]) -> tuple[list[int], list[int]]:
+    """Return the channels that stopped changing, and those that ran into a limit, among otherwise noisy ones.
+
+    A run of identical readings that a live channel does not give is a limit if it is the channel's extreme
+    and the channel moves elsewhere, and stuck otherwise. A board whose channels are all quiet (under `LIVE`
+    counts of noise) proves nothing either way. A reading that the wire cannot exceed is a limit in any case.
+
+    Args:
+        counts: Readings [counts], shape (n, taxels).
+        noise: Noise of each channel [counts], shape (taxels,).
+        limits: Least and greatest reading that the frame format can hold [counts].
+    """
+    stuck, saturated = [], []
+    constant = (counts == counts[:1]).all(axis=0) if len(counts) else np.ones(counts.shape[1], bool)
+    moving = noise[~constant]
+    live = bool(len(moving)) and not np.isnan(moving).all() and np.nanmedian(moving) > LIVE
+    for channel in range(counts.shape[1]):
+        values = counts[:, channel]
+        if len(values) < RUN or (constant[channel] and (constant.all() or not live)):
+            continue
+        at_limit = int(((values <= limits[0]) | (values >= limits[1])).sum())
+        if constant[channel]:
+            stuck.append(channel)
+        elif at_limit > 1:
+            saturated.append(channel)
+        elif live:
+            length, value = _longest_run(values)
+            if length >= RUN:
+                (saturated if value in (values.max(), values.min()) else stuck).append(channel)
+    return stuck, saturated
+
+
+def reading_limits(board: dict[str, Any]) -> tuple[float, float]:
+    """Return the least and greatest reading that a board's frame format can hold [counts]."""
+    kind = str(board.get("format", {}).get("channels", {}).get("type", ""))
+    sign, _, bits = kind.partition("int")
+    if not bits.isdigit():
+        return -np.inf, np.inf
+    whole = 2 ** int(bits)
+    return (0.0, whole - 1.0) if sign == "u" else (-whole / 2, whole / 2 - 1.0)
+
+
+def _longest_run(values: np.ndarray) -> tuple[int, float]:
+    edges = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1], [True]]))
+    lengths = np.diff(edges)
+    at = int(np.argmax(lengths))
+    return int(lengths[at]), float(values[edges[at]])
+
+
+def jumps(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jump]:
+    """Return the largest jump of each channel that has one.
+
+    Args:
+        episode: The recording.
+        noise: Noise of each channel [counts], shape (taxels,).
+        response: Change of each channel from rest to hold [counts], shape (taxels,).
+    """
+    threshold = np.maximum(JUMP * np.sqrt(2) * np.maximum(np.nan_to_num(noise, nan=np.inf), 0.5), 0.0)
+    threshold = np.maximum(threshold, JUMP_SHARE * np.abs(np.nan_to_num(response)))
+    found: dict[int, Jump] = {}
+    phase = episode.phase_at(episode.taxels.sample_ns)
+    for name in ("rest", "hold"):
+        rows = np.flatnonzero(phase == PHASES.index(name))[EDGE : -EDGE or None]
+        if len(rows) < 2 * LASTS + 2:
+            continue
+        for channel, place, size in _lasting(episode.taxels.counts[rows], threshold):
+            jump = Jump(channel, int(episode.taxels.sample_ns[rows[place]]), size)
+            if channel not in found or abs(size) > abs(found[channel].size):
+                found[channel] = jump
+    return [found[channel] for channel in sorted(found)]
+
+
+def _lasting(counts: np.ndarray, threshold: np.ndarray) -> list[tuple[int, int, float]]:
+    change = np.diff(counts, axis=0)
+    padded = np.pad(change, ((2, 2), (0, 0)), mode="edge")
+    trend = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1)
+    sudden = np.argwhere(np.abs(change - trend) > threshold)
+    found = []
+    for place, channel in sudden:
+        if not LASTS <= place + 1 <= len(counts) - LASTS:
+            continue
+        before = np.median(counts[place + 1 - LASTS : place + 1, channel])
+        size = float(np.median(counts[place + 1 : place + 1 + LASTS, channel]) - before)
+        if abs(size) > 0.6 * threshold[channel]:
+            found.append((int(channel), int(place) + 1, size))
+    return found

@@ -1,0 +1,267 @@
+"""Whether the channels are where the sensor file says, and as sensitive as before: presses tell.
+
+Every press stirs the taxels around its site. How much falls off with distance alike in all directions, so the
+answers of a session fit ``gain of channel * amplitude of press * exp(-distance^2 / 2 width^2)``. A channel that is
+wired to another place fits there better than at its own; one whose gain steps leaves the fit from some press on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from tacdata.recording.check.figures import Figures
+from tacdata.sensor.sensor import Taxels
+
+PRESSES = 10
+"""Presses from which the question can be asked [count]."""
+STEP_PRESSES = 16
+"""Presses from which a step of a gain can be told from chance [count]."""
+DEPTH = 0.15
+"""Depth from which a press counts [mm]."""
+WIDTHS = np.linspace(1.0, 4.0, 13)
+"""Widths that are tried for what an indenter stirs [mm]."""
+ROUNDS = 4
+"""Passes in which width, amplitudes and gains are fitted in turn [count]."""
+CLEAR = 8.0
+"""Gain in log-likelihood with which another place explains a channel's answers beyond doubt [1]."""
+STEP = 0.5
+"""Change of a gain that is worth a word [1]."""
+SURE = 7.0
+"""... if it is so many times its own uncertainty [1]."""
+NEAR = 0.15
+"""Share of a press's strongest answer from which a channel counts as near it [1]."""
+SIDE = 3
+"""Presses that a channel must have answered on both sides of a step [count]."""
+SILENT = 6.0
+"""Answer to a press close by that a working channel exceeds [times its noise]."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What each channel answered to each press of a session, in the order of recording."""
+
+    response: np.ndarray
+    """Change from rest to hold [counts], shape (presses, taxels)."""
+    sites: np.ndarray
+    """Places of the presses [mm, sensor frame], shape (presses, 2)."""
+    indenters: np.ndarray
+    """Name and angles of each press's indenter [text], shape (presses,)."""
+    noise: np.ndarray
+    """Noise of each channel [counts], shape (taxels,)."""
+    taxels: Taxels
+
+    @property
+    def distance(self) -> np.ndarray:
+        """Distance of every press from every taxel [mm], shape (presses, taxels)."""
+        return np.linalg.norm(self.sites[:, None] - self.taxels.centers, axis=-1)
+
+
+def answers(recordings: list[Figures]) -> Answers | None:
+    """Collect the answers of a session's whole presses; None without any."""
+    chosen = [f for f in recordings if counts_as_press(f)]
+    if not chosen:
+        return None
+    episodes = [f.recording.episode for f in chosen]
+    noise = np.array([[np.nan if v is None else v for v in f.document["taxels"]["idle_noise"]] for f in chosen], float)
+    known = ~np.isnan(noise).all(axis=0)
+    middle = np.full(noise.shape[1], np.nan)
+    middle[known] = np.nanmedian(noise[:, known], axis=0)
+    return Answers(
+        np.array([[0.0 if v is None else v for v in f.document["taxels"]["response"]] for f in chosen]),
+        np.array([(e.press.x, e.press.y) for e in episodes]),
+        np.array([f"{e.press.indenter_name} {e.press.turned}" for e in episodes]),
+        np.maximum(np.nan_to_num(middle, nan=1.0), 0.5),
+        episodes[0].sensor.taxels,
+    )
+
+
+def counts_as_press(figures: Figures) -> bool:
+    """Say whether a recording is a press whose answers tell something."""
+    press, response = figures.recording.episode.press, figures.document["taxels"]["response"]
+    return press.depth > DEPTH and any(value is not None for value in response)
+
+
+@dataclass(frozen=True)
+class AnswerFit:
+    """The answers as gains, amplitudes and widths."""
+
+    gain: np.ndarray
+    """Gain of each channel against the others [1], shape (taxels,)."""
+    pattern: np.ndarray
+    """What a channel of gain 1 would answer at each place [counts], shape (presses, taxels)."""
+
+
+def fit_answers(found: Answers, place: np.ndarray | None = None) -> AnswerFit:
+    """Fit the answers, robustly, with channel k at place ``place[k]`` (default: its own)."""
+    place = np.arange(found.response.shape[1]) if place is None else place
+    response, squared = found.response, found.distance[:, place] ** 2
+    gain, pattern = np.ones(response.shape[1]), np.zeros_like(response)
+    weight = np.ones_like(response)
+    for _ in range(ROUNDS):
+        for name in np.unique(found.indenters):
+            rows = found.indenters == name
+            fits = [
+                _amplitudes(response[rows], np.exp(-squared[rows] / (2 * w**2)) * gain, weight[rows]) for w in WIDTHS
+            ]
+            best = int(np.argmin([misfit for _, misfit in fits]))
+            shape = np.exp(-(found.distance[rows] ** 2) / (2 * WIDTHS[best] ** 2))
+            pattern[rows] = fits[best][0][:, None] * shape
+        expected = pattern[:, place]
+        weight = _trust(response - expected * gain, found.noise)
+        raw = (weight * response * expected).sum(axis=0) / np.maximum((weight * expected**2).sum(axis=0), 1e-12)
+        gain = np.clip(raw / max(float(np.median(raw)), 1e-12), 0.2, 5.0)
+    return AnswerFit(gain, pattern)
+
+
+def _amplitudes(response: np.ndarray, shape: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, float]:
+    amplitude = (weight * response * shape).sum(axis=1) / np.maximum((weight * shape**2).sum(axis=1), 1e-12)
+    return amplitude, float((weight * (response - amplitude[:, None] * shape) ** 2).sum())
+
+
+def _trust(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    scale = np.maximum(1.5 * np.median(np.abs(residual), axis=1, keepdims=True), noise)
+    return 1 / (1 + (residual / (3 * scale)) ** 2)
+
+
+def misplaced(found: Answers) -> dict[int, int]:
+    """Return the channels that answer like another taxel, with that taxel; {} with too few presses to say."""
+    if len(found.response) < PRESSES:
+        return {}
+    score = max((likelihood(found, fit_answers(found, place).pattern) for place in orders(found.taxels)), key=_best)
+    # Who is wrong spoils what the others are held against: those that fit elsewhere are moved there and asked again.
+    _, place = linear_sum_assignment(-score)
+    score = likelihood(found, fit_answers(found, place).pattern)
+    _, place = linear_sum_assignment(-score)
+    own = np.diag(score)
+    gain = score[np.arange(len(own)), place] - own
+    return {
+        k: int(j) for k, j in enumerate(place) if j != k and gain[k] > CLEAR and _cycle_gain(place, gain, k) > CLEAR
+    }
+
+
+def orders(taxels: Taxels) -> list[np.ndarray]:
+    """Return the orders in which a plug is easily connected: as it should be, turned by 180 deg, and mirrored."""
+    grid = np.arange(taxels.count).reshape(taxels.rows, taxels.columns)
+    return [order.ravel() for order in (grid, grid[::-1, ::-1], grid[:, ::-1], grid[::-1])]
+
+
+def _best(score: np.ndarray) -> float:
+    return float(score[linear_sum_assignment(-score)].sum())
+
+
+def _cycle_gain(place: np.ndarray, gain: np.ndarray, start: int) -> float:
+    """Return the least gain among the channels that change places with ``start``."""
+    least, at = gain[start], int(place[start])
+    while at != start:
+        least, at = min(least, gain[at]), int(place[at])
+    return float(least)
+
+
+def likelihood(found: Answers, pattern: np.ndarray) -> np.ndarray:
+    """Return how well each channel fits each place: log-likelihood with a gain of its own, shape (taxels, taxels)."""
+    response, count = found.response, len(found.response)
+    scale = np.maximum(np.abs(pattern).max(axis=1, keepdims=True), 1e-12)  # deep presses must not outweigh all others
+    a, b = response / scale, pattern / scale
+    floor = count * (np.median(found.noise / np.median(scale)) ** 2 + 0.02**2)
+    power = (a**2).sum(axis=0)[:, None]
+    shared = np.maximum(a.T @ b, 0.0) ** 2 / np.maximum((b**2).sum(axis=0), 1e-12)
+    return -0.5 * count * np.log((power - shared + floor) / (power + floor))
+
+
+def gain_steps(found: Answers) -> dict[int, tuple[int, float]]:
+    """Return the channels whose gain steps: the press before which it does, and the factor."""
+    if len(found.response) < STEP_PRESSES:
+        return {}
+    pattern = fit_answers(found).pattern
+    near = (pattern > NEAR * pattern.max(axis=1, keepdims=True)) & (pattern > SILENT * found.noise)
+    ratio = np.full(pattern.shape, np.nan)
+    ratio[near] = np.log(np.clip(found.response[near] / pattern[near], 0.05, 20.0))
+    ratio -= _common(found, ratio)
+    centers = np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in ratio.T])
+    usual = 1.4826 * float(np.median(np.abs(ratio - centers)[near])) if near.any() else 0.0
+    scatter = _scatter(found, ratio - centers, usual)
+    steps = {}
+    for channel in range(ratio.shape[1]):
+        rows = np.flatnonzero(near[:, channel])
+        step = _step(ratio[rows, channel], scatter[rows])
+        if step is not None:
+            steps[channel] = (int(rows[step[0]]), float(np.exp(step[1])))
+    return steps
+
+
+def _common(found: Answers, ratio: np.ndarray) -> np.ndarray:
+    """Return what all channels share of the misfit: an indenter's answer is no Gaussian, and deep ones saturate."""
+    shared = np.zeros_like(ratio)
+    own = np.zeros(ratio.shape[1])
+    distance = found.distance
+    for _ in range(3):
+        for name in np.unique(found.indenters):
+            rows = found.indenters == name
+            use = np.isfinite(ratio) & rows[:, None]
+            if use.sum() < 12:
+                continue
+            terms = np.stack([np.ones_like(distance), distance, distance**2, distance**3], axis=-1)
+            wanted = (ratio - own)[use]
+            weight = np.ones(len(wanted))
+            for _ in range(3):
+                fitted = np.linalg.lstsq(terms[use] * weight[:, None], wanted * weight, rcond=None)[0]
+                off = wanted - terms[use] @ fitted
+                weight = 1 / np.sqrt(1 + (off / (2 * np.median(np.abs(off)) + 1e-9)) ** 2)
+            shared[rows] = (terms @ fitted)[rows]
+        rest = ratio - shared
+        # A press that stirs more or less than its fit says does so for all channels near it.
+        level = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else 0.0 for row in rest - own])
+        shared += level[:, None]
+        own = np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in (ratio - shared).T])
+    return shared
+
+
+def _scatter(found: Answers, rest: np.ndarray, usual: float) -> np.ndarray:
+    """Return what every press's answers are off by [1], shape (presses,): an indenter that is not round fits worse.
+
+    Presses of one indenter often follow each other, and its misfit must not pass for a step.
+    """
+    scatter = np.full(len(rest), max(usual, 0.03))
+    for name in np.unique(found.indenters):
+        rows = found.indenters == name
+        own = rest[rows][np.isfinite(rest[rows])]
+        if len(own):
+            scatter[rows] = np.maximum(scatter[rows], np.sqrt(np.mean(np.square(own))))
+    return scatter
+
+
+def _step(values: np.ndarray, usual: np.ndarray) -> tuple[int, float] | None:
+    """Return where values step and by how much, if they do beyond doubt; ``usual``: scatter of each, shape (n,)."""
+    best: tuple[float, int, float] | None = None
+    for at in range(SIDE, len(values) - SIDE + 1):
+        before, after = values[:at], values[at:]
+        change = float(np.median(after) - np.median(before))
+        # By standard deviation on either side: an answer after the step that is as before speaks against it.
+        variance = sum(
+            max(float(np.var(side, ddof=1)), float(np.mean(np.square(said)))) / len(side)
+            for side, said in ((before, usual[:at]), (after, usual[at:]))
+        )
+        sure = abs(change) / np.sqrt(variance)
+        if best is None or sure > best[0]:
+            best = sure, at, change
+    if best is None or best[0] < SURE or abs(best[2]) < np.log1p(STEP):
+        return None
+    return best[1], best[2]
+
+
+def silent(found: Answers) -> list[int]:
+    """Return the channels that did not answer to any press close by, while others did."""
+    close = found.distance < 0.75 * max(found.taxels.pitch_x, found.taxels.pitch_y)
+    answered = (np.abs(found.response) > SILENT * found.noise) & close
+    if not answered.any():
+        return []
+    return [k for k in range(found.response.shape[1]) if close[:, k].sum() >= 2 and not answered[:, k].any()]
+
+
+def unanswered(found: Answers) -> bool:
+    """Say whether presses close to taxels, at least two, stirred no channel at all."""
+    close = (found.distance < 0.75 * max(found.taxels.pitch_x, found.taxels.pitch_y)).any(axis=1)
+    return bool(close.sum() >= 2 and not (np.abs(found.response[close]) > SILENT * found.noise).any())

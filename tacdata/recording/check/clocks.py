@@ -1,0 +1,89 @@
+"""What a recording says of its streams' clocks, as figures and in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tacdata.recording.clocks.clock_model import ClockModel
+from tacdata.recording.files.reader import Recording
+
+DRIFT_PPM = 250.0
+"""Drift against the nominal rate that is worth a word [ppm]: three times what a poor crystal has."""
+STEP_MS = 15.0
+"""Step of a device's clock that is worth a word [ms]: less is a host that was late for long."""
+UNCERTAIN_MS = 5.0
+"""Uncertainty of sample times that is worth a word [ms of real time]."""
+
+
+def clock_figures(clock: ClockModel | None, nominal_period_ns: float, within: tuple[int, int]) -> dict[str, Any] | None:
+    """Return a clock as an entry of `schemas/check.schema.json`; None without one.
+
+    Args:
+        clock: The stream's clock.
+        nominal_period_ns: Nominal time between frames [ns]; 0 if none is known.
+        within: Beginning and end of the recording [ns]: earlier steps are of no concern.
+    """
+    if clock is None:
+        return None
+    lines = (*clock.earlier, clock)[1:]
+    steps = [s for s, line in zip(clock.steps_ns, lines, strict=True) if within[0] < line.first_arrival_ns <= within[1]]
+    known = nominal_period_ns > 0 or clock.axis == "device_ns"
+    return {
+        "steady": clock.steady,
+        "drift": _rounded(clock.drift(nominal_period_ns), 1) if known else None,
+        "drift_uncertainty": _rounded(clock.drift_uncertainty * 1e6, 1),
+        "delay": _rounded(clock.delay_ns / 1e6),
+        "jitter": _rounded(clock.jitter_ns / 1e6),
+        "uncertainty": _rounded(clock.uncertainty_ns / 1e6),
+        "latency": _rounded(clock.latency.latency_ns / 1e6) if clock.latency else None,
+        "latency_uncertainty": _rounded(clock.latency.uncertainty_ns / 1e6) if clock.latency else None,
+        "steps": [_rounded(step / 1e6) for step in steps],
+    }
+
+
+def round_trip(recording: Recording) -> float | None:
+    """Return the median time from query to answer of the motion controller [ms]; None if the file does not say."""
+    said = recording.polled.get("round_trip_ns")
+    return None if said is None else _rounded(float(said) / 1e6)
+
+
+def clock_doubts(clock: dict[str, Any] | None, rate_of_clock: float) -> list[str]:
+    """Return in words what is doubtful about a stream's clock; ``rate_of_clock``: seconds shown per real second."""
+    if clock is None or not clock["steady"]:
+        return []
+    found = []
+    drift = clock["drift"]
+    if drift is not None and abs(drift) - 2 * clock["drift_uncertainty"] > DRIFT_PPM:
+        found.append(
+            f"its clock is {drift:+.0f} ppm off its nominal rate (known to {clock['drift_uncertainty']:.0f} ppm): "
+            "a bad crystal, or a wrong rate in its description"
+        )
+    steps = [step for step in clock["steps"] if abs(step) > STEP_MS * rate_of_clock]
+    if steps:
+        found.append(
+            f"its clock stepped by {', '.join(f'{s:+.0f}' for s in steps)} ms: it restarted, or lost its count"
+        )
+    if clock["uncertainty"] / rate_of_clock > UNCERTAIN_MS:
+        found.append(f"its sample times are known to {clock['uncertainty']:.1f} ms only")
+    return found
+
+
+def clock_words(clock: dict[str, Any] | None) -> str:
+    """Return a clock in half a line, for people."""
+    if clock is None:
+        return "no counter, so sample times are arrival times"
+    if not clock["steady"]:
+        return "too unsteady to be followed, so sample times are arrival times"
+    drift = "" if clock["drift"] is None else f"drift {clock['drift']:+.0f} +- {clock['drift_uncertainty']:.0f} ppm, "
+    tap = (
+        "constant delay not measured (record --sync-tap)"
+        if clock["latency"] is None
+        else f"constant delay {clock['latency']:.1f} +- {clock['latency_uncertainty']:.1f} ms taken off"
+    )
+    return f"clock: {drift}delay {clock['delay']:.1f} ms beyond the least, jitter {clock['jitter']:.1f} ms; {tap}"
+
+
+def _rounded(value: float, digits: int = 3) -> float:
+    return round(float(np.nan_to_num(value)), digits)

@@ -1,0 +1,155 @@
+"""The figures of one recording by which it is judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tacdata.recording.check.camera_figures import camera_figures
+from tacdata.recording.check.channel_health import (
+    frozen_channels,
+    idle_noise,
+    in_phase,
+    jumps,
+    reading_limits,
+    tied_channels,
+    undefined_channels,
+)
+from tacdata.recording.check.clocks import clock_figures, round_trip
+from tacdata.recording.episode import Episode
+from tacdata.recording.files.reader import Recording
+
+COUNTS = "counts"
+"""Unit of readings of which no board says another."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What was measured in one recording."""
+
+    recording: Recording
+    document: dict[str, Any]
+    """An entry of ``episodes`` in `schemas/check.schema.json`."""
+    lag: np.ndarray
+    """Arrival minus sample time [ms], shape (n,)."""
+
+
+def figures(recording: Recording) -> Figures:
+    """Measure one recording."""
+    episode = recording.episode
+    lag = (episode.taxels.arrival_ns - episode.taxels.sample_ns) / 1e6
+    document = {
+        "file": episode.path.name,
+        "number": episode.number,
+        "complete": episode.complete,
+        "taxels": _taxels(recording, lag),
+        "cnc": _cnc(recording),
+        "cameras": {name: camera_figures(recording, name) for name in recording.images},
+    }
+    return Figures(recording, document, lag)
+
+
+def _taxels(recording: Recording, lag: np.ndarray) -> dict[str, Any]:
+    episode = recording.episode
+    stream, sensor = episode.taxels, episode.sensor
+    steps = np.diff(stream.counter) if len(stream.counter) and stream.counter.min() >= 0 else np.empty(0, np.int64)
+    noise, response = idle_noise(episode), hold_response(episode)
+    stuck, saturated = frozen_channels(stream.counts, noise, reading_limits(recording.board))
+    nominal = float(recording.board.get("rate", {}).get("nominal", sensor.taxels.rate))
+    return {
+        "frames": len(stream.counter),
+        "rate": _rate(stream.sample_ns),
+        "nominal_rate": nominal,
+        "lost": int(np.maximum(steps - 1, 0).sum()),
+        "longest_gap": _longest(stream.sample_ns),
+        "unit": str(recording.board.get("unit", COUNTS)),
+        "interval_spread": _spread(stream.sample_ns),
+        "jitter": _rounded(lag.std()) if len(lag) else 0.0,
+        "latency": _rounded(np.percentile(lag, 99) - lag.min()) if len(lag) else 0.0,
+        "idle_noise": [None if np.isnan(value) else _rounded(value) for value in noise],
+        "response": [None if np.isnan(value) else _rounded(value) for value in response],
+        "idle_reading": [None if np.isnan(value) else _rounded(value) for value in idle_reading(episode)],
+        "stuck": stuck,
+        "saturated": saturated,
+        "undefined": undefined_channels(stream.counts),
+        "tied": tied_channels(stream.counts),
+        "jumps": [
+            {"channel": j.channel, "size": _rounded(j.size), "at": _rounded((j.time_ns - stream.sample_ns[0]) / 1e9)}
+            for j in jumps(episode, noise, response)
+        ],
+        "clock": clock_figures(recording.clocks.get("taxels"), 1e9 / nominal, _span(stream.arrival_ns)),
+        "driver_counts": recording.counts.get("taxels", {}),
+    }
+
+
+def _span(time_ns: np.ndarray) -> tuple[int, int]:
+    return (int(time_ns[0]), int(time_ns[-1])) if len(time_ns) else (0, 0)
+
+
+def idle_reading(episode: Episode) -> np.ndarray:
+    """Return each channel's reading without contact [counts], shape (taxels,); NaN without a rest."""
+    rest = in_phase(episode, "rest")
+    return np.median(rest, axis=0) if len(rest) else np.full(episode.taxels.counts.shape[1], np.nan)
+
+
+def hold_response(episode: Episode) -> np.ndarray:
+    """Return each channel's change from rest to hold [counts], shape (taxels,); NaN without either."""
+    rest, hold = in_phase(episode, "rest"), in_phase(episode, "hold")
+    if not len(rest) or not len(hold):
+        return np.full(episode.taxels.counts.shape[1], np.nan)
+    return np.median(hold, axis=0) - np.median(rest, axis=0)
+
+
+def _cnc(recording: Recording) -> dict[str, Any]:
+    stream = recording.episode.cnc
+    # A move that was broken off did not run to its end: its profile cannot be compared.
+    moves = recording.moves if recording.episode.complete else recording.moves[:-1]
+    loaded = [move for move in moves if move.command.phase in ("press", "release")]
+    slack = [(move.uncertainty_ns + move.contradiction_ns) * 1e-9 * move.profile.peak for move in loaded]
+    return {
+        "reports": len(stream.arrival_ns),
+        "rate": _rate(stream.arrival_ns),
+        "longest_gap": _longest(stream.arrival_ns),
+        "round_trip": round_trip(recording),
+        "start_uncertainty": _rounded(max((move.uncertainty_ns for move in moves), default=0) / 1e6),
+        "depth_uncertainty": _rounded(max(slack, default=0.0) + recording.height_resolution),
+        "contradiction": _rounded(max((move.contradiction_ns for move in moves), default=0) / 1e6),
+        "hold_error": _hold_error(recording),
+        "states": sorted(set(stream.state)),
+    }
+
+
+def _hold_error(recording: Recording) -> float | None:
+    hold = next((phase for phase in recording.episode.phases if phase.name == "hold"), None)
+    press = next((move for move in reversed(recording.moves) if move.command.phase == "press"), None)
+    if hold is None or press is None:
+        return None
+    stream = recording.episode.cnc
+    # The hold's end is an acknowledgement; its beginning is what the reports may put in doubt.
+    # A report's own time is only known between query and answer.
+    margin = int(np.max(stream.arrival_ns - stream.sample_ns, initial=0))
+    begin = hold.end_ns - round(recording.episode.press.hold / 2 * 1e9)
+    inside = (stream.sample_ns > begin) & (stream.sample_ns < hold.end_ns - margin)
+    if not inside.any():
+        return None
+    return _rounded(np.linalg.norm(stream.position[inside] - press.command.target, axis=1).max())
+
+
+def _rate(time_ns: np.ndarray) -> float | None:
+    spans = np.diff(time_ns)
+    return _rounded(1e9 / np.median(spans)) if len(spans) and np.median(spans) > 0 else None
+
+
+def _spread(time_ns: np.ndarray) -> float:
+    """Return by how much the times between samples vary: half of what the middle 68 % of them span [ms]."""
+    return _rounded(np.ptp(np.percentile(np.diff(time_ns), [16, 84])) / 2e6) if len(time_ns) > 2 else 0.0
+
+
+def _longest(time_ns: np.ndarray) -> float:
+    return _rounded(np.diff(time_ns).max() / 1e6) if len(time_ns) > 1 else 0.0
+
+
+def _rounded(value: Any) -> float:
+    return round(float(value), 4)

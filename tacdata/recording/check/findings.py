@@ -1,0 +1,189 @@
+"""What a person must know of a recording, judged by its figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.recording.check.camera_findings import camera_doubts
+from tacdata.recording.check.clocks import clock_doubts
+from tacdata.recording.check.figures import COUNTS, Figures
+from tacdata.recording.check.imported import imported_findings, is_imported
+
+WARNING, UNUSABLE = "warning", "unusable"
+LOST_SHARE = 0.01
+"""Share of lost frames from which a recording is unusable [1]."""
+GAP_MS = 200.0
+"""Time without a sample from which a recording is unusable [ms]: its 9-frame windows would lie."""
+RATE_SHARE = 0.02
+"""Deviation from the nominal rate that is worth a word [1]."""
+LATENCY_MS = 250.0
+"""Delay of the host that is worth a word [ms of real time]."""
+REPORT_GAP_MS = 1500.0
+"""Time without a status report that is worth a word [ms of real time]."""
+DEPTH_MM = (0.05, 0.2)
+"""Depth uncertainty that is worth a word, and that makes a recording unusable [mm]."""
+HOLD_MM = 0.05
+"""Distance of the guide from the commanded position in the hold that makes a recording unusable [mm]."""
+NOISE_RATIO = 5.0
+"""How much noisier than the median a channel may be [1]."""
+DEAD_DEPTH = 0.3
+"""Depth of a press from which a board with all channels at rest is dead [mm]."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a person should know."""
+
+    severity: str
+    """``warning`` or ``unusable``."""
+    stream: str
+    """What it concerns."""
+    file: str
+    """Name of the recording; empty for the session."""
+    text: str
+    """In words."""
+
+
+def findings(figures: Figures) -> list[Finding]:
+    """Judge one recording."""
+    if is_imported(figures.recording.episode):
+        # Quantised or resting channels of a foreign sensor are no proof of a fault.
+        doubts = [(WARNING, stream, text) for _, stream, text in _channels(figures)]
+        found = [*imported_findings(figures), *doubts]
+    else:
+        found = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
+    name = figures.recording.episode.path.name
+    return [Finding(severity, stream, name, text) for severity, stream, text in found]
+
+
+Judgement = tuple[str, str, str]
+
+
+def _rate_of_clock(figures: Figures) -> float:
+    return float(figures.recording.episode.rig.get("clock", {}).get("rate", 1.0))
+
+
+def _recording(figures: Figures) -> list[Judgement]:
+    episode, found = figures.recording.episode, []
+    if not episode.complete:
+        found.append((UNUSABLE, "recording", "; ".join(episode.notes) or "it was broken off"))
+    registration = episode.rig.get("registration", {})
+    if not registration.get("method") or not registration.get("date"):
+        found.append(
+            (
+                WARNING,
+                "registration",
+                "the rig file does not say how and when the sensor was registered to the guide",
+            )
+        )
+    phases = {phase.name for phase in episode.phases}
+    missing = [name for name in ("rest", "approach", "press", "hold", "release") if name not in phases]
+    if episode.complete and missing:
+        found.append((UNUSABLE, "recording", f"no {', '.join(missing)} phase"))
+    return found
+
+
+def _taxels(figures: Figures) -> list[Judgement]:
+    values, found = figures.document["taxels"], []
+    if values["frames"] < 2:
+        return [(UNUSABLE, "taxels", f"{values['frames']} frames")]
+    period = 1000 / values["nominal_rate"]
+    if values["lost"]:
+        share = values["lost"] / (values["frames"] + values["lost"])
+        bad = share > LOST_SHARE or values["longest_gap"] > GAP_MS
+        text = f"{values['lost']} frames lost ({100 * share:.1f} %), longest gap {values['longest_gap']:.0f} ms"
+        found.append((UNUSABLE if bad else WARNING, "taxels", text))
+    elif values["longest_gap"] > max(GAP_MS, 2.5 * period):
+        found.append((UNUSABLE, "taxels", f"a gap of {values['longest_gap']:.0f} ms without a sample"))
+    if values["rate"] and abs(values["rate"] / values["nominal_rate"] - 1) > RATE_SHARE:
+        text = f"{values['rate']:.2f} Hz, nominal {values['nominal_rate']:g} Hz"
+        found.append((WARNING, "taxels", text))
+    found += [(WARNING, "taxels", text) for text in _line(values["driver_counts"])]
+    found += [(WARNING, "taxels", text) for text in clock_doubts(values["clock"], _rate_of_clock(figures))]
+    if figures.recording.episode.taxels.counter.min() < 0:
+        text = "the board sends no counter: lost frames cannot be seen, sample times are arrival times"
+        found.append((WARNING, "taxels", text))
+    if values["latency"] / _rate_of_clock(figures) > LATENCY_MS:
+        found.append((WARNING, "taxels", f"the host was up to {values['latency']:.0f} ms late in reading"))
+    return found
+
+
+def _line(counts: dict) -> list[str]:
+    """Return in words what the driver saw on the line."""
+    found = []
+    if counts.get("corrupt", 0):
+        found.append(f"{counts['corrupt']} damaged frames discarded")
+    if counts.get("repeated", 0):
+        found.append(f"{counts['repeated']} frames came twice and were discarded")
+    if counts.get("garbage_bytes", 0):
+        found.append(f"{counts['garbage_bytes']} bytes between the frames belong to none")
+    return [*found, *counts.get("notes", [])]
+
+
+def _channels(figures: Figures) -> list[Judgement]:
+    values, found = figures.document["taxels"], []
+    if values["undefined"]:
+        found.append((UNUSABLE, "taxels", f"channel {_list(values['undefined'])} has readings that are no numbers"))
+    for first, second in values["tied"]:
+        found.append((UNUSABLE, "taxels", f"channels {first} and {second} read the same throughout: tied together"))
+    counts = figures.recording.episode.taxels.counts
+    if len(counts) > 1 and (counts == counts[:1]).all() and figures.recording.episode.press.depth >= DEAD_DEPTH:
+        found.append((UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"))
+    found += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1], values["unit"])]
+    if values["stuck"]:
+        found.append((UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"))
+    if values["saturated"]:
+        found.append((UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"))
+    noise = np.array([np.nan if v is None else v for v in values["idle_noise"]])
+    if np.isnan(noise).all():
+        found.append((WARNING, "taxels", "no idle stretch to measure noise and baseline"))
+    else:
+        loud = np.flatnonzero(noise > NOISE_RATIO * max(float(np.nanmedian(noise)), 1e-9))
+        if len(loud):
+            text = f"channel {_list(loud.tolist())} is over {NOISE_RATIO:g} times as noisy as the others"
+            found.append((WARNING, "taxels", text))
+    return found
+
+
+def _cnc(figures: Figures) -> list[Judgement]:
+    values, found = figures.document["cnc"], []
+    if not values["reports"]:
+        return [(UNUSABLE, "cnc", "no status report")]
+    alarms = [state for state in values["states"] if state.split(":")[0] in ("Alarm", "Door")]
+    if alarms:
+        found.append((UNUSABLE, "cnc", f"the controller was in state {', '.join(alarms)}"))
+    if values["longest_gap"] / _rate_of_clock(figures) > REPORT_GAP_MS:
+        found.append((WARNING, "cnc", f"no status report for {values['longest_gap']:.0f} ms"))
+    if figures.document["complete"] and values["depth_uncertainty"] > DEPTH_MM[0]:
+        severity = UNUSABLE if values["depth_uncertainty"] > DEPTH_MM[1] else WARNING
+        text = f"the depth while pressing is known to {values['depth_uncertainty']:.3f} mm only"
+        if values["contradiction"]:
+            text += f": reports contradict the commanded profile by {values['contradiction']:.0f} ms"
+        found.append((severity, "cnc", text))
+    if values["hold_error"] is not None and values["hold_error"] > HOLD_MM:
+        text = f"the guide stood {values['hold_error']:.3f} mm from the commanded position in the hold"
+        found.append((UNUSABLE, "cnc", text))
+    return found
+
+
+def _cameras(figures: Figures) -> list[Judgement]:
+    entries = figures.recording.episode.rig.get("cameras", {})
+    doubts = camera_doubts(entries, figures.document["cameras"], _rate_of_clock(figures))
+    return [(WARNING, stream, text) for stream, text in doubts]
+
+
+def _jumps(found: list[dict], channels: int, unit: str) -> list[str]:
+    if len(found) > channels / 2:
+        first = min(jump["at"] for jump in found)
+        return [f"{len(found)} channels jump while nothing moves, from {first:.1f} s on"]
+    digits = "+.0f" if unit == COUNTS else "+.3g"
+    return [
+        f"channel {jump['channel']} jumps by {jump['size']:{digits}} {unit} at {jump['at']:.1f} s while nothing moves"
+        for jump in found
+    ]
+
+
+def _list(channels: list[int]) -> str:
+    return ", ".join(str(channel) for channel in channels)

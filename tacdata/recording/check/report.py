@@ -1,0 +1,150 @@
+"""Judges a recording or a session: is it fit to be labelled and learned from?"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata.errors import FormatError, UsageError
+from tacdata.recording.check.clocks import clock_words
+from tacdata.recording.check.figures import Figures, figures
+from tacdata.recording.check.findings import UNUSABLE, WARNING, Finding, findings
+from tacdata.recording.check.imported import imported_summary, is_imported
+from tacdata.recording.check.session import session_findings
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.session import read_session
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found."""
+
+    source: Path
+    """File or folder that was checked."""
+    episodes: tuple[Figures, ...]
+    """Figures of every recording that could be read."""
+    findings: tuple[Finding, ...]
+
+    @property
+    def usable(self) -> bool:
+        """False if anything makes a recording unusable."""
+        return not any(finding.severity == UNUSABLE for finding in self.findings)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The report as its file's document (`schemas/check.schema.json`)."""
+        return {
+            "version": schemas.version("check"),
+            "source": self.source.name,
+            "usable": self.usable,
+            "findings": [asdict(finding) for finding in self.findings],
+            "episodes": [entry.document for entry in self.episodes],
+        }
+
+    @property
+    def text(self) -> str:
+        """One page of words."""
+        lines = [f"{self.source}: {len(self.episodes)} recordings"]
+        imported = bool(self.episodes) and is_imported(self.episodes[0].recording.episode)
+        told = imported_summary(self.episodes) if imported else _summary([entry.document for entry in self.episodes])
+        lines += told
+        lines += _grouped(self.findings) or ["nothing to remark"]
+        return "\n".join([*lines, "usable" if self.usable else "NOT usable as it is"])
+
+
+def check(path: Path) -> Report:
+    """Check a recording or a session folder.
+
+    Raises:
+        UsageError: If it is neither.
+        FormatError: If a single recording cannot be read, or the session's document is damaged.
+    """
+    path = Path(path)
+    if path.is_file():
+        entry = figures(read_recording(path))
+        return Report(path, (entry,), tuple(findings(entry)))
+    if not path.is_dir():
+        raise UsageError(f"no file or folder {path}", "a recording or a session folder", "check the path")
+    session = read_session(path)
+    entries, found = [], []
+    for file in session.episodes:
+        try:
+            entries.append(figures(read_recording(file)))
+            found += findings(entries[-1])
+        except FormatError as error:
+            found.append(Finding(UNUSABLE, "recording", file.name, error.given))
+    return Report(path, tuple(entries), (*found, *_of_session(session, entries)))
+
+
+def _of_session(session: Any, entries: list[Figures]) -> list[Finding]:
+    found = []
+    if not session.episodes:
+        found.append(Finding(UNUSABLE, "session", "", "no finished recording"))
+    if session.remaining:
+        text = f"{len(session.remaining)} of {len(session.plan.presses)} presses of the plan are not recorded"
+        found.append(Finding(WARNING, "session", "", f"{text}; go on with tacdata record --resume"))
+    if entries and is_imported(entries[0].recording.episode):
+        return found  # its channels' places may be stand-ins
+    return [*found, *session_findings(entries)]
+
+
+def _summary(documents: list[dict[str, Any]]) -> list[str]:
+    if not documents:
+        return []
+    taxels, cnc = [d["taxels"] for d in documents], [d["cnc"] for d in documents]
+    noise = [v for t in taxels for v in t["idle_noise"] if v is not None]
+    answers = _middle(c["round_trip"] for c in cnc)
+    lines = [
+        f"  taxels  {_middle(t['rate'] for t in taxels):.2f} Hz, {sum(t['frames'] for t in taxels)} frames, "
+        f"{sum(t['lost'] for t in taxels)} lost, jitter {_middle(t['jitter'] for t in taxels):.1f} ms, "
+        f"latency {_middle(t['latency'] for t in taxels):.0f} ms, idle noise {_middle(noise):.1f} counts",
+        f"          {clock_words(taxels[-1]['clock'])}",
+        f"  cnc     {_middle(c['rate'] for c in cnc):.1f} reports/s, start of a move known to "
+        f"{_middle(c['start_uncertainty'] for c in cnc):.1f} ms, depth to "
+        f"{max(c['depth_uncertainty'] for c in cnc):.3f} mm, "
+        + (f"answers within {answers:.1f} ms" if np.isfinite(answers) else "answers not timed"),
+    ]
+    for name in sorted({name for d in documents for name in d["cameras"]}):
+        views = [d["cameras"][name] for d in documents if name in d["cameras"]]
+        lines.append(
+            f"  camera {name}: {sum(v['images'] for v in views)} images, "
+            f"{_middle(v['rate'] for v in views):.1f} Hz, {_seen(views)}"
+        )
+        lines.append(f"          {clock_words(views[-1]['clock'])}")
+    return lines
+
+
+def _seen(views: list[dict[str, Any]]) -> str:
+    """Return in words what one camera saw of its cube and of fingers, over several recordings."""
+    fingers = sorted({finger for view in views for finger in view["fingers"]})
+    looked = {finger: [v["fingers"][finger] for v in views if finger in v["fingers"]] for finger in fingers}
+    if any(view["searched"] for view in views) or not fingers:
+        looked = {"tags": views, **looked}
+    words = []
+    for what, entries in looked.items():
+        searched = sum(entry["searched"] for entry in entries)
+        seen = sum(entry["searched"] * (entry["seen"] or 0.0) for entry in entries)
+        words.append(f"{what} in view in {100 * seen / max(searched, 1):.0f} % of {searched} searched")
+    return ", ".join(words)
+
+
+def _middle(values: Any) -> float:
+    known = [value for value in values if value is not None]
+    return float(np.median(known)) if known else float("nan")
+
+
+def _grouped(found: tuple[Finding, ...]) -> list[str]:
+    """Return a line per finding; what several recordings share is said once."""
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for finding in found:
+        groups.setdefault((finding.severity, finding.stream, finding.text), []).append(finding.file)
+    lines = []
+    for (severity, stream, text), files in sorted(groups.items(), key=lambda item: item[0][0] != UNUSABLE):
+        named = [name for name in files if name]
+        where = named[0] if len(named) == 1 else f"{len(named)} recordings" if named else "session"
+        lines.append(f"  {severity.upper():<8}  {stream}: {text} ({where})")
+    return lines

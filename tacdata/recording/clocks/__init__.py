@@ -1,0 +1,1 @@
+"""Clock models: device counters on the host's clock."""

@@ -1,0 +1,85 @@
+"""The clock of one stream while it is recorded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.envelope_fit import EnvelopeFit
+
+REFIT = 8
+"""Frames between two looks at the line while recording; the stored model uses all."""
+TAP_MIDDLE_NS = 10_000_000_000
+"""How long before its end the middle of a sync tap lies [ns]."""
+
+
+class StreamClock:
+    """Takes every arrival of a stream and says when it was sampled, as far as is known by then."""
+
+    def __init__(self, axis: str = "counter", rate: float = 1.0, nominal_ns: float | None = None) -> None:
+        """Begin without arrivals; ``axis``, ``rate`` and ``nominal_ns`` as in `EnvelopeFit`."""
+        self.axis, self.rate = axis, rate
+        self.latency: Latency | None = None
+        """The link's smallest delay, once measured, against the line as it is known now."""
+        self._fit = EnvelopeFit(axis, rate, nominal_ns)
+        self._line: tuple[int, int, float] | None = None
+        self._measured: tuple[Latency, int, int] | None = None  # with a counter, and where the line was then [ns]
+        self.frames = 0
+        """Arrivals taken."""
+
+    def take(self, arrival_ns: int, counter: int) -> int:
+        """Take one arrival [ns] of a counter [frames] or device time [ns]; return its sample time [ns].
+
+        Without a counter (-1), or before the line is known, that is the arrival.
+        """
+        if counter >= 0:
+            self._fit.add(arrival_ns, counter)
+            if self.frames % REFIT == 0 or self._line is None:
+                self._line = self._fit.line()
+                self._follow()
+            self.frames += 1
+        constant = self.latency.latency_ns if self.latency else 0
+        if counter < 0 or self._line is None:
+            return arrival_ns - constant
+        origin, host_ns, period = self._line
+        return min(host_ns + round(period * (counter - origin)), arrival_ns) - constant
+
+    def set_latency(self, latency: Latency | None) -> None:
+        """Take a constant delay that a sync tap has just shown against the present line, or none.
+
+        Arrivals that are quicker than any before let the line sink afterwards; where it was at the tap says by how
+        much, and the delay over it becomes less by that.
+        """
+        self.latency, self._measured = latency, None
+        line = self._fit.line()
+        if latency is not None and line is not None:
+            counter = max(self._fit.last_counter - round(TAP_MIDDLE_NS / line[2]), line[0])
+            self._measured = latency, counter, _at(line, counter)
+
+    def _follow(self) -> None:
+        if self._measured is None or self._line is None:
+            return
+        latency, counter, host_ns = self._measured
+        if self._fit.remembers(counter):
+            sunk = host_ns - _at(self._line, counter)
+            self.latency = replace(latency, latency_ns=latency.latency_ns - sunk)
+
+    def model(self) -> ClockModel | None:
+        """Return the model of all arrivals, or None before two counters are known."""
+        model = self._fit.model()
+        if model is None:
+            return None
+        self._line = self._fit.line()
+        self._follow()
+        return model.with_latency(self.latency)
+
+
+def _at(line: tuple[int, int, float], counter: int) -> int:
+    return line[1] + round(line[2] * (counter - line[0]))
+
+
+def nominal_period_ns(board: dict[str, Any]) -> float | None:
+    """Return the time between frames [ns] that a board's description of itself says; None if it says none."""
+    rate = board.get("rate", {}).get("nominal")
+    return 1e9 / rate if rate else None

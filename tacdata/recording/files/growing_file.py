@@ -1,0 +1,66 @@
+"""A recording that is still being written, read on from where it was read to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from mcap.opcode import Opcode
+
+from tacdata.errors import FormatError, UsageError
+from tacdata.recording.files.mcap_records import HEAD, MAGIC, Records, content, take
+
+
+class GrowingFile:
+    """Follows one file, under whatever name it is given at its end (a recorder renames it)."""
+
+    def __init__(self, path: Path, seen: Callable[[str, memoryview], None] | None = None) -> None:
+        """Open the file.
+
+        Args:
+            path: The file.
+            seen: Takes the topic and message of each picture as it is read (`mcap_records.read_records`).
+
+        Raises:
+            UsageError: If there is no such file.
+            FormatError: If it is no MCAP file.
+        """
+        if not path.is_file():
+            raise UsageError(f"no file {path}", "a recording that is being written", "check the path")
+        self.records = Records(path)
+        self.finished = False
+        """Whether the file was closed: no more comes."""
+        self._seen, self._stream = seen, path.open("rb")
+        if self._stream.read(len(MAGIC)) != MAGIC:
+            self._stream.close()
+            raise FormatError(f"{path} is no MCAP file", "a recording made by tacdata record", "check the path")
+
+    def update(self) -> bool:
+        """Read what was appended as far as its records are whole; return whether there was anything."""
+        found = False
+        while not self.finished:
+            at = self._stream.tell()
+            head = self._stream.read(HEAD)
+            length = int.from_bytes(head[1:], "little")
+            body = self._stream.read(length) if len(head) == HEAD and length <= self._left() else b""
+            if len(head) < HEAD or len(body) < length:
+                self._stream.seek(at)  # the rest has not reached the disk
+                return found
+            try:
+                for block in content(head[0], head, body, self.records.damage):
+                    take(self.records, block, images=False, digests=False, seen=self._seen)
+            except Exception as error:  # damaged lengths raise whatever the parser stumbles over
+                name = type(error).__name__
+                self.records.damage.append(f"an unreadable record at byte {at} is left out ({name})")
+            self.finished, found = head[0] == Opcode.FOOTER, True
+        return found
+
+    def _left(self) -> int:
+        at = self._stream.tell()
+        size = self._stream.seek(0, 2)
+        self._stream.seek(at)
+        return size - at
+
+    def close(self) -> None:
+        """Let the file go."""
+        self._stream.close()

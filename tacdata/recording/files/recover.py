@@ -1,0 +1,142 @@
+"""A damaged recording, written anew with a summary, so that every MCAP reader opens it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
+from mcap.writer import CompressionType, Writer
+
+from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.provenance import code_version
+from tacdata.recording.files.mcap_records import walk
+
+
+@dataclass
+class Recovered:
+    """What could be restored."""
+
+    path: Path
+    """The new file."""
+    messages: int = 0
+    """Messages in it."""
+    attachments: int = 0
+    """Attachments in it."""
+    damage: list[str] = field(default_factory=list)
+    """What was wrong with the old file, in words; empty if nothing was."""
+
+
+def recover(path: Path, target: Path | None = None) -> Recovered:
+    """Write what can be read of ``path`` beside it, as ``NAME.recovered.mcap``; the old file stays as it is.
+
+    The copy says that it is not complete, names the damage, and keeps every message, time and attachment as
+    it was.
+
+    Raises:
+        UsageError: If there is no such file or the target exists.
+        FormatError: If it is no MCAP file, or not one message can be read.
+        DeviceError: If the disk refuses the copy.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise UsageError(f"no file {path}", "an MCAP recording", "check the path")
+    target = target or path.with_name(path.name.removesuffix(".mcap") + ".recovered.mcap")
+    found = Recovered(target)
+    try:
+        stream = target.open("xb")
+    except FileExistsError:
+        raise UsageError(
+            f"{target} exists", "a new file; nothing is overwritten", "remove it or name another with --out"
+        ) from None
+    except OSError as error:
+        raise _refused(target, error) from error
+    try:
+        with stream:
+            _Copy(Writer(stream, compression=CompressionType.ZSTD), found).run(path)
+        if not found.messages:
+            raise _nothing(path, found)
+    except OSError as error:
+        target.unlink(missing_ok=True)
+        raise _refused(target, error) from error
+    except BaseException:
+        target.unlink(missing_ok=True)
+        raise
+    return found
+
+
+class _Copy:
+    """Copies record by record, so that a long recording needs little memory."""
+
+    def __init__(self, writer: Writer, found: Recovered) -> None:
+        self.writer, self.found = writer, found
+        self.begun = False
+        self.schemas: dict[int, int] = {}
+        self.channels: dict[int, int] = {}
+        self.orphans = 0
+        self.episode: dict[str, str] | None = None
+
+    def run(self, path: Path) -> None:
+        for record in walk(path, self.found.damage):
+            if not self.begun:
+                profile = record.profile if isinstance(record, Header) else ""
+                self.writer.start(profile=profile, library=f"tacdata {code_version()}")
+                self.begun = True
+            self._take(record)
+        if not self.begun:
+            return
+        damage = self.found.damage
+        if self.orphans:
+            damage.append(f"{self.orphans} messages without their channel are left out")
+        if damage or self.episode is None:
+            before = (self.episode or {}).get("reason", "")
+            reason = "; ".join(filter(None, [before, "recovered", *damage]))
+            self.episode = {"complete": json.dumps(False), "reason": reason}
+        self.writer.add_metadata("episode", self.episode)
+        self.writer.finish()
+
+    def _take(self, record: Any) -> None:
+        match record:
+            case Schema() if record.id not in self.schemas:
+                number = self.writer.register_schema(record.name, record.encoding, record.data)
+                self.schemas[record.id] = number
+            case Channel() if record.id not in self.channels:
+                schema = self.schemas.get(record.schema_id, 0)
+                self.channels[record.id] = self.writer.register_channel(
+                    record.topic, record.message_encoding, schema, record.metadata
+                )
+            case Message() if record.channel_id in self.channels:
+                number = self.channels[record.channel_id]
+                self.writer.add_message(number, record.log_time, record.data, record.publish_time, record.sequence)
+                self.found.messages += 1
+            case Message():
+                self.orphans += 1
+            case Attachment():
+                self.writer.add_attachment(
+                    record.create_time, record.log_time, record.name, record.media_type, record.data
+                )
+                self.found.attachments += 1
+            case Metadata() if record.name == "episode":
+                self.episode = record.metadata
+            case Metadata():
+                self.writer.add_metadata(record.name, record.metadata)
+
+
+def _nothing(path: Path, found: Recovered) -> FormatError:
+    if not found.attachments:
+        return FormatError(
+            f"{path} is no MCAP file, or nothing of it can be read",
+            "an MCAP file recorded by tacdata",
+            "check the path; for a file of another kind, convert it first",
+        )
+    return FormatError(
+        f"{path} breaks off before its first message: {'; '.join(found.damage) or 'it holds none'}",
+        "a recording with at least one message",
+        "nothing can be restored; record that press again with tacdata record --resume",
+    )
+
+
+def _refused(target: Path, error: OSError) -> DeviceError:
+    return DeviceError(f"writing {target} failed: {error}", "a disk with room for the copy", "make room or use --out")

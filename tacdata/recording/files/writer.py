@@ -1,0 +1,335 @@
+"""One press into one MCAP file, from any thread, safe against kill -9 but for the last second.
+
+While it is written the file is called ``*.partial.mcap``. Closed complete, it takes its final name; closed
+for a fault, it becomes ``*.interrupted-K.mcap``. Whatever the name, everything that reached the disk can be
+read.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+
+from schemas import tacdata_pb2 as pb
+from tacdata.clock import Clock
+from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
+from tacdata.errors import DeviceError, UsageError
+from tacdata.plans import Press
+from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.polled_clock import PolledClock
+from tacdata.recording.files import file_names, topics
+from tacdata.recording.files.chunked_file import ChunkedFile
+from tacdata.recording.motion.move_times import Command
+from tacdata.sensor import Sensor
+
+WAITING = 256_000_000
+"""Bytes that may wait for the disk; more means that it cannot keep up [bytes]."""
+LEVELS = {"info": Log.Level.INFO, "warning": Log.Level.WARNING, "error": Log.Level.ERROR}
+
+
+@dataclass(frozen=True)
+class Header:
+    """What is attached to every recording."""
+
+    press: Press
+    sensor: Sensor
+    rig: dict[str, Any]
+    """The rig file's document."""
+    plan: dict[str, Any]
+    """The plan file's document."""
+    board: dict[str, Any] = field(default_factory=dict)
+    """The board's description of itself: channels, frame format, units, nominal rate."""
+    controller: dict[str, Any] = field(default_factory=dict)
+    """``settings`` as read, ``acceleration`` [mm/s^2] and ``max_rate`` [mm/s] of each axis."""
+    latencies: dict[str, Latency] = field(default_factory=dict)
+    """Constant delay of each stream that a sync tap measured, by the stream's name."""
+
+    @property
+    def attachments(self) -> dict[str, Any]:
+        """Name of each attachment and its document."""
+        return {
+            "press.json": self.press.document,
+            "sensor.json": self.sensor.document,
+            "rig.json": self.rig,
+            "registration.json": self.rig.get("registration", {}),
+            "plan.json": self.plan,
+            "board.json": self.board,
+            "controller.json": self.controller,
+            "latencies.json": {name: latency.document for name, latency in self.latencies.items()},
+        }
+
+
+@dataclass(frozen=True)
+class CubePoseRecord:
+    """A cube's pose, or that of the fingertip that carries it, as the detector gives it."""
+
+    position: tuple[float, float, float]
+    """Origin of the cube or tip in the camera frame [m]."""
+    quaternion: tuple[float, float, float, float]
+    """Orientation of the cube or tip in the camera frame, xyzw [1]."""
+    reprojection: float
+    """Reprojection error, root mean square [px]."""
+    faces: int
+    """Faces seen [count]."""
+    ids: tuple[int, ...] = ()
+    """Tags read on the cube, ascending."""
+    ambiguous: bool = False
+    """Whether a second pose explains the image about as well."""
+    covariance: tuple[float, ...] = ()
+    """Of a small turn in the camera frame [rad] and the position [m], 6 x 6 by rows; empty if it is not known."""
+    strays: tuple[int, ...] = ()
+    """Tags of this cube that were read where the pose has none."""
+
+
+class Attached(Protocol):
+    """What says which documents a recording carries."""
+
+    @property
+    def attachments(self) -> dict[str, Any]:
+        """Name of each attachment and its document."""
+        ...
+
+
+class EpisodeWriter:
+    """A recording in progress. Methods may be called from any thread; writing happens in one of its own."""
+
+    def __init__(
+        self, path: Path, header: Attached, clock: Clock, cameras: tuple[str, ...] = (),
+        fingers: tuple[str, ...] = (), boards: tuple[str, ...] = (),
+    ) -> None:  # fmt: skip
+        """Create the file under its partial name and put the attachments on disk.
+
+        Args:
+            path: The finished file's name.
+            header: What is attached to it.
+            clock: The recording's clock.
+            cameras: Names of the cameras.
+            fingers: Names of the fingers that cameras may look at.
+            boards: Names of several boards, where there is not just one.
+
+        Raises:
+            UsageError: If a recording of that name, finished or partial, exists.
+            DeviceError: If the disk refuses it.
+        """
+        if path.exists():
+            raise UsageError(f"{path} exists", "a recording is never overwritten", "choose another session folder")
+        self.path, self._clock = path, clock
+        self.begun_ns = clock.now_ns()
+        """Host time of creation [ns]; what arrived before belongs to no recording or to the one before."""
+        try:
+            self._file = _begun(path, header, clock, cameras, fingers, boards)
+        except OSError as error:
+            raise DeviceError(
+                f"{path} cannot be begun: {error}", "a disk with room for the recording", "make room, then --resume"
+            ) from error
+        self._queue: queue.SimpleQueue[tuple[str, int, int, int, bytes] | None] = queue.SimpleQueue()
+        self._taken = self._written = 0  # bytes handed over and bytes dealt with
+        self._failure: Exception | None = None
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._drain, name=f"write {path.name}", daemon=True)
+        self.note("recording begins")
+        self._thread.start()
+
+    @property
+    def failure(self) -> Exception | None:
+        """What stopped the writing (a full disk, say), or None."""
+        return self._failure
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that wait to be written."""
+        with self._lock:
+            return self._taken - self._written
+
+    def _drain(self) -> None:
+        while True:
+            try:
+                item = self._queue.get(timeout=0.1)
+            except queue.Empty:
+                item = ()
+            if item is None:
+                return
+            try:
+                if self._failure is None:
+                    self._file.add(*item) if item else self._file.tick()
+            except Exception as error:  # whatever stops the writing stops the motion
+                self._failure = error
+            if item:
+                self._written += len(item[-1])
+
+    def _add(self, topic: str, log_ns: int, publish_ns: int, sequence: int, message: Any) -> None:
+        data = message.SerializeToString()
+        with self._lock:
+            self._taken += len(data)
+            waiting = self._taken - self._written
+        if self._failure is None and waiting > WAITING:
+            self._failure = OSError(f"the disk is slower than the streams: {waiting / 1e6:.0f} MB wait to be written")
+        if self._failure is None:
+            self._queue.put((topic, log_ns, publish_ns, sequence, data))
+
+    def taxels(self, frame: TaxelFrame, sample_ns: int, board: str = "") -> None:
+        """Write one reading of the board, or of one of several, with its sample time as estimated so far [ns]."""
+        message = pb.Taxels(
+            arrival_ns=frame.arrival_ns,
+            sample_ns=sample_ns,
+            counter=frame.counter,
+            counts=frame.counts.tolist(),
+            device_ns=frame.device_ns,
+        )
+        self._add(topics.taxels(board), frame.arrival_ns, sample_ns, max(frame.counter, 0), message)
+
+    def status(self, status: CncStatus) -> None:
+        """Write one status report; its sample time is the middle of query and answer."""
+        x, y, z = (float(value) for value in status.position)
+        message = pb.CncStatus(
+            sent_ns=status.sent_ns,
+            arrival_ns=status.arrival_ns,
+            state=status.state,
+            position=pb.Vector3(x=x, y=y, z=z),
+            feed=status.feed,
+        )
+        self._add(topics.STATUS, status.arrival_ns, (status.sent_ns + status.arrival_ns) // 2, 0, message)
+
+    def motion(self, command: Command) -> None:
+        """Write one acknowledged command."""
+        message = pb.Motion(
+            line=command.line,
+            sent_ns=command.sent_ns,
+            acknowledged_ns=command.acknowledged_ns,
+            phase=command.phase,
+            start=pb.Vector3(**dict(zip("xyz", command.start.tolist(), strict=True))),
+            target=pb.Vector3(**dict(zip("xyz", command.target.tolist(), strict=True))),
+            speed=command.speed,
+            dwell=command.dwell,
+        )
+        self._add(topics.MOTION, command.acknowledged_ns, command.sent_ns, 0, message)
+
+    def phase(self, name: str, start_ns: int) -> None:
+        """Mark the beginning of a phase; an empty name ends the one before."""
+        self._add(topics.PHASE, start_ns, start_ns, 0, pb.Phase(name=name, start_ns=start_ns))
+
+    def image(
+        self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, jpeg: bytes, device_ns: int = -1
+    ) -> None:
+        """Write one compressed image, and when it was taken."""
+        message = CompressedImage(frame_id=camera, data=jpeg, format="jpeg")
+        message.timestamp.FromNanoseconds(sample_ns)
+        time = pb.ImageTime(arrival_ns=arrival_ns, sample_ns=sample_ns, sequence=sequence, device_ns=device_ns)
+        self._add(topics.image_time(camera), arrival_ns, sample_ns, sequence, time)
+        self._add(topics.image(camera), arrival_ns, sample_ns, sequence, message)
+
+    def cube(
+        self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None,
+        finger: str = "",
+    ) -> None:  # fmt: skip
+        """Write what the tag detector says of the cube, or of a finger, in one image; ``None`` if no face was seen."""
+        pair = topics.finger(camera, finger) if finger else (topics.cube(camera), topics.pose(camera))
+        stamps = arrival_ns, sample_ns, sequence
+        if pose is not None:
+            self._add(pair[1], *stamps, _pose_message(camera, sample_ns, pose))
+        self._add(pair[0], *stamps, _view_message(stamps, pose))
+
+    def note(self, text: str, level: str = "info") -> None:
+        """Write a remark for a person."""
+        now = self._clock.now_ns()
+        self._add(topics.LOG, now, now, 0, self._log_message(text, level))
+
+    def _log_message(self, text: str, level: str) -> Log:
+        message = Log(level=LEVELS[level], message=text, name="tacdata")
+        message.timestamp.FromNanoseconds(self._clock.now_ns())
+        return message
+
+    def close(
+        self,
+        complete: bool,
+        reason: str = "",
+        clock_models: dict[str, ClockModel | PolledClock] | None = None,
+        counts: dict[str, StreamCounts] | None = None,
+    ) -> Path:
+        """Finish the file and give it its name.
+
+        Args:
+            complete: Whether the press was carried out and recorded whole.
+            reason: Why not, in words.
+            clock_models: Clock model of each stream, by its name ("taxels").
+            counts: What each stream delivered and lost.
+
+        Returns:
+            The file's path: the final one, or that of an interrupted recording.
+
+        Raises:
+            DeviceError: If the disk refused something; the message says which file holds what was written.
+        """
+        self._queue.put(None)
+        self._thread.join()
+        target = self.path if complete and self._failure is None else file_names.next_interrupted(self.path)
+        try:
+            if self._failure is not None:
+                raise self._failure
+            for name, model in (clock_models or {}).items():
+                self._file.describe(f"clock_model/{name}", model.document)
+            for name, count in (counts or {}).items():
+                self._file.describe(f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()})
+            self._file.describe("episode", {"complete": json.dumps(complete), "reason": reason})
+            self._file.close()
+        except Exception as error:  # whatever stops the writing is said, and the file let go
+            self._file.let_go()
+            partial = self._file.path
+            raise DeviceError(
+                f"writing {partial} failed: {error}",
+                "a disk with room for the recording",
+                f"make room, then continue with --resume; what was written stays readable in {partial.name}",
+            ) from error
+        self._file.path.rename(target)
+        return target
+
+
+def _pose_message(frame: str, sample_ns: int, pose: CubePoseRecord) -> PoseInFrame:
+    (x, y, z), (qx, qy, qz, qw) = pose.position, pose.quaternion
+    message = PoseInFrame(frame_id=frame)
+    message.timestamp.FromNanoseconds(sample_ns)
+    message.pose.position.x, message.pose.position.y, message.pose.position.z = float(x), float(y), float(z)
+    turn = message.pose.orientation
+    turn.x, turn.y, turn.z, turn.w = float(qx), float(qy), float(qz), float(qw)
+    return message
+
+
+def _view_message(stamps: tuple[int, int, int], pose: CubePoseRecord | None) -> pb.CubeView:
+    view = pb.CubeView(arrival_ns=stamps[0], sample_ns=stamps[1], sequence=stamps[2])
+    if pose is not None:
+        view.faces, view.reprojection, view.ambiguous = pose.faces, pose.reprojection, pose.ambiguous
+        view.ids.extend(pose.ids)
+        view.covariance.extend(pose.covariance)
+        view.strays.extend(pose.strays)
+    return view
+
+
+def _begun(
+    path: Path, header: Attached, clock: Clock, cameras: tuple[str, ...], fingers: tuple[str, ...],
+    boards: tuple[str, ...],
+) -> ChunkedFile:  # fmt: skip
+    """Create the file with its channels and attachments and hand it to the disk."""
+    file = ChunkedFile(file_names.partial(path))
+    for topic, message in topics.FIXED.items():
+        file.register(topic, message)
+    for board in boards:
+        file.register(topics.taxels(board), pb.Taxels)
+    for camera in cameras:
+        for topic, message in topics.of_camera(camera, fingers).items():
+            file.register(topic, message)
+    try:
+        for name, document in header.attachments.items():
+            file.attach(name, "application/json", json.dumps(document, indent=1).encode(), clock.now_ns())
+        file.flush()
+    except OSError:
+        file.let_go()
+        raise
+    return file

@@ -1,0 +1,215 @@
+"""Threads that drain boards and cameras into whichever recording is open; what silence means is for others to say."""
+
+from __future__ import annotations
+
+import copy
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+from tacdata.devices.device import Camera, ImageFrame, StreamCounts, TaxelBoard
+from tacdata.errors import DeviceError, TacdataError
+from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.polled_clock import PolledClock
+from tacdata.recording.clocks.running_clock import StreamClock, nominal_period_ns
+from tacdata.recording.files.writer import EpisodeWriter
+from tacdata.recording.live.camera_stream import CameraStream
+from tacdata.recording.live.detection_process import Detect
+from tacdata.recording.live.live_feed import LiveFeed, Watch
+
+BOARD = "taxel board"
+"""What an only board is called where people read it."""
+POLL = 0.05
+"""How long a read may wait [s of the host's clock]."""
+CATCH_UP = 5.0
+"""How long the end of a recording waits for images not yet written [s of real time]."""
+SEARCH = 2.0
+"""How long the end of a recording waits for a search for tags that is under way [s of real time]."""
+
+
+class DeviceStreams(ABC):
+    """Runs as a context while the devices are open; between recordings, what arrives feeds the clock models only."""
+
+    silence: float
+    """A stream that delivers nothing for so long has fallen silent [s of real time]."""
+
+    def __init__(
+        self, boards: dict[str, TaxelBoard], cameras: dict[str, Camera], entries: dict[str, dict[str, Any]],
+        fingers: dict[str, Any] | None = None, detect: Detect | None = None, watch: Watch | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare the threads.
+
+        Args:
+            boards: The opened boards; an only one may be called "".
+            cameras: The opened cameras.
+            entries: The rig file's camera entries.
+            fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
+            detect: Searches an image for cubes; without it images are only stored.
+            watch: Is shown some of what arrives.
+        """
+        self._boards = {f"taxels {name}".rstrip(): board for name, board in boards.items()}
+        self._cameras = {f"camera {name}": camera for name, camera in cameras.items()}
+        self._feed = LiveFeed(watch) if watch else None
+        self._stop, self._lock, self._ending = threading.Event(), threading.Lock(), False
+        self._sink: EpisodeWriter | None = None
+        self._before: dict[str, StreamCounts] = {}
+        self._passes: dict[str, int] = {}
+        self._clocks = {name: stream_clock(board) for name, board in self._boards.items()}
+        self._clocks |= {name: StreamClock("order", camera.clock.rate) for name, camera in self._cameras.items()}
+        self._views = [CameraStream(name, entries.get(name, {}), detect, fingers) for name in cameras]
+        self._work: dict[str, Callable[[], int]] = {}
+        for name, stream in zip(boards, self._boards, strict=True):
+            self._work[stream if name else BOARD] = self._board_reader(stream, name)
+        for view in self._views:
+            self._work[f"camera {view.name}"] = self._camera_reader(view)
+        self._threads: list[threading.Thread] = []
+
+    @abstractmethod
+    def _silent(self, name: str) -> None:
+        """Take that a stream has delivered nothing for `silence`, again with each empty read; may raise."""
+
+    @abstractmethod
+    def _broken(self, name: str, error: TacdataError) -> None:
+        """Take what ended a stream; its thread ends after that."""
+
+    @abstractmethod
+    def _spoke(self, name: str, count: int) -> None:
+        """Take that a stream has delivered so many frames, images or reports."""
+
+    def __enter__(self) -> DeviceStreams:
+        """Start the threads."""
+        self._threads = [
+            threading.Thread(target=self._run, args=item, name=item[0], daemon=True) for item in self._work.items()
+        ]
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Stop the threads; the devices must still be open."""
+        self._stop.set()
+        for thread in self._threads:
+            thread.join(timeout=10.0)
+
+    @property
+    def searching(self) -> bool:
+        """Whether every camera's detector has loaded its libraries and answered once."""
+        return all(view.ready for view in self._views)
+
+    @property
+    def clock_models(self) -> dict[str, ClockModel | PolledClock]:
+        """Clock of each stream, by its name: "taxels" or "taxels NAME", "camera NAME"."""
+        with self._lock:
+            models = {name: clock.model() for name, clock in self._clocks.items()}
+        return {name: model for name, model in models.items() if model is not None}
+
+    @property
+    def counts(self) -> dict[str, StreamCounts]:
+        """What each stream has delivered since `record_into` was called last."""
+        return {name: _since(self._before.get(name, StreamCounts()), now) for name, now in self._totals().items()}
+
+    def record_into(self, sink: EpisodeWriter | None) -> None:
+        """Send everything that arrives from now on into a recording, or nowhere."""
+        with self._lock:
+            self._sink = sink
+            self._before = copy.deepcopy(self._totals())
+            for name in self._cameras:
+                self._before[name].notes.clear()  # what a camera did not take at opening holds for all
+
+    def set_latencies(self, latencies: dict[str, Latency]) -> None:
+        """Take these constant delays of streams, by name, into all sample times from now on, and no others."""
+        with self._lock:
+            for name, clock in self._clocks.items():
+                clock.set_latency(latencies.get(name))
+
+    def catch_up(self, patience: float = CATCH_UP) -> None:
+        """Wait at most so long [s of real time] until every stream has handed on what has arrived by now."""
+        end, self._ending = time.monotonic() + patience, True
+        begun = dict(self._passes)
+        for thread in self._threads:
+            # One pass may have been under way; the one after it began later than this call and has ended.
+            while self._passes.get(thread.name, 0) < begun.get(thread.name, 0) + 2:
+                if not thread.is_alive() or time.monotonic() > end:
+                    break
+                time.sleep(POLL / 10)
+        self._ending = False
+
+    def _totals(self) -> dict[str, StreamCounts]:
+        return {name: device.counts for name, device in (self._boards | self._cameras).items()}
+
+    def _run(self, name: str, read: Callable[[], int]) -> None:
+        heard = time.monotonic()
+        while not self._stop.is_set():
+            self._passes[name] = self._passes.get(name, 0) + 1
+            try:
+                if count := read():
+                    heard = time.monotonic()
+                    self._spoke(name, count)
+                elif time.monotonic() - heard > self.silence:
+                    self._silent(name)
+            except TacdataError as error:
+                return self._broken(name, error)
+            except Exception as error:  # a driver's bug must not go unnoticed, nor cost the other streams
+                what = f"{name}: {type(error).__name__}: {error}"
+                return self._broken(name, DeviceError(what, "a driver that works", "report it with this line"))
+
+    def _board_reader(self, stream: str, name: str) -> Callable[[], int]:
+        board = self._boards[stream]
+
+        def read() -> int:
+            frames = board.read(POLL)
+            with self._lock:
+                clock = self._clocks[stream]
+                for frame in frames:
+                    counter = frame.device_ns if clock.axis == "device_ns" else frame.counter
+                    sample_ns = clock.take(frame.arrival_ns, counter)
+                    if self._sink and frame.arrival_ns >= self._sink.begun_ns:
+                        self._sink.taxels(frame, sample_ns, name)
+                if self._feed and frames:
+                    self._feed.taxels(frames[-1].arrival_ns, frames[-1].counts)
+            return len(frames)
+
+        return read
+
+    def _camera_reader(self, view: CameraStream) -> Callable[[], int]:
+        stream = f"camera {view.name}"
+        camera = self._cameras[stream]
+
+        def read() -> int:
+            frames = camera.read(POLL)
+            for frame in frames:
+                with self._lock:
+                    sink, clock = self._sink, self._camera_clock(stream, frame)
+                    counter = frame.device_ns if clock.axis == "device_ns" else frame.sequence
+                    sample_ns = clock.take(frame.arrival_ns, counter)
+                if sink is None or frame.arrival_ns >= sink.begun_ns:
+                    view.take(frame, sample_ns, sink)
+                if self._feed:
+                    self._feed.image(view.name, frame.arrival_ns, frame.image)
+            view.collect(SEARCH if self._ending else 0.0)
+            return len(frames)
+
+        return read
+
+    def _camera_clock(self, name: str, frame: ImageFrame) -> StreamClock:
+        """Return a camera's clock; its first image says whether the camera has a time of its own."""
+        clock = self._clocks[name]
+        if clock.axis == "order" and clock.frames == 0 and frame.device_ns >= 0:
+            latency, clock = clock.latency, StreamClock("device_ns", clock.rate)
+            clock.set_latency(latency)
+            self._clocks[name] = clock
+        return clock
+
+
+def stream_clock(board: TaxelBoard) -> StreamClock:
+    """Return a clock that says when a board's frames were sampled."""
+    described = board.describe()
+    axis = "device_ns" if described.get("clock") == "device_ns" else "counter"
+    return StreamClock(axis, board.clock.rate, nominal_period_ns(described))
+
+
+def _since(before: StreamCounts, now: StreamCounts) -> StreamCounts:
+    numbers = {k: v - getattr(before, k) for k, v in vars(now).items() if isinstance(v, int)}
+    return StreamCounts(**numbers, notes=now.notes[len(before.notes) :])

@@ -1,0 +1,109 @@
+"""Threads that drain a rig's devices into whichever recording is open; a fault in any of them stops the motion."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import DeviceError, TacdataError
+from tacdata.recording.clocks.clock_model import ClockModel
+from tacdata.recording.clocks.polled_clock import PolledClock, polled_clock
+from tacdata.recording.live.detection_process import Detect
+from tacdata.recording.live.device_streams import BOARD, POLL, DeviceStreams
+from tacdata.recording.live.live_feed import Watch
+from tacdata.recording.live.rig_devices import RigDevices
+
+TRIPS = 4096
+"""Round trips of the controller's reports that are remembered for its clock [count]."""
+
+
+class Streams(DeviceStreams):
+    """Runs while the session runs; what arrives between recordings feeds the clock models only."""
+
+    silence = 3.0
+
+    def __init__(
+        self,
+        devices: RigDevices,
+        cameras: dict[str, dict[str, Any]],
+        on_fault: Callable[[], None],
+        detect: Detect | None = None,
+        watch: Watch | None = None,
+        fingers: dict[str, Any] | None = None,
+    ) -> None:
+        """Prepare the threads.
+
+        Args:
+            devices: The opened devices.
+            cameras: The rig file's camera entries.
+            on_fault: Called at once, in the faulty stream's thread, before anything else: stops the motion.
+            detect: Searches an image for the cube; without it images are only stored.
+            watch: Is shown some of what arrives.
+            fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
+        """
+        super().__init__({"": devices.board}, devices.cameras, cameras, fingers, detect, watch)
+        self._cnc, self._on_fault = devices.cnc, on_fault
+        self._fault: TacdataError | None = None
+        self._trips: deque[tuple[int, int]] = deque(maxlen=TRIPS)
+        self.frames = 0
+        """Taxel frames received since the start."""
+        self.position: tuple[float, float, float] | None = None
+        """Latest reported machine position [mm]."""
+        self._work["motion controller"] = self._read_status
+
+    def __enter__(self) -> Streams:
+        """Start the threads."""
+        super().__enter__()
+        return self
+
+    @property
+    def fault(self) -> TacdataError | None:
+        """The first thing that went wrong in a stream or in writing, or None."""
+        failure = self._sink.failure if self._sink else None
+        if self._fault is None and failure is not None:
+            self._fail(DeviceError(f"writing failed: {failure}", "a disk with room", "make room, then --resume"))
+        return self._fault
+
+    @property
+    def clock_models(self) -> dict[str, ClockModel | PolledClock]:
+        """Clock of each stream, by its name: "taxels", "camera NAME", "cnc"."""
+        models = super().clock_models
+        with self._lock:
+            polled = polled_clock(*np.array(self._trips, np.int64).reshape(-1, 2).T)
+        return models if polled is None else {**models, "cnc": polled}
+
+    def _fail(self, error: TacdataError) -> None:
+        if self._fault is None:
+            self._on_fault()
+            self._fault = error
+
+    def _spoke(self, name: str, count: int) -> None:
+        if name == BOARD:
+            self.frames += count
+
+    def _silent(self, name: str) -> None:
+        raise DeviceError(
+            f"{name}: nothing received for {self.silence:g} s", "a stream that goes on",
+            "check cable and power, then continue with --resume",
+        )  # fmt: skip
+
+    def _broken(self, name: str, error: TacdataError) -> None:
+        self._fail(error)
+
+    def _read_status(self) -> int:
+        statuses = self._cnc.statuses()
+        with self._lock:
+            for status in statuses:
+                x, y, z = status.position.tolist()
+                self.position = (x, y, z)
+                self._trips.append((status.sent_ns, status.arrival_ns))
+                if self._feed:
+                    self._feed.position(status.arrival_ns, self.position)
+                if self._sink and status.arrival_ns >= self._sink.begun_ns:
+                    self._sink.status(status)
+        time.sleep(POLL)
+        return len(statuses)

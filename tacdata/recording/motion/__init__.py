@@ -1,0 +1,1 @@
+"""The motion of a press: its steps, profile and preflight check."""

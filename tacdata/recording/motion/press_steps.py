@@ -1,0 +1,79 @@
+"""One press as the moves and pauses that the controller is given, each move from rest to rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.plans import Press
+from tacdata.plans.plan import MotionSettings
+from tacdata.recording.motion.trapezoid import AxisLimits
+from tacdata.rig import Registration
+
+SYNC = 0.01
+"""Pause that makes the controller finish its moves before it answers [s]; GRBL rounds up to 0.05 s."""
+
+SIDES = {"": (0.0, 0.0), "+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
+"""Direction from a site to where the guide comes from, for each value of `Press.approach_from`."""
+
+Position = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A move or a pause."""
+
+    phase: str
+    """Phase it belongs to; empty for travel."""
+    target: Position | None = None
+    """Machine position to go to [mm]; None for a pause."""
+    speed: float = 0.0
+    """Speed of the move [mm/s]."""
+    seconds: float = 0.0
+    """Length of the pause [s]."""
+
+
+def steps(press: Press, motion: MotionSettings, registration: Registration) -> tuple[Step, ...]:
+    """Return the steps of one press: travel, rest, approach, press, hold, release, retract, recovery.
+
+    A pause stands behind every move: the next one then starts from rest, as the profile of `motion_profile`
+    takes it, and the pause's acknowledgement bounds the move's end. A press with negative depth stops above
+    the skin. One with ``approach_from`` rests ``run_up`` beside its site and comes over it from there.
+    """
+    # Above the standoff the way down is halved, so that approach and press are both moves.
+    high = -press.depth >= motion.standoff
+    near = (motion.clearance - press.depth) / 2 if high else min(motion.standoff, motion.clearance)
+    above, standoff, target = (
+        registration.to_machine(press.x, press.y, depth) for depth in (-motion.clearance, -near, press.depth)
+    )
+    rest = motion.rest if press.rest is None else press.rest
+    x, y = (c + motion.run_up * step for c, step in zip((press.x, press.y), SIDES[press.approach_from], strict=True))
+    path = [Step("", registration.to_machine(x, y, -motion.clearance), motion.travel_speed)]
+    path += [Step("rest", seconds=max(rest, SYNC))]
+    if press.approach_from:
+        path += [Step("approach", above, motion.travel_speed), Step("approach", seconds=SYNC)]
+    path += [Step("approach", standoff, motion.approach_speed), Step("approach", seconds=SYNC)]
+    if press.overshoot:
+        beyond = registration.to_machine(press.x, press.y, press.deepest)
+        path += [Step("press", beyond, press.speed), Step("press", seconds=SYNC)]
+    return (
+        *path,
+        Step("press", target, press.speed),
+        Step("hold", seconds=max(press.hold, SYNC)),
+        Step("release", standoff, press.speed),
+        Step("release", seconds=SYNC),
+        Step("", above, motion.approach_speed),
+        Step("", seconds=max(press.recovery, SYNC)),
+    )
+
+
+def duration(path: tuple[Step, ...], start: Position, limits: AxisLimits) -> tuple[float, Position]:
+    """Return how long the steps take from ``start`` [s], without the link's delays, and their end [mm]."""
+    seconds, position = 0.0, start
+    for step in path:
+        seconds += step.seconds
+        if step.target is not None:
+            move = limits.straight_move(np.array(position), np.array(step.target), step.speed)
+            seconds, position = seconds + move.duration, step.target
+    return seconds, position

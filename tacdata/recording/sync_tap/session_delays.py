@@ -1,0 +1,50 @@
+"""The sync taps of a session: the constant delays that hold for what is recorded after them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import schemas
+from tacdata import documents
+from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.session import FILE, Session
+from tacdata.recording.sync_tap.delays import SyncTap
+
+CHANGE = 3.0
+"""Change of a delay that is worth a word [times its uncertainty]."""
+LEAST_CHANGE_NS = 2_000_000
+"""... and at least so much [ns]."""
+
+
+def latencies(session: Session) -> dict[str, Latency]:
+    """Return the latest delay of each stream; {} without a sync tap."""
+    found: dict[str, Latency] = {}
+    for entry in session.document.get("sync", []):
+        found |= {name: Latency.from_document(values) for name, values in entry["latencies"].items()}
+    return found
+
+
+def changes(session: Session, now: dict[str, Latency]) -> tuple[str, ...]:
+    """Return in words which delays are not what an earlier sync tap of the session found."""
+    words = []
+    for name, before in latencies(session).items():
+        after = now.get(name, before)
+        change = after.latency_ns - before.latency_ns
+        sure = CHANGE * (after.uncertainty_ns**2 + before.uncertainty_ns**2) ** 0.5
+        if abs(change) > max(sure, LEAST_CHANGE_NS):
+            words.append(f"sync tap: the delay of {name} has changed by {change / 1e6:+.1f} ms; was a cable replugged?")
+    return tuple(words)
+
+
+def add_sync(session: Session, file: Path, found: SyncTap) -> Session:
+    """Write a sync tap into the session's document and return the session."""
+    delays = {name: latency.document for name, latency in found.latencies.items()}
+    entry = {"file": file.name, "latencies": delays, "remarks": list(found.remarks)}
+    document = {
+        **session.document,
+        "version": schemas.version("session"),
+        "sync": [*session.document.get("sync", []), entry],
+    }
+    documents.write(session.folder / FILE, document, "session")
+    return replace(session, document=document)

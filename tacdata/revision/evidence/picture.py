@@ -1,0 +1,103 @@
+"""One page: readings before and after, the gap by group, the labels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.revision.evidence.curves import EpisodeCurves
+from tacdata.revision.evidence.gap import Change, Gap
+
+BEFORE, AFTER, MEASURED = "#d55e00", "#0072b2", "#000000"
+"""Okabe and Ito's vermilion and blue, which all eyes tell apart."""
+
+
+def draw(
+    title: str, shown: Sequence[EpisodeCurves], found: Gap, path: Path, networks: Sequence[dict[str, Any]] = ()
+) -> None:
+    """Draw the page into a PNG file.
+
+    Args:
+        title: What it says.
+        shown: Episodes, at most three.
+        found: The gap.
+        path: File to write.
+        networks: Metrics of networks before and after (`tacdata.revision.labels.retrain`), if any were trained.
+    """
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from viewers.output_file import written_beside
+    from viewers.pictures.backend import STYLE
+
+    with rc_context(STYLE):
+        figure = Figure(figsize=(13.0, 7.6), layout="constrained")
+        FigureCanvasAgg(figure)
+        figure.suptitle(title, fontsize=13)
+        halves: Any = figure.subfigures(2, 1)
+        upper, lower = halves
+        top: Any = np.atleast_1d(upper.subplots(1, max(len(shown), 1)))
+        bottom: Any = lower.subplots(1, 3 if networks else 2)
+        for k, own in enumerate(shown):
+            _curves(top[k], own, k == 0)
+        _residuals(bottom[0], shown)
+        _groups(bottom[1], found)
+        if networks:
+            _networks(bottom[2], networks)
+        with written_beside(path) as temporary:
+            figure.savefig(temporary, dpi=110)
+
+
+def _curves(axis: Any, own: EpisodeCurves, legend: bool) -> None:
+    c = own.channel
+    axis.plot(own.time, own.measured[:, c], ".", ms=3, color=MEASURED, label="measured")
+    axis.plot(own.time, own.before[:, c], color=BEFORE, lw=1.2, label="model before")
+    axis.plot(own.time, own.after[:, c], color=AFTER, lw=1.2, label="model after")
+    axis.set(title=f"{own.name}, {own.channel_name}", xlabel="time [s]", ylabel="reading")
+    if legend:
+        axis.legend(loc="best")
+
+
+def _residuals(axis: Any, shown: Sequence[EpisodeCurves]) -> None:
+    axis.axhspan(-2, 2, color="0.9", zorder=0, label="noise, two standard deviations")
+    at = 0.0
+    for k, own in enumerate(shown):
+        c = own.channel
+        for said, color, name in ((own.before, BEFORE, "before"), (own.after, AFTER, "after")):
+            wrong = (own.measured[:, c] - said[:, c]) / own.noise[c]
+            axis.plot(own.time + at, wrong, color=color, lw=1.0, label=name if k == 0 else None)
+        at += float(own.time[-1]) + 0.5
+    axis.set(title="what the model leaves, in the same episodes", xlabel="time [s]", ylabel="residual / noise")
+    axis.legend(loc="best", fontsize=8)
+
+
+def _groups(axis: Any, found: Gap) -> None:
+    rows: list[Change] = [found.whole, *found.elsewhere]
+    where = np.arange(len(rows))
+    axis.barh(where - 0.2, [c.before for c in rows], 0.38, color=BEFORE, label="before")
+    axis.barh(where + 0.2, [c.after for c in rows], 0.38, color=AFTER, label="after")
+    axis.axvline(1.0, color="k", lw=0.8)
+    names = [c.name if k == 0 else f"{c.name}, left out" for k, c in enumerate(rows)]
+    axis.set_yticks(where, [f"{n} ({c.episodes})" for n, c in zip(names, rows, strict=True)], fontsize=8)
+    axis.invert_yaxis()
+    low = min(0.8, *(c.after for c in rows))
+    axis.set(xscale="log", xlim=(0.8 * low, None), xlabel="mean square of the residual; 1 is the noise floor",
+             title="the gap, where the numbers were not fitted")  # fmt: skip
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8)  # clear of every bar
+
+
+def _networks(axis: Any, metrics: Sequence[dict[str, Any]]) -> None:
+    """Draw each metric after over before: they have different units."""
+    known = [m for m in metrics if m["before"] and m["after"] is not None]
+    where = np.arange(len(known))
+    axis.barh(where, [m["after"] / m["before"] for m in known], 0.6, color=AFTER)
+    axis.axvline(1.0, color=BEFORE, lw=1.5)
+    for at, m in zip(where, known, strict=True):
+        axis.text(0.02, at, f"{m['before']:.3g} → {m['after']:.3g} {m['unit']}", va="center", fontsize=8, color="white")
+    axis.set_yticks(where, [m["title"].partition(",")[0] for m in known], fontsize=8)
+    axis.invert_yaxis()
+    axis.set(xlim=(0, None), xlabel="after / before", title="a network trained before and after")

@@ -1,0 +1,1 @@
+"""Labels and networks under a revised model."""

@@ -1,0 +1,126 @@
+"""Real finite-element presses where a revised model moves the loads most: does the table say the same there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.chain import predict
+from tacdata.chain.table_response import TableResponse
+from tacdata.effects import Placed
+from tacdata.errors import SolveError
+from tacdata.revision.comparison import Comparison
+from tacdata.revision.labels.relabel import THICKNESS, changed_skin
+from tacdata.sensor import Sensor
+from tacdata.skin.mesh.build import MeshSettings
+from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.skin.press import PressRequest
+from tacdata.surrogate.grid import UNIT, Reach
+from tacdata.surrogate.press_store import PressStore
+from tacdata.surrogate.reading import reading_of
+from tacdata.transduction import Loads, Transducer
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """One press solved again."""
+
+    tool: str
+    place: tuple[float, float]
+    """x and y [mm]."""
+    depth: float
+    """Where the revised model has the tip [mm]."""
+    change: float
+    """Largest change of a load by the revision, over the largest load [1]."""
+    difference: float
+    """Root mean square difference of surrogate and finite elements over the channels, over the largest load [1]."""
+    most: float
+    """The largest of them [1]."""
+    solved: bool
+    """Whether an equilibrium was found; without one the figures are NaN."""
+
+
+def touches_fem(placed: Sequence[Placed]) -> bool:
+    """Return whether effects change what finite elements were asked: where the tip is, or how thick the skin is."""
+    return any(p.stage == "kinematics" or p.effect.name == THICKNESS for p in placed)
+
+
+def confirm(
+    held: Comparison, placed: Sequence[Placed], sensor: Sensor, reaches: dict[str, Reach], count: int,
+    mesh: MeshSettings, progress: Callable[[int, int, float], None] = lambda *_: None,
+) -> list[Confirmed]:  # fmt: skip
+    """Solve a few presses where the effects change the loads most, each at another place.
+
+    Args:
+        held: Recordings and a model that starts from a table.
+        placed: The effects that were added.
+        sensor: The sensor.
+        reaches: The tools by name.
+        count: How many presses.
+        mesh: The mesh that the table was made on.
+        progress: Told how many are done, of how many, and the seconds left.
+    """
+    response = held.setting.response
+    if not isinstance(response, TableResponse) or not touches_fem(placed) or count < 1:
+        return []
+    course = held.course
+    before = predict(course, response, held.setting.given).pose
+    after = predict(course, response, [*held.setting.given, *placed]).pose
+    mechanical = [p for p in placed if p.effect.name == THICKNESS]
+    loads, moved = response.load(before, course.tool), response.load(after, course.tool)
+    for effect in mechanical:
+        moved = moved * _factor(held, effect, after)[:, None]
+    top = max(float(np.abs(loads).max()), 1e-12)
+    change = np.abs(moved - loads).max(axis=1) / top
+    rows = _spread(change, course.row_site, course.tool, count)
+    skin = changed_skin(sensor, placed) or sensor
+    model = SkinModel(skin, ModelSettings(mesh=mesh, error_estimate=False))
+    asked = [_press(reaches[course.tools[int(course.tool[r])].name], after[r]) for r in rows]
+    answers = PressStore.of(model).solve(asked, 1, progress)
+    found = []
+    for r, press, answer in zip(rows, asked, answers, strict=True):
+        name = course.tools[int(course.tool[r])].name
+        at, depth = (float(after[r, 0]), float(after[r, 1])), float(press.depths[-1])
+        if isinstance(answer, SolveError) or len(answer.depths) < len(press.depths):
+            found.append(Confirmed(name, at, depth, float(change[r]), float("nan"), float("nan"), False))
+            continue
+        reading = reading_of(sensor, answer.loads)
+        true = reading.load(Loads(*(v[-1:] for v in vars(answer.loads).values())), Transducer.of(sensor))[0]
+        wrong = np.abs(moved[r] - true) / max(float(np.abs(true).max()), 1e-12)
+        rms = float(np.sqrt(np.mean(wrong**2)))
+        found.append(Confirmed(name, at, depth, float(change[r]), rms, float(wrong.max()), True))
+    return found
+
+
+def _factor(held: Comparison, effect: Placed, pose: np.ndarray) -> np.ndarray:
+    """Return by what a mechanical effect multiplies the loads of every row, shape (rows,)."""
+    from tacdata.chain.state import State
+
+    ones = np.ones((len(pose), 1))
+    state = State(held.course, held.setting.response, pose, ones, ones[:, 0], ones)
+    return effect.act(state).load[:, 0]
+
+
+def _spread(change: np.ndarray, site: np.ndarray, tool: np.ndarray, count: int) -> list[int]:
+    """Return the rows of largest change, each at another place."""
+    rows: list[int] = []
+    taken: set[tuple[int, int]] = set()
+    for r in np.argsort(-change).tolist():
+        key = (int(site[r]), int(tool[r]))
+        if key in taken or change[r] <= 0:
+            continue
+        taken.add(key)
+        rows.append(r)
+        if len(rows) == count:
+            break
+    return rows
+
+
+def _press(reach: Reach, pose: np.ndarray) -> PressRequest:
+    depth = max(float(pose[2]), UNIT)
+    states = max(int(np.ceil(np.sqrt(depth / UNIT))), 3)
+    depths = depth * (np.arange(states + 1) / states) ** 2
+    x, y = (round(float(v), 4) for v in pose[:2])
+    return PressRequest(reach.indenter, x, y, reach.yaw, tuple(round(float(d), 6) for d in depths), *reach.tilt)

@@ -1,0 +1,127 @@
+"""How far the tip was off where it was told to be, by a second observation or a known truth: before and after."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.discrepancy.data.tip_observation import NEAR, second_views
+from tacdata.effects import Placed
+from tacdata.errors import FormatError, UsageError
+from tacdata.recording import Episode, read_episode, read_session
+from tacdata.revision.labels.pose_path import moved_episodes
+
+COLUMNS = ("time_ns", "x", "y", "depth")
+"""Columns of a file with the tip's true path: the recording's time [ns], then mm in the sensor's frame."""
+FEWEST = 5
+"""Points of an episode in contact below which nothing is said of it."""
+BETTER = 0.9
+"""An episode got better, or worse, if its error changed by such a factor [1]."""
+
+
+@dataclass(frozen=True)
+class TipError:
+    """How far labels' tips are from where the tip truly was."""
+
+    against: str
+    """What it was held against: a file's name, or "tag"."""
+    episodes: int
+    """How many could be compared."""
+    before: float
+    """Root mean square distance in contact, the commanded path, without the session's constant part [mm]."""
+    after: float
+    """The same with the model's effects [mm]."""
+    most_before: float
+    """Largest distance [mm]."""
+    most_after: float
+    """The same with the effects [mm]."""
+    better: int
+    """Episodes whose tip came nearer."""
+    worse: int
+    """Episodes whose tip went farther away."""
+    constant_before: float
+    """The constant part: an error of the registration, mostly [mm]; 0 against a tag, which cannot tell of it."""
+    constant_after: float
+    """The same with the effects [mm]."""
+
+
+def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None) -> TipError | None:
+    """Return how far the tip is off before and after, or None where nobody saw it.
+
+    Each session's median is taken out of both, as the registration is off by a constant too, and told apart. A tag does
+    not see what bends behind it: only effects that it sees are held against it.
+
+    Args:
+        session: Folder of recordings.
+        placed: Effects of the model.
+        truth: File of the tip's true path, as `COLUMNS`; None for the recordings' own second observation.
+    """
+    old = [read_episode(path) for path in read_session(session).episodes]
+    if truth is not None:
+        seen, effects = _true_views(truth, old), [p for p in placed if p.stage == "kinematics"]
+    else:
+        seen = {k: (view.time_ns, view.tip) for k, view in second_views(old).items()}
+        effects = [p for p in placed if p.stage == "kinematics" and p.seen_by_tag]
+    if not effects:
+        return None
+    new = {e.number: e for e in moved_episodes(old, effects)}
+    apart = [_apart(old[k], new[old[k].number], *view) for k, view in sorted(seen.items())]
+    apart = [pair for pair in apart if len(pair[0]) >= FEWEST]
+    if not apart:
+        return None
+    whole = [np.nanmedian(np.concatenate([pair[i] for pair in apart]), axis=0) for i in (0, 1)]
+    apart = [(a - whole[0], b - whole[1]) for a, b in apart]
+    constant = [0.0 if truth is None else float(np.sqrt(np.nansum(np.square(w)))) for w in whole]
+    far = [[np.sqrt(np.nansum(np.square(way), axis=1)) for way in pair] for pair in apart]
+    each = np.array([[np.sqrt(np.mean(way**2)) for way in pair] for pair in far])
+    first, last = (np.concatenate([pair[i] for pair in far]) for i in (0, 1))
+    return TipError(
+        "tag" if truth is None else truth.name, len(far), float(np.sqrt(np.mean(first**2))),
+        float(np.sqrt(np.mean(last**2))), float(first.max()), float(last.max()),
+        int((each[:, 1] < BETTER * each[:, 0]).sum()), int((BETTER * each[:, 1] > each[:, 0]).sum()),
+        *constant,
+    )  # fmt: skip
+
+
+def _apart(before: Episode, after: Episode, time_ns: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what the tip is off before and after where it touches [mm], each of shape (n, 3)."""
+    told, revised = before.tip_at(time_ns), after.tip_at(time_ns)
+    good = (told[:, 2] > 0) & np.isfinite(seen[:, 2])
+    good &= (time_ns >= before.tip_ns[0] - NEAR) & (time_ns <= before.tip_ns[-1] + NEAR)
+    return seen[good] - told[good], seen[good] - revised[good]
+
+
+def _true_views(path: Path, episodes: Sequence[Episode]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    time, tip = _read(path)
+    found = {}
+    for k, episode in enumerate(episodes):
+        if len(episode.tip_ns):
+            rows = slice(*np.searchsorted(time, [episode.tip_ns[0], episode.tip_ns[-1] + 1]))
+            if len(time[rows]) >= FEWEST:
+                found[k] = time[rows], tip[rows]
+    if not found:
+        raise UsageError(
+            f"{path} tells of none of the recordings' times", "the recordings' own clock, in ns",
+            "check its column time_ns",
+        )  # fmt: skip
+    return found
+
+
+def _read(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    if not path.is_file():
+        raise UsageError(f"no file {path}", f"a CSV file of {', '.join(COLUMNS)}", "check --truth")
+    with path.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    try:
+        time = np.array([int(row["time_ns"]) for row in rows], dtype=np.int64)
+        tip = np.array([[float(row[name]) for name in COLUMNS[1:]] for row in rows])
+    except (KeyError, TypeError, ValueError) as error:
+        raise FormatError(f"{path}: {error}", f"numbers in columns {', '.join(COLUMNS)}", "correct it") from None
+    if not len(time):
+        raise FormatError(f"{path} is empty", f"rows of {', '.join(COLUMNS)}", "give another --truth")
+    order = np.argsort(time, kind="stable")
+    return time[order], tip[order]

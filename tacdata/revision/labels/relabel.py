@@ -1,0 +1,127 @@
+"""Labels made again under a revised model: only what its effects change, beside the old ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from label_farm.labelling import FarmSettings, Labelling, Summary
+from label_farm.store.store import Store
+from tacdata.effects import Placed
+from tacdata.labels import read_label
+from tacdata.recording import read_episode, read_session
+from tacdata.revision.labels.pose_path import LATE, moved_episodes
+from tacdata.sensor import Sensor
+
+THICKNESS = "thickness"
+"""The effect that changes the sensor's skin itself."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What a revised model does to labels."""
+
+    episodes: int
+    """Episodes with contact."""
+    paths: int
+    """Episodes whose tip goes elsewhere by more than `LEAST`."""
+    path_rms: float
+    """How far the tip moves, root mean square in contact [mm]."""
+    path_most: float
+    """The same, at most [mm]."""
+    labels: int = 0
+    """Labels compared, old with new."""
+    rms: float = float("nan")
+    """Root mean square change of depth over pixels dented in either [mm]; NaN where none was compared."""
+    most: float = float("nan")
+    """Largest change of a pixel [mm]."""
+    solved: int = 0
+    """Paths that had to be solved anew."""
+    found: int = 0
+    """Paths that were there already."""
+    failed: dict[int, str] = field(default_factory=dict)
+    """Episode -> why it has no new label."""
+
+
+LEAST = 0.001
+"""A tip that moves less leaves a label as it is [mm]."""
+
+
+def moves_labels(placed: Sequence[Placed]) -> bool:
+    """Return whether effects change labels: the tip's path, when it was read, or the skin's thickness."""
+    return any(p.stage == "kinematics" or p.effect.name in (THICKNESS, LATE) for p in placed)
+
+
+def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:
+    """Return how far a model's effects move the tip in a session, without making any label."""
+    old = [read_episode(path) for path in read_session(session).episodes]
+    new = {e.number: e for e in moved_episodes(old, placed)}
+    squares, most, paths, touching = [], 0.0, 0, 0
+    for before in old:
+        inside = before.tip[:, 2] > 0
+        if not inside.any():
+            continue
+        touching += 1
+        after = new[before.number]
+        nominal = before.tip_at(after.tip_ns)
+        way = np.linalg.norm(after.tip - nominal, axis=1)[(nominal[:, 2] > 0) | (after.tip[:, 2] > 0)]
+        squares.append(np.mean(way**2))
+        most = max(most, float(way.max()))
+        paths += bool(way.max() > LEAST)
+    return Moved(touching, paths, float(np.sqrt(np.mean(squares))) if squares else 0.0, most)
+
+
+def relabelled(
+    session: Path, placed: Sequence[Placed], folder: Path, settings: FarmSettings,
+    store: Path | None = None, progress: Callable[[str, int, int], None] = lambda *_: None,
+) -> Moved:  # fmt: skip
+    """Make a session's labels under a revised model, in a folder of their own, and compare them with the old ones.
+
+    A path whose place, depths and model are the same is found in the store and not solved again.
+
+    Args:
+        session: The session's folder.
+        placed: The model's effects.
+        folder: Where the new labels go; the session's own stay as they are.
+        settings: How to label; the same as for the old labels, or all of them are new.
+        store: Where solved paths lie; the session's own if not given.
+        progress: Told how far it is.
+    """
+    recorded = read_session(session)
+    moved = {e.number: e for e in moved_episodes([read_episode(p) for p in recorded.episodes], placed)}
+    skin = changed_skin(recorded.sensor, placed)
+    labelling = Labelling(folder, Store(store or session / "labels" / "store"), settings, progress)
+    readers = {number: (lambda e=episode: e) for number, episode in moved.items()}
+    summary = labelling.run(readers, skin)
+    return _compared(paths_moved(session, placed), session / "labels", folder, summary)
+
+
+def changed_skin(sensor: Sensor, placed: Sequence[Placed]) -> Sensor | None:
+    """Return the sensor with the thickness that effects give it; None if they leave it alone."""
+    factor = float(np.prod([1 + float(p.values["e"]) for p in placed if p.effect.name == THICKNESS]))
+    if factor == 1.0:
+        return None
+    return replace(sensor, skin=replace(sensor.skin, thickness=sensor.skin.thickness * factor))
+
+
+def _compared(moved: Moved, before: Path, after: Path, summary: Summary) -> Moved:
+    squares, count, most, labels = 0.0, 0, 0.0, 0
+    for path in sorted(after.glob("episode-*.parquet")):
+        if not (before / path.name).is_file():
+            continue
+        old, new = read_label(before / path.name), read_label(path)
+        if old.depth.shape != new.depth.shape:
+            continue
+        labels += 1
+        dented = old.dented | new.dented
+        change = (new.depth - old.depth)[dented]
+        squares, count = squares + float(np.square(change, dtype=float).sum()), count + int(dented.sum())
+        most = max(most, float(np.abs(change).max(initial=0.0)))
+    return replace(
+        moved, labels=labels, rms=float(np.sqrt(squares / count)) if count else (0.0 if labels else float("nan")),
+        most=most if labels else float("nan"), solved=len(summary.seconds), found=summary.found,
+        failed=dict(summary.failed),
+    )  # fmt: skip

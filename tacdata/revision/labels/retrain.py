@@ -1,0 +1,211 @@
+"""What a revised model does to a network: trained on data as they were, and on data as the model has them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tacdata.dataset.pack import LabelFiles, pack
+from tacdata.effects import Placed
+from tacdata.errors import UsageError
+from tacdata.labels import Label
+from tacdata.recording import Episode, read_episode, read_session
+from tacdata.revision.comparison import Comparison
+from tacdata.revision.labels.pose_path import moved_episodes
+
+if TYPE_CHECKING:
+    from training.frames.frames import Frames
+
+FEWEST = 5
+"""Episodes with labels that a network needs: some to learn from, one to stop by, one to be scored on."""
+LABELS, READINGS = "labels", "readings"
+"""What the revision changes of what networks learn from."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How both networks are trained."""
+
+    epochs: int = 10
+    network: str = "paper"
+    seed: int = 0
+    threads: int | None = None
+
+
+@dataclass(frozen=True)
+class Retrained:
+    """Two networks that differ in the model alone."""
+
+    by: str
+    """`LABELS`: both learn from the readings measured, with labels of either model. `READINGS`: both learn from
+    readings that either model says, with the same labels, and are scored on those measured."""
+    episodes: int
+    """Scored ones, which neither network saw."""
+    frames: int
+    """Scored frames in contact."""
+    epochs: int
+    metrics: tuple[dict[str, Any], ...]
+    """name, title, unit, before, after; None where undefined."""
+
+
+def retrained(
+    sessions: Sequence[Path], labels: dict[Path, Path], held: Comparison, placed: Sequence[Placed], folder: Path,
+    recipe: Recipe, note: Callable[[str], None] = lambda text: None,
+) -> Retrained:  # fmt: skip
+    """Pack, train and score twice.
+
+    Args:
+        sessions: Folders of recordings, in the order that the verdict had them.
+        labels: Session -> folder of its labels under the revised model; without entries labels stay as they are.
+        held: Recordings and the model before.
+        placed: The effects that were added.
+        folder: Where both datasets and networks go.
+        recipe: How to train.
+        note: Is told what is being done.
+
+    Raises:
+        UsageError: If too few episodes have labels.
+    """
+    by = LABELS if labels else READINGS
+    pairs = _pairs(sessions, labels, placed)
+    if len(pairs) < FEWEST:
+        raise UsageError(
+            f"{len(pairs)} episodes with a label", f"{FEWEST} or more, to train on and to score",
+            "run `tacdata label SESSION` first",
+        )  # fmt: skip
+    note("datasets of both models")
+    simulated = _Simulated(held) if by == READINGS else None
+    sides = {}
+    for side in ("before", "after"):
+        episodes = [pair.episode(side) for pair in pairs]
+        if simulated is not None:
+            effects = placed if side == "after" else []
+            episodes = [replace(e, taxels=replace(e.taxels, counts=simulated(e, effects))) for e in episodes]
+        sides[side] = _frames(folder / side, episodes, [pair.label(side) for pair in pairs])
+    judge = sides["after"]
+    if simulated is not None:
+        judge = _frames(folder / "measured", [p.episode("before") for p in pairs], [p.label("before") for p in pairs])
+    scored = {}
+    for side, frames in sides.items():
+        scored[side] = _scored(frames, judge, folder / f"network-{side}", recipe, lambda t, s=side: note(f"{s}: {t}"))
+    return _told(by, recipe, scored["before"], scored["after"])
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """One recording as either model has it."""
+
+    before: Episode
+    after: Episode
+    labels: tuple[Label, Label]
+
+    def episode(self, side: str) -> Episode:
+        return self.before if side == "before" else self.after
+
+    def label(self, side: str) -> Label:
+        return self.labels[side == "after"]
+
+
+def _pairs(sessions: Sequence[Path], labels: dict[Path, Path], placed: Sequence[Placed]) -> list[_Pair]:
+    found = []
+    for session in sessions:
+        if not (session / "labels").is_dir():
+            raise UsageError(f"{session} has no labels", "a labelled session", f"run `tacdata label {session}` first")
+        episodes = [read_episode(path) for path in read_session(session).episodes]
+        old = LabelFiles(session / "labels")
+        new, moved = old, {e.path: e for e in episodes}
+        if session in labels:
+            new, moved = LabelFiles(labels[session]), {e.path: e for e in moved_episodes(episodes, placed)}
+        for episode in episodes:
+            pair = old(episode), new(episode)
+            if pair[0] is not None and pair[1] is not None:
+                found.append(_Pair(episode, moved[episode.path], (pair[0], pair[1])))
+    return found
+
+
+class _Simulated:
+    """What a model says of a recording's readings, with the noise that the recordings have."""
+
+    def __init__(self, held: Comparison) -> None:
+        self._held = held
+        self._said: dict[int, np.ndarray] = {}
+        self._names = list(held.course.names)
+
+    def __call__(self, episode: Episode, placed: Sequence[Placed]) -> np.ndarray:
+        course, key = self._held.course, id(placed)
+        if key not in self._said:
+            model = self._held.after(placed) if placed else self._held.before
+            self._said[key] = self._held.said(model.response, list(model.placed))
+        counts = episode.taxels.counts.astype(float).copy()
+        seconds = (episode.taxels.sample_ns - episode.taxels.sample_ns[0]) * 1e-9
+        rng = np.random.default_rng(int.from_bytes(hashlib.sha256(episode.path.name.encode()).digest()[:8]))
+        k = self._names.index(episode.path.stem)
+        rows = np.flatnonzero(course.episode == k)
+        read = rows[course.averaged[rows] > 0]
+        when = course.time[rows] - course.time[read[0]]
+        level = np.nanmedian(course.readings[read] - self._said[key][read], axis=0)
+        noise = self._held.frame.noise.scale
+        for c, number in enumerate(course.numbers or range(course.channels)):
+            said = np.interp(seconds, when, self._said[key][rows, c]) + level[c]
+            counts[:, number] = said + noise[c] * rng.normal(size=len(seconds))
+        return counts
+
+
+def _frames(folder: Path, episodes: list[Episode], labels: list[Label]) -> Frames:
+    from training.frames.data import read_frames
+
+    by_path = {e.path: label for e, label in zip(episodes, labels, strict=True)}
+    pack(episodes, lambda episode: by_path[episode.path], folder)
+    return read_frames(folder)
+
+
+def _scored(frames: Frames, judge: Frames, folder: Path, recipe: Recipe, note: Callable[[str], None]) -> dict[str, Any]:
+    """Return the scores of a network on the episodes of another dataset that are its test episodes in its own."""
+    from training.scoring.evaluate import evaluate
+    from training.settings import Settings
+    from training.train import train
+
+    settings = Settings(network=recipe.network, epochs=recipe.epochs, seed=recipe.seed)
+
+    def told(progress: Any) -> None:
+        if progress.finished is not None:
+            note(f"epoch {progress.epoch} of {progress.epochs}")
+
+    trained = train(frames, settings, folder, "auto", False, recipe.threads, told)
+    return evaluate(trained, _part(judge, trained.split.test), "auto", recipe.threads).document
+
+
+def _part(frames: Frames, numbers: tuple[int, ...]) -> Frames:
+    """Return a dataset of some episodes alone; it is another one than those that networks were trained on."""
+    spans, rows, at = [], [], 0
+    for span in frames.spans(numbers):
+        own = np.arange(span.start, span.stop)
+        rows.append(own)
+        spans.append(replace(span, start=at, stop=at + len(own)))
+        at += len(own)
+    index = np.concatenate(rows)
+    names = ("taxels", "depth", "tip", "phase", "time_ns", "valid")
+    digest = hashlib.sha256(f"{frames.dataset_hash} {sorted(numbers)}".encode()).hexdigest()
+    values = {name: np.asarray(getattr(frames, name))[index] for name in names}
+    return replace(frames, **values, episodes=tuple(spans), dataset_hash=digest)
+
+
+def _told(by: str, recipe: Recipe, before: dict[str, Any], after: dict[str, Any]) -> Retrained:
+    from training.scoring.evaluate import METRICS
+
+    rows = [
+        {"name": name, "title": f"{METRICS[name][1]}, frames in contact", "unit": METRICS[name][2],
+         "before": before["contact_frames"][name]["mean"], "after": after["contact_frames"][name]["mean"]}
+        for name in METRICS
+    ]  # fmt: skip
+    for name, title in (("centre_depth", "Depth at the contact's centre"), ("position", "Place of the contact")):
+        pair = [d["prescribed"]["prediction"][name]["mean"] for d in (before, after)]
+        rows.append({"name": name, "title": f"{title}, off the pose, at full depth", "unit": "mm",
+                     "before": pair[0], "after": pair[1]})  # fmt: skip
+    frames = after["frames"]["in_contact"]
+    return Retrained(by, len(after["split"]["episodes"]), frames, recipe.epochs, tuple(rows))

@@ -1,0 +1,139 @@
+"""The presses that would best tell rivals apart, as a plan that `tacdata record` runs.
+
+Box and Hill (Technometrics 9 (1967) 57) choose the experiment whose outcome is expected to move the rivals'
+probabilities most. For Gaussian readings of one covariance S under every rival it is the largest sum over pairs of
+pi_i pi_j d_ij' S^-1 d_ij, d_ij the difference of what they say. What calibration leaves open is no evidence: every
+channel's offset and one error of the press's depth are projected out of d_ij first. Presses are taken one after
+another; a pair that is told apart already counts by the logarithm of what it has, so that every pair gets its press.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata.chain import predict
+from tacdata.plans import Plan
+from tacdata.revision.comparison import Comparison
+from tacdata.revision.next_presses.rivals import Rival
+from tacdata.revision.next_presses.trial import Trial, elsewhere, foretold, laid_out, trials
+
+PRESSES, REPEATS = 4, 3
+"""Different presses, and how often each is done: an episode is the unit of all statistics."""
+JITTER = 0.01
+"""Error of a press's depth that is expected [mm]."""
+STEP = 0.01
+"""Step of the derivative with respect to depth [mm]."""
+NOISY = 1.0
+"""Whitened distance of two rivals [nats] below which a press tells nothing."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One press and what it is for."""
+
+    trial: Trial
+    nats: dict[tuple[str, str], float]
+    """Half the whitened squared distance of each pair of rivals [nats], for one press."""
+
+
+def choose(held: Comparison, found: list[Rival], plan: Plan, presses: int = PRESSES) -> list[Choice]:
+    """Return the presses that tell most, the best first; fewer where nothing tells the rivals apart.
+
+    Args:
+        held: Recordings and model.
+        found: The rivals, fitted.
+        plan: The plan of one of the sessions.
+        presses: How many different presses.
+    """
+    scored = [Choice(t, _distances(held, found, t)) for t in trials(held.course, plan)]
+    weight = _probabilities(found)
+    pairs = [(a, b) for i, a in enumerate(found) for b in found[i + 1 :]]
+    have = {(a.mechanism, b.mechanism): 0.0 for a, b in pairs}
+    chosen: list[Choice] = []
+    while scored and len(chosen) < presses:
+
+        def worth(choice: Choice) -> float:
+            gain = [weight[i] * weight[j] * np.log1p(choice.nats[i, j] / (1.0 + have[i, j])) for i, j in have]
+            return float(np.sum(gain)) / choice.trial.seconds**0.5
+
+        best = max(scored, key=worth)
+        if max(best.nats.values(), default=0.0) < NOISY:
+            break
+        chosen.append(best)
+        scored.remove(best)
+        for pair, nats in best.nats.items():
+            have[pair] += nats
+    return chosen
+
+
+def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repeats: int = REPEATS) -> dict[str, Any]:
+    """Return the plan's document (`schemas/plan.schema.json`): every press done several times, presses in turn.
+
+    Args:
+        chosen: The presses.
+        held: Recordings and model.
+        plan: The plan of one of the sessions: indenters and motion are taken over.
+        name: Of the new plan.
+        repeats: How often each press is done.
+    """
+    document = plan.document or {}
+    used = {held.course.tools[c.trial.tool].name for c in chosen}
+    entries = []
+    for turn in range(repeats):
+        for c in chosen:
+            tool = held.course.tools[c.trial.tool].name
+            angles = next((p.angles for p in plan.presses if p.indenter_name == tool), {"yaw": 0.0})
+            best = max(c.nats, key=lambda pair: c.nats[pair])
+            purpose = f"tells {best[0]} from {best[1]}"
+            entries.append({**c.trial.entry(tool, angles["yaw"]), **angles, "repeat": turn, "purpose": purpose})
+    tools = list(dict.fromkeys(e["indenter"] for e in entries))
+    entries.sort(key=lambda e: tools.index(e["indenter"]))
+    mechanisms = list(dict.fromkeys(m for c in chosen for pair in c.nats for m in pair))
+    return {
+        "version": schemas.version("plan"), "name": name, "purpose": f"to tell apart: {', '.join(mechanisms)}",
+        "indenters": {k: v for k, v in document["indenters"].items() if k in used}, "motion": document["motion"],
+        "presses": entries,
+    }  # fmt: skip
+
+
+def _probabilities(found: list[Rival]) -> dict[str, float]:
+    """Return each rival's share, flat enough that none is out: they are rivals because none is."""
+    energy = np.array([r.model.energy.sum() for r in found])
+    weight = np.exp(-np.minimum(energy - energy.min(), 3.0))
+    return {r.mechanism: float(w) for r, w in zip(found, weight / weight.sum(), strict=True)}
+
+
+def _distances(held: Comparison, found: list[Rival], trial: Trial) -> dict[tuple[str, str], float]:
+    course, noise = held.course, held.frame.noise
+    given, said = list(held.setting.given), []
+    for rival in found:
+        _, signal = foretold(course, rival.model.response, [*given, *rival.placed], trial)
+        said.append(signal / noise.scale[: course.channels])
+    own = laid_out(course, trial)
+    slope = _slope(held, found[0], trial) / noise.scale[: course.channels]
+    # Correlated noise carries less: an AR(1) of correlation m tells (1 - m) / (1 + m) as much of slow differences.
+    worth = (1 - noise.memory) / (1 + noise.memory)
+    nats = {}
+    for i, a in enumerate(found):
+        for j in range(i + 1, len(found)):
+            apart = said[i] - said[j]
+            apart = apart - apart.mean(axis=0)
+            share = (apart * slope).sum() / ((slope**2).sum() + JITTER**-2)
+            left = apart - share * slope
+            nats[a.mechanism, found[j].mechanism] = float(
+                0.5 * worth * np.square(left).sum() * len(own.time) / own.rows
+            )
+    return nats
+
+
+def _slope(held: Comparison, rival: Rival, trial: Trial) -> np.ndarray:
+    """Return how readings change with the press's depth [counts/mm], each channel's mean taken out."""
+    own = laid_out(held.course, trial)
+    response = elsewhere(rival.model.response, held.course, own, trial)
+    deeper = replace(own, tip=np.where(own.tip[:, 2:] > 0, own.tip + np.array([0.0, 0.0, STEP]), own.tip))
+    slope = (predict(deeper, response, []).signal - predict(own, response, []).signal) / STEP
+    return slope - slope.mean(axis=0)

@@ -1,0 +1,1 @@
+"""Contact of the skin with the indenter and the board: friction, adhesion, first touch."""

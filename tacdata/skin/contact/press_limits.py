@@ -1,0 +1,55 @@
+"""Which presses a skin can take."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.errors import SolveError
+from tacdata.sensor import Sensor
+from tacdata.skin.contact.first_touch import reach, room
+from tacdata.skin.press import PressRequest
+
+_STEEPEST = 30.0
+"""Largest tilt [deg]; beyond, the depth of the lowest point says little of a press."""
+
+
+def check_press(request: PressRequest, sensor: Sensor) -> None:
+    """Refuse a press that misses the skin or goes through it.
+
+    Raises:
+        SolveError: Saying which.
+    """
+    skin = sensor.skin
+    if not request.depths or not np.all(np.isfinite(request.depths)):
+        raise SolveError(f"depths {request.depths} mm", "one or more depths of 0 mm or more", "correct the press")
+    if min(request.depths) < 0 and sensor.contact.adhesion is None:
+        raise SolveError(
+            f"a depth of {min(request.depths):g} mm, above a skin that does not stick", "0 mm or more",
+            "correct the press, or state contact/adhesion in the sensor file",
+        )
+    angles = f"yaw {request.yaw} deg, tilts {request.tilt_x} and {request.tilt_y} deg"
+    if not np.all(np.isfinite([request.x, request.y, request.yaw, request.tilt_x, request.tilt_y])):
+        raise SolveError(f"press at ({request.x}, {request.y}) mm, {angles}", "finite numbers", "correct the press")
+    if max(abs(request.tilt_x), abs(request.tilt_y)) > _STEEPEST:
+        raise SolveError(f"a press with {angles}", f"tilts of at most {_STEEPEST:g} deg", "reduce the tilt")
+    if abs(request.x) > skin.size_x / 2 or abs(request.y) > skin.size_y / 2:
+        raise SolveError(
+            f"press at ({request.x:g}, {request.y:g}) mm, the skin spans {skin.size_x:g} x {skin.size_y:g} mm",
+            "a place on the skin", "move the press",
+        )
+    thick = room(sensor, request)
+    if max(request.depths) >= thick:
+        raise SolveError(
+            f"depth {max(request.depths):g} mm in a skin {thick:.3g} mm thick at ({request.x:g}, {request.y:g}) mm",
+            f"less than {thick:.3g} mm", "reduce the depth",
+        )
+    half_x, half_y = reach(sensor, request)
+    over = [abs(place) + half - size / 2 for place, half, size in
+            zip((request.x, request.y), (half_x, half_y), (skin.size_x, skin.size_y), strict=True)]
+    if "sides" in sensor.contact.bonded and max(over) > 0 and max(request.depths) > 0:
+        raise SolveError(
+            f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm, {max(request.depths):g} mm deep, reaches "
+            f"{max(over):.2f} mm over the rim, which is bonded to the frame",
+            f"a footprint of {half_x:.2f} x {half_y:.2f} mm around the press inside the rim",
+            "move the press inward, press less deep, or describe another bonding in the sensor file",
+        )

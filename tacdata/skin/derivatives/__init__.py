@@ -1,0 +1,1 @@
+"""Derivatives of a solved press by its parameters, and the standard deviations that follow."""

@@ -1,0 +1,167 @@
+"""Standard deviations of a whole path, at a part of its cost: a coarser mesh, and the loading branch alone.
+
+What the spreads make of a press depends little on the mesh: for a sphere of 3 mm radius, 1 mm deep in the default skin,
+the standard deviations on the companion mesh differ from those on the mesh itself by 9 to 13 % of their root mean
+square over the map, 1 to 3 % in the force; those of unloading from those of loading at the same depth by 1 %
+(`pytest -m slow -s -k matter_little` measures it again).
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tacdata.errors import SolveError, UsageError
+from tacdata.labels import PathSolution
+from tacdata.sensor import Sensor
+from tacdata.skin.derivatives.parameters import UNITS, known
+from tacdata.skin.derivatives.press import sensitivities
+from tacdata.skin.derivatives.uncertainty import Uncertainty, propagate, sampled_spread
+from tacdata.skin.press import PressRequest
+from tacdata.skin.validity.coarse_press import loading
+
+if TYPE_CHECKING:
+    from tacdata.indenters import Indenter
+    from tacdata.skin.model import SkinModel
+
+_INDENTER = "indenter/"
+
+_STEEPER = 2.0
+"""How many times steeper than the map itself, or than 45 degrees by half, a derivative by place may be [1]; those by
+height and thickness are 1 under the tip and less elsewhere."""
+
+_BESIDE = 0.02
+"""How far beside a pixel's centre its slope is taken [mm]: a punch's edge is steep within a part of a pixel."""
+
+_TOLERANCE = 1e-2
+"""Error of the derivatives' linear solves [1]: standard deviations of maps are those of 1e-5 within 0.5 % of their root
+mean square, of forces within 0.2 % (0.8 % by the bonding alone), of protrusions' loads within 7 % of the largest (a
+sphere, an ellipsoid), at a quarter of the time; the mesh makes more of a difference."""
+
+_SAMPLES = 12
+"""Presses drawn where derivatives are of no use; they tell a standard deviation to 20 %."""
+
+_NAMES = {
+    "surface": "uncertainty",
+    "force": "force_uncertainty",
+    "taxel_force": "taxel_force_uncertainty",
+    "taxel_closure": "taxel_closure_uncertainty",
+}
+"""Fields of `Uncertainty` -> those of `PathSolution`."""
+
+
+def spreads_of(sensor: Sensor, indenter: Indenter) -> dict[str, float]:
+    """Return the spreads of a sensor file that a press has.
+
+    None of 0, none of sizes that its indenter lacks, and none of a friction of 0, by which there is no derivative.
+    """
+    has = set(known(sensor, indenter)) - (set() if sensor.contact.friction else {"friction"})
+    return {
+        name: value for name, value in sensor.uncertainty.items()
+        if value > 0 and name in has
+    }
+
+
+def check_spreads(sensor: Sensor, indenter: Indenter) -> None:
+    """Refuse spreads of what no press on this skin has; sizes of indenters are passed over.
+
+    Raises:
+        UsageError: Naming them.
+    """
+    has = known(sensor, indenter)
+    unknown = [name for name in sensor.uncertainty if name not in has and not name.startswith(_INDENTER)]
+    if unknown:
+        raise UsageError(
+            f"sensor {sensor.name}: uncertainty of {', '.join(unknown)}",
+            ", ".join(name for name in has if not name.startswith(_INDENTER)) + ", indenter/NAME",
+            "correct the names under uncertainty in the sensor file",
+        )
+
+
+def with_uncertainty(model: SkinModel, request: PressRequest, solution: PathSolution) -> PathSolution:
+    """Return a solution with the standard deviations that the sensor file's spreads give it.
+
+    To first order on the companion; where derivatives are not found there or of no use (under a sharp cone), on the
+    mesh itself; where neither helps (at a punch's edge, perhaps), sampled on the companion. Unchanged, but for a remark
+    in its provenance, if the file states none or no way succeeds.
+
+    Args:
+        model: That solved it; its companion is taken where there is one.
+        request: The press.
+        solution: Its states, at the depths of ``request``.
+    """
+    spreads = spreads_of(model.sensor, request.indenter)
+    if not spreads or not loading(request).depths:
+        return _noted(solution, {"spreads": spreads, "remark": "no spreads stated" if not spreads else "no contact"})
+    remarks = []
+    cheapest = model.companion or model
+    for way, on in ((_first_order, cheapest), (_first_order, model), (_sampled, cheapest)):
+        try:
+            found = way(on, loading(request), spreads)
+        except SolveError as error:
+            remarks.append(f"{way.__name__[1:]} on {len(on.mesh.nodes)} nodes: {error.given}")
+            continue
+        how = {"mesh": on.mesh.content_hash, "method": way.__name__[1:], "remark": "; ".join(remarks)}
+        return _noted(replace(solution, **_along(solution.depth, found)), {"spreads": spreads, **how})
+    return _noted(solution, {"spreads": spreads, "remark": "not found: " + "; ".join(remarks)})
+
+
+def _first_order(model: SkinModel, request: PressRequest, spreads: dict[str, float]) -> list[tuple[float, Uncertainty]]:
+    """Return depths and standard deviations by derivatives.
+
+    Raises:
+        SolveError: If they are not found, or are steeper than the shape that they belong to: where a sharp tip is about
+            to slip on a coarse mesh, they hold for next to no change.
+    """
+    found = []
+    for depth, state, sensitivity in sensitivities(model, request, list(spreads), _TOLERANCE):
+        steep = _STEEPER * max(_slope(model, state.displacement), 0.5)
+        limits = {"x": steep, "y": steep, "z": _STEEPER, "thickness": _STEEPER}
+        for name, limit in limits.items():
+            if name not in spreads or depth <= 0:
+                continue
+            steepest = float(np.abs(sensitivity.surface[sensitivity.parameters.index(name)]).max())
+            if steepest > limit:
+                raise SolveError(
+                    f"at {depth:g} mm the map changes by {steepest:.1f} mm a mm of {name}", f"at most {limit:.1f}",
+                    "sample whole presses",
+                )
+        found.append((depth, propagate(sensitivity, spreads)))
+    return found
+
+
+def _slope(model: SkinModel, displacement: np.ndarray) -> float:
+    """Return the largest slope of the deformed face along x or y at a pixel [1], there and not from pixel to pixel."""
+    grid = model.sensor.map
+
+    def height(x: float, y: float) -> np.ndarray:
+        return model._face.depth_map(grid.x + x, grid.y + y, displacement)
+
+    along = [height(_BESIDE, 0.0) - height(-_BESIDE, 0.0), height(0.0, _BESIDE) - height(0.0, -_BESIDE)]
+    return float(np.abs(along).max()) / (2 * _BESIDE)
+
+
+def _sampled(model: SkinModel, request: PressRequest, spreads: dict[str, float]) -> list[tuple[float, Uncertainty]]:
+    """Return depths and standard deviations among whole presses."""
+    return sampled_spread(model, request, spreads, _SAMPLES, capacity=4)
+
+
+def _along(depth: np.ndarray, found: list[tuple[float, Uncertainty]]) -> dict[str, np.ndarray]:
+    """Return the standard deviations at all states [mm or N], between those of loading linearly in depth, 0 at 0."""
+    known_at = np.array([0.0, *(at for at, _ in found)])
+    after = np.clip(np.searchsorted(known_at, depth - 1e-9), 1, len(known_at) - 1)
+    share = np.clip((depth - known_at[after - 1]) / (known_at[after] - known_at[after - 1]), 0.0, 1.0)
+    result = {}
+    for field in fields(Uncertainty):
+        values = np.array([getattr(part, field.name) for _, part in found])
+        values = np.concatenate([np.zeros_like(values[:1]), values])
+        weight = share.reshape(-1, *[1] * (values.ndim - 1))
+        result[_NAMES[field.name]] = (1 - weight) * values[after - 1] + weight * values[after]
+    return result
+
+
+def _noted(solution: PathSolution, what: dict[str, Any]) -> PathSolution:
+    units = {name: UNITS.get(name, "1") for name in what["spreads"]}
+    return replace(solution, provenance={**solution.provenance, "uncertainty": {**what, "units": units}})

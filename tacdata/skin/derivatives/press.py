@@ -1,0 +1,170 @@
+"""Derivatives of a press's map, forces and taxels by pose, sizes and material."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+
+from tacdata.errors import SolveError
+from tacdata.skin.contact.contact import board_distance
+from tacdata.skin.derivatives.bonding import Bonding
+from tacdata.skin.derivatives.contact import ConditionsChange
+from tacdata.skin.derivatives.equilibria import TOLERANCE, Slack, Tangents
+from tacdata.skin.derivatives.parameters import check, directions, known
+from tacdata.skin.derivatives.trail import Trail
+from tacdata.skin.member.pose import Pose
+from tacdata.skin.press import PressRequest
+from tacdata.skin.solve.batch import Members
+from tacdata.skin.solve.state import State
+from tacdata.skin.surface.depth_map import DepthRaster
+
+if TYPE_CHECKING:
+    from tacdata.skin.model import SkinModel
+
+_MAP_STEP = 1e-6
+"""Largest displacement of the central difference of the map [mm]: the height has kinks at the edges of triangles, so
+that it must be small; it is exact to 1e-12 mm."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of one state by p parameters; units are those of the quantity over the parameter's."""
+
+    parameters: tuple[str, ...]
+    """Names of the parameters, as `tacdata.skin.derivatives.parameters.known` gives them."""
+    units: tuple[str, ...]
+    """Their units."""
+    surface: np.ndarray
+    """Of undeformed minus deformed height at the pixels [mm/unit], shape (p, pixels_x, pixels_y)."""
+    force: np.ndarray
+    """Of the force of the skin on the indenter [N/unit], shape (p, 3)."""
+    taxel_force: np.ndarray
+    """Of the normal force on each protrusion [N/unit], shape (p, taxels)."""
+    taxel_closure: np.ndarray
+    """Of the downward displacement of each protrusion's rim [mm/unit], shape (p, taxels)."""
+    taxel_area: np.ndarray
+    """Of each protrusion's contact area [mm^2/unit], shape (p, taxels), by Hertz's A ~ (F (1 - nu^2) / E)^(2/3), so to
+    some tens of per cent: the area itself is counted in quadrature points and has no derivative."""
+    error: float
+    """Largest error of the linear solves up to here, over what they found [1]."""
+
+
+def sensitivities(
+    model: SkinModel, request: PressRequest, parameters: Sequence[str], tolerance: float = TOLERANCE
+) -> Iterator[tuple[float, State, Sensitivity]]:
+    """Yield the requested states of a press with their derivatives, in the order of its depths.
+
+    Derivatives are those of the whole load path, friction's history included, at the load steps that are taken; where a
+    part of the skin just touches or just slips, they are one-sided.
+
+    Args:
+        model: The skin.
+        request: The press.
+        parameters: Names of parameters (`tacdata.skin.derivatives.parameters.known`).
+        tolerance: Error of the linear solves, over what they find [1].
+
+    Raises:
+        UsageError: If a parameter is not one of this press.
+        SolveError: If a state or its derivatives are not found.
+    """
+    names = list(parameters)
+    check(model.sensor, request.indenter, names)
+    if model.sensor.contact.adhesion:
+        raise SolveError(
+            "derivatives of a press into a skin that sticks", "a sensor file without contact/adhesion",
+            "sample whole presses (tacdata.skin.derivatives.uncertainty.sampled_spread)",
+        )
+    press = model._press(0, request)
+    batch, contacts = model._batch(request, 1)
+    trail, reader = Trail(contacts), _Reader(model, request, names)
+    touch = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
+    along = directions(model.sensor, request.indenter, names, press.conditions, touch)
+    at_touch = _without_depth(names, along)
+    label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
+    distances = [request.indenter.distance_function(), board_distance][: len(contacts)]
+    free = torch.as_tensor(~model._fixed, device=model.device).to(torch.float64)[:, None, None]
+    newton = model._batch(request, len(names))[0]._newton  # pyright: ignore
+    tangents = Tangents(newton, distances, free, label, tolerance, _slack(model, names))
+
+    def collect(members: Members) -> list[State]:
+        return model._gauge.states(members, contacts, True)
+
+    for _, depth, state in batch.run(iter([press]), collect):
+        if isinstance(state, SolveError):
+            raise state
+        for milestone in trail.take():
+            tangents.advance(milestone, along if tangents.changes else at_touch)
+        yield depth, state, reader.read(state, tangents, along)
+
+
+def _slack(model: SkinModel, names: list[str]) -> Slack | None:
+    """Return how held nodes move with each parameter: with the bonding alone."""
+    if "bonding" not in names:
+        return None
+    bonding = Bonding(model.mesh, model._fixed)
+    own = torch.tensor([name == "bonding" for name in names], dtype=torch.float64, device=model.device)
+    return lambda reaction: bonding.slack(reaction) * own
+
+
+def _without_depth(names: list[str], along: ConditionsChange) -> ConditionsChange:
+    """Return the change of a path's start: a press whose depth is off by z still starts where it touches."""
+    place = along.pose.place.clone()
+    place[2, [name == "z" for name in names]] = 0.0
+    return replace(along, pose=Pose(place, along.pose.turn))
+
+
+class _Reader:
+    """From derivatives of displacements and tractions to those of what is measured."""
+
+    def __init__(self, model: SkinModel, request: PressRequest, names: list[str]) -> None:
+        self._model, self._names = model, names
+        units = known(model.sensor, request.indenter)
+        self._units = tuple(units[name] for name in names)
+        grid = model.sensor.map
+        self._raster = DepthRaster(model.mesh, grid.x, grid.y, grid.sampling, model.device)
+        pixels = np.stack(np.meshgrid(grid.x, grid.y, indexing="ij"), axis=-1).reshape(-1, 2)
+        self._height = model._face.height(pixels).reshape(grid.shape)
+        self._nodes = torch.as_tensor(model.mesh.nodes, device=model.device)
+
+    def read(self, state: State, tangents: Tangents, along: ConditionsChange) -> Sensitivity:
+        """Return the derivatives of one state."""
+        taxel_force = self._taxel_force(tangents)
+        return Sensitivity(
+            tuple(self._names), self._units, self._map(state, tangents.du, along.conditions.thickness),
+            -tangents.changes[0].force.sum(dim=0).T.cpu().numpy(), taxel_force,
+            self._model._gauge.closure(tangents.du).T.cpu().numpy(), self._area(state, taxel_force), tangents.error,
+        )
+
+    def _map(self, state: State, du: torch.Tensor, thickness: torch.Tensor) -> np.ndarray:
+        """Return the derivative of the map: the skin moves under the pixels, and a thicker slab lies higher."""
+        rise = self._nodes[:, 2].clamp_min(0.0)
+        moves = du.clone()
+        moves[:, 2] += rise[:, None] * thickness
+        step = _MAP_STEP / moves.abs().amax(dim=(0, 1)).clamp_min(1e-30)
+        base = torch.as_tensor(state.displacement, device=du.device)[:, :, None]
+        maps = self._raster.depth(torch.cat([base + step * moves, base - step * moves], dim=2))
+        upper, lower = maps.cpu().numpy().reshape(2, -1, *maps.shape[1:])
+        slope = (upper - lower) / (2 * step.cpu().numpy()[:, None, None])
+        covered = self._raster.measure(base)[1][0].cpu().numpy() > 0
+        return slope + covered * self._height * thickness.cpu().numpy()[:, None, None]
+
+    def _taxel_force(self, tangents: Tangents) -> np.ndarray:
+        count = self._model.sensor.taxels.count
+        load = torch.zeros(count, len(self._names), dtype=torch.float64, device=tangents.du.device)
+        if len(tangents.changes) > 1:
+            load.index_add_(0, self._model._gauge._taxel, tangents.changes[1].load)
+        return load.T.cpu().numpy()
+
+    def _area(self, state: State, taxel_force: np.ndarray) -> np.ndarray:
+        """Return the derivative of the contact areas by Hertz's law, shape (p, taxels)."""
+        material = self._model.sensor.material
+        own = {"youngs_modulus": 1 / material.youngs_modulus}
+        own["poisson_ratio"] = 2 * material.poisson_ratio / (1 - material.poisson_ratio**2)
+        softer = np.array([own.get(name, 0.0) for name in self._names])[:, None]
+        loaded = state.taxel_force > 0
+        share = np.where(loaded, taxel_force / np.where(loaded, state.taxel_force, 1.0), 0.0) - softer * loaded
+        return 2 / 3 * state.taxel_area * share

@@ -1,0 +1,1 @@
+"""Internal forces and stiffness of the skin's body, as Warp kernels."""

@@ -1,0 +1,203 @@
+# Warp kernels are Python in form only; their operators have no types that pyright knows.
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
+"""Volume change averaged at the corners of the elements, so that quadratic tetrahedra do not lock.
+
+Four points an element ask for as many volumes as the nodes have motions to give: near incompressibility the mesh is too
+stiff. Here the part kappa/2 (J - 1)^2 of the law is taken not of J - 1 at the points but of its projection onto
+functions that are linear in every element and continuous: there is one volume to keep for each corner. That is Taylor
+and Hood's mixed element (1973), Computers & Fluids 1, 73, with its pressure eliminated:
+
+    energy = sum_q w (W - kappa/2 j^2) + kappa/2 b^T Q b,   b_a = sum_q w N_a j,   j = J - 1,
+
+with Q an approximate inverse of the mass matrix M of the N_a: the lumped mass D, corrected by Richardson's iteration,
+Q = sum_i (1 - D^-1 M)^i D^-1, symmetric and positive at any number of corrections.
+"""
+
+from functools import cache
+
+import numpy as np
+import scipy.sparse as sp
+import torch
+import warp as wp
+
+from tacdata.skin.elasticity.averaged_kernels import averaged_kernels
+from tacdata.skin.member.conditions import Conditions
+from tacdata.skin.member.warp_arrays import handed
+from tacdata.skin.mesh import elements
+from tacdata.skin.mesh.skin_mesh import SkinMesh
+
+_CORRECTIONS = 3
+"""Steps of Richardson's iteration; each takes two orders of the element's size off the error of lumping."""
+
+_REAL = {torch.float32: wp.float32, torch.float64: wp.float64}
+
+
+@cache
+def _mass_kernel(real: type) -> wp.Kernel:
+    @wp.kernel(module="unique", enable_backward=False)
+    def correct(
+        first: wp.array(dtype=wp.int32), neighbour: wp.array(dtype=wp.int32), mass: wp.array2d(dtype=real),
+        lumped: wp.array2d(dtype=real), thickness: wp.array(dtype=real), sums: wp.array2d(dtype=real),
+        before: wp.array2d(dtype=real), after: wp.array2d(dtype=real),
+    ):
+        # after = before + D^-1 (sums - M before); with before = 0 it is the lumped average.
+        a, b = wp.tid()
+        s, spread = thickness[b], real(0.0)
+        for k in range(first[a], first[a + 1]):
+            spread += (mass[0, k] + s * mass[1, k]) * before[neighbour[k], b]
+        after[a, b] = before[a, b] + (sums[a, b] - spread) / (lumped[0, a] + s * lumped[1, a])
+
+    return correct
+
+
+class AveragedVolume:
+    """Forces, tangent and energy of a mesh with averaged volume changes."""
+
+    def __init__(self, mesh: SkinMesh, law: str, slab: np.ndarray, device: str = "cpu") -> None:
+        """Prepare the averages.
+
+        Args:
+            mesh: The mesh.
+            law: File name in tacdata/skin/materials.
+            slab: Which elements stretch with the slab's thickness, shape (e,), bool.
+            device: "cpu" or "cuda:0".
+        """
+        slopes, weights = mesh.shape_gradients()
+        corner, tets = np.unique(mesh.tets[:, :4], return_inverse=True)
+        self._count, self._law, self._device, self._elements = len(corner), law, device, len(mesh.tets)
+        tets = tets.reshape(-1, 4)
+        mass = [corner_mass(tets, weights * part[:, None], self._count) for part in (~slab, slab)]
+        pattern = sp.csr_matrix(sum(abs(m) for m in mass) + sp.identity(self._count, format="csr") * 0)
+        pattern.sort_indices()
+        values = [_on_pattern(m, pattern) for m in mass]
+        lumped = np.stack([np.asarray(m.sum(axis=1)).ravel() for m in mass])
+        self._indices = [
+            wp.array(a.astype(np.int32), dtype=wp.int32, device=device)
+            for a in (mesh.tets, tets, slab, pattern.indptr, pattern.indices)
+        ]
+        self._numbers = {
+            dtype: [
+                wp.array(np.ascontiguousarray(a), dtype=real, device=device)
+                for a in (corner_shapes(), slopes, weights, np.stack(values), lumped)
+            ]
+            for dtype, real in _REAL.items()
+        }
+        self._seen: tuple | None = None
+
+    def add_force(
+        self, u: torch.Tensor, conditions: Conditions, smallest: torch.Tensor, force: torch.Tensor
+    ) -> None:
+        """Add the internal forces [N] at displacements ``u`` [mm], both of shape (n, 3, b); lower ``smallest``, shape
+        (b,), to the smallest det F [1]."""
+        own = conditions.to(u.dtype)
+        self._launch("force", u, (), own, own.law, self._average_at(u, own), smallest, force)
+
+    def average(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor:
+        """Return the averaged J - 1 at the corners [1], shape (c, b)."""
+        return self._average_at(u, conditions.to(u.dtype))
+
+    def add_product(
+        self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor,
+        average: torch.Tensor | None = None,
+    ) -> None:
+        """Add K(u) p [N]; all of shape (n, 3, b) and of one precision; ``average``: that at ``u``, if known."""
+        own = conditions.to(u.dtype)
+        change = self._average(self._sums("swelling_change", u, (p,), own), own)
+        known = self._kept(u, own) if average is None else average
+        self._launch("product", u, (p,), own, own.law, known, change, own.modulus, product)
+
+    def add_energy(self, u: torch.Tensor, conditions: Conditions, total: torch.Tensor) -> None:
+        """Add the strain energy [N mm], shape (b,)."""
+        own = conditions.to(u.dtype)
+        self._launch("energy", u, (), own, own.law, self._average_at(u, own), total)
+
+    def _kept(self, u: torch.Tensor, own: Conditions) -> torch.Tensor:
+        """Return `_average_at`, kept while it is asked for at one state: conjugate gradients ask many times."""
+        state, versions = (u, own.thickness), (u._version, own.thickness._version)
+        seen = self._seen
+        if seen is None or seen[1] != versions or seen[0][0] is not u or seen[0][1] is not own.thickness:
+            seen = self._seen = (state, versions, self._average_at(u, own))
+        return seen[2]
+
+    def _average_at(self, u: torch.Tensor, own: Conditions) -> torch.Tensor:
+        """Return the averaged J - 1 at the corners, shape (c, b)."""
+        return self._average(self._sums("swelling", u, (), own), own)
+
+    def _sums(self, name: str, u: torch.Tensor, more: tuple[torch.Tensor, ...], own: Conditions) -> torch.Tensor:
+        sums = torch.zeros(self._count, u.shape[2], dtype=u.dtype, device=u.device)
+        self._launch(name, u, more, own, sums)
+        return sums
+
+    def _average(self, sums: torch.Tensor, own: Conditions) -> torch.Tensor:
+        """Return Q times sums over the corners' surroundings, shape (c, b)."""
+        numbers, average = self._numbers[sums.dtype], torch.zeros_like(sums)
+        for _ in range(_CORRECTIONS + 1):
+            after = torch.empty_like(sums)
+            wp.launch(
+                _mass_kernel(_REAL[sums.dtype]), dim=tuple(sums.shape),
+                inputs=[*self._indices[3:], *numbers[3:], *map(handed, (own.thickness, sums, average))],
+                outputs=[handed(after)], device=self._device,
+            )
+            average = after
+        return average
+
+    def _launch(
+        self, name: str, u: torch.Tensor, more: tuple[torch.Tensor, ...], own: Conditions, *rest: torch.Tensor
+    ) -> None:
+        """Run a kernel; ``rest`` follows the thickness, its last one receives the result."""
+        tets, corners, slab = self._indices[:3]
+        wp.launch(
+            getattr(averaged_kernels(self._law, _REAL[u.dtype]), name), dim=(self._elements, u.shape[2]),
+            inputs=[
+                *map(handed, (u, *more)), tets, corners, *self._numbers[u.dtype][:3], slab,
+                *map(handed, (own.thickness, *rest)),
+            ],
+            device=self._device,
+        )
+
+
+def averaged_stiffness(mesh: SkinMesh, bulk_modulus: float) -> sp.csr_matrix:
+    """Return the volumetric stiffness at rest [N/mm], shape (3n, 3n), by the lumped average alone: as far as a
+    preconditioner must know it.
+
+    Args:
+        mesh: The mesh.
+        bulk_modulus: kappa [MPa].
+    """
+    slopes, weights = mesh.shape_gradients()
+    corner, tets = np.unique(mesh.tets[:, :4], return_inverse=True)
+    tets, shapes = tets.reshape(-1, 4), corner_shapes()
+    divergence = np.einsum("eq,qa,eqni->eani", weights, shapes, slopes)
+    rows = np.broadcast_to(tets[:, :, None, None], divergence.shape)
+    columns = np.broadcast_to((3 * mesh.tets[:, :, None] + np.arange(3))[:, None], divergence.shape)
+    size = (len(corner), 3 * len(mesh.nodes))
+    b = sp.csr_matrix(sp.coo_matrix((divergence.ravel(), (rows.ravel(), columns.ravel())), shape=size))
+    lumped = np.bincount(tets.ravel(), (weights @ shapes).ravel(), minlength=len(corner))
+    return sp.csr_matrix(b.T @ sp.diags(bulk_modulus / lumped) @ b)
+
+
+def corner_shapes() -> np.ndarray:
+    """Return the corners' linear shape functions at an element's quadrature points [1], shape (4, 4)."""
+    points = elements.tetrahedron_quadrature()[0]
+    return np.concatenate([1 - points.sum(axis=1, keepdims=True), points], axis=1)
+
+
+def corner_mass(tets: np.ndarray, weights: np.ndarray, count: int) -> sp.csr_matrix:
+    """Return the mass matrix of linear shape functions [mm^3], shape (count, count).
+
+    Args:
+        tets: Corners of the elements, shape (e, 4).
+        weights: Of the quadrature points [mm^3], shape (e, 4).
+        count: Number of corners.
+    """
+    shapes = corner_shapes()
+    blocks = np.einsum("eq,qa,qb->eab", weights, shapes, shapes)
+    rows, columns = np.repeat(tets, 4, axis=1).ravel(), np.tile(tets, (1, 4)).ravel()
+    return sp.csr_matrix(sp.coo_matrix((blocks.ravel(), (rows, columns)), shape=(count, count)))
+
+
+def _on_pattern(matrix: sp.csr_matrix, pattern: sp.csr_matrix) -> np.ndarray:
+    """Return a matrix's entries in the order of a wider pattern's."""
+    rows = np.repeat(np.arange(len(pattern.indptr) - 1), np.diff(pattern.indptr))
+    return np.asarray(matrix[rows, pattern.indices]).ravel()

@@ -1,0 +1,1 @@
+"""Linear algebra of a Newton step: factors, preconditioners, conjugate gradients."""

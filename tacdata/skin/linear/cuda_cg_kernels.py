@@ -1,0 +1,146 @@
+# Warp kernels are Python in form only; their operators have no types that pyright knows.
+# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
+"""Kernels of `tacdata.skin.linear.cuda_cg`: what conjugate gradients do to fields, each field read and written once.
+
+Fields are (3n, batch); ``order`` says for which degree of freedom each row of the rest state's inverse stands.
+A thread does `STRIP` rows of one member, so that its sums go to memory once.
+"""
+
+import warp as wp
+
+STRIP = wp.constant(32)
+"""Rows a thread."""
+
+_FULL = wp.constant(wp.float32(6.0e4))
+"""Near the largest number of half precision."""
+
+
+@wp.func
+def halved(value: wp.float32):
+    """Round to half precision, never to infinity."""
+    return wp.float16(wp.clamp(value, -_FULL, _FULL))
+
+
+@wp.kernel(enable_backward=False)
+def load(
+    r: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32),
+    size: wp.array(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
+):
+    """H = the residual, scaled, on the rows of the inverse."""
+    k, b = wp.tid()
+    h[k, b] = halved(r[order[k], b] * scale[k] * size[b])
+
+
+@wp.kernel(enable_backward=False)
+def pick(
+    z: wp.array2d(dtype=wp.float32), which: wp.array2d(dtype=wp.int64), member: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32), softness: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32),
+    count: wp.int64, moved: wp.array2d(dtype=wp.float32),
+):
+    """Moved = displacements where a member touches."""
+    b, s = wp.tid()
+    row, value = which[member[b], s], wp.float32(0.0)
+    if row < count:
+        k = wp.int32(row)
+        value = z[k, b] * scale[k] * softness[b] / size[b]
+    moved[b, s] = value
+
+
+@wp.kernel(enable_backward=False)
+def push_back(
+    transfer: wp.array3d(dtype=wp.float32), moved: wp.array2d(dtype=wp.float32), which: wp.array2d(dtype=wp.int64),
+    member: wp.array(dtype=wp.int32), own: wp.array(dtype=wp.int32), order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32), count: wp.int64,
+    r: wp.array2d(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
+):
+    """Take what the contact answers off the residual; the transfer is symmetric, so neighbours read neighbours."""
+    b, s = wp.tid()
+    m = member[b]
+    row = which[m, s]
+    if row < count:
+        force = wp.float32(0.0)
+        for c in range(own[b]):
+            force += transfer[m, c, s] * moved[b, c]
+        k = wp.int32(row)
+        h[k, b] = halved((r[order[k], b] - force) * scale[k] * size[b])
+
+
+@wp.kernel(enable_backward=False)
+def curve(
+    p: wp.array2d(dtype=wp.float32), q: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32),
+    curvature: wp.array(dtype=wp.float32),
+):
+    """Curvature += p q."""
+    strip, b = wp.tid()
+    total = wp.float32(0.0)
+    for k in range(strip * STRIP, wp.min((strip + 1) * STRIP, order.shape[0])):
+        total += p[order[k], b] * q[order[k], b]
+    wp.atomic_add(curvature, b, total)
+
+
+@wp.kernel(enable_backward=False)
+def advance(
+    x: wp.array2d(dtype=wp.float32), r: wp.array2d(dtype=wp.float32), p: wp.array2d(dtype=wp.float32),
+    q: wp.array2d(dtype=wp.float32), rho: wp.array(dtype=wp.float32), curvature: wp.array(dtype=wp.float32),
+    going: wp.array(dtype=wp.int32), first: wp.array(dtype=wp.int32), order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
+):
+    """Let x += alpha p, r -= alpha q, h = r scaled; where the tangent is indefinite at first, x = p."""
+    k, b = wp.tid()
+    if going[b] == 1:
+        n = order[k]
+        if curvature[b] > wp.float32(0.0):
+            alpha = rho[b] / curvature[b]
+            x[n, b] = x[n, b] + alpha * p[n, b]
+            left = r[n, b] - alpha * q[n, b]
+            r[n, b] = left
+            h[k, b] = halved(left * scale[k] * size[b])
+        elif first[b] == 1:
+            x[n, b] = p[n, b]
+
+
+@wp.kernel(enable_backward=False)
+def measure(
+    w: wp.array2d(dtype=wp.float32), r: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32), softness: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32),
+    rho: wp.array(dtype=wp.float32),
+):
+    """Rho += r z, with z = w scaled back."""
+    strip, b = wp.tid()
+    total = wp.float32(0.0)
+    for k in range(strip * STRIP, wp.min((strip + 1) * STRIP, order.shape[0])):
+        total += r[order[k], b] * w[k, b] * scale[k]
+    wp.atomic_add(rho, b, total * softness[b] / size[b])
+
+
+@wp.kernel(enable_backward=False)
+def judge(
+    rho_new: wp.array(dtype=wp.float32), goal: wp.array(dtype=wp.float32), curvature: wp.array(dtype=wp.float32),
+    rho: wp.array(dtype=wp.float32), beta: wp.array(dtype=wp.float32), going: wp.array(dtype=wp.int32),
+    first: wp.array(dtype=wp.int32),
+):
+    """Stop members that are done; leave nothing in the sums."""
+    b = wp.tid()
+    first[b] = 0
+    beta[b] = wp.float32(0.0)
+    if going[b] == 1:
+        if curvature[b] > wp.float32(0.0) and rho_new[b] > goal[b]:
+            beta[b] = rho_new[b] / rho[b]
+            rho[b] = rho_new[b]
+        else:
+            going[b] = 0
+    rho_new[b] = wp.float32(0.0)
+    curvature[b] = wp.float32(0.0)
+
+
+@wp.kernel(enable_backward=False)
+def turn(
+    w: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32),
+    softness: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32), beta: wp.array(dtype=wp.float32),
+    p: wp.array2d(dtype=wp.float32),
+):
+    """P = z + beta p."""
+    k, b = wp.tid()
+    n = order[k]
+    p[n, b] = w[k, b] * scale[k] * softness[b] / size[b] + beta[b] * p[n, b]

@@ -1,0 +1,1 @@
+"""What each batch member is made of: constants, indenter, pose."""

@@ -1,0 +1,1 @@
+"""From a sensor to its mesh of quadratic tetrahedra."""

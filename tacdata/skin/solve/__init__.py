@@ -1,0 +1,1 @@
+"""Newton's method along the load path of many presses at once."""

@@ -1,0 +1,1 @@
+"""The deformed outer face as a depth map."""

@@ -1,0 +1,1 @@
+"""A camera's intrinsics from views of a ChArUco board."""

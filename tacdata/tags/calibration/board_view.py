@@ -1,0 +1,52 @@
+"""A board's corners in an image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.tags.calibration.board import Board
+from tacdata.tags.detection.detector import to_grey
+
+LEAST_CORNERS = 8
+"""Corners below which an image shows no board."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoardView:
+    """What one image shows of a board."""
+
+    name: str
+    """Which image."""
+    ids: np.ndarray
+    """Numbers of the corners seen [1], shape (n,)."""
+    corners: np.ndarray
+    """Where they are [px], shape (n, 2); whole numbers are pixel centres."""
+
+    def moved(self, other: BoardView) -> float:
+        """Return how far the corners that both see lie apart [px], median; infinite if they share none."""
+        _, here, there = np.intersect1d(self.ids, other.ids, return_indices=True)
+        if not len(here):
+            return np.inf
+        return float(np.median(np.linalg.norm(self.corners[here] - other.corners[there], axis=1)))
+
+
+def find_board(image: np.ndarray, board: Board, name: str = "") -> BoardView | None:
+    """Return a board's corners, found to a fraction of a pixel, or None if fewer than `LEAST_CORNERS` are seen.
+
+    Args:
+        image: Grey (height, width) or BGR (height, width, 3), uint8.
+        board: The board.
+        name: What to call the view.
+
+    Raises:
+        UsageError: If this is no such image.
+    """
+    import cv2
+
+    detector = cv2.aruco.CharucoDetector(board.opencv)
+    found, ids, _, _ = detector.detectBoard(to_grey(image))
+    if found is None or ids is None or len(ids) < LEAST_CORNERS:
+        return None
+    return BoardView(name, np.asarray(ids).ravel(), np.asarray(found, float).reshape(-1, 2))

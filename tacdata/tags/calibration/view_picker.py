@@ -1,0 +1,97 @@
+"""Which of many images of a board are worth keeping: still ones, each different from those kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.errors import FormatError, UsageError
+from tacdata.tags.calibration.board import Board
+from tacdata.tags.calibration.board_view import BoardView, find_board
+
+STILL = 1.0
+"""Movement between two images that follow each other [px per 1000 px of width] above which they are blurred."""
+NEW = 40.0
+"""Movement since every view kept [px per 1000 px of width] from which an image shows something new."""
+ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+
+
+class ViewPicker:
+    """Takes images one after the other; `views` holds those worth keeping."""
+
+    def __init__(self, board: Board, still: bool = True) -> None:
+        """Keep the board; ``still``: the images follow each other as those of a film do."""
+        self.board, self.still = board, still
+        self.views: list[BoardView] = []
+        self.size: tuple[int, int] | None = None
+        """Width and height of the images [px]."""
+        self.seen = 0
+        """Images taken."""
+        self.with_board = 0
+        """Images that show the board."""
+        self._last: BoardView | None = None
+
+    def take(self, image: np.ndarray, name: str) -> bool:
+        """Look at an image, grey or BGR uint8; say whether it was kept.
+
+        Raises:
+            FormatError: If it has another size than those before.
+        """
+        size = (image.shape[1], image.shape[0])
+        if self.size not in (None, size):
+            raise FormatError(
+                f"{name}: {size[0]} x {size[1]} pixels, those before {self.size[0]} x {self.size[1]}",
+                "images of one size",
+                "remove it, or calibrate each size by itself",
+            )
+        self.size, self.seen = size, self.seen + 1
+        view = find_board(image, self.board, name)
+        before, self._last = self._last, view
+        if view is None:
+            return False
+        self.with_board += 1
+        if self.still:
+            unit = size[0] / 1000
+            if before is None or view.moved(before) > STILL * unit:
+                return False
+            if any(view.moved(kept) < NEW * unit for kept in self.views):
+                return False
+        self.views.append(view)
+        return True
+
+
+def images_of(source: Path) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield name and image, grey uint8, of a folder's images or a video's.
+
+    Raises:
+        UsageError: If there is no such file or folder, or no image in it.
+        FormatError: If a file is damaged.
+    """
+    import cv2
+
+    if source.is_dir():
+        paths = sorted(path for path in source.iterdir() if path.suffix.lower() in ENDINGS)
+        if not paths:
+            raise UsageError(f"{source} holds no image", f"files ending in {', '.join(ENDINGS)}", "check the path")
+        for path in paths:
+            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+            if image is None:
+                raise FormatError(f"{path} cannot be read as an image", "whole image files", "replace or remove it")
+            yield path.name, image
+        return
+    if not source.is_file():
+        raise UsageError(f"no file or folder {source}", "a folder of images or a video", "check the path")
+    quiet = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    film = cv2.VideoCapture(str(source))
+    cv2.utils.logging.setLogLevel(quiet)
+    number, good = 0, film.isOpened()
+    while good:
+        good, image = film.read()
+        if good:
+            yield f"{source.name} image {number}", cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+            number += 1
+    film.release()
+    if not number:
+        raise FormatError(f"{source} is no video that can be read", "a video file", "convert it, or take images")

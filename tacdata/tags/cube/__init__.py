@@ -1,0 +1,1 @@
+"""A cube of AprilTags and its pose in an image."""

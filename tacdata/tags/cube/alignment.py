@@ -1,0 +1,177 @@
+"""Refine a cube's pose on the grey values of its faces (analysis by synthesis).
+
+The tags' patterns are drawn as the camera would see them from the pose at hand, blurred, and compared with
+the image pixel by pixel; a few Gauss-Newton steps on the pose, on black and white of every face and on the
+blur make them agree (Lucas & Kanade 1981; Baker & Matthews, IJCV 56, 2004, forward-additive form). All edges
+of a pattern count, not only four corners, so that the scale's bias of detected corners falls out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tacdata.tags.cube.cube import Cube
+from tacdata.tags.cube.face_patch import FacePatch, draw_face, slopes_of
+
+STEPS = 4
+"""Most Gauss-Newton steps."""
+SETTLED = 0.4
+"""Move in the image [px] below which a step is the last."""
+COVERED = (0.05, 0.15)
+"""Difference, over the contrast [1], from which a pixel counts as covered by something: three times what is left on
+the detected faces, within these."""
+ENTIRE = 0.85
+"""Correlation [1] with its pattern from which a face that was not detected is uncovered enough to take part."""
+GRAIN = 0.015
+"""Standard deviation of a tag's corner [px] that remains however good the image is: print, lens, drawing."""
+ALIKE = 0.6
+"""Correlation [1] with its pattern from which a face is there."""
+
+
+@dataclass(eq=False)
+class Alignment:
+    """A pose and how well the image agrees with it."""
+
+    rotation: np.ndarray
+    """From the cube frame to the camera frame [1], shape (3, 3)."""
+    translation: np.ndarray
+    """Cube centre in the camera frame [m], shape (3,)."""
+    blur: float = 0.8
+    """Standard deviation of the blur [px]."""
+    likeness: dict[str, float] = field(default_factory=dict)
+    """Face that should be seen -> correlation of the image with its pattern [1]."""
+    residual: float = np.inf
+    """Difference of image and drawing on the faces detected, over the contrast of black and white [1]: root mean
+    square, but for what is covered."""
+    covariance: np.ndarray = field(default_factory=lambda: np.full((6, 6), np.inf))
+    """Of a small turn in the camera frame [rad] and the translation [m], in this order, shape (6, 6)."""
+
+
+@dataclass(eq=False)
+class _Step:
+    """Where a Gauss-Newton step leads."""
+
+    move: np.ndarray
+    """Rotation [rad], translation [m], the blur's variance [px^2], shape (7,)."""
+    covariance: np.ndarray
+    """Of rotation [rad] and translation [m], shape (6, 6)."""
+    pixels: float
+    """By how far the rotation and translation move the cube in the image, about [px]."""
+
+
+def align(
+    start: Alignment, seen: set[str], cube: Cube, matrix: np.ndarray, grey: np.ndarray, steps: int = STEPS
+) -> Alignment:
+    """Return the pose at which drawing and image agree best near ``start``.
+
+    Args:
+        start: First pose, within about half a cell of the truth.
+        seen: Faces whose tags were detected; others take part if they look as they should.
+        cube: The cube.
+        matrix: Camera matrix [px], shape (3, 3).
+        grey: Image without distortion, uint8, shape (height, width).
+        steps: Most Gauss-Newton steps; one that is too small to see is the last.
+    """
+    pose = start
+    for step in range(max(steps, 1)):
+        patches = _patches(pose, cube, matrix, grey)
+        used = [p for f, p in patches.items() if f in seen or p.likeness > ENTIRE]
+        detected = [p for f, p in patches.items() if f in seen]
+        found = _step(used, pose, matrix, cube, None if step == 0 else pose.residual) if steps else None
+        pose = Alignment(
+            pose.rotation, pose.translation, pose.blur, {f: p.likeness for f, p in patches.items()},
+            _residual(detected, np.zeros(7)), pose.covariance,
+        )  # fmt: skip
+        if found is None:
+            return pose if step == 0 else replace(start, likeness=pose.likeness)
+        pose = Alignment(
+            _rotation(found.move[:3]) @ pose.rotation, pose.translation + found.move[3:6],
+            float(np.sqrt(np.clip(pose.blur**2 + found.move[6], 0.2**2, 3.0**2))),
+            pose.likeness, _residual(detected, found.move), found.covariance,
+        )  # fmt: skip
+        if step > 0 and found.pixels < SETTLED:
+            break
+    return replace(pose, covariance=pose.covariance + _grain(pose, seen, cube, matrix))
+
+
+def _grain(pose: Alignment, seen: set[str], cube: Cube, matrix: np.ndarray) -> np.ndarray:
+    """Return the covariance of rotation [rad] and translation [m] that `GRAIN` gives, shape (6, 6)."""
+    arms = np.concatenate([cube.corners(face) for face in seen]) @ pose.rotation.T
+    slopes = np.empty((2, 6, len(arms)))
+    for row, (x, y) in zip(slopes, ((-1.0, 0.0), (0.0, -1.0)), strict=True):
+        ones = np.ones(len(arms))
+        slopes_of(x * ones, y * ones, arms.T, pose.translation, matrix, row)
+    rows = slopes.transpose(0, 2, 1).reshape(-1, 6)
+    return GRAIN**2 * np.linalg.pinv(rows.T @ rows, rcond=1e-12)
+
+
+def _residual(patches: list[FacePatch], move: np.ndarray) -> float:
+    """Return what is left after a step, to first order, over each face's contrast; what is covered counts little."""
+    if not patches:
+        return np.inf
+    left = [p.rest / max(p.contrast, 1.0) - move @ p.columns[:7] for p in patches]
+    return float(COVERED[1] * np.sqrt(np.log1p(np.square(np.concatenate(left) / COVERED[1])).mean()))
+
+
+def _step(
+    patches: list[FacePatch], pose: Alignment, matrix: np.ndarray, cube: Cube, left: float | None
+) -> _Step | None:
+    """Return the Gauss-Newton step on some faces; None if they do not determine one.
+
+    Args:
+        patches: The faces.
+        pose: Where they are drawn.
+        matrix: Camera matrix [px].
+        cube: The cube.
+        left: What the step before has left of the difference, over the contrast [1]; None at the first step, when
+            large differences mean that the pose is off.
+    """
+    normal, right = np.zeros((7, 7)), np.zeros(7)
+    squares = count = 0.0
+    for patch in patches:
+        if patch.contrast <= 1.0:
+            continue
+        weighted, rest = patch.columns, patch.rest
+        if left is not None:
+            # Cauchy weights: what covers a part of the face counts little.
+            weight = 1 / (1 + np.square(rest / (patch.contrast * np.clip(3 * left, *COVERED))))
+            weighted, rest = weighted * weight, weight * rest
+            count += float(weight.sum())
+        else:
+            count += len(rest)
+        squares += float(rest @ patch.rest)
+        product, towards = weighted @ patch.columns.T, patch.columns @ rest
+        # Black and white of a face are its own: they are solved for and drop out.
+        inner = product[:7, 7:] @ np.linalg.inv(product[7:, 7:])
+        normal += patch.contrast**2 * (product[:7, :7] - inner @ product[7:, :7])
+        right += patch.contrast * (towards[:7] - inner @ towards[7:])
+    if not count:
+        return None
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+    scales = np.outer(scale, scale)
+    try:
+        inverse = np.linalg.inv(normal / scales + 1e-9 * np.eye(7)) / scales
+    except np.linalg.LinAlgError:
+        return None
+    move = inverse @ right
+    if not np.isfinite(move).all() or np.linalg.norm(move[:3]) > 0.5:
+        return None
+    focal, depth = matrix[0, 0], max(float(pose.translation[2]), 1e-3)
+    turned, moved = np.linalg.norm(move[:3]) * cube.side / 1000, np.linalg.norm(move[3:6])
+    return _Step(move, squares / count * inverse[:6, :6], float(turned + moved) * focal / depth)
+
+
+def _patches(pose: Alignment, cube: Cube, matrix: np.ndarray, grey: np.ndarray) -> dict[str, FacePatch]:
+    """Draw every face that the pose turns to the camera and that lies inside the image."""
+    drawn = (
+        (face, draw_face(face, pose.rotation, pose.translation, pose.blur, cube, matrix, grey)) for face in cube.ids
+    )
+    return {face: patch for face, patch in drawn if patch is not None}
+
+
+def _rotation(vector: np.ndarray) -> np.ndarray:
+    import cv2
+
+    return cv2.Rodrigues(vector)[0]

@@ -1,0 +1,160 @@
+"""Poses of a cube that explain the corners of its tags.
+
+Every tag alone gives two poses: a square seen in weak perspective looks the same tilted either way (Collins
+& Bartoli, "Infinitesimal plane-based pose estimation", IJCV 109, 2014). All corners together give one. A
+pose is refined by Gauss-Newton steps (OpenCV's VVS) on the tags that fit it, first loosely, then tightly; the
+others are outliers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.tags.camera import Camera
+from tacdata.tags.cube.cube import AXES, Cube
+from tacdata.tags.detection.tag import Tag
+
+LOOSE, TIGHT = 0.35, 0.06
+"""Reprojection of a tag's corners over its size [1] up to which it joins a first and a refined pose."""
+LEAST = 1.2
+"""Reprojection that is always allowed [px]: four times a corner's noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A pose and the tags that it explains."""
+
+    rotation: np.ndarray
+    """From the cube frame to the camera frame [1], shape (3, 3)."""
+    translation: np.ndarray
+    """Cube centre in the camera frame [m], shape (3,)."""
+    tags: tuple[Tag, ...]
+    """Tags explained, one a face."""
+    reprojection: float
+    """Root mean square distance of their corners from where the pose puts them [px]."""
+
+    def moved(self, rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: Camera) -> float:
+        """Return the reprojection [px] of the same tags at another pose."""
+        errors = [_error(rotation, translation, tag, cube, camera) for tag in self.tags]
+        return float(np.sqrt(np.mean(np.square(errors))))
+
+
+def candidates(tags: list[Tag], cube: Cube, camera: Camera) -> list[Candidate]:
+    """Return the different poses that explain the most tags, best first; none if there are no tags.
+
+    Args:
+        tags: Tags of the cube with straightened corners.
+        cube: The cube.
+        camera: The camera.
+    """
+    found: list[Candidate] = []
+    several = len({tag.id for tag in tags}) > 1
+    for tag in sorted(tags, key=lambda tag: -tag.size):
+        for candidate in _solved(tag, tags, cube, camera):
+            found.append(candidate)
+            if several and len(candidate.tags) == len(tags) and candidate.reprojection < LEAST:
+                return [candidate]  # several faces allow one pose only
+    most = max((len(c.tags) for c in found), default=0)
+    kept: list[Candidate] = []
+    for candidate in sorted((c for c in found if len(c.tags) == most), key=lambda c: c.reprojection):
+        if all(angle_between(candidate.rotation, other.rotation) > np.radians(2.0) for other in kept):
+            kept.append(candidate)
+    return kept
+
+
+def contradicting(
+    tags: list[Tag], rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: Camera
+) -> list[Tag]:
+    """Return the tags that lie elsewhere than a pose has them; what is merely read badly, as at a slant, is not meant.
+
+    Args:
+        tags: Tags of the cube with straightened corners, not among those that gave the pose.
+        rotation: From the cube frame to the camera frame [1], shape (3, 3).
+        translation: Cube centre in the camera frame [m], shape (3,).
+        cube: The cube.
+        camera: The camera.
+    """
+    import cv2
+
+    near = _fitting(cv2.Rodrigues(rotation)[0], translation.reshape(3, 1), tags, cube, camera, LOOSE)
+    return [tag for tag in tags if not any(tag is other for other in near)]
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the angle [rad] between two rotations, shape (3, 3)."""
+    return float(np.arccos(np.clip(((a * b).sum() - 1) / 2, -1.0, 1.0)))
+
+
+def _solved(start: Tag, tags: list[Tag], cube: Cube, camera: Camera) -> Iterator[Candidate]:
+    """Yield the two poses that one tag gives, each refined on all tags that fit it."""
+    import cv2
+
+    points, pixels = _pairs([start], cube)
+    method = cv2.SOLVEPNP_IPPE
+    try:
+        _, rotations, translations, _ = cv2.solvePnPGeneric(points, pixels, camera.matrix, None, flags=method)
+    except cv2.error:  # corners on a line, from a false detection
+        return
+    for rotation, translation in zip(rotations, translations, strict=True):
+        candidate = _settle(rotation, translation, tags, cube, camera)
+        if candidate is not None:
+            yield candidate
+
+
+def _settle(
+    rotation: np.ndarray, translation: np.ndarray, tags: list[Tag], cube: Cube, camera: Camera
+) -> Candidate | None:
+    """Refine a pose (rotation vector [rad] and translation [m]) on the tags that fit it; None if none do."""
+    import cv2
+
+    for limit in (LOOSE, TIGHT):
+        group = _fitting(rotation, translation, tags, cube, camera, limit)
+        if not group:
+            return None
+        try:
+            rotation, translation = cv2.solvePnPRefineVVS(
+                *_pairs(group, cube), camera.matrix, None, rotation.copy(), translation.copy()
+            )
+        except cv2.error:
+            return None
+    group = _fitting(rotation, translation, tags, cube, camera, TIGHT)
+    if not group:
+        return None
+    square, place = cv2.Rodrigues(rotation)[0], translation.ravel()
+    errors = [_error(square, place, tag, cube, camera) for tag in group]
+    return Candidate(square, place, tuple(group), float(np.sqrt(np.mean(np.square(errors)))))
+
+
+def _fitting(
+    rotation: np.ndarray, translation: np.ndarray, tags: list[Tag], cube: Cube, camera: Camera, limit: float
+) -> list[Tag]:
+    """Return the tags, one an id, that a pose explains and whose faces it turns to the camera."""
+    import cv2
+
+    if not (np.isfinite(rotation).all() and np.isfinite(translation).all()):
+        return []
+    square, place = cv2.Rodrigues(rotation)[0], translation.ravel()
+    chosen: dict[int, tuple[float, Tag]] = {}
+    for tag in tags:
+        outward = square @ AXES[cube.faces[tag.id]][:, 2]
+        if place[2] <= 0 or outward @ (place + outward * cube.side / 2000) >= 0:
+            continue
+        error = _error(square, place, tag, cube, camera)
+        if error <= max(limit * tag.size, LEAST) and (tag.id not in chosen or error < chosen[tag.id][0]):
+            chosen[tag.id] = (error, tag)
+    return [tag for _, tag in chosen.values()]
+
+
+def _error(rotation: np.ndarray, translation: np.ndarray, tag: Tag, cube: Cube, camera: Camera) -> float:
+    """Return the root mean square distance [px] of a tag's corners from where a pose puts them."""
+    points = cube.corners(cube.faces[tag.id]) @ rotation.T + translation
+    return float(np.sqrt(((camera.project(points) - tag.corners) ** 2).sum(axis=1).mean()))
+
+
+def _pairs(tags: list[Tag], cube: Cube) -> tuple[np.ndarray, np.ndarray]:
+    """Return corners in the cube frame [m], shape (n, 3), and in the image [px], shape (n, 2)."""
+    points = np.concatenate([cube.corners(cube.faces[tag.id]) for tag in tags])
+    return points, np.concatenate([tag.corners for tag in tags]).astype(float)

@@ -1,0 +1,138 @@
+"""A cube's pose in an image: tags, then corners, then grey values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tacdata.tags.camera import Camera
+from tacdata.tags.cube.corners import contradicting
+from tacdata.tags.cube.cube import Cube
+from tacdata.tags.cube.rivals import Before, Rival, best_rival
+from tacdata.tags.detection.detector import detect_tags, to_grey
+from tacdata.tags.detection.tag import Tag
+
+AROUND = 2.0
+"""How far around the pose just before a cube is looked for first, in sides of the cube [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class CubePose:
+    """Where a cube is in the camera frame (x right, y down, z forward)."""
+
+    position: np.ndarray
+    """The cube's centre [m], shape (3,)."""
+    quaternion: np.ndarray
+    """Rotation from the cube frame to the camera frame, xyzw [1], shape (4,)."""
+    reprojection: float
+    """Root mean square distance of the detected corners from where the pose puts them [px]."""
+    faces: int
+    """Faces detected [count]."""
+    ids: tuple[int, ...]
+    """Their tag numbers, ascending."""
+    ambiguous: bool = False
+    """Whether a second pose fits the image about as well."""
+    covariance: np.ndarray = field(default_factory=lambda: np.full((6, 6), np.inf))
+    """Of a small turn in the camera frame [rad] and the position [m], in this order, shape (6, 6). It knows the
+    image's noise, not errors of the calibration, the print's scale or a choice that was ambiguous."""
+    residual: float = 0.0
+    """Difference of the image and the drawn tags over the contrast of black and white [1]; about 0.02 when sharp."""
+    rival: CubePose | None = None
+    """The other pose, where `ambiguous`."""
+    strays: tuple[int, ...] = ()
+    """Numbers of this cube that were read where the pose has no such tag: swapped tags, or another cube's."""
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """The cube frame in the camera frame, homogeneous, shape (4, 4) [m]."""
+        from scipy.spatial.transform import Rotation
+
+        matrix = np.eye(4)
+        matrix[:3, :3] = Rotation.from_quat(self.quaternion).as_matrix()
+        matrix[:3, 3] = self.position
+        return matrix
+
+
+def detect_cube(
+    image: np.ndarray, intrinsics: dict[str, Any], cube: dict[str, Any], hint: CubePose | None = None
+) -> CubePose | None:
+    """Return the pose of a cube, or None if no tag of it is seen.
+
+    Args:
+        image: Grey (height, width) or BGR (height, width, 3), uint8.
+        intrinsics: A rig file's ``intrinsics`` [px].
+        cube: A rig file's ``cube`` [mm].
+        hint: The pose just before, if known: where to look first, and what decides where the image does not.
+
+    Raises:
+        UsageError: If the image is no image or of another size than the intrinsics.
+        FormatError: If intrinsics or cube contradict themselves.
+    """
+    grey, camera, known = to_grey(image), Camera.from_document(intrinsics), Cube.from_document(cube)
+    camera.check(grey)
+    near = None if hint is None else surroundings(hint, known, camera)
+    for within in (near, None) if near else (None,):
+        pose = solve_cube(grey, detect_tags(grey, whole=False, within=within), known, camera, hint)
+        if pose is not None:
+            return pose
+    return None
+
+
+def solve_cube(
+    grey: np.ndarray, tags: list[Tag], cube: Cube, camera: Camera, hint: CubePose | None = None
+) -> CubePose | None:
+    """Return the pose of a cube from tags that were read in an image, or None if none of them is the cube's.
+
+    Args:
+        grey: The image, uint8, shape (height, width).
+        tags: Tags as read [px of the image as taken].
+        cube: The cube.
+        camera: The camera.
+        hint: The pose just before, if known; decides only where the image does not.
+    """
+    own = [Tag(tag.id, camera.straighten(tag.corners), tag.margin, tag.hamming) for tag in tags if tag.id in cube.faces]
+    before = None
+    if hint is not None:
+        before = Before(hint.matrix[:3, :3], 0.0 if hint.ambiguous else hint.residual)
+    found = best_rival(own, grey, cube, camera, before)
+    if found is None:
+        return None
+    best, other = found
+    used, aligned = {id(tag) for tag in best.tags}, best.alignment
+    others = [tag for tag in own if id(tag) not in used]
+    away = contradicting(others, aligned.rotation, aligned.translation, cube, camera)
+    strays = tuple(sorted({tag.id for tag in away}))
+    return _pose(best, strays, None if other is None else _pose(other, strays, None))
+
+
+def surroundings(pose: CubePose, cube: Cube, camera: Camera) -> tuple[int, int, int, int] | None:
+    """Return left, top, right, bottom [px] of where a cube is to be expected soon; None if out of the image."""
+    if pose.position[2] <= cube.side / 1000:
+        return None
+    centre = camera.bend(camera.project(pose.position[None]))[0]
+    reach = (0.9 + AROUND) * cube.side / 1000 * camera.matrix[0, 0] / pose.position[2]
+    low, high = np.floor(centre - reach).astype(int), np.ceil(centre + reach).astype(int)
+    left, top = np.maximum(low, 0)
+    right, bottom = np.minimum(high, [camera.width, camera.height])
+    return (int(left), int(top), int(right), int(bottom)) if right > left and bottom > top else None
+
+
+def _pose(rival: Rival, strays: tuple[int, ...], other: CubePose | None) -> CubePose:
+    from scipy.spatial.transform import Rotation
+
+    ids = tuple(sorted(tag.id for tag in rival.tags))
+    aligned = rival.alignment
+    return CubePose(
+        position=aligned.translation.copy(),
+        quaternion=Rotation.from_matrix(aligned.rotation).as_quat(),
+        reprojection=float(rival.reprojection),
+        faces=len(ids),
+        ids=ids,
+        ambiguous=other is not None,
+        covariance=aligned.covariance,
+        residual=aligned.residual,
+        rival=other,
+        strays=strays,
+    )

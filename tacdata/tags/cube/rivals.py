@@ -1,0 +1,187 @@
+"""Which of several poses that explain the same corners an image shows.
+
+Where one face is all that was detected, two poses fit its corners. Both are aligned with the image; what
+their other faces should look like decides (a grazing face that no detector reads still correlates with its
+pattern), then how well the grey values agree, and only then, if the caller knows it, the pose just before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.tags.camera import Camera
+from tacdata.tags.cube.alignment import ALIKE, STEPS, Alignment, align
+from tacdata.tags.cube.corners import TIGHT, Candidate, angle_between, candidates
+from tacdata.tags.cube.cube import AXES, Cube
+from tacdata.tags.detection.tag import Tag
+
+UNLIKE = 0.45
+"""Correlation [1] below which a face that a pose turns to the camera is not there (or is covered)."""
+CLEARLY = 1.15
+"""Ratio of residuals [1] from which the better one is believed."""
+LARGE = 48
+"""Side of a tag [px] that is as good as a larger one: from twice that the image is halved, and so on."""
+LEAST_TILT = np.radians(6.0)
+"""By how much [rad] a mirrored pose is turned at least."""
+STRIDE, AWAY = np.radians(8.0), 3.0
+"""How far a cube turns between two images at most [rad] for its last pose to choose between two that are at least
+twice that, and so many times [1] as far as the nearer one, from it; the image must agree as well as before."""
+APART = np.radians(2.0)
+"""Angle [rad] from which two poses are different ones."""
+
+
+class Rival:
+    """A pose that explains the detected corners, aligned with the image."""
+
+    def __init__(self, candidate: Candidate, grey: np.ndarray, cube: Cube, camera: Camera) -> None:
+        """Align a candidate with an image, uint8, shape (height, width)."""
+        self.tags = candidate.tags
+        self.seen = {cube.faces[tag.id] for tag in self.tags}
+        start = Alignment(candidate.rotation, candidate.translation)
+        self.alignment = _aligned(start, self.seen, grey, cube, camera)
+        self.reprojection = candidate.moved(self.alignment.rotation, self.alignment.translation, cube, camera)
+        if not self.reprojection <= 1.5 * max(TIGHT * max(tag.size for tag in self.tags), 1.2):
+            self.alignment = _aligned(start, self.seen, grey, cube, camera, steps=0)
+            self.reprojection = candidate.reprojection
+        likeness = self.alignment.likeness
+        self.false = [tag for tag in self.tags if likeness.get(cube.faces[tag.id], 0.0) < ALIKE]
+        """Tags read where the image does not show them."""
+
+    @property
+    def support(self) -> int:
+        """Faces that were not detected and yet look as they should."""
+        return sum(value > ALIKE for face, value in self.alignment.likeness.items() if face not in self.seen)
+
+    @property
+    def missing(self) -> int:
+        """Faces that should be seen and do not look so: not there, or covered."""
+        return sum(value < UNLIKE for face, value in self.alignment.likeness.items() if face not in self.seen)
+
+
+@dataclass(frozen=True, eq=False)
+class Before:
+    """How a cube stood in the image before."""
+
+    rotation: np.ndarray
+    """From the cube frame to the camera frame [1], shape (3, 3)."""
+    residual: float
+    """What was left of the difference between image and drawing [1]; 0 if two poses were about as good."""
+
+
+def best_rival(
+    tags: list[Tag], grey: np.ndarray, cube: Cube, camera: Camera, before: Before | None
+) -> tuple[Rival, Rival | None] | None:
+    """Return the pose that the image supports best, and another that it supports about as well, if any.
+
+    Args:
+        tags: Tags of the cube with straightened corners [px].
+        grey: The image, uint8, shape (height, width).
+        cube: The cube.
+        camera: The camera.
+        before: How it stood just before, if known; decides between two equals.
+    """
+    while tags:
+        starts = candidates(tags, cube, camera)
+        if not starts:
+            return None
+        start = None if before is None else _continuing(starts, before)
+        if before is not None and start is not None:
+            rival = Rival(start, grey, cube, camera)
+            if not rival.false and rival.alignment.residual < CLEARLY * before.residual:
+                return rival, None
+        rivals = [Rival(candidate, grey, cube, camera) for candidate in starts]
+        first = rivals[0]
+        turns = [angle_between(first.alignment.rotation, r.alignment.rotation) for r in rivals]
+        if len(first.seen) == 1 and max(turns) < APART:
+            rivals = [first, Rival(_mirrored(first, cube), grey, cube, camera)]
+        best, other = _choose(rivals, before)
+        if not best.false:
+            return best, other
+        tags = [tag for tag in tags if not any(tag is false for false in best.false)]
+    return None
+
+
+def _continuing(starts: list[Candidate], before: Before) -> Candidate | None:
+    """Return the pose that goes on from the one before, if the other is far from it; None if that is not sure."""
+    angles = sorted((angle_between(start.rotation, before.rotation), k) for k, start in enumerate(starts))
+    if len(angles) < 2 or angles[0][0] > STRIDE or angles[1][0] < AWAY * angles[0][0] + 2 * STRIDE:
+        return None
+    return starts[angles[0][1]]
+
+
+def _mirrored(rival: Rival, cube: Cube) -> Candidate:
+    """Return the pose whose one face is tilted the other way about the line of sight, at the same place.
+
+    Noise lets both poses of a face that is looked at squarely end up in one minimum of its four corners,
+    though the image has two.
+    """
+    rotation, (face,) = rival.alignment.rotation, rival.seen
+    normal = rotation @ AXES[face][:, 2]
+    centre = rival.alignment.translation + normal * cube.side / 2000
+    sight = centre / np.linalg.norm(centre)
+    towards = 2 * (normal @ sight) * sight - normal
+    axis = np.cross(normal, towards)
+    # At least some tilt, so that the other minimum is in reach.
+    angle = np.arctan2(np.linalg.norm(axis), normal @ towards)
+    turned = _turn(axis, max(angle, LEAST_TILT)) @ rotation
+    place = centre - turned @ AXES[face][:, 2] * cube.side / 2000
+    return Candidate(turned, place, rival.tags, rival.reprojection)
+
+
+def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
+    import cv2
+
+    length = float(np.linalg.norm(axis))
+    return cv2.Rodrigues(axis * (angle / length))[0] if length > 1e-9 else np.eye(3)
+
+
+def _choose(rivals: list[Rival], before: Before | None) -> tuple[Rival, Rival | None]:
+    rivals = [r for r in rivals if not r.false] or rivals
+    most = max(rival.support for rival in rivals)
+    rivals = sorted((r for r in rivals if r.support == most), key=lambda r: r.alignment.residual)
+    best = rivals[0]
+    close = [
+        r
+        for r in rivals
+        if r.alignment.residual < CLEARLY * best.alignment.residual
+        and angle_between(r.alignment.rotation, best.alignment.rotation) > APART
+    ]
+    if not close:
+        return best, None
+    # A face that is missing speaks against a pose, but may be covered: it decides nothing for sure.
+    equals = sorted([best, *close], key=lambda r: (r.missing, r.alignment.residual))
+    if before is not None:
+        equals.sort(key=lambda r: angle_between(r.alignment.rotation, before.rotation))
+    return equals[0], equals[1]
+
+
+def _aligned(
+    start: Alignment, seen: set[str], grey: np.ndarray, cube: Cube, camera: Camera, steps: int = STEPS
+) -> Alignment:
+    """Align with a window of the image that holds the whole cube, in half size or less where it is large."""
+    half = cube.side / 2000
+    box = half * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    points = box @ start.rotation.T + start.translation
+    if points[:, 2].min() <= 1e-3:
+        return start
+    pixels = camera.project(points)
+    image, matrix = camera.window(grey, pixels.min(axis=0) - 8, pixels.max(axis=0) + 8)
+    size = cube.tag / 1000 * camera.matrix[0, 0] / start.translation[2]
+    return align(start, seen, cube, *_shrunk(image, matrix, int(size / LARGE)), steps)
+
+
+def _shrunk(image: np.ndarray, matrix: np.ndarray, factor: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return an image and its camera matrix with so many pixels a side made one; odd rows at the end are lost."""
+    import cv2
+
+    height, width = image.shape
+    if factor < 2 or min(height, width) < 8 * factor:
+        return matrix, image
+    kept = image[: height // factor * factor, : width // factor * factor]
+    small = cv2.resize(kept, (width // factor, height // factor), interpolation=cv2.INTER_AREA)
+    # Pixel centres: a pixel of the small image covers `factor` whole ones.
+    shift = (factor - 1) / (2 * factor)
+    to_small = np.array([[1 / factor, 0, -shift], [0, 1 / factor, -shift], [0, 0, 1.0]])
+    return to_small @ matrix, small

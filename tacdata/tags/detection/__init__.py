@@ -1,0 +1,1 @@
+"""AprilTags found in an image."""

@@ -1,0 +1,198 @@
+"""An emulated Grbl 1.1 or grblHAL motion controller on a virtual port."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from tacdata.clock import Clock
+from tacdata.virtual_rig.firmware import texts
+from tacdata.virtual_rig.firmware.dialect import NAMES
+from tacdata.virtual_rig.firmware.machine import Machine
+from tacdata.virtual_rig.firmware.planner import Planner
+from tacdata.virtual_rig.port import VirtualPort
+
+REALTIME = b"?!~\x18"
+"""Bytes that never reach the receive buffer; nor does any above 0x7F."""
+BYTE_SECONDS = 10 / 115200
+NS = 1_000_000_000
+
+
+class Controller:
+    """The firmware's main loop in a thread, on the time of ``clock``.
+
+    `position_at` is where the machine really is; what it reports can differ from that after a loss of
+    position.
+    """
+
+    def __init__(
+        self, clock: Clock, seed: int = 0, position: tuple[float, float, float] = (-1.0, -1.0, -1.0),
+        homed: bool = True, settings: dict[str, str] | None = None,
+        offset: tuple[float, float, float] = (0.0, 0.0, 0.0), firmware: str = "Grbl", fresh: bool = False,
+    ) -> None:  # fmt: skip
+        """Switch on a machine that stands at ``position`` [mm, machine]; ``offset`` is its G54 [mm].
+
+        ``firmware`` is Grbl or grblHAL; a ``fresh`` one finds its memory empty.
+        """
+        self.clock = clock
+        self.port = VirtualPort(115200, seed)
+        kind = NAMES[firmware]
+        self.settings = {**texts.DEFAULTS, **kind.changed, **(settings or {})}
+        self._rng = np.random.default_rng(seed)
+        self.machine = Machine(
+            kind, self.settings, np.array(position, float), np.array(offset, float), homed, self._rng, self._say
+        )
+        self.heard: list[tuple[int, int]] = []
+        """Real-time bytes other than ``?`` and when they came [ns]."""
+        self._fresh, self._muted = fresh, False
+        self._lines: deque[tuple[int, str]] = deque()
+        self._received = bytearray()
+        self._out: deque[tuple[int, str]] = deque()
+        self._report_ns: int | None = None
+        self._faults: queue.SimpleQueue[Callable[[int], None]] = queue.SimpleQueue()
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="virtual-grbl", daemon=True)
+
+    @property
+    def planner(self) -> Planner:
+        """The motion."""
+        return self.machine.planner
+
+    def start(self) -> None:
+        """Switch on."""
+        self.machine.power_on(self.clock.now_ns(), self._fresh)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Switch off and unplug."""
+        self._stopped.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=2.0)
+        self.port.close()
+
+    def position_at(self, time_ns: int) -> np.ndarray:
+        """Return the true position of the carriage [mm], shape (3,), at a time of the recent past [ns]."""
+        return self.planner.position(time_ns)
+
+    def inject_alarm(self, code: int = 1) -> None:
+        """Fault: a limit switch closes (1) or another alarm that stops the machine dead."""
+        self._faults.put(lambda now: self._wiped(lambda: self.machine.stop_dead(now, code)))
+
+    def inject_brown_out(self) -> None:
+        """Fault: the supply sags; the firmware starts anew and believes to stand at zero."""
+        self._faults.put(lambda now: self._wiped(lambda: self.machine.brown_out(now)))
+
+    def inject_silence(self) -> None:
+        """Fault: nothing is answered any more."""
+        self._faults.put(lambda now: setattr(self, "_muted", True))
+
+    def inject_bytes(self, data: bytes) -> None:
+        """Fault: bytes appear on the line."""
+        self._faults.put(lambda now: self.port.write(data))
+
+    def inject_door(self, is_open: bool) -> None:
+        """Fault: the safety door is opened or closed."""
+
+        def turn(now: int) -> None:
+            self.machine.door_open = is_open
+            if is_open:
+                self.machine.open_door(now)
+
+        self._faults.put(turn)
+
+    def inject_byte(self, byte: int) -> None:
+        """Fault: somebody else sends a real-time byte, or presses the button for it."""
+        self._faults.put(lambda now: self.machine.realtime(byte, now))
+
+    def inject_unreadable_memory(self) -> None:
+        """Fault: stored parameters cannot be read; ``$#`` says error:7 and then its own ok."""
+        self._faults.put(lambda now: setattr(self.machine, "unreadable", True))
+
+    def unplug(self) -> None:
+        """Fault: the cable is pulled."""
+        self._faults.put(lambda now: self.port.close())
+
+    def _run(self) -> None:
+        while not self._stopped.is_set():
+            data = self.port.read(self._pause())
+            now = self.clock.now_ns()
+            while not self._faults.empty():
+                self._faults.get()(now)
+            for byte in data:
+                self._take(byte, now)
+            self.machine.serve(now)
+            self._serve_lines(now)
+            self._serve_output(self.clock.now_ns())
+
+    def _pause(self) -> float:
+        """Return how long nothing will happen unless a byte comes [s, real time]."""
+        due = [t for t in (self._report_ns, self.machine.next_event()) if t is not None]
+        if self._out:
+            due.append(self._out[0][0])
+        if self._lines and self._lines[0][0] > self.clock.now_ns():
+            due.append(self._lines[0][0])
+        if not due:
+            return 0.02
+        return min(max((min(due) - self.clock.now_ns()) / NS / self.clock.rate, 0.0002), 0.02)
+
+    def _take(self, byte: int, now: int) -> None:
+        if byte == ord("?"):
+            if self._report_ns is None:
+                step = self.machine.firmware.dwell_step if self.machine.dwell_ns is not None else 0.0
+                self._report_ns = now + int(self._rng.uniform(0.001, max(step, 0.014)) * NS)
+        elif byte in REALTIME or byte > 0x7F:
+            self.heard.append((byte, now))
+            if byte == 0x18:
+                self._wiped(lambda: self.machine.reset(now))
+            else:
+                self.machine.realtime(byte, now)
+        elif self._waiting() >= self.machine.firmware.rx_bytes:
+            return  # what does not fit is lost, as in the firmware's ring buffer
+        elif byte in (0x0A, 0x0D):
+            due = now + int((len(self._received) + 1) * BYTE_SECONDS * NS)
+            self._lines.append((due, self._received.decode("ascii", "replace")))
+            self._received.clear()
+        else:
+            self._received.append(byte)
+
+    def _waiting(self) -> int:
+        return len(self._received) + sum(len(line) + 1 for _, line in self._lines)
+
+    def _wiped(self, restart: Callable[[], None]) -> None:
+        """Forget what was received and not yet said, then start anew."""
+        self._lines.clear()
+        self._received.clear()
+        self._out.clear()
+        self._report_ns = None
+        restart()
+
+    def _serve_lines(self, now: int) -> None:
+        while self._lines and self._lines[0][0] <= now and self.machine.takes_lines(now):
+            line = self._lines[0][1].replace(" ", "")
+            if not self.machine.admits(line, now):
+                return
+            self._lines.popleft()
+            self.machine.execute(line, now)
+
+    def _serve_output(self, now: int) -> None:
+        if self._report_ns is not None and now >= self._report_ns:
+            due, self._report_ns = self._report_ns, None
+            if not self.machine.silent(now):
+                text = self.machine.report(due, self.machine.firmware.rx_bytes - self._waiting())
+                self._say(now, text, lag=0.0)
+        if self.port.waiting:
+            self.port.write(b"")
+        while self._out and self._out[0][0] <= now:
+            text = self._out.popleft()[1]
+            if not self._muted:
+                self.port.write(text.encode("ascii") + b"\r\n")
+
+    def _say(self, now: int, text: str, lag: float | None = None) -> None:
+        # The bridge to USB hands its bytes on once a millisecond.
+        lag = self._rng.uniform(0.0005, 0.0015) if lag is None else lag
+        due = now + int((lag + len(text) * BYTE_SECONDS) * NS)
+        self._out.append((max(due, self._out[-1][0]) if self._out else due, text))

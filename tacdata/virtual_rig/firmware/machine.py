@@ -1,0 +1,392 @@
+"""The emulated firmware's state machine: what a line and a real-time byte do, and when it is done."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from tacdata.virtual_rig.firmware import gcode, texts
+from tacdata.virtual_rig.firmware.dialect import Firmware
+from tacdata.virtual_rig.firmware.planner import Block, Planner, axis_limit
+from tacdata.virtual_rig.firmware.texts import LOCKED, axis_setting
+
+NS = 1_000_000_000
+ALWAYS_ON = 255
+OVERRIDES = {0x90: None, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}
+"""Real-time byte -> change of the feed override [%]; None sets it back to 100."""
+CRITICAL = (1, 2)
+"""Alarms after which only a reset is heard."""
+LOST = 0.02
+"""Steps lost when motors are cut off in motion, standard deviation [mm]."""
+
+
+class Machine:
+    """Grbl 1.1's or grblHAL's behaviour in closed form (`protocol.c`); `serve` brings it to the present time."""
+
+    def __init__(
+        self, firmware: Firmware, settings: dict[str, str], position: np.ndarray, offset: np.ndarray, homed: bool,
+        rng: np.random.Generator, say: Callable[[int, str], None],
+    ) -> None:  # fmt: skip
+        """Stand still at ``position`` [mm, machine]; ``offset`` is the G54 [mm]; ``say`` gets (time [ns], line)."""
+        self.firmware, self.settings, self.offset = firmware, settings, offset
+        self.planner = Planner(position)
+        self.startup = ["", ""]
+        self.alarm: int | None = None if homed else 0
+        self.door_open = False
+        self.override = 100
+        self.unreadable = False
+        self.error = np.zeros(3)
+        """True minus reported position [mm], shape (3,)."""
+        self.busy_until = 0
+        """Until then nothing is executed or reported [ns]: the pause after an alarm."""
+        self._say, self._rng = say, rng
+        self._boot_due: int | None = None
+        self._clear()
+
+    def _clear(self) -> None:
+        self.modal = gcode.Modal()
+        self.counters = texts.Counters()
+        self.dwell_ns: int | None = None
+        self.homing = self.critical = self.check = self.sleeping = False
+        self._door = self._limit_hit = self._jog_cancelled = False
+        self._held_at: int | None = None
+        self._refused = 0
+        self.override = 100
+
+    def moving(self, now: int) -> bool:
+        """Whether it counts as moving: until the motors' idle delay (``$1``) after the last step."""
+        delay = int(self.settings["$1"])
+        settling = 0 if delay == ALWAYS_ON else delay * 1_000_000
+        rest_ns = self.planner.rest_ns
+        return self.planner.moving(now) or (rest_ns is not None and rest_ns <= now < rest_ns + settling)
+
+    def state(self, now: int) -> str:
+        """Return the state with its substate, as reports write it."""
+        if self.homing:
+            return "Home"
+        if self.alarm is not None:
+            return f"Alarm:{self.alarm}" if self.alarm and self.firmware.alarm_substate else "Alarm"
+        if self.check:
+            return "Check"
+        moving = self.moving(now)
+        if self._door:
+            return "Door:2" if moving else "Door:1" if self.door_open else "Door:0"
+        if self._jog_cancelled:
+            return "Jog"
+        if self.planner.held and (moving or not self._limit_hit):
+            return "Hold:1" if moving else "Hold:0"
+        if self.sleeping:
+            return "Sleep"
+        if not moving:
+            return "Idle"
+        return self.planner.blocks[0].kind if self.planner.blocks else "Run"
+
+    def silent(self, now: int) -> bool:
+        """Whether ``?`` stays without an answer."""
+        deaf = self.critical and not self.firmware.answers_in_critical_alarm
+        return self.homing or deaf or now < self.busy_until
+
+    def next_event(self) -> int | None:
+        """Return when something ends by itself [ns], as far as it is known."""
+        due = [t for t in (self.dwell_ns, self._boot_due) if t is not None]
+        if self.busy_until:
+            due.append(self.busy_until)
+        if (end := self.planner.next_end()) is not None:
+            due.append(end)
+        return min(due, default=None)
+
+    def serve(self, now: int) -> None:
+        """Carry out what has become due."""
+        if self._boot_due is not None and now >= self._boot_due:
+            self._boot(now)
+        if now < self.busy_until:
+            return
+        self.busy_until = 0
+        left = self.planner.retire(now)
+        if self.homing and not left:
+            self.homing, self.alarm, self.error = False, None, np.zeros(3)
+            self._say(now, "ok")
+        if self._jog_cancelled and not self.moving(now):
+            self._jog_cancelled = False
+            self.planner.stop(now)
+        if self._limit_hit and not self.moving(now):
+            self._limit_hit = False
+            self.stop_dead(now, 2)
+        if self.dwell_ns is not None and now >= self.dwell_ns and not self._suspended(now):
+            self.dwell_ns = None
+            self._say(now, "ok")
+
+    def realtime(self, byte: int, now: int) -> None:
+        """Heed a real-time byte other than ``?`` and 0x18."""
+        state = self.state(now).split(":")[0]
+        if byte == ord("!") and state in ("Idle", "Run", "Jog"):
+            self._hold(now)
+            self._jog_cancelled = state == "Jog"
+        elif byte == ord("~") and not self.moving(now):
+            self._go_on(now)
+        elif byte == 0x84:
+            self.open_door(now)
+        elif byte == 0x85 and state == "Jog":
+            self._hold(now)
+            self._jog_cancelled = True
+        elif byte in OVERRIDES:
+            change = OVERRIDES[byte]
+            new = 100 if change is None else min(max(self.override + change, 10), 200)
+            if new != self.override:
+                self.planner.scale(new / self.override, now)
+                self.override, self.counters.overrides = new, 0
+
+    def open_door(self, now: int) -> None:
+        """The door's switch opens, or ``0x84`` says so."""
+        if self.homing:
+            self.stop_dead(now, 7)
+        elif self.alarm is None:
+            self._say(now, "[MSG:Check Door]")
+            self._hold(now)
+            self._door = True
+
+    def takes_lines(self, now: int) -> bool:
+        """Whether the main loop runs at all: not in a pause, a standing hold, an open door, sleep or homing."""
+        blocked = self.dwell_ns is not None or self.homing or self._limit_hit or self.critical or self.sleeping
+        return not blocked and now >= self.busy_until and self._boot_due is None and not self._suspended(now)
+
+    def admits(self, line: str, now: int) -> bool:
+        """Whether the planner is ready for a line: empty for a dwell, with a free block for a move."""
+        left = self.planner.retire(now)
+        if "G4P" in line.upper().replace(" ", ""):
+            return not left and not self.moving(now) and not self.planner.held
+        return line.startswith("$") or left < self.firmware.planner_blocks
+
+    def execute(self, line: str, now: int) -> None:
+        """Carry out a line and say its answer."""
+        try:
+            if len(line) > self.firmware.line_bytes:
+                raise gcode.Refused(11)
+            if line.startswith("$"):
+                self._dollar(line.upper(), now)
+            elif line:
+                self._gcode(line, now)
+            else:
+                self._say(now, "ok")
+            self._refused = 0
+        except gcode.Refused as refusal:
+            self._refused = refusal.code if self.firmware.refuses_after_error else 0
+            self._say(now, f"error:{refusal.code}")
+
+    def report(self, now: int, rx_free: int) -> str:
+        """Return a status report."""
+        free = self.firmware.planner_blocks - self.planner.retire(now), rx_free
+        believed = self.planner.position(now) - self.error
+        return texts.report(
+            self.settings, self.state(now), believed, self.planner.speed(now), self.offset, free, self.counters,
+            self.override, "D" if self.door_open else "",
+        )  # fmt: skip
+
+    def reset(self, now: int) -> None:
+        """Heed 0x18: in motion the motors are cut off and steps are lost."""
+        moving, homing = self.moving(now), self.homing
+        self.planner.stop(now)
+        self._clear()
+        self.busy_until = 0
+        if moving:
+            self.error += self._rng.normal(0, LOST, 3)
+            self._raise_alarm(6 if homing else 3, now)
+            self._boot_due = self.busy_until
+        else:
+            self._boot(now)
+
+    def brown_out(self, now: int) -> None:
+        """Start anew, believing to stand at zero."""
+        self.planner.stop(now)
+        self._clear()
+        self.error = self.planner.position(now)
+        self.alarm = 0 if self.settings["$22"] != "0" else None
+        self._say(now, "\x00")
+        self._boot(now)
+
+    def stop_dead(self, now: int, code: int) -> None:
+        """Cut the motors off and raise an alarm."""
+        if self.planner.stop(now):
+            self.error += self._rng.normal(0, LOST, 3)
+        self._clear()
+        self._raise_alarm(code, now)
+        self.critical = code in CRITICAL
+        if self.critical:
+            self._say(now, "[MSG:Reset to continue]")
+
+    def power_on(self, now: int, fresh: bool) -> None:
+        """Say what a board says when it is switched on; ``fresh``: with an empty memory."""
+        if fresh:
+            self._say(now, "error:7")
+            for line in texts.information("$$", self.firmware, self.settings, self.offset, []) or []:
+                self._say(now, line)
+        self._boot(now)
+        if fresh:
+            for _ in self.startup:
+                self._say(now, ">:error:7")
+
+    def _suspended(self, now: int) -> bool:
+        return (self.planner.held or self._door) and not self.moving(now)
+
+    def _hold(self, now: int) -> None:
+        if not self.planner.held:
+            self._held_at = now
+        self.planner.hold(now)
+
+    def _go_on(self, now: int) -> None:
+        if self.alarm is not None or (self._door and self.door_open):
+            return
+        self._door = False
+        if self.dwell_ns is not None and self._held_at is not None:
+            self.dwell_ns += now - self._held_at
+        self._held_at = None
+        self.planner.resume(now)
+
+    def _raise_alarm(self, code: int, now: int) -> None:
+        self.alarm = code
+        self._say(now, f"ALARM:{code}")
+        self.busy_until = now + int(self.firmware.alarm_pause * NS)
+
+    def _boot(self, now: int) -> None:
+        self._boot_due = None
+        self._say(now, "")
+        self._say(now, self.firmware.welcome)
+        if self.alarm is not None:
+            self._say(now, LOCKED)
+            return
+        if self.door_open:
+            self.open_door(now)
+        for line in self.startup:
+            if line:
+                try:
+                    self._act(line, now)
+                    self._say(now, f">{line}:ok")
+                except gcode.Refused as refusal:
+                    self._say(now, f">{line}:error:{refusal.code}")
+
+    def _gcode(self, line: str, now: int) -> None:
+        if self.alarm is not None or self.state(now) == "Jog":
+            raise gcode.Refused(9)
+        if self._refused:
+            raise gcode.Refused(self._refused)
+        if self._act(line, now):
+            self._say(now, "ok")
+
+    def _act(self, line: str, now: int) -> bool:
+        """Carry out G-code; return False if its answer comes later or never."""
+        action = gcode.interpret(line, self.modal, self.planner.target - self.error, self.offset)
+        if action.target is not None and self._outside(action.target):
+            self._hold(now)
+            self._limit_hit = True
+            return False
+        if self.check:
+            return True
+        if action.dwell is not None:
+            step = self.firmware.dwell_step
+            self.dwell_ns = now + int(math.ceil(round(action.dwell / step, 6)) * step * NS)
+            return False
+        if action.target is not None:
+            speed = None if action.rapid else self.modal.feed / 60 * self.override / 100
+            self._move(action.target, speed, now, "Run")
+        return True
+
+    def _move(self, target: np.ndarray, speed: float | None, now: int, kind: str) -> None:
+        start, steps = self.planner.target, axis_setting(self.settings, "$10")
+        end = np.round((target + self.error) * steps) / steps
+        length = float(np.linalg.norm(end - start))
+        if length == 0:
+            return
+        unit = (end - start) / length
+        fastest = axis_limit(unit, axis_setting(self.settings, "$11") / 60)
+        speed = fastest if speed is None else min(max(speed, 1 / 60), fastest)
+        self.planner.add(Block(start, end, speed, axis_limit(unit, axis_setting(self.settings, "$12")), kind), now)
+
+    def _outside(self, target: np.ndarray) -> bool:
+        return self.settings["$20"] == "1" and bool(
+            np.any(target > 0) or np.any(target < -axis_setting(self.settings, "$13"))
+        )
+
+    def _dollar(self, line: str, now: int) -> None:
+        state = self.state(now).split(":")[0]
+        if line.startswith("$J="):
+            self._jog(line[3:], now)
+        elif line == "$G":
+            words = " ".join(self.modal.words.values())
+            self._answer(now, [f"[GC:{words} T0 F{self.modal.feed:g} S0]"])
+        elif line in ("$", "$$", "$#", "$I", "$N", "$C", "$H", "$X", "$SLP") or "=" in line:
+            if state not in ("Idle", "Alarm", "Check"):
+                raise gcode.Refused(8)
+            self._idle_command(line, now)
+        else:
+            raise gcode.Refused(3)
+
+    def _idle_command(self, line: str, now: int) -> None:
+        told = texts.information(line, self.firmware, self.settings, self.offset, self.startup)
+        if told is not None:
+            self._answer(now, ["error:7"] if line == "$#" and self.unreadable else told)
+        elif line == "$X":
+            self._answer(now, ["[MSG:Caution: Unlocked]"] if self.alarm is not None else [])
+            self.alarm = None
+        elif line == "$C":
+            self.check = not self.check
+            self._answer(now, [f"[MSG:{'Enabled' if self.check else 'Disabled'}]"])
+        elif line == "$SLP":
+            self.sleeping = True
+            self._answer(now, ["[MSG:Sleeping]"])
+        elif line == "$H":
+            self._home(now)
+        elif line.startswith("$N"):
+            self._keep(line, now)
+        else:
+            self._set(line, now)
+
+    def _answer(self, now: int, lines: list[str]) -> None:
+        for text in [*lines, "ok"]:
+            self._say(now, text)
+
+    def _keep(self, line: str, now: int) -> None:
+        number, _, text = line[2:].partition("=")
+        if number not in ("0", "1"):
+            raise gcode.Refused(3)
+        if text:
+            self._act(text, now)
+        self.startup[int(number)] = text
+        self._say(now, "ok")
+
+    def _set(self, line: str, now: int) -> None:
+        name, _, value = line.partition("=")
+        if name not in self.settings:
+            raise gcode.Refused(3)
+        try:
+            if float(value) < 0:
+                raise gcode.Refused(4)
+        except ValueError:
+            raise gcode.Refused(2) from None
+        if (name, value) == ("$20", "1") and self.settings["$22"] != "1":
+            raise gcode.Refused(10)
+        self.settings[name] = value
+        self._say(now, "ok")
+
+    def _home(self, now: int) -> None:
+        if self.settings["$22"] != "1":
+            raise gcode.Refused(5)
+        self.homing, self.error = True, np.zeros(3)
+        self._move(np.full(3, -float(self.settings["$27"])), float(self.settings["$25"]) / 60, now, "Home")
+
+    def _jog(self, line: str, now: int) -> None:
+        if self.alarm is not None:
+            raise gcode.Refused(9)
+        if self.state(now) not in ("Idle", "Jog"):
+            raise gcode.Refused(8)
+        scratch = gcode.Modal(dict(self.modal.words), 0.0)
+        action = gcode.interpret(line, scratch, self.planner.target - self.error, self.offset, jog=True)
+        if action.target is None:
+            raise gcode.Refused(16)
+        if self._outside(action.target):
+            raise gcode.Refused(15)
+        words = dict(gcode.split(line))
+        unit = 25.4 if "G20" in line or (self.modal.unit != 1.0 and "G21" not in line) else 1.0
+        self._move(action.target, words["F"] * unit / 60, now, "Jog")
+        self._say(now, "ok")

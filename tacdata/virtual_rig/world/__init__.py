@@ -1,0 +1,1 @@
+"""The emulated skin, hand and operator."""

@@ -1,0 +1,1 @@
+"""Frames of taxel readings as bytes."""

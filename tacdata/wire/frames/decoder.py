@@ -1,0 +1,63 @@
+"""From received bytes to frames of readings."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from tacdata.wire.delivered import StreamCounts, TaxelFrame
+from tacdata.wire.frames.ascii import AsciiLines
+from tacdata.wire.frames.binary import BinaryFrames
+from tacdata.wire.frames.counter import CounterTrack
+from tacdata.wire.frames.frame_format import BITS, FrameFormat
+from tacdata.wire.frames.packets import PacketFrames
+
+
+class Decoder:
+    """Decodes one board's stream; keeps what is unfinished between calls and never makes up a reading.
+
+    ``counts`` says what was received, lost (by the counter), repeated (and dropped), corrupt, and skipped.
+    """
+
+    def __init__(self, layout: FrameFormat) -> None:
+        """Decode frames that lie as ``layout`` says."""
+        self.layout = layout
+        self.counts = StreamCounts()
+        cutter = AsciiLines if layout.encoding == "ascii" else BinaryFrames
+        self._frames = (PacketFrames if layout.framing != "none" else cutter)(layout, self.counts)
+        modulus = 1 << BITS[layout.counter] if layout.counter else 0
+        self._counter = CounterTrack(modulus, layout.rate, self.counts) if modulus else None
+        self._received = 0
+        self._arrivals: deque[tuple[int, int]] = deque()
+        self._ticks: int | None = None
+
+    def feed(self, data: bytes, arrival_ns: int) -> list[TaxelFrame]:
+        """Take bytes received at ``arrival_ns`` [ns]; return the frames that they complete."""
+        self._received += len(data)
+        self._arrivals.append((self._received, arrival_ns))
+        frames = []
+        for fields, end in self._frames.push(data):
+            arrival = self._arrival_of(end)
+            ticks = self._unwrap(int(fields["timestamp"][0])) if "timestamp" in fields else None
+            counter = -1
+            if self._counter:
+                value = self._counter.advance(int(fields["counter"][0]), arrival)
+                if value is None:
+                    continue
+                counter = value
+            self.counts.received += 1
+            device_ns = -1 if ticks is None else round(ticks * self.layout.tick * 1e9)
+            frames.append(TaxelFrame(arrival, counter, fields["channels"], device_ns))
+        while self._arrivals and self._arrivals[0][0] <= self._frames.offset:
+            self._arrivals.popleft()  # of bytes that are cut up already, were they frames or garbage
+        return frames
+
+    def _arrival_of(self, end: int) -> int:
+        # A frame may be proven only by later bytes: its time is that of the chunk with its own last byte.
+        while self._arrivals[0][0] < end:
+            self._arrivals.popleft()
+        return self._arrivals[0][1]
+
+    def _unwrap(self, raw: int) -> int:
+        modulus = 1 << BITS[self.layout.timestamp or "uint32"]
+        self._ticks = raw if self._ticks is None else self._ticks + (raw - self._ticks) % modulus
+        return self._ticks

@@ -1,0 +1,379 @@
+"""The conversation with a GRBL controller: lines answered one by one, real-time bytes, polled status."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import serial
+
+from tacdata.clock import Clock
+from tacdata.errors import DeviceError
+from tacdata.wire.delivered import CncStatus
+from tacdata.wire.grbl import codes
+from tacdata.wire.grbl.lines import ALARM, RESPONSE, WELCOME, StatusReport, parse_status
+from tacdata.wire.grbl.statuses import Statuses
+from tacdata.wire.grbl.watch import WELCOME_IN_MID_STREAM, what_is_wrong
+from tacdata.wire.serial_port import read_available
+
+REAL_FLOOR = 1.0
+"""No wait for the controller gives up sooner than this [s, real time], however fast the clock runs."""
+SILENCE = 3.0
+"""A controller that is asked and says nothing for so long is gone [s of the clock, and of real time: a fast clock is
+an emulator's, which stalls with its host]."""
+LINE_BYTES = 79
+"""Longest line that Grbl 1.1 takes [bytes without its end] (``LINE_BUFFER_SIZE`` 80; grblHAL takes 256)."""
+RX_BYTES = 128
+"""Receive buffer until the controller has said its own [bytes]; Grbl 1.1's."""
+READ_FAILED = "error:7"
+"""Said by ``$#`` and ``$N`` for each entry that cannot be read, before their own answer."""
+
+
+def deadline(clock: Clock, seconds: float) -> float:
+    """Return the `time.monotonic` value at which a wait of ``seconds`` [s of the clock] ends."""
+    return time.monotonic() + max(seconds / clock.rate, REAL_FLOOR)
+
+
+@dataclass
+class _Line:
+    """A line on its way."""
+
+    text: str
+    answer: str | None = None
+    pushed: list[str] = field(default_factory=list)
+
+
+class GrblLink:
+    """One open line to a controller, with a reading and a polling thread.
+
+    Each line is answered once, in order, and only a line that is exactly ``ok`` or ``error:N`` is an answer. A line
+    goes out only when it fits into what unanswered ones leave of the receive buffer. What stops the machine for good
+    (alarm, unexpected welcome, broken line, silence) is kept as `fault` and raised by every later call; what only
+    interrupts it (a hold, the door) is kept as `interruption` until `rearm`.
+    """
+
+    def __init__(self, port: serial.SerialBase, clock: Clock, poll_rate: float) -> None:
+        """Talk through an open ``port``, asking for the status ``poll_rate`` times a second of ``clock``."""
+        self.port, self.clock, self.poll_rate = port, clock, poll_rate
+        self.welcome = ""
+        self.resets = 0  # welcomes that answer no soft reset of ours
+        self.rx_bytes = RX_BYTES
+        self.fault: DeviceError | None = None
+        self.interruption: DeviceError | None = None
+        self.notes: list[str] = []
+        self.seen = bytearray()  # first bytes ever received, for a person who has to guess the baud rate
+        self.statuses = Statuses(clock)
+        self.homing = False
+        self._held = False
+        self._unanswered: deque[_Line] = deque()
+        self._received_at, self._commanded_ns = time.monotonic(), clock.now_ns()
+        self._welcome_expected, self._reset_asked = True, False
+        self.polled = False
+        self._stopped = threading.Event()
+        self._changed = threading.Condition()
+        self._turn = threading.RLock()
+        # Reentrant, because a signal handler may send a feed hold while its own thread is writing a line.
+        self._writing = threading.RLock()
+        self._threads: list[threading.Thread] = []
+
+    @property
+    def last(self) -> CncStatus | None:
+        """The latest report."""
+        return self.statuses.last
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a line is not answered yet."""
+        return bool(self._unanswered)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the latest report says Idle and no line went out since."""
+        last = self.last
+        return last is not None and last.state == "Idle" and last.sent_ns > self._commanded_ns
+
+    def start(self) -> None:
+        """Start to listen."""
+        self._begin(self._listen, "grbl-listen")
+
+    def poll(self) -> None:
+        """Start to ask for the status and to mind silence; from now on a welcome means a lost position."""
+        self._welcome_expected, self.polled = False, True
+        self._received_at = time.monotonic()
+        self._begin(self._ask_regularly, "grbl-poll")
+
+    def stop(self) -> None:
+        """End the threads and every wait, and close the port; never raises."""
+        self._stopped.set()
+        self._fail(f"the controller on {self.port.port} was closed", "an open one", "open it again")
+        for thread in self._threads:
+            thread.join(timeout=2.0)
+        try:
+            self.port.close()
+        except (serial.SerialException, OSError):
+            pass
+
+    def realtime(self, byte: bytes) -> None:
+        """Send a real-time byte at once, past every waiting line; safe from any thread and signal handler."""
+        self._write(byte)
+
+    def hold(self) -> None:
+        """Send ``!``; until `rearm` no line goes out, and whoever waits for an answer is told so."""
+        try:
+            self._write(b"!")
+        finally:
+            with self._changed:
+                self._held = True
+                self._changed.notify_all()
+
+    def rearm(self) -> None:
+        """Take lines again after a hold or an interruption."""
+        with self._changed:
+            self._held, self.interruption = False, None
+
+    def ask(self) -> None:
+        """Ask for the status, unless an answer is still due."""
+        with self._changed:
+            wanted = self.statuses.ask()
+        if wanted:
+            self._write(b"?")
+
+    def command(self, line: str, timeout: float | None) -> tuple[list[str], int, int]:
+        """Send a line and wait for its answer.
+
+        Args:
+            line: One line without its end.
+            timeout: Longest wait [s of the clock]; None waits as long as the controller lives, as a full
+                planner or a dwell hold the answer back.
+
+        Returns:
+            What was pushed meanwhile, and the times of sending and of the answer [ns].
+
+        Raises:
+            DeviceError: If the line is too long, refused, thrown away or not answered, on a hold or a fault.
+        """
+        data = line.encode("ascii") + b"\n"
+        if len(data) > min(LINE_BYTES + 1, self.rx_bytes):
+            raise DeviceError(
+                f"a line of {len(line)} bytes for the controller: {line[:40]!r}...",
+                f"at most {min(LINE_BYTES + 1, self.rx_bytes) - 1} bytes, as its buffers hold no more",
+                "shorten the line",
+            )
+        entry = _Line(line)
+        with self._turn:
+            self.wait(lambda: self._room() >= len(data), timeout, "room in the controller's receive buffer")
+            with self._changed:
+                self._unanswered.append(entry)
+            sent_ns = self._commanded_ns = self.clock.now_ns()
+            self._write(data)
+        self.wait(lambda: entry.answer is not None, timeout, f"an answer to {line!r}")
+        answered_ns = self.clock.now_ns()
+        self._raise_if_refused(entry)
+        return entry.pushed, sent_ns, answered_ns
+
+    def wait(self, reached: Callable[[], bool], timeout: float | None, what: str, through_hold: bool = False) -> None:
+        """Wait until ``reached()``, ``timeout`` [s of the clock] at most; None: while nothing is wrong.
+
+        With ``through_hold`` only a fault ends the wait, no hold and no interruption.
+
+        Raises:
+            DeviceError: On a fault, an interruption or a hold, or when the time is over.
+        """
+        end = None if timeout is None else deadline(self.clock, timeout)
+        with self._changed:
+            self.check(through_hold)
+            while not reached():
+                if end is not None and time.monotonic() > end:
+                    raise self._too_late(timeout or 0.0, what)
+                self._changed.wait(0.05)
+                self.check(through_hold)
+
+    def take_statuses(self) -> list[CncStatus]:
+        """Return the reports received since the last call."""
+        with self._changed:
+            return self.statuses.collect()
+
+    def fresh_status(self, timeout: float) -> CncStatus:
+        """Ask and return a report whose query went out after this call began; a hold does not stop this.
+
+        Raises:
+            DeviceError: On a fault, or when the time is over.
+        """
+        begun, end = self.clock.now_ns(), deadline(self.clock, timeout)
+        while True:
+            self.ask()
+            with self._changed:
+                self.check(through_hold=True)
+                if self.last and self.last.sent_ns >= begun:
+                    return self.last
+                if time.monotonic() > end:
+                    raise self._too_late(timeout, "a status report")
+                if self.statuses.asked_ns is not None or self.statuses.automatic:
+                    self._changed.wait(0.05)
+
+    def soft_reset(self, timeout: float) -> None:
+        """Send 0x18 and wait for the welcome that answers it; the caller makes sure that nothing moves."""
+        with self._changed:
+            self._welcome_expected, self._reset_asked, self.welcome = True, True, ""
+        self._write(b"\x18")
+        try:
+            self.wait(lambda: bool(self.welcome), timeout, "the welcome after a soft reset", through_hold=True)
+        finally:
+            self._welcome_expected, self._reset_asked = not self.polled, False
+
+    def hear(self, seconds: float) -> bool:
+        """Wait at most ``seconds`` [s, real time] for a welcome or a status report; say whether one came."""
+        with self._changed:
+            return self._changed.wait_for(lambda: bool(self.welcome or self.last or self.fault), seconds)
+
+    def check(self, through_hold: bool = False) -> None:
+        """Raise the fault, the interruption or the hold, if there is one; ``through_hold``: only the fault."""
+        wrong = self.fault or (None if through_hold else self.interruption)
+        if wrong:
+            raise DeviceError(wrong.given, wrong.allowed, wrong.remedy)
+        if self._held and not through_hold:
+            raise DeviceError("the motion was stopped by a feed hold", "a running machine", "continue with --resume")
+
+    def _too_late(self, timeout: float, what: str) -> DeviceError:
+        state = self.last.state if self.last else "unknown"
+        return DeviceError(
+            f"waited {timeout:g} s for {what}; the controller's last state is {state}",
+            "a controller that answers in time",
+            "look at the machine; reset it if it hangs, and record again",
+        )
+
+    def _room(self) -> int:
+        return self.rx_bytes - sum(len(line.text) + 1 for line in self._unanswered)
+
+    def _raise_if_refused(self, entry: _Line) -> None:
+        if entry.answer == "ok":
+            return
+        code = RESPONSE.match(entry.answer or "")
+        raise DeviceError(
+            f"the controller refused {entry.text!r}: {codes.error_in_words(int(code[1]))}"
+            if code
+            else f"the line {entry.text!r} was thrown away by a reset",
+            "a line that it accepts in its present state",
+            "correct the plan or the controller's settings" if code else "send it again when the machine is idle",
+        )
+
+    def _begin(self, work: Callable[[], None], name: str) -> None:
+        thread = threading.Thread(target=work, name=name, daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _write(self, data: bytes) -> None:
+        try:
+            with self._writing:
+                self.port.write(data)
+        except (serial.SerialException, OSError) as error:
+            self._break(error)
+            raise DeviceError(*self._broken(error)) from None
+
+    def _broken(self, error: Exception) -> tuple[str, str, str]:
+        return (
+            f"the line to the controller on {self.port.port} broke: {error}",
+            "a port that stays connected",
+            "check the cable and the power; the position is unknown, home or touch off again",
+        )
+
+    def _break(self, error: Exception) -> None:
+        self._fail(*self._broken(error))
+
+    def _fail(self, given: str, allowed: str, remedy: str) -> None:
+        with self._changed:
+            self.fault = self.fault or DeviceError(given, allowed, remedy)
+            self._changed.notify_all()
+
+    def _ask_regularly(self) -> None:
+        while not self._stopped.wait(1.0 / (self.poll_rate * self.clock.rate)):
+            waited = time.monotonic() - self._received_at
+            # A homing controller (Grbl 1.1) answers nothing; its own time-out minds it.
+            if not self.homing and waited > max(SILENCE / self.clock.rate, SILENCE):
+                self._fail(
+                    f"the controller on {self.port.port} is silent for {waited * self.clock.rate:.1f} s",
+                    f"an answer to ? within {SILENCE:g} s",
+                    "check power and cable; the position is unknown, home or touch off again",
+                )
+            if self.fault is None:
+                try:
+                    self.ask()
+                except DeviceError:
+                    return
+
+    def _listen(self) -> None:
+        buffer = bytearray()
+        while not self._stopped.is_set():
+            try:
+                data = read_available(self.port)
+            except (serial.SerialException, OSError, TypeError) as error:
+                if not self._stopped.is_set():
+                    self._break(error)
+                return
+            arrival_ns = self.clock.now_ns()
+            if not data:
+                continue
+            self.seen += data[: 64 - len(self.seen)] if len(self.seen) < 64 else b""
+            buffer += data
+            while (end := buffer.find(b"\n")) >= 0:
+                line = bytes(buffer[:end]).decode("ascii", "replace").strip("\r \x00")
+                del buffer[: end + 1]
+                if line:
+                    self._take(line, arrival_ns)
+            del buffer[: max(0, len(buffer) - 4096)]
+
+    def _take(self, line: str, arrival_ns: int) -> None:
+        with self._changed:
+            if line.startswith("<"):
+                report = parse_status(line)
+                if report:
+                    self._take_status(report, arrival_ns)
+                else:
+                    self.notes.append(f"damaged status report: {line!r}")
+            elif RESPONSE.match(line):
+                self._take_response(line)
+            elif alarm := ALARM.match(line):
+                self._fail(
+                    f"the controller stopped with {codes.alarm_in_words(int(alarm[1]))}",
+                    "motion without an alarm",
+                    "free the machine by hand if need be, then home or unlock it and record again",
+                )
+            elif WELCOME.search(line):
+                self._take_welcome(line)
+            elif self._unanswered:
+                self._unanswered[0].pushed.append(line)
+            else:
+                self.notes.append(line)
+            del self.notes[:-200]
+            self._changed.notify_all()
+
+    def _take_response(self, line: str) -> None:
+        if not self._unanswered:
+            self.notes.append(f"unasked {line}")
+        elif line == READ_FAILED and self._unanswered[0].text.startswith("$"):
+            self._unanswered[0].pushed.append(line)
+        else:
+            self._unanswered.popleft().answer = line
+
+    def _take_welcome(self, line: str) -> None:
+        self.welcome = line
+        self.statuses.forget()
+        self.resets += not self._reset_asked
+        while self._unanswered:
+            self._unanswered.popleft().answer = "reset"
+        if not self._welcome_expected:
+            given, *rest = WELCOME_IN_MID_STREAM
+            self._fail(given.format(line), *rest)
+
+    def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
+        self._received_at = time.monotonic()
+        self.statuses.take(report, arrival_ns)
+        if self.polled and not self._welcome_expected:
+            wrong, for_good = what_is_wrong(report, self._held, self.homing)
+            if wrong and for_good:
+                self._fail(*wrong)
+            elif wrong and self.interruption is None:
+                self.interruption = DeviceError(*wrong)

@@ -1,0 +1,109 @@
+"""From an open port to a controller that is known to stand still and to obey, without moving it."""
+
+from __future__ import annotations
+
+from tacdata.errors import DeviceError
+from tacdata.wire.grbl.lines import OPENED_AGAIN, WELCOME
+from tacdata.wire.grbl.link import GrblLink
+from tacdata.wire.grbl.settings import GrblSettings
+
+GREETING = 15.0
+"""Longest wait for the first sign of life [s, real time]: a boot loader takes 1-2 s, a simulated board more."""
+GARBAGE = 4.0
+"""The same if what is heard are no characters: another baud rate [s, real time]."""
+FIRST_QUERY = 0.25
+"""Time between queries while nothing is heard [s, real time]."""
+ANSWER = 10.0
+"""Longest wait for the answer to a ``$`` command or a reset [s of the clock]; an alarm alone takes Grbl 0.5 s."""
+TALKS = ("Idle", "Alarm")
+"""States in which ``$`` commands are answered."""
+FULL_SPEED = (b"\x90", b"\x95")
+"""Feed and rapid override back to 100 %; moves nothing."""
+REMEDIES = {
+    "Run": "let it finish or stop it, then try again",
+    "Jog": "let it finish or stop it, then try again",
+    "Home": "wait until homing has ended, then try again",
+    "Hold": "wait until the hold has ended, then try again",
+    "Door": "close the safety door, then try again",
+    "Check": "switch check mode off ($C) in a terminal, then try again",
+    "Sleep": "wake it with a reset and home it, as its motors were off",
+    "Tool": "finish the tool change, then try again",
+}
+
+
+def greet(link: GrblLink, baud: int) -> None:
+    """Wait for a welcome (the board was reset) or an answer to ``?`` (it was not).
+
+    Nothing but queries is sent: whatever speaks here may be moving.
+
+    Raises:
+        DeviceError: If nothing speaks GRBL 1.1.
+    """
+    for turn in range(int(GREETING / FIRST_QUERY)):
+        if turn * FIRST_QUERY >= GARBAGE and not bytes(link.seen).isascii():
+            break
+        if link.hear(FIRST_QUERY):
+            link.check()
+            _refuse_old(link)
+            return
+        link.ask()
+    raise _silent(link, baud)
+
+
+def clear(link: GrblLink) -> str:
+    """End a hold that stands still (nothing moves) and return the state that was found.
+
+    Raises:
+        DeviceError: If the machine is moving, or in another state that only a person should end.
+    """
+    found = link.fresh_status(ANSWER).state
+    if found in OPENED_AGAIN:
+        link.soft_reset(ANSWER)
+    state = link.fresh_status(ANSWER).state
+    if state.split(":")[0] not in TALKS:
+        raise DeviceError(
+            f"the controller on {link.port.port} is in state {state}",
+            "Idle",
+            REMEDIES.get(state.split(":")[0], "bring it to Idle, then try again"),
+        )
+    for override in FULL_SPEED:
+        link.realtime(override)
+    return found
+
+
+def locked(link: GrblLink, settings: GrblSettings) -> DeviceError:
+    """Return what to tell a person whose controller is in alarm."""
+    state = link.last.state if link.last else "Alarm"
+    home = (
+        "home it ($H), or set home: true under cnc in the rig file (every axis moves at opening)"
+        if settings.homing
+        else "unlock it ($X) in a terminal and touch off again; homing is switched off ($22=0)"
+    )
+    return DeviceError(
+        f"the controller on {link.port.port} is locked (state {state}): its position is not known",
+        "a homed controller in state Idle",
+        home,
+    )
+
+
+def _refuse_old(link: GrblLink) -> None:
+    version = WELCOME.search(link.welcome)
+    if version and (int(version[1]), int(version[2])) < (1, 1):
+        raise DeviceError(
+            f"the controller on {link.port.port} says {link.welcome!r}",
+            "Grbl 1.1 or grblHAL, whose reports and codes are known",
+            "flash Grbl 1.1h or grblHAL",
+        )
+
+
+def _silent(link: GrblLink, baud: int) -> DeviceError:
+    seen = bytes(link.seen)
+    return DeviceError(
+        f"nothing on {link.port.port} at {baud} baud speaks GRBL: "
+        + (f"it sent {len(seen)} bytes or more, beginning {seen[:24].hex(' ')}" if seen else "it sent no byte"),
+        "a GRBL 1.1 or grblHAL controller that says its welcome or answers ?",
+        "check the baud rate (GRBL: 115200) and that this is the controller's port"
+        if seen
+        else "check power, cable and port; Grbl says nothing while it homes or after a limit alarm (press its reset); "
+        "some boards need dtr: false under cnc",
+    )

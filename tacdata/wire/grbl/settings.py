@@ -1,0 +1,148 @@
+"""What a GRBL controller says of itself when asked, and what follows from it for a recording."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.errors import DeviceError
+from tacdata.wire.grbl.lines import MESSAGE, MM_PER_INCH, SETTING, STARTUP
+from tacdata.wire.grbl.link import GrblLink
+
+QUESTIONS = ("$I", "$$", "$#", "$G", "$N")
+"""Asked at opening; Grbl answers all of them when idle or locked, and none of them moves anything."""
+ALWAYS_ON = 255
+"""``$1`` that keeps the motors powered."""
+AXIS_WORD = re.compile(r"[XYZ]")
+
+
+@dataclass(frozen=True)
+class GrblSettings:
+    """The answers."""
+
+    said: dict[str, str]
+    """Settings and start-up lines by their name (``$110``, ``$N0``), other answers by their tag (``VER``, ``G54``)."""
+
+    @classmethod
+    def read(cls, link: GrblLink, timeout: float) -> GrblSettings:
+        """Ask everything, each answer awaited for ``timeout`` [s of the clock].
+
+        Raises:
+            DeviceError: If a question is refused or not answered.
+        """
+        said: dict[str, str] = {}
+        for question in QUESTIONS:
+            for pushed in link.command(question, timeout)[0]:
+                if line := STARTUP.match(pushed):
+                    said[pushed.partition("=")[0]] = line[1]
+                elif setting := SETTING.match(pushed):
+                    said[setting[1]] = setting[2]
+                elif message := MESSAGE.match(pushed):
+                    before = f"{said[message[1]]}; " if message[1] in said else ""
+                    said[message[1]] = before + message[2]
+        return cls(said)
+
+    @property
+    def unit(self) -> float:
+        """Report units to mm (``$13``)."""
+        return MM_PER_INCH if self.number("$13") else 1.0
+
+    @property
+    def reports_by_itself(self) -> bool:
+        """Whether grblHAL's ``$481`` is set."""
+        return bool(self.number("$481"))
+
+    @property
+    def rx_bytes(self) -> int | None:
+        """Receive buffer by ``[OPT:codes,blocks,bytes...]`` [bytes], if it says so."""
+        parts = self.said.get("OPT", "").split(",")
+        return int(parts[2]) if len(parts) > 2 and parts[2].isdigit() else None
+
+    @property
+    def homing(self) -> bool:
+        """Whether homing is switched on (``$22``)."""
+        return bool(self.number("$22"))
+
+    @property
+    def work_offset(self) -> np.ndarray | None:
+        """Work coordinate offset [report units], shape (3,): the active G54 to G59.3, G92 and the tool's length."""
+        active = re.search(r"G5\d(?:\.\d)?", self.said.get("GC", ""))
+        try:
+            parts = [self._triple(active[0] if active else "G54"), self._triple("G92")]
+            tool = [float(value) for value in self.said.get("TLO", "0").split(",")]
+        except (KeyError, ValueError):
+            return None
+        length = np.array(tool[:3]) if len(tool) >= 3 else np.array([0.0, 0.0, tool[0]])
+        return np.sum([*parts, length], axis=0)
+
+    @property
+    def travel(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Machine box of the soft limits [mm], shapes (3,) and (3,), if they are on (``$20``, ``$130``-``$132``).
+
+        Machine zero is where homing ends and all positions are negative, unless the firmware was built to put the
+        origin at the switch (``Z`` in OPT; grblHAL: bit 3 of ``$22``), where axes homing downwards count upwards.
+        """
+        length = np.array([self.number(f"$13{axis}") for axis in range(3)])
+        if not self.number("$20") or not np.all(length > 0):
+            return None
+        codes = self.said.get("OPT", "").partition(",")[0]
+        at_switch = "grblHAL" not in self.said.get("FIRMWARE", "") and "Z" in codes
+        at_switch = at_switch or ("grblHAL" in self.said.get("FIRMWARE", "") and bool(int(self.number("$22")) & 8))
+        upwards = np.array([bool(int(self.number("$23")) >> axis & 1) for axis in range(3)]) & at_switch
+        return np.where(upwards, 0.0, -length), np.where(upwards, length, 0.0)
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """What a person should know before the first move."""
+        found = []
+        if not self.number("$20"):
+            found.append("soft limits are off ($20=0): only the rig file's envelope keeps the guide in bounds")
+        if not self.homing:
+            found.append("homing is off ($22=0): machine zero is where the controller was switched on or reset")
+        if (delay := self.number("$1")) != ALWAYS_ON:
+            found.append(
+                f"motors are switched off {delay:g} ms after each move ($1={delay:g}): the tip can give way while it "
+                "holds; $1=255 keeps them on"
+            )
+        return tuple(found)
+
+    def refuse_moves_at_start(self, port: str) -> None:
+        """Refuse start-up lines that move: they run at every reset, and a fault is answered by one.
+
+        Raises:
+            DeviceError: Naming the line.
+        """
+        for name, line in self.said.items():
+            if name.startswith("$N") and AXIS_WORD.search(line.upper()):
+                raise DeviceError(
+                    f"the controller on {port} runs {line!r} at every reset ({name})",
+                    "start-up lines without axis words",
+                    f"clear it in the controller ({name}=)",
+                )
+
+    def limits(self, prefix: str, divisor: float, port: str) -> np.ndarray:
+        """Return three axis settings divided by ``divisor``, shape (3,), for example the rates for ``$11``.
+
+        Raises:
+            DeviceError: If one is missing or not positive.
+        """
+        values = np.array([self.number(f"{prefix}{axis}") for axis in range(3)]) / divisor
+        if not np.all(values > 0):
+            raise DeviceError(
+                f"the controller on {port} reports no usable {prefix}0 to {prefix}2",
+                "a positive rate and acceleration for each axis",
+                "open it first; if it is open, correct these settings in the controller",
+            )
+        return values
+
+    def number(self, name: str) -> float:
+        """Return a setting as a number; 0 if it is absent or no number."""
+        try:
+            return float(self.said.get(name, ""))
+        except ValueError:
+            return 0.0
+
+    def _triple(self, name: str) -> np.ndarray:
+        return np.array([float(value) for value in self.said[name].split(",")[:3]])

@@ -1,0 +1,59 @@
+"""What a status report says that nobody asked for, in words."""
+
+from __future__ import annotations
+
+from tacdata.wire.grbl import codes
+from tacdata.wire.grbl.lines import StatusReport
+
+Words = tuple[str, str, str]
+"""Given, allowed, remedy, as `tacdata.errors` wants them."""
+
+WELCOME_IN_MID_STREAM: Words = (
+    "the controller was reset in mid-stream (it said {!r}); its position is lost",
+    "one welcome, when the port is opened",
+    "check its power supply and cable (a brown-out does this); home or touch off again",
+)
+RESUME = "see why, put it right, then continue with --resume"
+UNASKED = {
+    "Hold": ("someone held the motion (a button, or another program)", "no hold", RESUME),
+    "Door": ("the safety door was opened", "a closed door", "close it, then continue with --resume"),
+    "Jog": ("someone jogs the machine", "one master", "leave the machine alone while it records"),
+    "Home": ("someone homes the machine", "one master", "leave the machine alone while it records"),
+    "Check": ("the controller is in check mode and moves nothing", "Idle or Run", "switch it off ($C)"),
+    "Sleep": ("the controller fell asleep and its motors are off", "a machine that is awake", "reset and home it"),
+    "Tool": ("the controller waits for a tool change", "no tool change", RESUME),
+}
+"""State -> words; none of these ever follows from what a recording sends."""
+LOST = ("Sleep",)
+"""States after which the position is not known."""
+
+
+def what_is_wrong(report: StatusReport, held: bool, homing: bool) -> tuple[Words | None, bool]:
+    """Return what a report says is wrong, or None, and whether that is for good.
+
+    Args:
+        report: A report of a machine that was opened and made ready.
+        held: Whether the hold is our own.
+        homing: Whether the homing is our own.
+    """
+    state, _, substate = report.state.partition(":")
+    if state == "Alarm":
+        why = f": {codes.alarm_in_words(int(substate))}" if substate else ""
+        words = (
+            f"the controller is locked (state {report.state}{why})",
+            "a machine without an alarm",
+            "free it by hand if need be, then home or unlock it and record again",
+        )
+        return words, True
+    # A machine that still brakes (Hold:1) may be about to say why by an alarm.
+    ours = (state == "Hold" and (held or substate != "0")) or (state == "Home" and homing)
+    if state in UNASKED and not ours:
+        return UNASKED[state], state in LOST
+    if report.feed_override is not None and report.feed_override != 100:
+        words = (
+            f"the feed override stands at {report.feed_override:g} %: moves do not run as commanded",
+            "100 %",
+            "leave the override alone while it records; opening the controller sets it back",
+        )
+        return words, False
+    return None, False

@@ -1,0 +1,1 @@
+"""Labelled frames as arrays for the trainer."""

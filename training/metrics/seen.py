@@ -1,0 +1,138 @@
+"""Whether readings are like those that a network has learnt from: for readings that have no label to score by.
+
+A network says something of any readings. Where they lie far from all that it was trained on, that is a guess, and no
+figure of its scores holds. Kept are readings that stand for the training frames: each next one is the frame farthest
+from all chosen so far (T. F. Gonzalez, Theoretical Computer Science 38 (1985) 293), so that few cover all. The measure
+of far is what the validation episodes show: presses that were not learnt from, on which the network is known to do.
+
+Distances are Euclidean between square roots of readings (with their signs), so that a weak contact counts too. Single
+frames are compared, not windows: a movement never seen before passes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata import documents, provenance
+from training.frames.frames import Frames
+from training.metrics.depth_maps import CONTACT_THRESHOLD
+
+FILE = "seen.json"
+KEPT = 400
+"""Readings that stand for all others [count]."""
+LOOKED_AT = 20_000
+"""Training frames among which they are chosen, evenly taken [count]."""
+SHARE = 0.99
+"""Share of the validation frames in contact that count as near [1]."""
+FEWEST = 20
+"""Validation frames in contact without which nothing is said [count]."""
+BLOCK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a network has learnt from, and how far from it is far."""
+
+    readings: np.ndarray
+    """Tared readings that stand for the training frames [counts], shape (k, taxels)."""
+    far: float
+    """Distance from the nearest of them within which `SHARE` of the validation frames in contact lie [counts^0.5]."""
+    checkpoint: str
+    """SHA-256 of the checkpoint that it belongs to."""
+
+    def novelty(self, taxels: np.ndarray) -> np.ndarray:
+        """Return how far readings are from all that was learnt from, over `far` [1], shape (m,).
+
+        Above 1 they are farther than nearly all readings on which the network was validated.
+
+        Args:
+            taxels: Tared readings [counts], shape (m, taxels); where one is no number, the result is NaN.
+        """
+        return _nearest(_root(taxels), _root(self.readings)) / self.far
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """It as plain data (`schemas/seen.schema.json`)."""
+        return {
+            "version": schemas.version("seen"), "checkpoint": self.checkpoint, "far": self.far, "share": SHARE,
+            "readings": np.round(self.readings, 1).tolist(),
+            "provenance": provenance.stamp("training.metrics.seen", {"checkpoint": self.checkpoint}, {"kept": KEPT}),
+        }  # fmt: skip
+
+
+def gathered(
+    frames: Frames, learned: np.ndarray, validated: np.ndarray, checkpoint: str, mirror: bool = False
+) -> Seen | None:
+    """Return what a network has seen; None where the validation episodes hold too little contact to say what is far.
+
+    Args:
+        frames: The dataset.
+        learned: Numbers of the frames that it was trained on, shape (m,).
+        validated: Numbers of the validation frames, shape (q,).
+        checkpoint: SHA-256 of the checkpoint.
+        mirror: Whether training mirrored its frames.
+    """
+    pressed = np.array([n for n in validated if frames.depth[n].max() > CONTACT_THRESHOLD], int)
+    if len(pressed) < FEWEST or not len(learned):
+        return None
+    known = frames.taxels[learned[:: -(-len(learned) // LOOKED_AT)]].astype(np.float64)
+    if mirror:
+        known = np.concatenate(_mirrored(known, frames.sensor.taxels.rows, frames.sensor.taxels.columns))
+    chosen = np.round(known[_covering(_root(known))], 1)
+    far = float(np.quantile(_nearest(_root(frames.taxels[pressed]), _root(chosen)), SHARE))
+    return Seen(chosen, max(far, 1e-6), checkpoint)
+
+
+def write(run: Path, seen: Seen) -> None:
+    """Write RUN/seen.json; an older one is replaced, as it belongs to an older checkpoint."""
+    documents.write(run / FILE, seen.document, "seen")
+
+
+def read(run: Path, checkpoint: str) -> Seen | None:
+    """Return what a run's checkpoint has seen; None if the run does not say it of this checkpoint.
+
+    Raises:
+        FormatError: If the file is damaged.
+    """
+    if not (run / FILE).is_file():
+        return None
+    document = documents.read(run / FILE, "seen")
+    if document["checkpoint"] != checkpoint:
+        return None
+    return Seen(np.array(document["readings"], float), float(document["far"]), checkpoint)
+
+
+def _root(taxels: np.ndarray) -> np.ndarray:
+    values = np.asarray(taxels, np.float64)
+    return np.sign(values) * np.sqrt(np.abs(values))
+
+
+def _nearest(points: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return the distance of each point, shape (m, d), from the nearest known one, shape (k, d)."""
+    found = np.empty(len(points))
+    squares = (known**2).sum(axis=1)
+    for start in range(0, len(points), BLOCK):
+        block = points[start : start + BLOCK]
+        square = (block**2).sum(axis=1)[:, None] + squares - 2 * block @ known.T
+        found[start : start + BLOCK] = np.sqrt(np.maximum(square.min(axis=1), 0.0))
+    return found
+
+
+def _covering(points: np.ndarray) -> np.ndarray:
+    """Return the rows of at most `KEPT` points, shape (n, d), each the farthest from those before it."""
+    chosen, distance = [0], np.full(len(points), np.inf)
+    while len(chosen) < min(KEPT, len(points)):
+        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(int(distance.argmax()))
+    return np.array(chosen)
+
+
+def _mirrored(taxels: np.ndarray, rows: int, columns: int) -> list[np.ndarray]:
+    """Return readings, shape (n, taxels), mirrored in no, one, the other and both directions (taxel i + columns j)."""
+    grid = taxels.reshape(-1, rows, columns)
+    return [grid[:, ::j, ::i].reshape(len(taxels), -1) for j in (1, -1) for i in (1, -1)]

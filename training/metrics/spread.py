@@ -1,0 +1,199 @@
+"""How far off each pixel may be: calibrated on the validation episodes, for any network.
+
+The error of a depth map is largest at the contact's edge and where it is deep. So each pixel falls into a cell by its
+predicted depth and by the depth's slope there; the cell's root mean square error over one half of the validation
+episodes is its standard deviation (cells with few pixels take that of all cells of their depth). The other half of the
+episodes says, as in split conformal prediction (Angelopoulos and Bates, 2023, section 1.1), within how many of these
+deviations a given share of errors lies. Whole episodes are divided, because frames of one press err alike.
+
+What holds on validation episodes holds for presses like them. `reliability` measures on the scored episodes what share
+of the errors really lies inside each interval: on unseen shapes it is less, and the report says how much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata import documents, provenance
+from tacdata.errors import FormatError, UsageError
+from training.metrics.depth_maps import CONTACT_THRESHOLD
+
+FILE = "spread.json"
+DEFINITION = (
+    "share of errors inside intervals calibrated on validation episodes, over pixels deeper than 0.1 mm in label or "
+    "prediction"
+)
+LEVELS = (0.5, 0.68, 0.8, 0.9, 0.95, 0.99)
+"""Shares of errors for which intervals are calibrated [1]."""
+DEPTHS = (0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5)
+"""Borders of the cells in predicted depth [mm]."""
+SLOPES = (0.02, 0.1, 0.3, 0.6, 1.0)
+"""Borders of the cells in slope [mm/mm]."""
+LEAST = 200
+"""Pixels that a cell needs for a deviation of its own."""
+NOT_KNOWN = 1e9
+"""Factor where nothing is known: an interval that holds everything."""
+FLOOR = 1e-4
+"""Smallest deviation [mm]."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Deviation by cell, and how many deviations hold each share of the errors."""
+
+    deviation: np.ndarray
+    """Root mean square error [mm], shape (len(DEPTHS) + 1, len(SLOPES) + 1)."""
+    factors: tuple[float, ...]
+    """Deviations within which each share of `LEVELS` lies [1]."""
+    checkpoint: str
+    """SHA-256 of the checkpoint that it belongs to."""
+
+    def sigma(self, depth: np.ndarray, pitch: float) -> np.ndarray:
+        """Return the standard deviation of each pixel [mm], same shape as ``depth``.
+
+        Args:
+            depth: Predicted maps [mm], shape (n, pixels_x, pixels_y).
+            pitch: Distance of pixels [mm].
+        """
+        return self.deviation[cells(depth, pitch)]
+
+    def half_width(self, depth: np.ndarray, pitch: float, level: float) -> np.ndarray:
+        """Return how far either way the interval of a level reaches [mm], same shape as ``depth``.
+
+        Raises:
+            UsageError: If the level is none of `LEVELS`.
+        """
+        if level not in LEVELS:
+            raise UsageError(f"level {level}", ", ".join(map(str, LEVELS)), "choose one of them")
+        return self.factors[LEVELS.index(level)] * self.sigma(depth, pitch)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The calibration as plain data (`schemas/spread.schema.json`)."""
+        return {
+            "version": schemas.version("spread"),
+            "checkpoint": self.checkpoint,
+            "depths": list(DEPTHS),
+            "slopes": list(SLOPES),
+            "deviation": self.deviation.tolist(),
+            "levels": list(LEVELS),
+            "factors": list(self.factors),
+            "provenance": provenance.stamp("training.metrics.spread", {"checkpoint": self.checkpoint}, {}),
+        }
+
+
+def cells(depth: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cell of each pixel: by depth and by slope, both of the shape of ``depth`` [mm], int64."""
+    along_x, along_y = np.gradient(depth, pitch, axis=(1, 2))
+    return np.digitize(depth, DEPTHS), np.digitize(np.hypot(along_x, along_y), SLOPES)
+
+
+def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, checkpoint: str) -> Spread:
+    """Calibrate on episodes that the network did not learn from.
+
+    Args:
+        maps: Predicted maps of each episode [mm], shape (n, pixels_x, pixels_y).
+        labels: Their labels [mm], same shapes.
+        pitch: Distance of pixels [mm].
+        checkpoint: SHA-256 of the checkpoint.
+
+    Raises:
+        UsageError: If there are fewer than two episodes.
+    """
+    if len(maps) < 2:
+        raise UsageError(f"{len(maps)} validation episodes", "two or more, to calibrate the spread", "record more")
+    shape = (len(DEPTHS) + 1, len(SLOPES) + 1)
+    square, count = np.zeros(shape), np.zeros(shape)
+    for depth, label in zip(maps[::2], labels[::2], strict=True):
+        place = np.ravel_multi_index(cells(depth, pitch), shape).reshape(-1)
+        error = (depth - label).astype(np.float64).reshape(-1)
+        square += np.bincount(place, error**2, minlength=square.size).reshape(shape)
+        count += np.bincount(place, minlength=square.size).reshape(shape)
+    deviation = _filled(square, count)
+    draft = Spread(deviation, (1.0,) * len(LEVELS), checkpoint)
+    ratios = [
+        np.abs(depth - label)[_interesting(depth, label)] / draft.sigma(depth, pitch)[_interesting(depth, label)]
+        for depth, label in zip(maps[1::2], labels[1::2], strict=True)
+    ]
+    together = np.concatenate(ratios)
+    if not len(together):
+        # Nothing touched: there is nothing to calibrate on, and the widest claim is the honest one.
+        return Spread(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint)
+    return Spread(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint)
+
+
+def reliability(
+    spread: Spread, maps: list[np.ndarray], labels: list[np.ndarray], pitch: float
+) -> list[dict[str, float | int]]:
+    """Return for each level the share of errors inside its interval, over pixels in contact in label or prediction.
+
+    Args:
+        spread: The calibration.
+        maps: Predicted maps of each episode [mm], shape (n, pixels_x, pixels_y).
+        labels: Their labels [mm], same shapes.
+        pitch: Distance of pixels [mm].
+    """
+    inside, width, total = np.zeros(len(LEVELS)), np.zeros(len(LEVELS)), 0
+    for depth, label in zip(maps, labels, strict=True):
+        chosen = _interesting(depth, label)
+        sigma, error = spread.sigma(depth, pitch)[chosen], np.abs(depth - label)[chosen]
+        for k, factor in enumerate(spread.factors):
+            inside[k] += (error <= factor * sigma).sum()
+            width[k] += (2 * factor * sigma).sum()
+        total += int(chosen.sum())
+    return [
+        {
+            "level": level,
+            "inside": float(inside[k] / total) if total else 0.0,
+            "mean_width_mm": float(width[k] / total) if total else 0.0,
+            "pixels": total,
+        }
+        for k, level in enumerate(LEVELS)
+    ]
+
+
+def write(run: Path, spread: Spread) -> None:
+    """Write RUN/spread.json; an older one is replaced, as it belongs to an older checkpoint."""
+    documents.write(run / FILE, spread.document, "spread")
+
+
+def read(run: Path, checkpoint: str) -> Spread | None:
+    """Return the calibration of a run's checkpoint; None if the run has none for it.
+
+    Raises:
+        FormatError: If the file is damaged.
+    """
+    path = run / FILE
+    if not path.is_file():
+        return None
+    document = documents.read(path, "spread")
+    deviation = np.array(document["deviation"])
+    wanted = (len(DEPTHS) + 1, len(SLOPES) + 1)
+    same = (tuple(document[k]) for k in ("depths", "slopes", "levels"))
+    if deviation.shape != wanted or tuple(same) != (DEPTHS, SLOPES, LEVELS):
+        raise FormatError(f"{path}: cells of another release", "cells of this release", "remove it and train again")
+    if document["checkpoint"] != checkpoint:
+        return None
+    return Spread(deviation, tuple(document["factors"]), checkpoint)
+
+
+def _interesting(depth: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return the pixels in contact in either map; elsewhere both are near zero, and any interval holds."""
+    return (depth > CONTACT_THRESHOLD) | (label > CONTACT_THRESHOLD)
+
+
+def _filled(square: np.ndarray, count: np.ndarray) -> np.ndarray:
+    rows = square.sum(axis=1, keepdims=True) / np.maximum(count.sum(axis=1, keepdims=True), 1)
+    enough = count.sum(axis=1) >= LEAST
+    known = np.flatnonzero(enough)
+    if not len(known):
+        rows[:] = square.sum() / max(count.sum(), 1)
+    for k in np.flatnonzero(~enough) if len(known) else ():
+        rows[k] = rows[known[np.argmin(np.abs(known - k))]]
+    own = square / np.maximum(count, 1)
+    return np.sqrt(np.where(count >= LEAST, own, np.broadcast_to(rows, count.shape))).clip(FLOOR)

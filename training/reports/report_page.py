@@ -1,0 +1,142 @@
+"""The report of several runs as one HTML page: splits, tables, pictures, reliability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from training.frames.frames import Frames
+from training.reports.comparison import Group, groups, verdicts
+from training.reports.html_page import HtmlPage
+from training.reports.score_picture import draw_cases
+from training.reports.score_sheet import markdown, number, title
+from training.scoring.evaluate import METRICS, Evaluation
+from training.scoring.published import TABLE_1
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One run with its scores."""
+
+    name: str
+    """Network, and what its recipe changes of the paper's."""
+    evaluation: Evaluation
+    frames: Frames
+    """What it was scored on."""
+
+
+def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None = None) -> str:
+    """Return the page.
+
+    Args:
+        runs: Scored runs, in the order in which they are to stand.
+        trials: The sheet of the paper's configuration-referenced evaluations, as Markdown; empty for none.
+        impossible: Split -> why it could not be made.
+    """
+    result = HtmlPage("Scores by split")
+    found = groups((run.name, run.evaluation.document) for run in runs)
+    result.paragraph(runs[0].evaluation.document["statement"])
+    _overview(result, found, impossible or {})
+    _data(result, runs[0].frames)
+    if any(group.reliability for group in found):
+        result.heading("Reliability of the pixels' uncertainty")
+        words = (
+            "Share of errors inside intervals that were calibrated on validation episodes, against what should "
+            "lie there: on the diagonal the uncertainty is right, below it too small."
+        )
+        result.picture(lambda stream: _draw_reliability(stream, found), words)
+    if trials:
+        result.markdown(trials)
+    seen: set[tuple[str, str]] = set()
+    for run in runs:
+        document = run.evaluation.document
+        key = run.name, document["split"]["name"]
+        if key in seen:
+            continue  # of several seeds the first stands for all; their figures are in the first table
+        seen.add(key)
+        _run(result, run, document)
+    return result.text
+
+
+def _overview(result: HtmlPage, found: list[Group], impossible: dict[str, str]) -> None:
+    result.heading("Splits, networks and seeds")
+    result.paragraph("Mean over the frames in contact, then mean ± SD over seeds. Bold: better than the paper's mean.")
+    heads = ["Network", "Split", "Seeds", "Frames", *(title(m) for m in METRICS), "ms a frame"]
+    rows = [
+        [g.name, g.split, str(len(g.seeds)), str(g.frames), *(_cell(g, m) for m in METRICS), f"{g.pace:.2f}"]
+        for g in found
+    ]
+    paper = ["The paper, its own data", "not said", "", "", *(number(TABLE_1[m]["mean"]) for m in METRICS), ""]
+    metrics = list(METRICS)
+    result.table(
+        heads,
+        [*rows, paper],
+        lambda row, column: row < len(found) and 4 <= column < 9 and found[row].beats_the_paper(metrics[column - 4]),
+    )
+    for sentence in verdicts(found):
+        result.paragraph(sentence, note=True)
+    for split, reason in impossible.items():
+        result.paragraph(f"Split {split} was not possible: {reason}", note=True)
+
+
+def _cell(group: Group, metric: str) -> str:
+    deviation = group.deviation(metric)
+    return number(group.mean(metric)) + ("" if deviation is None else f" ± {number(deviation)}")
+
+
+def _data(result: HtmlPage, frames: Frames) -> None:
+    result.heading("Data")
+    specimens = sorted({e.specimen for e in frames.episodes if e.specimen})
+    speeds = [e.speed for e in frames.episodes if e.speed is not None]
+    words = f"{len(frames.episodes)} episodes, {len(frames.taxels)} frames, dataset {frames.dataset_hash[:12]}"
+    words += f", sensor {frames.sensor.name} {frames.sensor.content_hash[:12]}"
+    words += f", specimens: {', '.join(specimens)}" if specimens else ""
+    words += f", {min(speeds):g} to {max(speeds):g} mm/s" if speeds else ""
+    result.paragraph(words + ".")
+    result.picture(lambda stream: _draw_coverage(stream, frames), "Nominal contact centres and depths by indenter.")
+
+
+def _run(result: HtmlPage, run: Scored, document: dict[str, Any]) -> None:
+    split = document["split"]
+    result.heading(f"{run.name}, split {split['name']}, seed {split['seed']}")
+    result.picture(
+        lambda stream: draw_cases(stream, run.evaluation, run.frames),
+        "Best, median and worst press at full depth: signals, label, prediction, error.",
+    )
+    result.markdown(markdown(document).split("\n", 2)[2])
+    result.paragraph(f"Test episodes: {', '.join(map(str, split['episodes']))}.", note=True)
+
+
+def _draw_coverage(stream: BinaryIO, frames: Frames) -> None:
+    figure = Figure(figsize=(11, 3.6), dpi=90, layout="constrained")
+    plane, depths = figure.subplots(1, 2, width_ratios=[1.3, 1])
+    names = sorted({e.indenter for e in frames.episodes})
+    for name in names:
+        mine = [e for e in frames.episodes if e.indenter == name]
+        plane.scatter(
+            [e.x for e in mine], [e.y for e in mine], s=[8 + 20 * max(e.depth, 0) for e in mine], label=name, alpha=0.7
+        )
+    half_x, half_y = (n * frames.sensor.map.pixel_pitch / 2 for n in frames.sensor.map.shape)
+    plane.set(xlim=(-half_x, half_x), ylim=(-half_y, half_y), xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    plane.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    depths.hist([[e.depth for e in frames.episodes if e.indenter == n] for n in names], bins=12, stacked=True)
+    depths.set(xlabel="depth [mm]", ylabel="episodes")
+    figure.savefig(stream, format="png")
+
+
+def _draw_reliability(stream: BinaryIO, found: list[Group]) -> None:
+    figure = Figure(figsize=(8.4, 4.6), dpi=90, layout="constrained")
+    axes = figure.subplots()
+    axes.plot([0.4, 1], [0.4, 1], color="black", linewidth=0.8, linestyle="--")
+    several = len({group.name for group in found}) > 1
+    for group in (g for g in found if g.reliability):
+        levels = sorted(group.reliability)
+        inside = [float(np.mean(group.reliability[level])) for level in levels]
+        words = f"{group.name}, {group.split}" if several else group.split
+        axes.plot(levels, inside, "o-", markersize=3.5, label=words)
+    axes.set(xlabel="should lie inside", ylabel="does", xlim=(0.4, 1.01), ylim=(0.0, 1.01))
+    axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.savefig(stream, format="png")

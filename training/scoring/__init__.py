@@ -1,0 +1,1 @@
+"""A network's scores: the paper's table, protocols, successes."""

@@ -1,0 +1,294 @@
+"""Score a trained network: the paper's table, by indenter, against the prescribed contact, and successes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata import provenance
+from training.frames.frames import EpisodeSpan, Frames
+from training.frames.trials import at_full_depth
+from training.frames.windows import Windows
+from training.inference.checkpoint import Checkpoint
+from training.inference.compute import choose_device, reproducible
+from training.inference.predictor import milliseconds_per_frame, predict
+from training.metrics import depth_maps, physical, spread
+from training.metrics.depth_maps import FrameScores
+from training.metrics.physical import PressScore
+from training.scoring import baselines, published, wilson
+
+DEPTHS = (0.2, 0.3, 0.5, 0.8)
+"""Borders of the largest labelled depth by which frames are told apart [mm]."""
+METRICS = {
+    "pixel_rmse": ("Depth", "Pixel-wise RMSE", "mm"),
+    "peak_error": ("Depth", "Peak Depth Error", "mm"),
+    "contact_rmse": ("Depth", "Contact-region RMSE", "mm"),
+    "centroid_error": ("Position", "Centroid Error", "px"),
+    "iou": ("Region", "IoU", "1"),
+}
+"""Metric -> category, title and unit, in the order of the paper's Table 1."""
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """One scored episode."""
+
+    span: EpisodeSpan
+    """The episode."""
+    depth: np.ndarray
+    """Predicted depth of every frame [mm], shape (n, pixels_x, pixels_y), float32."""
+    label: np.ndarray
+    """Labelled depth clipped to 0 ... D_max [mm], same shape."""
+    valid: np.ndarray
+    """Frames that are scored [bool], shape (n,)."""
+    scores: FrameScores
+    """Scores of all frames, valid or not."""
+    full: np.ndarray
+    """Valid frames at full depth [bool], shape (n,)."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Scores with what they were computed from."""
+
+    document: dict[str, Any]
+    """`schemas/scores.schema.json`."""
+    episodes: tuple[EpisodeResult, ...]
+    """One entry a scored episode."""
+    part: str
+    """What the network knew of them: "test", or "other dataset"."""
+    checkpoint_hash: str
+    """Identity of the checkpoint."""
+
+
+def evaluate(
+    trained: Checkpoint,
+    frames: Frames,
+    device: str = "auto",
+    threads: int | None = None,
+    listener: Callable[[int, int], None] = lambda k, n: None,
+) -> Evaluation:
+    """Score a network on the test episodes of its own dataset, or on every episode of another one.
+
+    Args:
+        trained: The network.
+        frames: The dataset.
+        device: Where the maps are predicted; the time per frame is always taken on one CPU thread.
+        threads: CPU threads; by default one a core, at most `compute.THREADS`.
+        listener: Called after each episode with its count and the number of all.
+
+    Raises:
+        FormatError: If the dataset is of another sensor, or lacks episodes of the split.
+    """
+    trained.check_sensor(frames.sensor, frames.origin)
+    own = frames.dataset_hash == trained.document["dataset"]["hash"]
+    numbers = trained.split.test if own else tuple(e.number for e in frames.episodes)
+    spans = frames.spans(numbers)
+    frames.indices(numbers)
+    place = choose_device(device)
+    windows = Windows(frames, trained.network.offsets, place)
+    network = trained.network.to(place)
+    results = []
+    with reproducible(threads):
+        for count, span in enumerate(spans, start=1):
+            results.append(
+                _result(
+                    frames,
+                    span,
+                    predict(network, windows, np.arange(span.start, span.stop), frames.sensor.map.depth_max),
+                )
+            )
+            listener(count, len(spans))
+    pace = milliseconds_per_frame(network.to("cpu"), Windows(frames, network.offsets))
+    episodes, part, identity = tuple(results), "test" if own else "other dataset", trained.content_hash
+    document = {
+        "version": schemas.version("scores"),
+        **_identity(trained, identity, frames, part, episodes),
+        **_agreement(episodes),
+        "baselines": _baselines(trained, frames, episodes) if own else {},
+        **_prescribed(episodes, frames),
+        **_uncertainty(trained, identity, episodes, frames),
+        "inference_ms_per_frame": pace,
+        "provenance": provenance.stamp(
+            "training.scoring.evaluate",
+            {"checkpoint": identity, "dataset": frames.dataset_hash},
+            {"device": str(place)},
+        ),
+    }
+    return Evaluation(document, episodes, part, identity)
+
+
+def _result(frames: Frames, span: EpisodeSpan, depth: np.ndarray) -> EpisodeResult:
+    here = slice(span.start, span.stop)
+    label = np.clip(frames.depth[here], 0.0, frames.sensor.map.depth_max)
+    scores = depth_maps.score_frames(depth, label)
+    return EpisodeResult(span, depth, label, frames.valid[here], scores, at_full_depth(frames, span))
+
+
+def _identity(
+    trained: Checkpoint, identity: str, frames: Frames, part: str, episodes: tuple[EpisodeResult, ...]
+) -> dict[str, Any]:
+    rig = {True: "a virtual rig", False: "a real rig", None: "a rig that the dataset does not name"}[frames.virtual]
+    first = {
+        "test": "Scores on test episodes that the network never saw",
+        "other dataset": "Scores on every episode of a dataset that the network was not trained on",
+    }[part]
+    return {
+        "statement": f"{first}, recorded on {rig}. The paper's figures come from its own sensor, rig and "
+        "test set: they stand beside ours for orientation and are no comparison on equal data.",
+        "checkpoint": {
+            "hash": identity,
+            "epoch": trained.document["epoch"],
+            **trained.document["network"],
+            "code_version": trained.document["provenance"]["code_version"],
+        },
+        "dataset": {"hash": frames.dataset_hash, "path": frames.origin, "virtual": frames.virtual},
+        "sensor": {
+            "name": frames.sensor.name,
+            "hash": frames.sensor.content_hash,
+            "pixel_pitch_mm": frames.sensor.map.pixel_pitch,
+        },
+        "split": {
+            "name": trained.split.name,
+            "seed": trained.split.seed,
+            "part": part,
+            "episodes": [e.span.number for e in episodes],
+        },
+    }
+
+
+def _agreement(episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
+    """Return the tables of prediction against label, and the counts behind them."""
+    scores = _joined([e.scores.where(e.valid) for e in episodes])
+    touching = scores.where(scores.labelled)
+    names = sorted({e.span.indenter for e in episodes})
+    by_indenter = []
+    for name in names:
+        mine = [e for e in episodes if e.span.indenter == name]
+        part = _joined([e.scores.where(e.valid & e.scores.labelled) for e in mine])
+        by_indenter.append({"indenter": name, "episodes": len(mine), "frames": len(part.iou), "metrics": _table(part)})
+    missed = int((~touching.predicted).sum())
+    apart = ~scores.labelled
+    return {
+        "contact_threshold_mm": depth_maps.CONTACT_THRESHOLD,
+        "frames": {
+            "scored": len(scores.iou),
+            "in_contact": len(touching.iou),
+            "left_out_as_invalid": sum(int((~e.valid).sum()) for e in episodes),
+        },
+        "contact_frames": _table(touching),
+        "all_frames": _table(scores),
+        "indenters": by_indenter,
+        "depths": _by_depth(episodes),
+        "missed_contact": _proportion(
+            "frames in contact whose predicted map has no pixel above the contact threshold",
+            missed,
+            len(touching.iou),
+        ),
+        "false_contact": _proportion(
+            "frames out of contact whose predicted map has a pixel above the contact threshold",
+            int(scores.predicted[apart].sum()),
+            int(apart.sum()),
+        ),
+    }
+
+
+def _by_depth(episodes: tuple[EpisodeResult, ...]) -> list[dict[str, Any]]:
+    """Return the table by the largest labelled depth of a frame: where contact only begins, regions are few pixels."""
+    touching = [e.valid & e.scores.labelled for e in episodes]
+    scores = _joined([e.scores.where(chosen) for e, chosen in zip(episodes, touching, strict=True)])
+    deepest = np.concatenate([e.label[chosen].max(axis=(1, 2)) for e, chosen in zip(episodes, touching, strict=True)])
+    rows = []
+    for low, high in itertools.pairwise((depth_maps.CONTACT_THRESHOLD, *DEPTHS, np.inf)):
+        part = scores.where((deepest > low) & (deepest <= high))
+        if len(part.iou):
+            upper = None if high == np.inf else high
+            rows.append({"above_mm": low, "up_to_mm": upper, "frames": len(part.iou), "metrics": _table(part)})
+    return rows
+
+
+def _baselines(trained: Checkpoint, frames: Frames, episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
+    """Return the table of every baseline over the same frames in contact."""
+    spans = [np.arange(e.span.start, e.span.stop)[e.valid & e.scores.labelled] for e in episodes]
+    label = np.concatenate([e.label[e.valid & e.scores.labelled] for e in episodes])
+    maps = baselines.predictions(frames, trained.split, np.concatenate(spans))
+    return {name: _table(depth_maps.score_frames(depth, label)) for name, depth in maps.items()}
+
+
+def _prescribed(episodes: tuple[EpisodeResult, ...], frames: Frames) -> dict[str, Any]:
+    """Return the comparison of predictions and labels with the nominal contact, one value a press."""
+    grid = frames.sensor.map
+    ours, labels = [], []
+    for e in (e for e in episodes if e.span.depth > 0 and e.full.any()):
+        tip = frames.tip[e.span.start : e.span.stop][e.full].mean(axis=0)
+        reference = e.label[e.full].mean(axis=0)
+        ours.append(physical.score_press(e.span.number, e.depth[e.full].mean(axis=0), reference, tip, grid))
+        labels.append(physical.score_press(e.span.number, reference, reference, tip, grid))
+    inside = [s for s in ours if s.reference_region and not s.truncated]
+    near = [s for s in inside if s.position_error is not None and s.position_error < grid.pixel_pitch]
+    return {
+        "region_threshold_mm": physical.REGION_THRESHOLD,
+        "prescribed": {
+            "prediction": {**_press_table(ours), "paper": published.PHYSICAL},
+            "label": {**_press_table(labels), "paper": published.LABELS},
+        },
+        "presses": [asdict(s) for s in ours],
+        "success": _proportion(
+            "presses whose predicted contact centre at full depth lies within one pixel "
+            f"({grid.pixel_pitch:g} mm) of the nominal centre, among those whose labelled region above "
+            f"{physical.REGION_THRESHOLD:g} mm is not cut by the map's "
+            "border; a press without predicted region fails",
+            len(near),
+            len(inside),
+        ),
+    }
+
+
+def _uncertainty(
+    trained: Checkpoint, identity: str, episodes: tuple[EpisodeResult, ...], frames: Frames
+) -> dict[str, Any]:
+    """Return what share of errors each interval holds; nothing if the run was not calibrated."""
+    known = spread.read(trained.path.parent, identity)
+    if known is None:
+        return {}
+    maps, labels = ([getattr(e, name)[e.valid] for e in episodes] for name in ("depth", "label"))
+    levels = spread.reliability(known, maps, labels, frames.sensor.map.pixel_pitch)
+    return {"uncertainty": {"definition": spread.DEFINITION, "levels": levels}}
+
+
+def _press_table(scores: list[PressScore]) -> dict[str, Any]:
+    """Summarize presses; a truncated reference region counts in ``position_all`` alone, a lost one never."""
+
+    def values(kept: list[float | None]) -> np.ndarray:
+        return np.array([np.nan if v is None else abs(v) for v in kept])
+
+    with_region = [s for s in scores if s.reference_region]
+    return {
+        "centre_depth": asdict(depth_maps.summarize(values([s.centre_depth_error for s in scores]))),
+        "position": asdict(depth_maps.summarize(values([s.position_error for s in with_region if not s.truncated]))),
+        "position_all": asdict(depth_maps.summarize(values([s.position_error for s in with_region]))),
+    }
+
+
+def _joined(parts: list[FrameScores]) -> FrameScores:
+    return FrameScores(*(np.concatenate([getattr(p, name) for p in parts]) for name in vars(parts[0])))
+
+
+def _table(scores: FrameScores) -> dict[str, Any]:
+    return {name: asdict(depth_maps.summarize(getattr(scores, name))) for name in METRICS}
+
+
+def _proportion(definition: str, successes: int, trials: int) -> dict[str, Any]:
+    low, high = wilson.interval(successes, trials) if trials else (None, None)
+    return {
+        "definition": definition,
+        "count": successes,
+        "of": trials,
+        "proportion": successes / trials if trials else None,
+        "wilson_95": [low, high],
+    }

@@ -1,0 +1,1 @@
+"""Episodes as a list and as a page to choose from."""

@@ -1,0 +1,151 @@
+"""Where a list of episodes comes from: a session's plan, labels and check, or a dataset's own records."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from tacdata import documents
+from tacdata.dataset import label_states
+from tacdata.dataset.flags import read_flags
+from tacdata.dataset.format import features, folder, metadata
+from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.recording.files import file_names
+from tacdata.recording.session import read_session
+from training.inference.prediction import Prediction, read_prediction
+from viewers.browse.episode_list import Entry, EpisodeList, errors_of, of_press, with_flags
+from viewers.parts.label import shown_label
+from viewers.parts.prediction_files import prediction_paths
+
+
+def episodes_at(path: Path, labels: Path | None = None, predictions: Path | None = None) -> EpisodeList:
+    """Return the episodes of a session or dataset.
+
+    Args:
+        path: The folder.
+        labels: A session's labels, else those inside it.
+        predictions: Folder of predictions, or a training run: then each episode has an error where it can be said.
+
+    Raises:
+        UsageError: If it is neither.
+        FormatError: If a file is damaged.
+    """
+    if (path / folder.INFO).is_file():
+        return _dataset(path, predictions)
+    if not path.is_dir():
+        raise UsageError(f"{path} is no folder", "a session or dataset folder", "check the path")
+    return _session(path, labels or path / "labels", predictions)
+
+
+def _session(root: Path, labels: Path, predictions: Path | None) -> EpisodeList:
+    session = read_session(root)
+    presses = {press.index: press for press in session.plan.presses}
+    checked, remarks = _checked(root)
+    entries = []
+    for number, path in file_names.finished(root).items():
+        entry = of_press(number, path.name, presses.get(number))
+        entries.append(replace(entry, label=_label_state(labels, path.stem), quality=checked.get(path.name)))
+    found = with_flags(tuple(entries), read_flags(root))
+    if predictions is not None:
+        found = _with_session_errors(found, labels, predictions)
+    return EpisodeList(root, "session", found, tuple(remarks))
+
+
+def _checked(root: Path) -> tuple[dict[str, float], list[str]]:
+    """Return the share of frames that came, by recording, as `tacdata check` counted them."""
+    if not (root / "check.json").is_file():
+        return {}, ["no check.json: `tacdata check` says how good the recordings are"]
+    try:
+        document = documents.read(root / "check.json", "check")
+    except TacdataError as error:
+        return {}, [f"check.json cannot be read: {error.given}"]
+    shares = {}
+    for entry in document["episodes"]:
+        taxels = entry["taxels"]
+        whole = taxels["frames"] + taxels["lost"]
+        shares[entry["file"]] = taxels["frames"] / whole if whole else 0.0
+    for finding in document["findings"]:
+        if finding["severity"] == "unusable" and finding["file"] in shares:
+            shares[finding["file"]] = 0.0
+    return shares, []
+
+
+def _label_state(labels: Path, stem: str) -> str:
+    if (labels / f"{stem}.parquet").is_file():
+        return "complete"
+    return "failed" if (labels / f"{stem}.failure.json").is_file() else "none"
+
+
+def _with_session_errors(entries: tuple[Entry, ...], labels: Path, predictions: Path) -> tuple[Entry, ...]:
+    known = {int(p.time_ns[0]): p for p in map(read_prediction, prediction_paths(predictions))}
+    result = []
+    for entry in entries:
+        path = labels / f"{Path(entry.file).stem}.parquet"
+        label = shown_label(path) if entry.label == "complete" else None
+        own = next((p for t, p in known.items() if label is not None and t in label.time_ns), None)
+        error = None
+        if label is not None and own is not None:
+            error = errors_of(np.maximum(label.signed, 0), label.time_ns, own.depth, own.time_ns)
+        result.append(replace(entry, error=error, part=own.part if own else ""))
+    return tuple(result)
+
+
+def _dataset(root: Path, predictions: Path | None) -> EpisodeList:
+    rows = folder.read_rows(root, folder.read_info(root))
+    records = metadata.read_records(root)
+    keys = _record_keys(root, rows)
+    known = label_states.read(root)
+    entries = []
+    for row in rows:
+        record = records.get(keys.get(row.index, -1))
+        if record is None:
+            entries.append(Entry(row.index, "", label="complete"))
+            continue
+        entry = of_press(row.index, record.recording_file, record.configuration)
+        model = record.label_provenance.get("parents", {}).get("model", "")
+        label = "complete" if known["models"].get(record.sensor, model) == model else "stale"
+        entries.append(replace(entry, quality=record.quality, label=label, recording=record.recording))
+    found = with_flags(tuple(entries), read_flags(root))
+    if predictions is not None:
+        found = _with_dataset_errors(root, found, predictions)
+    absent = sum(len(set(own["episodes"]) - set(own["packed"])) for own in known["sessions"].values())
+    return EpisodeList(root, "dataset", found, (f"{absent} more are waiting for labels, or failed",) if absent else ())
+
+
+def _record_keys(root: Path, rows: list[folder.EpisodeRow]) -> dict[int, int]:
+    """Return which record each episode has, from the first frame of its file; episodes may share a file."""
+    keys: dict[int, int] = {}
+    for number in sorted({row.data_file for row in rows}):
+        own = [row for row in rows if row.data_file == number]
+        try:
+            table = pq.ParquetFile(root / folder.data_path(number)).read([features.RECORD], use_threads=False)
+        except (pa.ArrowException, OSError, KeyError) as error:
+            reason = str(error).splitlines()[0]
+            raise FormatError(f"{folder.data_path(number)} cannot be read: {reason}", "a data file",
+                              "take it from a copy, or pack the session again") from None  # fmt: skip
+        values, first = table.column(0), min(row.start for row in own)
+        keys |= {row.index: int(values[row.start - first].as_py()) for row in own}
+    return keys
+
+
+def _with_dataset_errors(root: Path, entries: tuple[Entry, ...], predictions: Path) -> tuple[Entry, ...]:
+    from tacdata.dataset.reader import read_dataset
+
+    dataset = read_dataset(root)
+    time, depth = dataset[features.TIME], dataset[features.DEPTH]
+    known: dict[int, Prediction] = {}
+    for path in prediction_paths(predictions):
+        own = read_prediction(path)
+        known[int(own.time_ns[0])] = own
+    result = []
+    for entry, place in zip(entries, dataset.episodes, strict=True):
+        part = slice(place.start, place.stop)
+        own_time = np.asarray(time[part])
+        own = next((p for t, p in known.items() if own_time[0] <= t <= own_time[-1]), None)
+        error = errors_of(np.asarray(depth[part]), own_time, own.depth, own.time_ns) if own else None
+        result.append(replace(entry, error=error, part=own.part if own else ""))
+    return tuple(result)

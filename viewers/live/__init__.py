@@ -1,0 +1,1 @@
+"""Recordings shown while they are made."""

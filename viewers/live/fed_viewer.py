@@ -1,0 +1,60 @@
+"""A viewer that is fed while it runs: a window, or Rerun's web viewer on the loopback."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from viewers.rerun.window import GRPC_PORT, LOOPBACK, WEB_PORT, free_port, quiet_environment, running
+
+START = 30.0
+"""Longest wait for the viewer [s of real time]."""
+
+
+@dataclass(frozen=True)
+class FedViewer:
+    """It runs, and what is logged arrives."""
+
+    process: subprocess.Popen
+    address: str
+    """What a browser has to open; empty for a window."""
+    feed: str
+    """Where it listens."""
+
+    def connect(self, recording: Any) -> None:
+        """Send it what is logged to a Rerun recording (`rerun.RecordingStream`) from now on."""
+        recording.connect_grpc(self.feed)
+
+
+@contextmanager
+def fed_viewer(web: bool) -> Iterator[FedViewer]:
+    """Start a viewer that takes what is logged, for as long as the context lasts.
+
+    Raises:
+        TimeoutError: If it does not listen.
+    """
+    with quiet_environment() as environment:
+        port, page = free_port(GRPC_PORT), free_port(WEB_PORT)
+        command = ["--bind", LOOPBACK, "--port", str(port), "--memory-limit", "500MB"]
+        if web:
+            command += ["--serve-web", "--web-viewer-port", str(page), "--server-memory-limit", "200MB"]
+        with running(command, environment) as process:
+            _wait_for(port)
+            address = f"http://{LOOPBACK}:{page}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{port}%2Fproxy"
+            yield FedViewer(process, address if web else "", f"rerun+http://{LOOPBACK}:{port}/proxy")
+
+
+def _wait_for(port: int) -> None:
+    """Return once the viewer listens; what is sent before is lost."""
+    end = time.monotonic() + START / 2
+    while time.monotonic() < end:
+        with socket.socket() as probe:
+            if probe.connect_ex((LOOPBACK, port)) == 0:
+                return
+        time.sleep(0.05)
+    raise TimeoutError(f"the viewer does not listen on port {port}")

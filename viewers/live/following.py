@@ -1,0 +1,180 @@
+"""Shows a recording while it is being written: what is there first, then what is added, until it ends."""
+
+from __future__ import annotations
+
+import time
+import webbrowser
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tacdata.errors import DeviceError, TacdataError, UsageError
+from tacdata.recording.files import file_names
+from viewers.scene.newest_part import ScenePart, open_ended
+from viewers.scene.scene import Scene
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+    from viewers.live.fed_viewer import FedViewer
+
+PAUSE = 0.5
+"""Least time between two looks at the file [s]; its chunks are closed about as often."""
+SHARE = 4.0
+"""How many times as long as a look takes is waited for the next: a long recording takes longer to read through."""
+
+
+class Follower:
+    """Draws one growing recording into a Rerun recording."""
+
+    def __init__(self, path: Path, recording: rr.RecordingStream) -> None:
+        """Open the file. Raises as `tacdata.recording.files.growing_file.GrowingFile`."""
+        from tacdata.recording.files.growing_file import GrowingFile
+        from viewers.parts.recorded_images import ImageSampler
+
+        self._sampler = ImageSampler()
+        self._file = GrowingFile(path, self._sampler.take)
+        self._recording, self._part, self._layout = recording, ScenePart(), ()
+        self.frames = 0
+        """Taxel frames that were drawn."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether the recorder closed the file."""
+        return self._file.finished
+
+    def step(self) -> bool:
+        """Draw what was added since; return whether there was anything to draw."""
+        if not self._file.update():
+            return False
+        scene = self._scene()
+        if scene is None:
+            return False
+        self._lay_out(scene)
+        from viewers.rerun.columns import RerunParts
+
+        RerunParts(self._recording, self._part.newer(scene)).write()
+        self._recording.flush()
+        self.frames = len(scene.frame_ns)
+        return True
+
+    def _scene(self) -> Scene | None:
+        """Return what there is so far, or None if that is too little to be drawn."""
+        from dataclasses import replace
+
+        from tacdata.recording.files.reader import recording_of
+        from viewers.scenes.recording import scene_of
+
+        remarks = () if self.finished else ("being recorded: it goes on while you look",)
+        try:
+            scene = scene_of(recording_of(self._file.records), self._sampler, remarks=remarks)
+        except TacdataError:
+            if self.finished:
+                raise
+            return None
+        return scene if self.finished else replace(scene, phases=open_ended(scene.phases))
+
+    def _lay_out(self, scene: Scene) -> None:
+        """Send the layout again where another view or another scale belongs into it."""
+        from viewers.rerun.blueprint import episode_blueprint
+
+        scales = tuple((a.scale.low, a.scale.high) for a in scene.arrays)
+        layout = (scales, bool(scene.phases), tuple(c.name for c in scene.curves), len(scene.bodies))
+        if layout != self._layout:
+            self._recording.send_blueprint(episode_blueprint(scene, follows=True))
+            self._recording.send_recording_name(scene.title)
+            self._layout = layout
+
+    def close(self) -> None:
+        """Let the file go."""
+        self._file.close()
+
+
+def is_growing(path: Path) -> bool:
+    """Say whether a recording of a press has no end yet, by its name: it is being written, or a crash left it."""
+    from viewers.kinds.kind import kind_of
+    from viewers.kinds.recording import Recording
+
+    return path.is_file() and path.name.endswith(file_names.PARTIAL) and isinstance(kind_of(path), Recording)
+
+
+def meant(path: Path) -> Path:
+    """Return the recording that a path stands for: one that has ended since, or a session's first that has not.
+
+    Any other path stands for itself.
+    """
+    if path.is_dir() and not file_names.finished(path):
+        return next((own for own in file_names.unfinished(path) if is_growing(own)), path)
+    whole = path.with_name(path.name.removesuffix(file_names.PARTIAL) + ".mcap")
+    return whole if path.name.endswith(file_names.PARTIAL) and not path.exists() and whole.is_file() else path
+
+
+def follow(path: Path, web: bool) -> None:
+    """Show a recording that is being written, then those that follow it in its session, in a window or a browser.
+
+    Ends when the window is closed, or with Ctrl-C.
+
+    Args:
+        path: The recording.
+        web: Serve Rerun's web viewer instead of a window.
+
+    Raises:
+        UsageError: If there is no display for a window.
+        FormatError: If it is no recording of a press.
+        DeviceError: If the viewer does not start.
+    """
+    from viewers.live.fed_viewer import fed_viewer
+    from viewers.rerun.window import has_display
+
+    try:
+        with suppress(KeyboardInterrupt), fed_viewer(web) as viewer:
+            if web:
+                print(f"open {viewer.address}", flush=True)
+                if has_display():
+                    webbrowser.open(viewer.address)
+            print(f"following {path.name}; Ctrl-C ends the viewer, never the recording", flush=True)
+            left = set(file_names.unfinished(path.parent))  # what crashes left is not waited for
+            shown, following = left, path
+            while viewer.process.poll() is None:
+                if following is None:
+                    time.sleep(PAUSE)
+                else:
+                    _follow_one(following, viewer)
+                    shown.add(following)
+                following = next((p for p in file_names.unfinished(path.parent) if _is_next(p, shown)), None)
+    except TimeoutError as error:
+        given = f"the viewer does not start: {error}"
+        raise DeviceError(given, "a viewer that listens on the loopback", "use --save FILE.rrd, or --web") from None
+
+
+def _is_next(path: Path, shown: set[Path]) -> bool:
+    return is_growing(path) and path not in shown
+
+
+def _follow_one(path: Path, viewer: FedViewer) -> None:
+    """Draw one recording until it ends or the viewer is closed."""
+    import rerun as rr
+
+    from viewers.rerun.backend import APPLICATION
+
+    recording = rr.RecordingStream(APPLICATION)
+    viewer.connect(recording)
+    try:
+        follower = Follower(path, recording)
+    except UsageError:  # it ended, and has its own name by now
+        return
+    told = False
+    try:
+        while not follower.finished and viewer.process.poll() is None:
+            begun = time.monotonic()
+            if not (follower.step() or follower.frames or told):
+                print(f"{path.name}: waiting for the first readings", flush=True)
+                told = True
+            if not follower.finished:
+                time.sleep(max(PAUSE, SHARE * (time.monotonic() - begun)))
+        if follower.finished:
+            name = path.name.removesuffix(file_names.PARTIAL)
+            print(f"{name} has ended: {follower.frames} frames", flush=True)
+    finally:
+        follower.close()
+        recording.disconnect()

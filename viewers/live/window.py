@@ -1,0 +1,171 @@
+"""A live view of a recording in progress, in a process of its own: what it cannot take in time, it does not get."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from multiprocessing import get_context
+from pathlib import Path
+from queue import Empty, Full
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from viewers.live.fed_viewer import START, fed_viewer
+from viewers.rerun.window import require_display
+
+WAITING = 16
+"""Values that wait for the viewer; more are dropped [count]."""
+PATIENCE = 15.0
+"""How long the viewer may take to end [s of real time]."""
+NICENESS = 10
+"""By how much the process gives way to others (Unix)."""
+
+Watch = Callable[[str, int, Any], None]
+
+
+@contextmanager
+def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
+    """Show a recording while it is made.
+
+    Args:
+        where: ``window``, ``web`` (an address on this machine is printed), or the path of a Rerun file to write.
+        columns: Taxels along x.
+        rows: Taxels along y.
+
+    Yields:
+        ``watch(stream, arrival [ns], value)``, which never waits (`tacdata.recording.live.live_feed`).
+
+    Raises:
+        UsageError: If there is no display for a window, the file exists, or Rerun does not start.
+    """
+    _refuse(where)
+    context = get_context("spawn")
+    values, started, ending = context.Queue(WAITING), context.Queue(), context.Event()
+    process = context.Process(target=_show, args=(where, columns, rows, values, started, ending), daemon=False)
+    process.start()
+    try:
+        try:
+            said = started.get(timeout=START)
+        except Empty:
+            said = "error: the viewer did not start"
+        if said.startswith("error: "):
+            raise UsageError(said.removeprefix("error: "), "window, web or FILE.rrd", "record without --live")
+        if said:
+            print(f"live view: {said}", flush=True)
+
+        def watch(stream: str, arrival_ns: int, value: Any) -> None:
+            with suppress(Full):
+                values.put_nowait((stream, arrival_ns, value))
+
+        yield watch
+    finally:
+        with suppress(Full):
+            values.put(None, timeout=PATIENCE)  # stands behind everything that was given
+        ending.set()
+        for end in (lambda: None, process.terminate, process.kill):
+            if process.is_alive():
+                end()
+                process.join(PATIENCE)
+        values.cancel_join_thread()
+        values.close()
+
+
+def _refuse(where: str) -> None:
+    if where == "window":
+        require_display()
+    elif where != "web":
+        path = Path(where)
+        if path.suffix != ".rrd":
+            raise UsageError(f"--live {where}", "window, web, or a file name that ends in .rrd", "correct --live")
+        if path.exists():
+            raise UsageError(f"{path} exists", "a new file; nothing is overwritten", "choose another name")
+
+
+def _show(where: str, columns: int, rows: int, values: Any, started: Any, ending: Any) -> None:
+    # Ctrl-C reaches every process of the terminal; only the recorder is to answer it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
+    with ExitStack() as stack:
+        try:
+            recording, words = _open(where, stack)
+        except Exception as error:  # whatever Rerun says is for the person who asked for it
+            started.put(f"error: the live view cannot be opened ({type(error).__name__}: {error})")
+            return
+        started.put(words)
+        drawing = _Drawing(recording, columns, rows)
+        while True:
+            try:
+                value = values.get(timeout=PATIENCE / 2)
+            except Empty:
+                if ending.is_set():
+                    break
+                continue
+            if value is None:
+                break
+            drawing.take(*value)
+        recording.flush()
+        recording.disconnect()
+        # Rerun reports on the terminal that its server goes away, which it does because we end it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+
+
+def _open(where: str, stack: ExitStack) -> tuple[Any, str]:
+    import rerun as rr
+
+    recording = rr.RecordingStream("tacdata_live")
+    if where not in ("window", "web"):
+        recording.save(where)
+        return recording, where
+    viewer = stack.enter_context(fed_viewer(where == "web"))
+    viewer.connect(recording)
+    return recording, viewer.address
+
+
+class _Drawing:
+    """Writes what arrives into a Rerun recording: the array as a picture, signals, the guide, images."""
+
+    def __init__(self, recording: Any, columns: int, rows: int) -> None:
+        self._recording, self._shape = recording, (rows, columns)
+        self._first: np.ndarray | None = None
+
+    def take(self, stream: str, arrival_ns: int, value: Any) -> None:
+        import rerun as rr
+
+        self._recording.set_time("host_time", timestamp=np.datetime64(arrival_ns, "ns"))
+        kind, _, name = stream.partition(" ")
+        if kind == "taxels":
+            self._taxels(np.asarray(value, float))
+        elif kind == "cnc":
+            for axis, number in zip("xyz", value, strict=True):
+                self._recording.log(f"guide/{axis}_mm", rr.Scalars([float(number)]))
+        elif kind == "depth":
+            self._depth(name, *value)
+        elif kind == "camera":
+            self._recording.log(f"camera/{name}", rr.Image(value, "L" if value.ndim == 2 else "BGR"))
+
+    def _depth(self, name: str, depth: np.ndarray, largest: float, centre: tuple[float, float] | None) -> None:
+        import rerun as rr
+
+        # Row 0 of a map lies at the lowest x; shown with x to the right and y upwards, as the array is.
+        self._recording.log(f"depth/{name}", rr.Tensor(np.round(depth.T[::-1], 4), dim_names=("y", "x")))
+        self._recording.log(f"depth_mm/{name}", rr.Scalars([largest]))
+        for axis, number in zip("xy", centre or (np.nan, np.nan), strict=True):
+            self._recording.log(f"centre_mm/{name}/{axis}", rr.Scalars([float(number)]))
+
+    def _taxels(self, counts: np.ndarray) -> None:
+        import rerun as rr
+
+        if self._first is None:
+            self._first = counts
+        change = counts - self._first
+        self._recording.log("taxels/change_counts", rr.Scalars(change))
+        if change.size == self._shape[0] * self._shape[1]:
+            # Row 0 of the array lies at the lowest y, row 0 of a picture on top.
+            self._recording.log("array", rr.Tensor(change.reshape(self._shape)[::-1], dim_names=("y", "x")))

@@ -1,0 +1,76 @@
+"""What a person reads first about a demonstration or about targets, as Markdown."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.demonstrations.compensation import contact_depth
+from tacdata.demonstrations.demonstration import Demonstration
+from tacdata.demonstrations.recording.reader import DemoRecording
+from tacdata.replay.targets import Targets
+
+
+def of_demonstration(
+    title: str, made: Demonstration | None, recorded: DemoRecording | None, remarks: tuple[str, ...] = ()
+) -> str:
+    """Return what the demonstration is, finger by finger, and what is missing."""
+    lines = [f"# {title}", ""]
+    if recorded is not None:
+        begin, end = recorded.span_ns
+        state = "" if recorded.complete else "; **interrupted or salvaged**"
+        lines.append(f"- **Task** {recorded.task}, {(end - begin) / 1e9:.1f} s, rig {recorded.rig.name}{state}")
+        lines.append(
+            f"- **Boards** {', '.join(recorded.taxels) or 'none'}; **cameras** {', '.join(recorded.rig.cameras)}"
+        )
+    elif made is not None:
+        lines.append(f"- **Task** {made.task}, {made.seconds[-1]:.1f} s")
+    absent = []
+    if made is None:
+        absent.append("no tracks, so the fingers do not stand in space: run `tacdata track`")
+    else:
+        lines += _tracks(made)
+        if made.network is None:
+            absent.append("no predicted depth: run `tacdata track --network RUN`")
+    if recorded is None:
+        absent.append("no recording beside the tracks, so no cameras and no boards")
+    if absent:
+        lines += ["", "Not shown: " + "; ".join(absent) + "."]
+    notes = (*remarks, *(recorded.notes if recorded else ()), *(made.remarks if made else ()))
+    return "\n".join([*lines, *(["", *(f"- {note}" for note in dict.fromkeys(notes))] if notes else [])])
+
+
+def _tracks(made: Demonstration) -> list[str]:
+    lines = [f"- **Frame** {made.frame}, grid of {made.rate:g} Hz"]
+    for name, track in made.tracks.items():
+        felt = ""
+        if track.depth is not None:
+            depth = contact_depth(track.depth)
+            felt = f", predicted depth to {np.nanmax(depth, initial=0.0):.2f} mm"
+        lines.append(
+            f"- **{name}** {track.sightings} sightings, {track.outliers} left out, {track.gap.mean():.0%} bridged{felt}"
+        )
+    if made.network:
+        lines.append(f"- **Depth** is an estimate by {made.network['network']}, checkpoint {made.network['hash'][:12]}")
+    return lines
+
+
+def of_targets(title: str, targets: Targets, others: int, joints: dict[str, np.ndarray] | None) -> str:
+    """Return what a robot is asked to do."""
+    seconds = (targets.time_ns[-1] - targets.time_ns[0]) / 1e9
+    moved = 1000 * np.linalg.norm(targets.position - targets.seen, axis=-1)
+    lines = [
+        f"# {title}", "",
+        f"- **Targets** {targets.kind}, {len(targets.time_ns)} in {seconds:.1f} s, frame {targets.frame}",
+        f"- **Demonstration** {targets.recording}, task {targets.task}",
+    ]  # fmt: skip
+    for k, name in enumerate(targets.fingers):
+        gain = f", gain {1000 * targets.gains[name]:g} mm/mm" if name in targets.gains else ""
+        lines.append(
+            f"- **{name}** moved by up to {moved[:, k].max():.1f} mm{gain}, {targets.gap[:, k].mean():.0%} bridged"
+        )
+    if joints:
+        lost = np.isnan(np.column_stack(list(joints.values()))).any(axis=1).sum()
+        lines.append(f"- **Joints** {len(joints)}; {lost} of {len(targets.time_ns)} targets are not reached (gaps)")
+    if others:
+        lines += ["", f"{others} more beside it: --episode 0 to {others}."]
+    return "\n".join([*lines, *(["", *(f"- {note}" for note in targets.remarks)] if targets.remarks else [])])

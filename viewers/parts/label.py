@@ -1,0 +1,70 @@
+"""What is drawn of a label: of a long one the deepest maps, and the rest of its file is not read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.labels import Label, map_batches, read_label_columns
+from viewers.scene import thinning
+
+BATCH = 2000
+"""Maps in memory at a time [frames]."""
+
+
+@dataclass(frozen=True)
+class ShownLabel:
+    """Part of a `tacdata.labels.Label`."""
+
+    time_ns: np.ndarray
+    """Time of each frame [ns], shape (n,), int64."""
+    force: np.ndarray
+    """Force of the skin on the indenter [N], shape (n, 3), float32."""
+    error: np.ndarray
+    """Root mean square of the estimated numerical error [mm], shape (n,), float32."""
+    kept: np.ndarray
+    """Rows whose maps are here [frames], shape (k,), ascending."""
+    signed: np.ndarray
+    """Their maps: undeformed minus deformed height of the outer face [mm], shape (k, pixels_x, pixels_y), float32."""
+
+    @classmethod
+    def of(cls, label: Label) -> ShownLabel:
+        """Return all of a label's maps."""
+        return cls(label.time_ns, label.force, label.error, np.arange(len(label.time_ns)), label.signed)
+
+    @property
+    def map_ns(self) -> np.ndarray:
+        """Times of the maps [ns], shape (k,), int64."""
+        return self.time_ns[self.kept]
+
+
+def shown_label(path: Path, most: int | None = None) -> ShownLabel:
+    """Read what is drawn from a label file.
+
+    Args:
+        path: The file.
+        most: Maps to keep, the deepest of each stretch (`thinning.strongest`); without it all.
+
+    Raises:
+        UsageError: As `tacdata.labels.read_label`.
+        FormatError: As `tacdata.labels.read_label`.
+    """
+    small = read_label_columns(path, ("time_ns", "force", "error"))
+    count = len(small["time_ns"])
+    if most is None or count <= most:
+        return ShownLabel(**small, kept=np.arange(count), **read_label_columns(path, ("signed",)))
+    starts = thinning.stretches(count, most)
+    best, row, shown = np.full(most, -np.inf), np.zeros(most, int), {}
+    begin = 0
+    for maps in map_batches(path, "signed", BATCH):
+        depth = maps.reshape(len(maps), -1).max(axis=1)
+        own = np.searchsorted(starts, begin + np.arange(len(maps)), side="right") - 1
+        for stretch in range(own[0], own[-1] + 1):
+            rows = np.flatnonzero(own == stretch)
+            deepest = rows[np.argmax(depth[rows])]
+            if depth[deepest] > best[stretch]:
+                best[stretch], row[stretch], shown[stretch] = depth[deepest], begin + deepest, maps[deepest].copy()
+        begin += len(maps)
+    return ShownLabel(**small, kept=row, signed=np.stack([shown[k] for k in range(most)]))

@@ -1,0 +1,71 @@
+"""Depth maps of an episode: label, prediction, and their difference, with the depths on one scale."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.sensor import Sensor
+from viewers.scene import thinning
+from viewers.scene.color_scale import scale_of
+from viewers.scene.scene import Curves, DepthMaps
+
+DEPTH_FLOOR = 0.1
+"""Least end of the depth scale [mm]: below the paper's contact threshold there is nothing to see."""
+ERROR_FLOOR = 0.05
+"""Least end of the error scale [mm]."""
+
+
+def depth_maps(
+    sensor: Sensor,
+    label: tuple[np.ndarray, np.ndarray] | None,
+    prediction: tuple[np.ndarray, np.ndarray] | None,
+) -> tuple[DepthMaps, ...]:
+    """Return the maps called "label", "prediction" and, for frames that both hold, "error".
+
+    Args:
+        sensor: Gives the pixel grid.
+        label: Times [ns], shape (n,), and depth [mm], shape (n, pixels_x, pixels_y); or None.
+        prediction: The same of a network.
+    """
+    given = {name: pair for name, pair in (("label", label), ("prediction", prediction)) if pair is not None}
+    if not given:
+        return ()
+    scale = scale_of(np.array([depth.max(initial=0.0) for _, depth in given.values()]), "mm", floor=DEPTH_FLOOR)
+    x, y = sensor.map.x, sensor.map.y
+    maps = [DepthMaps(name, x, y, time, depth, scale) for name, (time, depth) in given.items()]
+    if label is not None and prediction is not None:
+        time, ours, theirs = np.intersect1d(label[0], prediction[0], return_indices=True)
+        if len(time):
+            error = (prediction[1][theirs] - label[1][ours]).astype(np.float32)
+            maps.append(DepthMaps("error", x, y, time, error, scale_of(error, "mm", signed=True, floor=ERROR_FLOOR)))
+    return tuple(maps)
+
+
+def error_curves(maps: tuple[DepthMaps, ...]) -> tuple[Curves, ...]:
+    """Return the root mean square over all pixels and the largest difference of each frame [mm]."""
+    error = next((m for m in maps if m.name == "error"), None)
+    if error is None:
+        return ()
+    root_mean_square = np.sqrt(np.mean(error.values.astype(float) ** 2, axis=(1, 2)))
+    largest = np.abs(error.values).max(axis=(1, 2))
+    values = np.stack([root_mean_square, largest], axis=1)
+    return (Curves("error", "mm", ("root mean square", "largest"), error.time_ns, values),)
+
+
+def thinned(maps: tuple[DepthMaps, ...], most: int = thinning.MAPS) -> tuple[DepthMaps, ...]:
+    """Return maps of at most ``most`` times, about the same times for all of them: the deepest of each stretch."""
+    if not maps or max(len(m.time_ns) for m in maps) <= most:
+        return maps
+    first = max(maps, key=lambda m: len(m.time_ns))
+    flat = first.values.reshape(len(first.values), -1)
+    strength = np.maximum(flat.max(axis=1), -flat.min(axis=1))
+    times = first.time_ns[thinning.strongest(strength, most)]
+    result = []
+    for m in maps:
+        rows = np.flatnonzero(np.isin(m.time_ns, times))
+        if not len(rows):
+            rows = thinning.evenly(len(m.time_ns), most)
+        result.append(replace(m, time_ns=m.time_ns[rows], values=m.values[rows]))
+    return tuple(result)

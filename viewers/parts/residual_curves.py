@@ -1,0 +1,50 @@
+"""Residuals of a verdict as curves over the time of the sessions, the stream with most to see first."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.discrepancy.verdict.residual_table import Residuals
+from viewers.scene.scene import Curves
+from viewers.scene.thinning import extremes
+
+ROWS = 4000
+"""Rows of a stream that are drawn, about [1]."""
+MOST = 32
+"""Streams that are drawn; of more, those with most to see [1]."""
+READINGS, RESIDUALS = "readings", "residuals"
+
+
+def residual_curves(told: Residuals) -> tuple[Curves, ...]:
+    """Return for each stream its readings measured, before and after, and what is left over the noise; then the depth.
+
+    Args:
+        told: What `tacdata discrepancy` wrote.
+    """
+    time_ns = np.round(told.time * 1e9).astype(np.int64)
+    breaks = np.flatnonzero(np.diff(told.episode)) + 1
+    power = np.nanmean(np.square(told.off(told.before)), axis=0)
+    made = []
+    for k in np.argsort(-np.nan_to_num(power))[:MOST].tolist():
+        name = told.streams[k].replace(" ", "_")
+        said = np.column_stack([told.measured[:, k], told.before[:, k], told.after[:, k]])
+        left = (said[:, :1] - said[:, 1:]) / told.noise[k]
+        made.append(
+            _curves(f"{READINGS}/{name}", "as recorded", ("measured", "before", "after"), time_ns, said, breaks)
+        )
+        made.append(_curves(f"{RESIDUALS}/{name}", "noise", ("before", "after"), time_ns, left, breaks))
+    depth = _curves("depth", "mm", ("commanded",), time_ns, told.depth[:, None], breaks)
+    return (*made, depth)
+
+
+def _curves(
+    name: str, unit: str, labels: tuple[str, ...], time_ns: np.ndarray, values: np.ndarray, breaks: np.ndarray
+) -> Curves:
+    """Return curves of few enough rows that do not run on from one episode into the next."""
+    rows = extremes(values, ROWS)
+    cut = np.unique(np.searchsorted(rows, breaks))
+    cut = cut[(cut > 0) & (cut < len(rows))]
+    between = (time_ns[rows[cut - 1]] + 1).astype(np.int64)
+    return Curves(
+        name, unit, labels, np.insert(time_ns[rows], cut, between), np.insert(values[rows], cut, np.nan, axis=0)
+    )

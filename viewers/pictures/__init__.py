@@ -1,0 +1,1 @@
+"""Scenes drawn as pictures and films by matplotlib."""

@@ -1,0 +1,158 @@
+"""Draws a scene as a film (MP4 or GIF), without a display: skin, maps and signals as time goes by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from tacdata.errors import UsageError
+from viewers.backend import Backend
+from viewers.output_file import FILMS, new_file, written_beside
+from viewers.pictures import panels as panels
+from viewers.pictures.backend import STYLE
+from viewers.pictures.skin import skin
+from viewers.scene.moments import nearest
+from viewers.scene.scene import Scene
+
+RATE = {".mp4": 20.0, ".gif": 10.0}
+"""Frames a second [Hz]."""
+MOST = {".mp4": 240, ".gif": 60}
+"""Frames of a film; what lasts longer is shown faster."""
+SIZE = (10.0, 5.6)
+"""Of a frame [inch]."""
+
+
+class FilmBackend(Backend):
+    """One film an episode."""
+
+    def __init__(self, path: Path, resolution: int = 80) -> None:
+        """Take the file to write and its resolution [dots per inch].
+
+        Raises:
+            UsageError: If it exists or ends in neither .mp4 nor .gif.
+        """
+        self._path, self._resolution = new_file(path, *FILMS), resolution
+
+    def draw(self, scene: Scene) -> None:
+        """Write the film; a crash leaves none rather than half of one.
+
+        Raises:
+            UsageError: If the scene has nothing that moves on a skin.
+        """
+        if scene.kind != "episode":
+            given = f"a film of {scene.title}"
+            raise UsageError(given, "an episode of a recording, session or dataset", "use --picture or --save")
+        kind = self._path.suffix
+        times = film_times(scene, RATE[kind], MOST[kind])
+        with rc_context(STYLE):
+            write_film(self._path, self._frames(scene, times))
+
+    def _frames(self, scene: Scene, times: np.ndarray) -> Iterator[np.ndarray]:
+        for time in times.tolist():
+            figure = frame(scene, time)
+            canvas = FigureCanvasAgg(figure)
+            figure.set_dpi(self._resolution)
+            canvas.draw()
+            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def film_times(scene: Scene, rate: float, most: int) -> np.ndarray:
+    """Return the times of a film's frames [ns]: from approach to release if they are marked, else all of the episode.
+
+    Args:
+        scene: The episode.
+        rate: Frames a second [Hz].
+        most: Frames at most.
+    """
+    begin, end = int(scene.frame_ns[0]), int(scene.frame_ns[-1])
+    marked = [span for span in scene.phases if span.name != "rest"]
+    if marked:
+        begin, end = max(begin, marked[0].start_ns), min(end, max(span.end_ns for span in marked))
+    count = int(np.clip((end - begin) / 1e9 * rate, 2, most))
+    return np.linspace(begin, end, count).astype(np.int64)
+
+
+def frame(scene: Scene, time_ns: int) -> Figure:
+    """Return one frame: the skin, the maps, the taxels, and the signals with a line at the time."""
+    chosen = (("deepest", time_ns),)
+    figure = Figure(figsize=SIZE)
+    parts: Any = figure.subfigures(1, 2, width_ratios=[1.25, 1])
+    left, right = parts
+    skin(left, scene, chosen, bar=False)
+    shown = [m for m in scene.maps if not m.scale.signed][:2]
+    axes = right.subplots(1 + len(shown) + 1, 1, height_ratios=[1.0] * (1 + len(shown)) + [0.9])
+    right.subplots_adjust(left=0.16, right=0.97, top=0.94, bottom=0.1, hspace=0.55)
+    taxels = scene.taxels
+    centers = taxels.centers.reshape(taxels.rows, taxels.columns, 3)
+    values = taxels.grid[nearest(taxels.time_ns, time_ns)]
+    panels.image(axes[0], values, (centers[0, :, 0], centers[:, 0, 1]), taxels.scale)
+    axes[0].set_title(f"Taxels, {taxels.scale.low:g} to {taxels.scale.high:g} {taxels.scale.unit}", fontsize=9)
+    for own, maps in zip(axes[1:], shown, strict=False):
+        panels.image(own, maps.values[nearest(maps.time_ns, time_ns)].T, (maps.x, maps.y), maps.scale)
+        panels.tip_mark(own, scene, time_ns)
+        own.set_title(f"{maps.name.capitalize()}: depth, 0 to {maps.scale.high:g} mm", fontsize=9)
+    for own in axes[:-1]:
+        own.set_ylabel("y [mm]", fontsize=8)
+        own.tick_params(labelsize=7)
+    axes[-2].set_xlabel("x [mm]", fontsize=8)
+    _signals(axes[-1], scene, time_ns)
+    return figure
+
+
+def _signals(axes: Any, scene: Scene, time_ns: int) -> None:
+    change = next(c for c in scene.curves if c.name == "taxels/change")
+    colors = panels.taxel_colors(scene.taxels.columns, scene.taxels.rows) / 255
+    seconds = panels.seconds(scene, change.time_ns)
+    for values, color in zip(change.values.T, colors, strict=True):
+        axes.plot(seconds, values, color=tuple(color), linewidth=0.9)
+    axes.axvline(float(panels.seconds(scene, np.array(time_ns))), color="black", linewidth=1.2)
+    axes.set_xlim(seconds[0], seconds[-1])
+    axes.set_xlabel("time [s]", fontsize=8)
+    axes.set_ylabel(change.unit, fontsize=8)
+    axes.tick_params(labelsize=7)
+
+
+def write_film(path: Path, frames: Iterator[np.ndarray]) -> None:
+    """Write frames, uint8, shape (height, width, 3) each, at the rate of the file's kind; whole or not at all.
+
+    Raises:
+        UsageError: If the package that writes such films is missing.
+    """
+    with written_beside(path) as temporary:
+        write = _write_gif if path.suffix == ".gif" else _write_mp4
+        write(temporary, frames, RATE[path.suffix])
+
+
+def _write_gif(path: Path, frames: Iterator[np.ndarray], rate: float) -> None:
+    from PIL import Image
+
+    # Median cut, the default, spends its colours on large areas and loses those of the curves.
+    how = {"colors": 160, "method": Image.Quantize.MAXCOVERAGE, "dither": Image.Dither.NONE}
+    pictures = [Image.fromarray(f).quantize(**how) for f in frames]
+    pictures[0].save(
+        path, save_all=True, append_images=pictures[1:], duration=round(1000 / rate), loop=0, optimize=True
+    )
+
+
+def _write_mp4(path: Path, frames: Iterator[np.ndarray], rate: float) -> None:
+    try:
+        import av
+    except ImportError:
+        given = "no package av, which writes MP4 films"
+        raise UsageError(given, ".gif without it", "pip install av, or name a file that ends in .gif") from None
+
+    with av.open(str(path), "w") as film:
+        stream: Any = None
+        for picture in frames:
+            height, width = (2 * (n // 2) for n in picture.shape[:2])  # H.264 wants even numbers
+            if stream is None:
+                stream = film.add_stream("libx264", rate=round(rate))
+                stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]))))
+        film.mux(stream.encode())

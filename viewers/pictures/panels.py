@@ -1,0 +1,192 @@
+"""The panels of a page."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import SubFigure
+from matplotlib.patches import Circle, Rectangle
+
+from viewers.scene.color_scale import HUES, ColorScale, taxel_colors
+from viewers.scene.moments import nearest, picture_at
+from viewers.scene.scene import Scene
+
+Moments = tuple[tuple[str, int], ...]
+TITLES = {"label": "Label", "prediction": "Prediction", "error": "Prediction − label"}
+INK, SHADES = "0.25", ("0.97", "0.91")
+
+
+def seconds(scene: Scene, time_ns: np.ndarray) -> np.ndarray:
+    """Return times [s] since the first taxel frame, of times [ns], shape (n,)."""
+    return (np.asarray(time_ns) - scene.frame_ns[0]) / 1e9
+
+
+def mappable(scale: ColorScale) -> ScalarMappable:
+    """Return what a colour bar needs."""
+    return ScalarMappable(Normalize(scale.low, scale.high), scale.colormap)
+
+
+def signals(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
+    """Draw the taxels' change above the tip's depth, over the phases."""
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.3])
+    change = next(c for c in scene.curves if c.name == "taxels/change")
+    time = seconds(scene, change.time_ns)
+    colors = taxel_colors(scene.taxels.columns, scene.taxels.rows) / 255
+    for values, color in zip(change.values.T, colors, strict=True):
+        upper.plot(time, values, color=tuple(color), linewidth=1.3)
+    upper.set_ylabel(f"change since rest [{change.unit}]")
+    upper.set_title("Taxel signals", pad=20 if scene.phases else 6)
+    key(upper, scene)
+    if scene.tip is not None:
+        depth = scene.tip.values[:, 2]
+        lower.plot(seconds(scene, scene.tip.time_ns), depth, color=INK, linewidth=1.5, label="nominal")
+        lower.axhline(0, color=INK, linewidth=0.7, linestyle=":")
+        reported = next((c for c in scene.curves if c.name == "tip/reported"), None)
+        if reported is not None:
+            lower.plot(
+                seconds(scene, reported.time_ns),
+                reported.values[:, 2],
+                ".",
+                color=np.array(HUES[5]) / 255,
+                markersize=4,
+                label="reported by the controller",
+            )
+        lower.legend(loc="upper center")
+        # Travel high above the skin would flatten the press; it runs out of the panel instead.
+        lower.set_ylim(1.15 * max(depth.max(), 0.1), max(depth.min(), -2 * max(depth.max(), 1.0)))
+    lower.set_ylabel("tip depth [mm]")
+    lower.set_xlabel("time since the first frame [s]")
+    upper.set_xlim(time[0], max(time[-1], time[0] + 1e-3))
+    for axes in (upper, lower):
+        phases(axes, scene, named=axes is upper)
+        for _, moment in chosen:
+            axes.axvline(seconds(scene, np.array(moment)), color=INK, linewidth=0.8, linestyle="--")
+
+
+def phases(axes: Axes, scene: Scene, named: bool) -> None:
+    """Shade the phases and name them above the axes."""
+    low, high = axes.get_xlim()
+    for number, span in enumerate(scene.phases):
+        start, end = np.clip(seconds(scene, np.array([span.start_ns, span.end_ns])), low, high)
+        if end <= start:
+            continue
+        axes.axvspan(start, end, color=SHADES[number % 2], zorder=0, linewidth=0)
+        if named:
+            axes.text(
+                (start + end) / 2,
+                1.015,
+                span.name,
+                transform=axes.get_xaxis_transform(),
+                ha="center",
+                color=INK,
+                fontsize=9,
+            )
+
+
+def key(axes: Axes, scene: Scene) -> None:
+    """Draw the colours of the curves as the array that they come from."""
+    inset = axes.inset_axes((0.05, 0.62, 0.15, 0.32))
+    columns, rows = scene.taxels.columns, scene.taxels.rows
+    inset.imshow(taxel_colors(columns, rows).reshape(rows, columns, 3), origin="lower", aspect="equal")
+    inset.set_xticks(range(columns))
+    inset.set_yticks(range(rows))
+    inset.tick_params(length=0, labelsize=7, pad=1)
+    inset.set_xlabel("column", fontsize=7, labelpad=1)
+    inset.set_ylabel("row", fontsize=7, labelpad=1)
+
+
+def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
+    """Draw every map at every chosen moment: moments downwards, kinds across, one bar for each scale."""
+    grid = figure.subplots(len(chosen), len(scene.maps), squeeze=False, sharex=True, sharey=True)
+    for row, (name, moment) in zip(grid, chosen, strict=True):
+        row[0].set_ylabel(f"{name}, {seconds(scene, np.array(moment)):.2f} s\ny [mm]")
+        for axes, shown in zip(row, scene.maps, strict=True):
+            image(axes, picture_at(shown, moment).T, (shown.x, shown.y), shown.scale)
+            tip_mark(axes, scene, moment)
+            if shown.scale.signed:
+                rmse = np.sqrt(np.mean(picture_at(shown, moment).astype(float) ** 2))
+                axes.text(
+                    0.98,
+                    0.03,
+                    f"RMSE {rmse:.3f} mm",
+                    transform=axes.transAxes,
+                    ha="right",
+                    fontsize=8,
+                    color=INK,
+                )
+    for axes, shown in zip(grid[0], scene.maps, strict=True):
+        axes.set_title(TITLES.get(shown.name, shown.name))
+    for axes in grid[-1]:
+        axes.set_xlabel("x [mm]")
+    depths = [k for k, m in enumerate(scene.maps) if not m.scale.signed]
+    bar = figure.colorbar(mappable(scene.maps[0].scale), ax=grid[:, depths], location="bottom", shrink=0.7, aspect=40)
+    bar.set_label("depth [mm]")
+    signed = [k for k, m in enumerate(scene.maps) if m.scale.signed]
+    if signed:
+        scale = scene.maps[signed[0]].scale
+        bar = figure.colorbar(mappable(scale), ax=grid[:, signed], location="bottom", shrink=0.9, aspect=25)
+        single = len(signed) == 1 and scene.maps[signed[0]].name == "error"
+        bar.set_label("predicted minus labelled depth [mm]" if single else "difference of depth [mm]")
+
+
+def image(axes: Axes, values: np.ndarray, centers: tuple[np.ndarray, np.ndarray], scale: ColorScale) -> None:
+    """Draw values, shape (rows, columns), whose centres along x and y [mm] are given."""
+    half = [(c[1] - c[0]) / 2 if len(c) > 1 else 0.5 for c in centers]
+    (left, right), (bottom, top) = ((c[0] - h, c[-1] + h) for c, h in zip(centers, half, strict=True))
+    axes.imshow(
+        values,
+        origin="lower",
+        extent=(left, right, bottom, top),
+        cmap=scale.colormap,
+        vmin=scale.low,
+        vmax=scale.high,
+    )
+    axes.spines[:].set_visible(False)
+
+
+def tip_mark(axes: Axes, scene: Scene, moment: int) -> None:
+    """Mark the nominal tip."""
+    if scene.tip is not None:
+        x, y, _ = scene.tip.values[nearest(scene.tip.time_ns, moment)]
+        axes.plot(x, y, "+", color="white", markersize=9, markeredgewidth=2.4)
+        axes.plot(x, y, "+", color="black", markersize=8, markeredgewidth=1.0)
+
+
+def taxels_and_tip(figure: SubFigure, scene: Scene, chosen: Moments, stacked: bool) -> None:
+    """Draw the taxels' signal at the deepest moment and the tip's path over the array."""
+    moment = dict(chosen)["deepest"]
+    first, second = figure.subplots(*((2, 1) if stacked else (1, 2)))
+    taxels = scene.taxels
+    centers = taxels.centers.reshape(taxels.rows, taxels.columns, 3)
+    values = taxels.grid[nearest(taxels.time_ns, moment)]
+    image(first, values, (centers[0, :, 0], centers[:, 0, 1]), taxels.scale)
+    tip_mark(first, scene, moment)
+    first.set_title(f"Taxels at {seconds(scene, np.array(moment)):.2f} s")
+    figure.colorbar(mappable(taxels.scale), ax=first, shrink=0.8).set_label(f"change since rest [{taxels.scale.unit}]")
+    low, high = scene.corners
+    second.add_patch(Rectangle(low[:2], *(high - low)[:2], fill=False, edgecolor="0.6"))
+    for x, y, _ in taxels.centers:
+        second.add_patch(Circle((x, y), taxels.radius, facecolor="0.92", edgecolor="0.75"))
+    if scene.tip is not None:
+        scale = scene.surfaces[0].scale
+        path = scene.tip.values[np.argsort(scene.tip.values[:, 2], kind="stable")]
+        touching = path[:, 2] > 0
+        second.plot(*scene.tip.values[:, :2].T, "-", color="0.5", linewidth=1)
+        second.scatter(*path[~touching, :2].T, s=14, color="0.5", label="above the skin")
+        second.scatter(
+            *path[touching, :2].T,
+            c=path[touching, 2],
+            s=26,
+            cmap=scale.colormap,
+            vmin=scale.low,
+            vmax=max(scale.high, path[:, 2].max()),
+            label="in the skin",
+        )
+        bar = ScalarMappable(Normalize(scale.low, max(scale.high, path[:, 2].max())), scale.colormap)
+        figure.colorbar(bar, ax=second, shrink=0.8).set_label("tip depth [mm]")
+    second.set(xlim=(low[0] - 0.5, high[0] + 0.5), ylim=(low[1] - 0.5, high[1] + 0.5), aspect="equal")
+    second.set_title("Path of the tip over the taxels (grey: above the skin)")
+    for axes in (first, second):
+        axes.set(xlabel="x [mm]", ylabel="y [mm]")

@@ -1,0 +1,38 @@
+"""Pictures small enough for a repository, replacing those of before."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from tacdata.replacement import replacement
+from viewers.pictures.backend import PictureBackend
+from viewers.pictures.film import FilmBackend
+from viewers.scene.scene import Scene
+
+PAGE, FILM = 64, 52
+"""Resolutions [dots per inch]."""
+
+
+def small_page(scene: Scene, path: Path) -> Path:
+    """Draw a page and return its path."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "page.png"
+        PictureBackend(file, PAGE).draw(scene)
+        _put(file, path)
+    return path
+
+
+def small_film(scene: Scene, path: Path) -> Path:
+    """Draw a film (.gif) and return its path."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "film.gif"
+        FilmBackend(file, FILM).draw(scene)
+        _put(file, path)
+    return path
+
+
+def _put(made: Path, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacement(path) as stream:
+        stream.write(made.read_bytes())

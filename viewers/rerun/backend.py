@@ -1,0 +1,47 @@
+"""Draws scenes with Rerun, into a file that `viewers.rerun.window` or any Rerun viewer shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import rerun as rr
+
+from viewers.backend import Backend
+from viewers.output_file import RERUN, new_file, written_beside
+from viewers.rerun.blueprint import episode_blueprint
+from viewers.rerun.columns import RerunParts
+from viewers.rerun.comparison_blueprint import comparison_blueprint
+from viewers.rerun.hand_blueprint import hand_blueprint
+from viewers.rerun.verdict_blueprint import verdict_blueprint
+from viewers.scene.scene import Scene
+
+APPLICATION = "tacdata"
+LAYOUTS = {
+    "episode": episode_blueprint,
+    "hand": hand_blueprint,
+    "verdict": verdict_blueprint,
+    "comparison": comparison_blueprint,
+}
+"""Kind of a scene -> what lays it out."""
+
+
+class RerunBackend(Backend):
+    """Writes each scene into a file (.rrd) that the stock Rerun viewer opens."""
+
+    def __init__(self, path: Path) -> None:
+        """Take the file to write.
+
+        Raises:
+            UsageError: If it exists or does not end in .rrd.
+        """
+        self._path = new_file(path, RERUN)
+
+    def draw(self, scene: Scene) -> None:
+        """Write the file; a crash leaves none rather than half of one."""
+        with written_beside(self._path) as temporary:
+            recording = rr.RecordingStream(APPLICATION)
+            recording.save(temporary, default_blueprint=LAYOUTS[scene.kind](scene))
+            recording.send_recording_name(scene.title)
+            RerunParts(recording, scene).write()
+            recording.flush()
+            recording.disconnect()

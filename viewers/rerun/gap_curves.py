@@ -1,0 +1,41 @@
+"""The readings that `viewers.rerun.gap_recording` wrote, read back as curves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from rerun.chunk import RrdReader
+
+from tacdata.errors import FormatError
+from viewers.rerun.gap_recording import COLORS, TIMELINE
+from viewers.scene.scene import Curves
+
+
+def read_gap_curves(path: Path) -> tuple[Curves, ...]:
+    """Return one entry for each episode: its reading measured, before and after [the source's unit].
+
+    Raises:
+        FormatError: If the file is damaged.
+    """
+    found: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {}
+    try:
+        for chunk in RrdReader(path).stream():
+            parts = str(chunk.entity_path).strip("/").split("/")
+            if chunk.is_static or len(parts) != 3 or parts[1] != "reading":
+                continue
+            batch = chunk.to_record_batch()
+            time = batch[TIMELINE].cast("int64").to_numpy()
+            values = batch["Scalars:scalars"].flatten().to_numpy()
+            found.setdefault(parts[0], {})[parts[2]] = (time, values)
+    except Exception as error:  # whatever Rerun's reader says of a damaged file
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise FormatError(f"{path} cannot be read: {reason}", "a file of tacdata revise", "revise again") from None
+    curves = []
+    for name, own in sorted(found.items()):
+        if set(own) == set(COLORS):
+            time = own["measured"][0]
+            curves.append(
+                Curves(name, "as recorded", tuple(COLORS), time, np.column_stack([own[key][1] for key in COLORS]))
+            )
+    return tuple(curves)

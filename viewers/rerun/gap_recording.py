@@ -1,0 +1,101 @@
+"""Readings measured and as a model says them, before and after a revision, as a Rerun file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from viewers.output_file import RERUN, new_file, written_beside
+from viewers.scene.color_scale import HUES
+
+TIMELINE = "time_in_episode"
+COLORS = {"measured": (30, 30, 30), "before": HUES[5], "after": HUES[0]}
+
+
+class Shown(Protocol):
+    """One episode."""
+
+    @property
+    def name(self) -> str:
+        """The episode's name."""
+        ...
+
+    @property
+    def time(self) -> np.ndarray:
+        """[s], shape (n,)."""
+        ...
+
+    @property
+    def depth(self) -> np.ndarray:
+        """[mm], shape (n,)."""
+        ...
+
+    @property
+    def measured(self) -> np.ndarray:
+        """Readings, shape (n, channels)."""
+        ...
+
+    @property
+    def before(self) -> np.ndarray:
+        """What the model said, shape (n, channels)."""
+        ...
+
+    @property
+    def after(self) -> np.ndarray:
+        """What it says now, shape (n, channels)."""
+        ...
+
+    @property
+    def channel(self) -> int:
+        """The channel that tells most."""
+        ...
+
+    @property
+    def channel_name(self) -> str:
+        """What it is called."""
+        ...
+
+
+def write(episodes: Sequence[Shown], path: Path, title: str) -> None:
+    """Write episodes, one view each of its telling channel and of its depth.
+
+    Args:
+        episodes: What to show.
+        path: File to write (.rrd).
+        title: What it is called.
+
+    Raises:
+        UsageError: If the file exists or does not end in .rrd.
+    """
+    path = new_file(path, RERUN)
+    views = []
+    for k, own in enumerate(episodes):
+        root = f"episode_{k}"
+        views.append(rrb.TimeSeriesView(origin=f"{root}/reading", name=f"{own.name}, {own.channel_name}"))
+        views.append(rrb.TimeSeriesView(origin=f"{root}/depth", name=f"{own.name}, depth [mm]"))
+    blueprint = rrb.Blueprint(rrb.Grid(*views, grid_columns=2), collapse_panels=True)
+    with written_beside(path) as temporary:
+        recording = rr.RecordingStream("tacdata")
+        recording.save(temporary, default_blueprint=blueprint)
+        recording.send_recording_name(title)
+        for k, own in enumerate(episodes):
+            _episode(recording, f"episode_{k}", own)
+        recording.flush()
+        recording.disconnect()
+
+
+def _episode(recording: rr.RecordingStream, root: str, own: Shown) -> None:
+    index = [rr.TimeColumn(TIMELINE, duration=own.time)]
+    curves = {name: getattr(own, name)[:, own.channel] for name in COLORS}
+    for name, values in curves.items():
+        entity = f"{root}/reading/{name}"
+        recording.log(entity, rr.SeriesLines(colors=[COLORS[name]], names=[name], widths=[1.5]), static=True)
+        recording.send_columns(entity, index, columns=rr.Scalars.columns(scalars=values))
+    entity = f"{root}/depth/commanded"
+    recording.log(entity, rr.SeriesLines(colors=[HUES[2]], names=["depth [mm]"]), static=True)
+    recording.send_columns(entity, index, columns=rr.Scalars.columns(scalars=own.depth))

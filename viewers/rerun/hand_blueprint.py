@@ -1,0 +1,77 @@
+"""How a demonstration, or a robot's targets, are laid out in Rerun."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun.blueprint as rrb
+
+from viewers.rerun.columns import ELAPSED, HOST, entity, heat_map_of
+from viewers.scene.scene import Scene
+
+
+def hand_blueprint(scene: Scene) -> rrb.Blueprint:
+    """Return fingers in space beside what they felt, curves below, text and cameras at the side."""
+    rows: list[rrb.ContainerLike] = [rrb.Horizontal(_space(scene), *_felt(scene), column_shares=[3, 1])]
+    shares = [6.0]
+    if scene.curves:
+        rows.append(_curves(scene))
+        shares.append(4.0)
+    side: list[rrb.ContainerLike] = [rrb.TextDocumentView(origin="about", name="About")]
+    for camera in scene.cameras:
+        path = f"cameras/{camera.name}"
+        side.append(rrb.Spatial2DView(origin=f"{path}/image", contents=f"{path}/**", name=f"Camera {camera.name}"))
+    return rrb.Blueprint(
+        rrb.Horizontal(rrb.Vertical(*rows, row_shares=shares), rrb.Vertical(*side), column_shares=[3, 1]),
+        rrb.TimePanel(timeline=HOST if scene.on_host_clock else ELAPSED, state="collapsed", loop_mode="All"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+    )
+
+
+def _space(scene: Scene) -> rrb.Spatial3DView:
+    places = [t.position[np.isfinite(t.position).all(axis=1)] for t in scene.trails]
+    points = np.concatenate(places) if places else np.zeros((0, 3))
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.full(3, 100.0))
+    middle, size = (low + high) / 2, max(float(np.linalg.norm(high - low)), 60.0)
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=["world/**", "contact/**"],
+        name="Fingertips [mm]; pale: bridged",
+        eye_controls=rrb.EyeControls3D(
+            position=tuple((middle + size * np.array([-0.7, -1.1, 0.8])).tolist()), look_target=tuple(middle.tolist())
+        ),
+        line_grid=rrb.LineGrid3D(visible=False),
+    )
+
+
+def _felt(scene: Scene) -> list[rrb.ContainerLike]:
+    """Return a column with each finger's predicted map, and a tab behind it with its taxels."""
+    pictures = [rrb.Spatial2DView(origin=entity("maps", m.name), name=m.title) for m in scene.maps]
+    arrays = [
+        rrb.Spatial2DView(
+            origin=heat_map_of(a), name=f"{a.name}: taxels, {a.scale.low:g} to {a.scale.high:g} {a.scale.unit}"
+        )
+        for a in scene.arrays
+    ]
+    tabs = []
+    if pictures:
+        tabs.append(rrb.Vertical(*pictures, name="Predicted depth"))
+    if arrays:
+        tabs.append(rrb.Vertical(*arrays, name="Taxels"))
+    return [rrb.Tabs(*tabs)] if tabs else []
+
+
+def _curves(scene: Scene) -> rrb.Container:
+    hidden = rrb.PlotLegend(visible=False)
+    groups = dict.fromkeys(c.name.split("/")[0] for c in scene.curves)
+    views = []
+    for group in groups:
+        own = [c for c in scene.curves if c.name.split("/")[0] == group]
+        legend = hidden if group == "taxels" or len(own) * len(own[0].labels) > 12 else None
+        title = {"clock": "clock: arrival after sample", "spread": "standard deviation of the position"}.get(
+            group, group
+        )
+        views.append(
+            rrb.TimeSeriesView(origin=entity("curves", group), name=f"{title} [{own[0].unit}]", plot_legend=legend)
+        )
+    return rrb.Horizontal(views[0], rrb.Tabs(*views[1:])) if len(views) > 1 else rrb.Horizontal(views[0])

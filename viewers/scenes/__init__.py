@@ -1,0 +1,1 @@
+"""From a file of one kind to its scene."""

@@ -1,0 +1,146 @@
+"""From a discrepancy verdict, and what a revision made of it, to a scene."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewers.scene.scene import Bars, Curves, Page, Scene
+
+GATE = 0.01
+"""Largest share of sign flips at which a gap counts as one (`tacdata.discrepancy`)."""
+WIDE = 20.0
+"""Ratio from which bars are drawn on a logarithmic axis."""
+SURELY = 2.33
+"""Standard errors by which a name must be better than another (`tacdata.discrepancy`)."""
+
+
+def verdict_scene(
+    title: str, verdict: dict[str, Any], picture: Path | None = None, curves: tuple[Curves, ...] = ()
+) -> Scene:
+    """Return a verdict in words and bars.
+
+    Args:
+        title: What stands on top.
+        verdict: The document (`schemas/verdict.schema.json`).
+        picture: The page with residuals that lies beside it, if one does.
+        curves: Readings beside the model before and after, if they are there.
+    """
+    words = verdict_words(title, verdict, picture.name if picture else None)
+    bars = (*_left(verdict), *_slices(verdict), *_margins(verdict), *_limits(verdict))
+    scene = _scene(f"{title}: {verdict['status']}", words, bars, curves)
+    if picture is None:
+        return scene
+    return replace(scene, pages=(Page("residuals", "Residuals before and after", picture.read_bytes()),))
+
+
+def revision_scene(title: str, revision: dict[str, Any], table: str, curves: tuple[Curves, ...]) -> Scene:
+    """Return what a revision did: the gap before and after, and readings of telling episodes.
+
+    Args:
+        title: What stands on top.
+        revision: The document (`schemas/revision.schema.json`).
+        table: The gap as a Markdown table.
+        curves: Readings measured, before and after, one entry an episode.
+    """
+    gap = revision["gap"] or {}
+    rows = [gap[key] for key in ("sealed", "worst") if gap.get(key)]
+    rows += [{**entry, "name": f"left out: {entry['name']}"} for entry in gap.get("elsewhere", ())]
+    names = [f"{entry['name']}, {when}" for entry in rows for when in ("before", "after")]
+    values = np.array([entry[when] for entry in rows for when in ("before", "after")], float)
+    added = ", ".join(f"**{entry['effect'] if isinstance(entry, dict) else entry}**" for entry in revision["added"])
+    lines = [
+        f"# {title}",
+        "",
+        f"- **Verdict** {revision['status']}",
+        f"- **Added** {added or 'nothing'}",
+        "",
+        table,
+        "",
+    ]
+    lines += [f"- next: {press}" for press in (revision.get("next") or {}).get("presses", [])]
+    wide = bool(len(values)) and bool(values.max() > WIDE * values.min())
+    title_of_bars = "Residual: mean square over the noise; 1 is the floor"
+    bars = (Bars("gap", title_of_bars, tuple(names), values, 1.0, wide),) if rows else ()
+    return _scene(title, "\n".join(lines), bars, curves)
+
+
+def _scene(title: str, words: str, bars: tuple[Bars, ...], curves: tuple[Curves, ...] = ()) -> Scene:
+    time = np.unique(np.concatenate([c.time_ns for c in curves])) if curves else np.zeros(0, np.int64)
+    return Scene(title, words, time, np.arange(len(time)), curves=curves, bars=bars, kind="verdict")
+
+
+def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> str:
+    """Return the verdict as Markdown: the answer first, what it rests on, what to do next."""
+    lines = [f"# {title}: {verdict['status']}", "", verdict["why"] + ".", ""]
+    for effect in verdict["effects"]:
+        lines += [f"## {effect['title']} ({effect['effect']}, {effect['stage']}): {effect['status']}", ""]
+        for name, p in effect["parameters"].items():
+            value = np.ravel(p["value"])
+            shown = f"{value[0]:.4g}" if len(value) == 1 else f"{value.min():.3g} to {value.max():.3g}, one a channel"
+            spread = f" ± {p['error']:.2g}" if p["error"] is not None else ""
+            lines.append(f"- {name} = {shown}{spread}" + (f" {p['unit']}" if p["unit"] != "1" else ""))
+        if effect["alternatives"]:
+            lines.append(f"- could also be: {', '.join(effect['alternatives'])}")
+        lines.append(f"- told apart by: {effect['experiment']}")
+        if effect.get("confidence") is not None:
+            lines.append(f"- probability that the name is right: {effect['confidence']:.0%}")
+    gate, left = verdict["gate"], verdict["left"]
+    says = f"{GATE:g} or less says so"
+    share = f" **Left** {left['share']:.1%} of what could be explained." if verdict["effects"] else ""
+    lines += [
+        "", f"**Gap** p = {gate['p']:.3g} ({'there is one' if gate['gap'] else 'none'}: {says}).{share}", "",
+    ]  # fmt: skip
+    for heading, items in (
+        ("Where it lives", verdict["located"]), ("Next", verdict["next"]), ("Of these recordings", verdict["remarks"]),
+    ):  # fmt: skip
+        if items:
+            lines += [f"## {heading}", "", *(f"- {item}" for item in items), ""]
+    if verdict["unjudgeable"]:
+        lines += ["Cannot be judged here: " + ", ".join(verdict["unjudgeable"]) + ".", ""]
+    if picture:
+        lines.append(f"A page with the residuals lies beside it: {picture}.")
+    return "\n".join(lines)
+
+
+def _left(verdict: dict[str, Any]) -> list[Bars]:
+    names, left = ("before", "after", "noise floor"), verdict["left"]
+    values = np.array([left["before"], left["after"], left["floor"]], float)
+    wide = values[0] > WIDE * min(values[1:])
+    return [Bars("gap", "Residual: mean square over the noise", names, values, 1.0, bool(wide))]
+
+
+def _slices(verdict: dict[str, Any]) -> list[Bars]:
+    """Return where the residual lives, before and after."""
+    told = [s for s in verdict.get("slices", ()) if s["by"] != "stream"]
+    if not told:
+        return []
+    names = tuple(f"{s['by']}: {s['name']}, {when}" for s in told for when in ("before", "after"))
+    values = np.array([s[when] for s in told for when in ("before", "after")], float)
+    title = "Where it lives: mean square over the noise; 1 is the floor"
+    return [Bars("slices", title, names, values, 1.0, bool(values.max() > WIDE * max(values.min(), 1e-9)))]
+
+
+def _margins(verdict: dict[str, Any]) -> list[Bars]:
+    found = []
+    for effect in verdict["effects"]:
+        if effect["margins"]:
+            rivals = sorted(effect["margins"].items(), key=lambda pair: pair[1])
+            title = f"{effect['effect']}: by how many standard errors better than"
+            found.append(
+                Bars(f"margins/{effect['effect']}", title, tuple(n for n, _ in rivals),
+                     np.array([v for _, v in rivals], float), SURELY)
+            )  # fmt: skip
+    return found
+
+
+def _limits(verdict: dict[str, Any]) -> list[Bars]:
+    """Return how small an effect would have been seen, those that these recordings excite."""
+    known = sorted(((n, v) for n, v in verdict["limits"].items() if v), key=lambda pair: pair[1])
+    if not known:
+        return []
+    title = "Would be found half the time at this part of its usual size"
+    return [Bars("limits", title, tuple(n for n, _ in known), np.array([v for _, v in known], float), 1.0, True)]
