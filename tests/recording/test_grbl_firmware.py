@@ -1,4 +1,4 @@
-"""Driver and recorder against a real firmware built for a host (see docs/testing_with_firmware.md).
+"""Driver and recorder against a real firmware built for a host (see docs/how_to/testing_with_firmware.md).
 
 Run with ``TACDATA_GRBL_FIRMWARE='PATH/TO/grblHAL_sim -n -s /dev/null -b /dev/null'``.
 """
