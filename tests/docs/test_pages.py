@@ -11,8 +11,8 @@ import typer.main
 from tacdata.cli import application
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("*/*.md")])
-PAGES = [page for page in PAGES if "decisions" not in page.parts]
+FOLDERS = ("docs", "examples", "benchmarks", "schemas", "tacdata", "label_farm", "training", "viewers")
+PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -24,7 +24,8 @@ def blocks(page, language):
     return [body for kind, body in BLOCK.findall(page.read_text()) if kind == language]
 
 
-PYTHON = [page for page in PAGES if blocks(page, "python")]
+GUIDES = [page for page in PAGES if page.parent == ROOT or page.is_relative_to(ROOT / "docs")]
+PYTHON = [page for page in GUIDES if blocks(page, "python")]
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,16 @@ def test_commands_have_the_arguments_that_they_are_typed_with(page, verbs):
         options = {option for parameter in command.params for option in parameter.opts + parameter.secondary_opts}
         typed = {word.split("=")[0] for word in rest if word.startswith("--")} - {"--help"}
         assert typed <= options, f"{' '.join(words)}: no {typed - options}"
+
+
+PATHS = re.compile(rf"`((?:{'|'.join(FOLDERS)}|tests|\\.dev|\\.ci)/[\\w./-]+)`")
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "CHANGELOG.md"], ids=name)
+def test_paths_in_backquotes_are_there(page):
+    assert not [
+        path for path in PATHS.findall(page.read_text()) if not re.search("my_", path) and not (ROOT / path).exists()
+    ]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
