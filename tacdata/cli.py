@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from tacdata import registry
+from tacdata import registry, stages
 from tacdata.errors import TacdataError
 
 ROOM, BASE = "tacdata.commands", "command"
@@ -63,6 +63,7 @@ def interruptible(verb: Callable[..., Any]) -> Callable[..., Any]:
 
 def main() -> None:
     """Run the command line; an error meant for a person ends in words and a non-zero exit, never a traceback."""
+    stages.follow()
     try:
         application()(prog_name="tacdata")
     except TacdataError as error:

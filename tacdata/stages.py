@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import functools
+import os
 import shlex
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tacdata.errors import DeviceError, TacdataError
 
 PATIENCE = 60.0
 """Time that an interrupted verb gets to stop the motion and close its files [s]."""
+
+LIFELINE = "TACDATA_LIFELINE"
+"""Variable that tells a stage its pipe: it closes when the process that runs the stages is gone."""
 
 
 class StageError(TacdataError):
@@ -69,13 +76,53 @@ class Line:
 
 
 def _run(line: list[str]) -> int:
-    # A group of its own: the terminal's Ctrl-C then reaches it once, through us, and not twice.
-    process = subprocess.Popen(line, stdin=subprocess.DEVNULL, process_group=0)
+    process = _start(line)
     try:
         return process.wait()
     except BaseException:
         stop(process)
         raise
+
+
+def _start(line: list[str], **streams: Any) -> subprocess.Popen:
+    pipe = _lifeline()
+    return subprocess.Popen(
+        line,
+        stdin=subprocess.DEVNULL,
+        # A group of its own: the terminal's Ctrl-C then reaches it once, through us, and not twice.
+        process_group=0,
+        pass_fds=[pipe],
+        env={**os.environ, LIFELINE: str(pipe)},
+        **streams,
+    )
+
+
+@functools.cache
+def _lifeline() -> int:
+    """Return the end of a pipe on which nothing is written: the other end is held until this process is gone."""
+    return os.pipe()[0]
+
+
+def follow() -> None:
+    """End this verb as by Ctrl-C once the process that runs it as a stage is gone, killed or not.
+
+    Does nothing in a verb that is no stage.
+    """
+    pipe = os.environ.pop(LIFELINE, None)
+    if pipe is None:
+        return
+    os.set_inheritable(int(pipe), False)
+    # A shell's background job and all below it ignore Ctrl-C; a stage hears it from its parent alone.
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    threading.Thread(target=_end_with_parent, args=(int(pipe),), daemon=True, name="lifeline").start()
+
+
+def _end_with_parent(pipe: int) -> None:
+    os.read(pipe, 1)
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(PATIENCE)
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def stop(process: subprocess.Popen) -> None:
@@ -104,13 +151,7 @@ class Background:
         """Start it."""
         print(f"$ {written(self.arguments)} &", flush=True)
         with self.log.open("wb") as stream:
-            self.process = subprocess.Popen(
-                command_line(self.arguments),
-                stdin=subprocess.DEVNULL,
-                stdout=stream,
-                stderr=stream,
-                process_group=0,
-            )
+            self.process = _start(command_line(self.arguments), stdout=stream, stderr=stream)
         return self
 
     def wait_until(self, ready: Callable[[], bool], what: str, timeout: float) -> None:

@@ -26,11 +26,26 @@ except KeyboardInterrupt:
     sys.exit(130)
 """
 
+RUNNER = """
+import sys
+from tacdata import stages
+stages.command_line = lambda arguments: [sys.executable, "-c", *arguments]
+stages.Line(1, "").run("a", ["from tacdata import stages; stages.follow()" + sys.argv[1], sys.argv[2]])
+"""
+"""A program that runs another as a stage."""
+
 
 @pytest.fixture
 def scripts(monkeypatch):
     """Stages are Python scripts instead of verbs: the first argument is the program's text."""
     monkeypatch.setattr(stages, "command_line", lambda arguments: [sys.executable, "-c", *arguments])
+
+
+def wait_for(condition, seconds=20.0):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.01)
 
 
 def test_stages_run_in_order_and_print_what_would_be_typed(scripts, tmp_path, capfd):
@@ -79,6 +94,17 @@ def test_an_interrupt_waits_until_the_stage_has_closed_its_files(scripts, tmp_pa
         stages.Line(1, "").run("a", [PATIENT, str(tmp_path)])
     thread.join()
     assert (tmp_path / "closed").read_text() == "once"
+
+
+@pytest.mark.parametrize("ignored", [False, True], ids=["in front", "background job of a script"])
+def test_a_stage_closes_its_files_when_its_parent_is_killed(tmp_path, ignored):
+    start = [sys.executable, "-c", RUNNER, PATIENT, str(tmp_path)]
+    if ignored:
+        start = ["sh", "-c", 'trap "" INT; exec "$@"', "sh", *start]
+    with subprocess.Popen(start, stdout=subprocess.DEVNULL) as parent:
+        wait_for((tmp_path / "started").exists)
+        parent.kill()
+    wait_for((tmp_path / "closed").exists)
 
 
 def test_a_background_verb_is_stopped_at_the_end(scripts, tmp_path):

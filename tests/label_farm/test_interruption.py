@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from farm_examples import HERE, press_episode
+from session_examples import session
 
 SCRIPT = """
 import sys
@@ -21,6 +22,12 @@ try:
 except KeyboardInterrupt:
     sys.exit(130)
 print(len(summary.written), len(summary.failed))
+"""
+
+STAGE = """
+import sys
+from tacdata import stages
+stages.Line(1, "").run("label", ["label", sys.argv[1], "--factory", "fast_model:FastModel", "--workers", "2"])
 """
 
 
@@ -89,3 +96,14 @@ def test_a_run_that_is_stopped_goes_on_where_it_stood(tmp_path, label_all, solve
     assert labels_in(tmp_path) == list(range(count)) and not summary.failed
     assert len(solves()) - begun == count - results, "only what was not finished is computed"
     assert all(path.read_bytes() == content for path, content in kept.items())
+
+
+def test_workers_end_with_whoever_runs_the_verb_as_a_stage(tmp_path, solves, monkeypatch):
+    """As `tacdata demo` does: killed, it leaves nobody behind who goes on solving."""
+    monkeypatch.setenv("FAST_MODEL_SECONDS", "200")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HERE), str(HERE.parent.parent)]))
+    recorded = session(tmp_path / "session", 3)
+    with subprocess.Popen([sys.executable, "-c", STAGE, str(recorded)], stdout=subprocess.DEVNULL) as parent:
+        wait_for(lambda: len(solves()) == 2)
+        parent.kill()
+    wait_for(lambda: not any(alive(int(worker)) for worker, _ in solves()))
