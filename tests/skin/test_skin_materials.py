@@ -77,7 +77,6 @@ class TestLaw:
         up, down = (values(make(name), F + s * h * dF) for s in (1, -1))
         here = values(make(name), F, dF)
         assert np.allclose((up.stress - down.stress) / (2 * h), here.tangent, atol=1e-7)
-        assert np.allclose((up.isochoric_stress - down.isochoric_stress) / (2 * h), here.isochoric_tangent, atol=1e-7)
 
     def test_tangent_is_symmetric(self, name, make, random):
         F = gradients(random)
@@ -108,20 +107,6 @@ class TestLaw:
         assert np.allclose(of_swelling, 3 * material.bulk_modulus * np.eye(3), atol=1e-12)
         assert np.allclose(of_pull, np.diag([material.youngs_modulus, 0, 0]), atol=1e-12)
 
-    def test_the_isochoric_part_knows_no_volume(self, name, make, random):
-        """It derives from W(J^(-1/3) F): swelling does no work on it, and does not change its Kirchhoff stress."""
-        F, numbers = gradients(random), make(name)
-        part = values(numbers, F).isochoric_stress
-        assert np.abs(np.einsum("nij,nij->n", part, F)).max() < 1e-13
-        assert np.allclose(values(numbers, 1.2 * F).isochoric_stress * 1.2, part, atol=1e-12)
-        unswollen = F / np.cbrt(np.linalg.det(F))[:, None, None]
-        h, dF = 1e-6, random.normal(size=F.shape)
-        dF -= np.einsum("nij,nji->n", np.linalg.inv(unswollen), dF)[:, None, None] * unswollen / 3
-        up, down = (unswollen + s * h * dF for s in (1, -1))
-        up, down = (values(numbers, f / np.cbrt(np.linalg.det(f))[:, None, None]).energy for f in (up, down))
-        work = np.einsum("nij,nij->n", values(numbers, unswollen).isochoric_stress, dF)
-        assert np.allclose((up - down) / (2 * h), work, atol=1e-8)
-
     def test_single_precision_keeps_its_digits_at_small_strain(self, name, make, random):
         """From H relative to the exact answer; from F, whose own rounding counts, relative to that of the rounded F."""
         H = small_gradients(random)
@@ -133,7 +118,6 @@ class TestLaw:
             error, size = (np.linalg.norm(P, axis=(1, 2)) for P in (given.stress - wanted.stress, wanted.stress))
             assert (error < 1e-5 * size).all()
             assert np.abs(given.energy / wanted.energy - 1).max() < 1e-5
-            assert np.abs(given.isochoric_stress - wanted.isochoric_stress).max() < 1e-5 * np.abs(wanted.stress).max()
 
     def test_single_precision_follows_at_large_strain(self, name, make, random):
         F = gradients(random).astype(np.float32)
@@ -151,7 +135,7 @@ class TestLaw:
 
     def test_the_same_functions_are_returned_at_every_call(self, name, make):
         law, again = load_law(name), load_law(name)
-        for which in ("energy", "stress", "tangent", "isochoric_stress", "isochoric_tangent"):
+        for which in ("energy", "stress", "tangent"):
             function, other = (getattr(x, f"{which}_function") for x in (law, again))
             assert function() is other(wp.float64)
             assert function(wp.float32, "H") is other(wp.float32, "H")

@@ -1,1 +1,1 @@
-"""What material laws are built from: kinematics, invariants, principal axes, Prony series."""
+"""What material laws are built from: kinematics, invariants, principal axes."""

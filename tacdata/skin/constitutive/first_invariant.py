@@ -22,7 +22,7 @@ class Profile(NamedTuple):
 
 
 def functions(real: type, profile: Profile) -> tuple[wp.Function, ...]:
-    """Return energy, stress, tangent, isochoric stress and isochoric tangent; m[0] is mu, m[1] kappa."""
+    """Return energy, stress and tangent; m[0] is mu, m[1] kappa."""
     mat33, numbers = kinematics.matrix(real), kinematics.parameters(real)
     volume, first, excess = kinematics.volume(real), invariants.first(real), invariants.excesses(real).first
     cofactor_change, volume_change = volume.cofactor_change, volume.change

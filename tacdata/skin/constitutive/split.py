@@ -11,7 +11,7 @@ from tacdata.skin.constitutive import kinematics
 def with_volumetric(
     real: type, energy: wp.Function, stress: wp.Function, tangent: wp.Function
 ) -> tuple[wp.Function, ...]:
-    """Return energy, stress and tangent of the whole law, then the given isochoric stress and tangent.
+    """Return energy, stress and tangent of the whole law.
 
     Args:
         real: Scalar type of the functions.
@@ -42,4 +42,4 @@ def with_volumetric(
         swelling = wp.ddot(cof, dF) * cof + volume_change(H, K) * cross(F, dF)
         return tangent(H, dF, m) + m[1] * swelling
 
-    return whole_energy, whole_stress, whole_tangent, stress, tangent
+    return whole_energy, whole_stress, whole_tangent

@@ -37,10 +37,6 @@ class LawFunctions(NamedTuple):
     """``f(H, m)``: first Piola-Kirchhoff stress P = dW/dF [MPa]."""
     tangent: wp.Function
     """``f(H, dF, m)``: directional derivative of P along dF [MPa]."""
-    isochoric_stress: wp.Function
-    """``f(H, m)``: the part of P that derives from W(J^(-1/3) F) [MPa]."""
-    isochoric_tangent: wp.Function
-    """``f(H, dF, m)``: directional derivative of the isochoric part along dF [MPa]."""
 
 
 @dataclass(frozen=True)
@@ -124,14 +120,6 @@ class Law(ABC):
         """Return ``f(F, dF, m) -> mat33``: directional derivative of P along dF [MPa]."""
         return _function(type(self), "tangent", real, of)
 
-    def isochoric_stress_function(self, real: type | None = None, of: Gradient = "F") -> wp.Function:
-        """Return ``f(F, m) -> mat33``: the part of P that derives from W(J^(-1/3) F) [MPa], which relaxes."""
-        return _function(type(self), "isochoric_stress", real, of)
-
-    def isochoric_tangent_function(self, real: type | None = None, of: Gradient = "F") -> wp.Function:
-        """Return ``f(F, dF, m) -> mat33``: directional derivative of the isochoric part along dF [MPa]."""
-        return _function(type(self), "isochoric_tangent", real, of)
-
 
 @cache
 def _second(real: type) -> wp.Function:
@@ -149,7 +137,7 @@ def _function(kind: type[Law], quantity: str, real: type | None, of: Gradient) -
     if real not in (wp.float64, wp.float32):
         raise TypeError(f"{kind.__name__}: real = {real!r}, allowed are warp.float64 and warp.float32")
     inner = getattr(kind.functions(real), quantity)
-    return inner if of == "H" else _of_deformation(inner, real, "tangent" in quantity)
+    return inner if of == "H" else _of_deformation(inner, real, quantity == "tangent")
 
 
 @cache

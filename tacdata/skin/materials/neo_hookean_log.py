@@ -11,12 +11,11 @@ import warp as wp
 
 from tacdata.skin.constitutive import kinematics, scalars
 from tacdata.skin.materials.law import Law, LawFunctions
-from tacdata.skin.materials.neo_hookean import NeoHookean
 
 
 @dataclass(frozen=True)
 class NeoHookeanLog(Law):
-    """The textbook form (Bonet and Wood 2008, eq. 6.27); its isochoric part is that of the split form."""
+    """The textbook form (Bonet and Wood 2008, eq. 6.27)."""
 
     splits_volume: ClassVar[bool] = False
 
@@ -42,7 +41,7 @@ class NeoHookeanLog(Law):
     def functions(real: type) -> LawFunctions:
         """Return W, P = mu (F - F^-T) + lambda ln J F^-T, and dP."""
         mat33, numbers = kinematics.matrix(real), kinematics.parameters(real)
-        volume, split = kinematics.volume(real), NeoHookean.functions(real)
+        volume = kinematics.volume(real)
         cofactor_change, volume_change = volume.cofactor_change, volume.change
         cross, shifted = volume.cross, volume.shifted
         log1p_ratio, exp_excess = scalars.log1p_ratio(real), scalars.exp_excess(real)
@@ -75,4 +74,4 @@ class NeoHookeanLog(Law):
             dG = cross(shifted(H, real(1.0)), dF) / J - g * G
             return m[0] * (dF - dG) + m[1] * (g * G + j * log1p_ratio(j) * dG)
 
-        return LawFunctions(energy, stress, tangent, split.isochoric_stress, split.isochoric_tangent)
+        return LawFunctions(energy, stress, tangent)

@@ -24,10 +24,6 @@ class LawValues:
     """First Piola-Kirchhoff stress P [MPa], shape (n, 3, 3)."""
     tangent: np.ndarray
     """Change of P along dF [MPa], shape (n, 3, 3)."""
-    isochoric_stress: np.ndarray
-    """Isochoric part of P [MPa], shape (n, 3, 3)."""
-    isochoric_tangent: np.ndarray
-    """Its change along dF [MPa], shape (n, 3, 3)."""
 
 
 def evaluate(
@@ -58,7 +54,7 @@ def evaluate(
     displacement = state if of == "H" else state - np.eye(3, dtype=scalar)
     states = [wp.array(a, dtype=mat33, device=device) for a in (displacement, change)]
     energy = wp.zeros(n, dtype=real, device=device)
-    others = [wp.zeros(n, dtype=mat33, device=device) for _ in range(4)]
+    others = [wp.zeros(n, dtype=mat33, device=device) for _ in range(2)]
     m = kinematics.parameters(real)(*numbers, *([0.0] * (8 - len(numbers))))
     wp.launch(_kernel(type(law), real), dim=n, inputs=[*states, m], outputs=[energy, *others], device=device)
     return LawValues(energy.numpy(), *(a.numpy() for a in others))
@@ -67,7 +63,7 @@ def evaluate(
 @cache
 def _kernel(kind: type[Law], real: type) -> wp.Kernel:
     mat33, numbers = kinematics.matrix(real), kinematics.parameters(real)
-    energy_of, stress_of, tangent_of, isochoric_stress_of, isochoric_tangent_of = kind.functions(real)
+    energy_of, stress_of, tangent_of = kind.functions(real)
 
     @wp.kernel(module="unique", enable_backward=False)
     def values(
@@ -77,14 +73,10 @@ def _kernel(kind: type[Law], real: type) -> wp.Kernel:
         energy: wp.array(dtype=real),
         stress: wp.array(dtype=mat33),
         tangent: wp.array(dtype=mat33),
-        isochoric_stress: wp.array(dtype=mat33),
-        isochoric_tangent: wp.array(dtype=mat33),
     ):
         i = wp.tid()
         energy[i] = energy_of(H[i], m)
         stress[i] = stress_of(H[i], m)
         tangent[i] = tangent_of(H[i], D[i], m)
-        isochoric_stress[i] = isochoric_stress_of(H[i], m)
-        isochoric_tangent[i] = isochoric_tangent_of(H[i], D[i], m)
 
     return values
