@@ -3,7 +3,7 @@
     python benchmarks/recorder_load.py --seconds 600
 
 One process emulates the board (a pseudo-terminal at 1 kHz, from ready-made frames, so that the emulation costs
-little) and the guide; the other runs the drivers, `Streams` and `EpisodeWriter` as `tacdata record` does. Images
+little) and the guide; the other runs the drivers, `RigStreams` and `EpisodeWriter` as `tacdata record` does. Images
 come from a camera in memory: noise that does not compress well. Printed: lost samples, CPU, memory and its slope,
 bytes on disk, and how far the writer lagged.
 """
@@ -30,7 +30,7 @@ from tacdata.plans import Plan
 from tacdata.recording.files.mcap_records import walk
 from tacdata.recording.files.writer import EpisodeWriter, Header
 from tacdata.recording.live.rig_devices import RigDevices
-from tacdata.recording.live.rig_streams import Streams
+from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.sensor import default_sensor
 from tacdata.wire import Encoder, default_format
 from tacdata.wire.frames.frame_format import from_document
@@ -146,7 +146,7 @@ def run(seconds: float, folder: Path) -> dict:
             memory.append(resident_mb())
             waiting.append(writer.waiting / 1e6)
 
-    with board, Streams(devices, {}, lambda: None) as streams:
+    with board, RigStreams(devices, {}, lambda: None) as streams:
         time.sleep(1.0)
         writer = EpisodeWriter(folder / "load.mcap", header(), clock, CAMERAS)
         watcher = threading.Thread(target=watch)

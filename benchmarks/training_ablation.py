@@ -23,26 +23,26 @@ from training.loss import WeightedLoss
 from training.reports.comparison import groups
 from training.reports.score_sheet import number, row, rule, title
 from training.scoring.evaluate import METRICS
-from training.settings import Settings
+from training.settings import TrainingSettings
 
 PAST = [-8, -7, -6, -5, -4, -3, -2, -1, 0]
 CONTACT = WeightedLoss(mixture=0.2, threshold=0.033, foreground=3.0)
 """Weight on all of the contact, from 0.1 mm, and on absolute errors: the paper's begins at 0.9 mm."""
-RECIPES: dict[str, Settings] = {
-    "paper": Settings(network="paper"),
-    "causal": Settings(network="causal"),
-    "paper mirror": Settings(network="paper", mirror=True, schedule="cosine"),
-    "history": Settings(network="history", schedule="cosine"),
-    "direct constant": Settings(network="direct"),
-    "direct": Settings(network="direct", schedule="cosine"),
-    "direct nearest": Settings(network="direct", schedule="cosine", arguments={"offsets": PAST}),
-    "direct one frame": Settings(network="direct", schedule="cosine", arguments={"offsets": [0]}),
-    "direct mirror": Settings(network="direct", schedule="cosine", mirror=True),
-    "direct jitter": Settings(network="direct", schedule="cosine", gain_jitter=0.08),
-    "direct mirror jitter": Settings(network="direct", schedule="cosine", mirror=True, gain_jitter=0.08),
-    "direct contact": Settings(network="direct", schedule="cosine", loss=CONTACT),
-    "direct contact mirror": Settings(network="direct", schedule="cosine", loss=CONTACT, mirror=True),
-    "direct wide": Settings(network="direct", schedule="cosine", mirror=True, arguments={"hidden": 512}),
+RECIPES: dict[str, TrainingSettings] = {
+    "paper": TrainingSettings(network="paper"),
+    "causal": TrainingSettings(network="causal"),
+    "paper mirror": TrainingSettings(network="paper", mirror=True, schedule="cosine"),
+    "history": TrainingSettings(network="history", schedule="cosine"),
+    "direct constant": TrainingSettings(network="direct"),
+    "direct": TrainingSettings(network="direct", schedule="cosine"),
+    "direct nearest": TrainingSettings(network="direct", schedule="cosine", arguments={"offsets": PAST}),
+    "direct one frame": TrainingSettings(network="direct", schedule="cosine", arguments={"offsets": [0]}),
+    "direct mirror": TrainingSettings(network="direct", schedule="cosine", mirror=True),
+    "direct jitter": TrainingSettings(network="direct", schedule="cosine", gain_jitter=0.08),
+    "direct mirror jitter": TrainingSettings(network="direct", schedule="cosine", mirror=True, gain_jitter=0.08),
+    "direct contact": TrainingSettings(network="direct", schedule="cosine", loss=CONTACT),
+    "direct contact mirror": TrainingSettings(network="direct", schedule="cosine", loss=CONTACT, mirror=True),
+    "direct wide": TrainingSettings(network="direct", schedule="cosine", mirror=True, arguments={"hidden": 512}),
 }
 
 

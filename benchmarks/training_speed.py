@@ -31,7 +31,7 @@ from training.frames.windows import Windows
 from training.inference.checkpoint import load
 from training.inference.compute import choose_device, reproducible
 from training.inference.predictor import milliseconds_per_frame
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.train import Progress, train
 
 REPEATS = 3
@@ -93,7 +93,7 @@ def steps_per_second(frames: Frames, given: argparse.Namespace, device: str, fol
                     torch.cuda.synchronize()
                 times.append(time.perf_counter())
 
-        recipe = Settings(network=given.network, epochs=1, batch_size=given.batch, precision=given.precision)
+        recipe = TrainingSettings(network=given.network, epochs=1, batch_size=given.batch, precision=given.precision)
         train(frames, recipe, folder / str(number), device, False, given.threads, note, given.compile)
         return (times[-1] - times[9]) / (len(times) - 10)
 

@@ -17,13 +17,13 @@ from label_farm.labels.margin import Margin
 from label_farm.labels.recall import FLUSH, Recall, skin_key
 from label_farm.labels.request import LabelRequest, Planned, request
 from label_farm.labels.session_labels import SessionLabels
-from label_farm.ledger.ledger import Change, Ledger, owner_name
+from label_farm.ledger.ledger import JobOutcome, Ledger, owner_name
 from label_farm.presses import model
 from label_farm.presses.job import Job
 from label_farm.settings import FarmSettings
 from label_farm.store.failure import Failure
 from label_farm.store.store import Store
-from label_farm.summary import Summary
+from label_farm.summary import LabellingSummary
 from label_farm.workers.engine import StoreFull
 from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
@@ -73,7 +73,7 @@ class Labelling:
         """
         self.labels, self.store = SessionLabels(folder), store
         self.settings, self.progress = settings or FarmSettings(), progress
-        self.summary = Summary()
+        self.summary = LabellingSummary()
         self.name = name or f"{owner_name()} {uuid.uuid4().hex[:8]}"
         self._delivered = delivered
         self._versions: dict[str, model.Version] = {} if versions is None else versions
@@ -98,7 +98,7 @@ class Labelling:
         recordings: Mapping[int, Callable[[], Episode]],
         sensor: Sensor | None = None,
         paths: Mapping[int, Path] | None = None,
-    ) -> Summary:
+    ) -> LabellingSummary:
         """Label recordings.
 
         Args:
@@ -154,7 +154,7 @@ class Labelling:
             self.progress("solve", 0, self._total)
         return since
 
-    def settle(self, change: Change) -> None:
+    def settle(self, change: JobOutcome) -> None:
         """Take note of a press that was finished or failed; those of other runs are passed over."""
         job = self._jobs.get(change.key)
         if job is None:

@@ -8,7 +8,7 @@ from label_farm.labels.margin import Margin
 
 
 @dataclass
-class Summary:
+class LabellingSummary:
     """What became of a session."""
 
     written: list[int] = field(default_factory=list)

@@ -29,7 +29,7 @@ class Registry:
 
 
 @dataclass(frozen=True)
-class Member:
+class RegistryMember:
     """One file of a registry."""
 
     name: str
@@ -52,7 +52,7 @@ def registries() -> dict[str, Registry]:
     return dict(sorted(found.items()))
 
 
-def members(name: str) -> list[Member]:
+def members(name: str) -> list[RegistryMember]:
     """Return the members of a registry, sorted by name.
 
     Raises:
@@ -70,11 +70,11 @@ def members(name: str) -> list[Member]:
     return [_member(_folder(room), member) for member in registry.names(room, base)]
 
 
-def _member(folder: Path, name: str) -> Member:
+def _member(folder: Path, name: str) -> RegistryMember:
     path = folder / f"{name}.py" if (folder / f"{name}.py").exists() else folder / name / "__init__.py"
     tree = _parse(path)
     classes = [n for n in tree.body if isinstance(n, ast.ClassDef) and not n.name.startswith("_")]
-    return Member(name, _first_line(tree), tuple(field for kind in classes for field in _fields(kind)))
+    return RegistryMember(name, _first_line(tree), tuple(field for kind in classes for field in _fields(kind)))
 
 
 def _fields(kind: ast.ClassDef) -> list[tuple[str, str]]:

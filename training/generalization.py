@@ -11,7 +11,7 @@ from training.frames.frames import Frames
 from training.inference import checkpoint
 from training.reports import report
 from training.scoring.evaluate import Evaluation, evaluate
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.splits.split import divide
 from training.train import Progress, train
 
@@ -20,10 +20,10 @@ DEFAULTS = ("episode", "configuration", "indenter", "site", "depth", "rate", "sp
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SplitOutcome:
     """What came of one split and seed."""
 
-    settings: Settings
+    settings: TrainingSettings
     folder: Path
     evaluation: Evaluation | None
     """Scores on the test episodes; None if the split is not possible."""
@@ -31,21 +31,21 @@ class Outcome:
     """Why it is not possible."""
 
 
-def run_name(settings: Settings) -> str:
+def run_name(settings: TrainingSettings) -> str:
     """Return the folder of a run: network, split, seed."""
     return f"{settings.network}-{settings.split}-{settings.seed}"
 
 
 def generalize(
     frames: Frames,
-    recipe: Settings,
+    recipe: TrainingSettings,
     splits: tuple[str, ...],
     seeds: int,
     out: Path,
     device: str = "auto",
     threads: int | None = None,
-    begun: Callable[[Settings], Callable[[Progress], None]] = lambda settings: lambda progress: None,
-) -> list[Outcome]:
+    begun: Callable[[TrainingSettings], Callable[[Progress], None]] = lambda settings: lambda progress: None,
+) -> list[SplitOutcome]:
     """Train and score ``recipe`` on every split and seed; what is finished in ``out`` is kept, what is begun goes on.
 
     Args:
@@ -69,15 +69,15 @@ def generalize(
             try:
                 divide(frames, split, seed)
             except FormatError as error:
-                outcomes.append(Outcome(settings, folder, None, error.given))
+                outcomes.append(SplitOutcome(settings, folder, None, error.given))
                 continue
             except UsageError as error:
                 if "leaves no" not in error.given:
                     raise
-                outcomes.append(Outcome(settings, folder, None, error.given))
+                outcomes.append(SplitOutcome(settings, folder, None, error.given))
                 continue
             outcomes.append(
-                Outcome(settings, folder, _finished(frames, settings, folder, device, threads, begun(settings)))
+                SplitOutcome(settings, folder, _finished(frames, settings, folder, device, threads, begun(settings)))
             )
     if not any(outcome.evaluation for outcome in outcomes):
         raise UsageError(
@@ -90,7 +90,7 @@ def generalize(
 
 def _finished(
     frames: Frames,
-    settings: Settings,
+    settings: TrainingSettings,
     folder: Path,
     device: str,
     threads: int | None,

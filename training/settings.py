@@ -14,7 +14,7 @@ PRECISIONS = ("float32", "bfloat16")
 
 
 @dataclass(frozen=True)
-class Settings:
+class TrainingSettings:
     """Everything that decides a run besides the dataset; the defaults are the paper's."""
 
     network: str = "paper"
@@ -83,7 +83,7 @@ class Settings:
     @property
     def title(self) -> str:
         """The network, and what the recipe changes of the paper's, in words."""
-        paper = Settings()
+        paper = TrainingSettings()
         changed = [f"{k} {v}" for k, v in self.arguments.items()]
         names = (
             "batch_size",
@@ -103,6 +103,6 @@ class Settings:
         return self.network + (f" ({', '.join(changed)})" if changed else "")
 
     @classmethod
-    def from_document(cls, document: dict[str, Any]) -> Settings:
+    def from_document(cls, document: dict[str, Any]) -> TrainingSettings:
         """Rebuild settings from `document`."""
         return cls(**{**document, "loss": WeightedLoss(**document["loss"])})

@@ -26,7 +26,7 @@ from training.inference.predictor import predict
 from training.loss import normalized
 from training.metrics import depth_maps, seen, spread
 from training.networks.network import Network, create
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.splits.split import Split, divide
 
 METRICS = "metrics.jsonl"
@@ -68,7 +68,7 @@ class _Run:
 
 def train(
     frames: Frames,
-    settings: Settings,
+    settings: TrainingSettings,
     out: Path,
     device: str = "auto",
     resume: bool = False,
@@ -135,7 +135,7 @@ def train(
     return checkpoint.load(out)
 
 
-def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, split: Split) -> spread.Spread:
+def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, split: Split) -> spread.CalibratedSpread:
     """Return how far off the best epoch's pixels are on the validation episodes."""
     grid, maps, labels = frames.sensor.map, [], []
     for number in split.validation:
@@ -155,7 +155,7 @@ def normalization(taxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mean.astype(np.float32), np.where(still, 1.0, sd).astype(np.float32)
 
 
-def _started(frames: Frames, settings: Settings, place: torch.device) -> _Run:
+def _started(frames: Frames, settings: TrainingSettings, place: torch.device) -> _Run:
     split = divide(frames, settings.split, settings.seed)
     torch.manual_seed(settings.seed)
     network = create(settings.network, frames.sensor, settings.arguments)
@@ -188,7 +188,7 @@ def _started(frames: Frames, settings: Settings, place: torch.device) -> _Run:
     return _Run(network, _optimizer(network, settings), document)
 
 
-def _resumed(frames: Frames, settings: Settings, out: Path, place: torch.device) -> _Run:
+def _resumed(frames: Frames, settings: TrainingSettings, out: Path, place: torch.device) -> _Run:
     last = checkpoint.load(out / checkpoint.LAST, place)
     last.check_sensor(frames.sensor, frames.origin)
     if last.document["dataset"]["hash"] != frames.dataset_hash:
@@ -219,7 +219,7 @@ def _resumed(frames: Frames, settings: Settings, out: Path, place: torch.device)
     return _Run(last.network, optimizer, last.document, last.document["epoch"])
 
 
-def _optimizer(network: Network, settings: Settings) -> torch.optim.Optimizer:
+def _optimizer(network: Network, settings: TrainingSettings) -> torch.optim.Optimizer:
     # Fused, a step on a card launches few kernels instead of hundreds.
     on_card = network.get_buffer("mean").is_cuda
     return torch.optim.AdamW(
@@ -240,7 +240,7 @@ def _epoch(
     chosen: torch.Tensor,
     taken: torch.Tensor,
     frames: Frames,
-    settings: Settings,
+    settings: TrainingSettings,
     listener: Callable[[Progress], None],
 ) -> float:
     """Run one pass over the training frames ``chosen`` (m,) and return the mean loss over them.
@@ -280,7 +280,7 @@ def _epoch(
     return mean
 
 
-def _always(frames: Frames, learned: np.ndarray, settings: Settings) -> np.ndarray:
+def _always(frames: Frames, learned: np.ndarray, settings: TrainingSettings) -> np.ndarray:
     """Return which of the frames ``learned`` (m,) every epoch takes [bool], shape (m,): all, or those in contact."""
     if settings.idle_share == 1.0:
         return np.ones(len(learned), bool)
@@ -314,7 +314,7 @@ def _free_memory() -> int:
 
 
 def _validate(
-    network: Network, windows: Windows, frames: Frames, chosen: np.ndarray, settings: Settings
+    network: Network, windows: Windows, frames: Frames, chosen: np.ndarray, settings: TrainingSettings
 ) -> dict[str, float | None]:
     """Return loss and median contact-region RMSE [mm] over the frames ``chosen``."""
     top = frames.sensor.map.depth_max

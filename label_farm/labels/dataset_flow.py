@@ -46,7 +46,7 @@ class DatasetFlow:
             raise UsageError(f"{out} is no dataset of tacdata", "a dataset, or a new folder", "name another folder")
         self._out, self._sensor, self._labels = out, sensor, labels or session / "labels"
         self._recordings = {int(path.stem[-6:]): path for path in recordings}
-        self._state = label_states.SessionLabels(session.name, tuple(path.name for path in recordings))
+        self._state = label_states.LabelledSession(session.name, tuple(path.name for path in recordings))
         self._writer: DatasetWriter | None = None
         self._stamp, self._said = "", 0.0
         self._models: dict[str, str] = {}

@@ -71,7 +71,7 @@ class SessionLabels:
     def _read_parents(self, path: Path) -> dict[str, str] | None:
         try:
             return dict(read_label(path).provenance["parents"]) if path.exists() else None
-        except table.VersionError as error:
+        except table.LabelVersionError as error:
             # Not damaged: it must not be replaced unasked.
             return {"model": error.given.rpartition(": ")[2]}
         except FormatError:

@@ -44,7 +44,7 @@ class Lease:
 
 
 @dataclass(frozen=True)
-class Change:
+class JobOutcome:
     """A job that was finished or failed."""
 
     number: int
@@ -304,14 +304,14 @@ class Ledger:
         """Return the running number of the latest change."""
         return self._db.execute("SELECT coalesce(max(changed), 0) FROM job").fetchone()[0]
 
-    def changes(self, since: int) -> list[Change]:
+    def changes(self, since: int) -> list[JobOutcome]:
         """Return the jobs finished or failed after a change number, in order."""
         rows = self._db.execute(
             "SELECT changed, key, state, coalesce(error, ''), coalesce(seconds, 0.0) FROM job"
             " WHERE changed > ? AND state IN (2, 3) ORDER BY changed",
             (since,),
         )
-        return [Change(number, key, state == DONE, error, seconds) for number, key, state, error, seconds in rows]
+        return [JobOutcome(number, key, state == DONE, error, seconds) for number, key, state, error, seconds in rows]
 
     def counts(self) -> dict[int, int]:
         """Return how many jobs are in each state (`WAITING`, `LEASED`, `DONE`, `FAILED`)."""

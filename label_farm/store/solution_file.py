@@ -42,7 +42,7 @@ REMEDY = "remove it and run `tacdata label` again: results can always be made an
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-class VersionError(FormatError):
+class SolutionVersionError(FormatError):
     """A result was written by a release with another major version of the format; it is not damaged."""
 
 
@@ -108,7 +108,7 @@ def decode(data: bytes, origin: str) -> tuple[Job, PathSolution]:
 def _check_version(header: Any, origin: str) -> None:
     found, known = str(header["version"]), schemas.version("path_solution")
     if found.split(".")[0] != known.split(".")[0]:
-        raise VersionError(
+        raise SolutionVersionError(
             f"{origin}: result of format version {found}",
             f"version {known}",
             "use the tacdata release that wrote it, or name a new folder with --store",

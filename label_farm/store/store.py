@@ -94,7 +94,7 @@ class Store:
             found, solution = solution_file.decode(data, str(path))
             if found.key == job.key:
                 return solution
-        except solution_file.VersionError:
+        except solution_file.SolutionVersionError:
             raise
         except FormatError:
             pass

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from label_farm.ledger.ledger import Change, Ledger
+from label_farm.ledger.ledger import JobOutcome, Ledger
 from label_farm.store.store import Store
 from tacdata.errors import UsageError
 from tacdata.sensor import Sensor
@@ -36,7 +36,7 @@ class Engine(ABC):
         if sensors is not None:
             self._ledger.register({version: sensor.document for version, sensor in sensors.items()})
 
-    def run(self, keys: set[str], since: int, on_change: Callable[[Change], None]) -> int:
+    def run(self, keys: set[str], since: int, on_change: Callable[[JobOutcome], None]) -> int:
         """Work until every key is settled, by these workers or by those of another run on the same store.
 
         Args:

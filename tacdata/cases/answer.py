@@ -24,7 +24,7 @@ from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.state import State
 from tacdata.skin.validity import fineness
 from tacdata.skin.validity.mesh_error import Figures, NumericalError
-from tacdata.transduction import Loads, Readings, Transducer
+from tacdata.transduction import Loads, TaxelReadings, Transducer
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class CaseAnswer:
     """Time of the estimate, the making of a coarser mesh included if it was needed [s]."""
 
     @cached_property
-    def readings(self) -> Readings | None:
+    def readings(self) -> TaxelReadings | None:
         """What the taxels read; None if the skin stands on none or the sensor file does not describe them."""
         sensor = self.model.sensor
         if sensor.transduction is None or not sensor.skin.protrusion_radius or not sensor.contact.board:

@@ -10,7 +10,7 @@ import typer
 from tacdata.commands.command import TOOLS
 
 if TYPE_CHECKING:
-    from tacdata.replay.targets import Targets
+    from tacdata.replay.targets import FingertipTargets
 
 ORDER = 121
 PANEL = TOOLS
@@ -59,7 +59,7 @@ def run(
         raise typer.Exit(1)
 
 
-def _notes(targets: Targets) -> list[str]:
+def _notes(targets: FingertipTargets) -> list[str]:
     """Return what a person should know of compensated targets: what was not felt, and what was not known."""
     made = targets.source
     if made is None or targets.kind == "direct":

@@ -12,7 +12,7 @@ from tacdata.commands.command import PIPELINE
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from training.settings import Settings
+    from training.settings import TrainingSettings
     from training.train import Progress
 
 ORDER = 64
@@ -47,10 +47,10 @@ def run(
     from training.frames.data import read_frames
     from training.generalization import DEFAULTS, generalize, run_name
     from training.reports.report_page import Scored, page
-    from training.settings import Settings
+    from training.settings import TrainingSettings
     from training.splits.split import describe
 
-    recipe = Settings(
+    recipe = TrainingSettings(
         network=network, epochs=epochs, batch_size=batch_size, learning_rate=learning_rate, schedule=schedule,
         mirror=mirror, gain_jitter=gain_jitter, idle_share=idle_share,
     )  # fmt: skip
@@ -75,7 +75,7 @@ def run(
     print(f"report: {out / REPORT}")
 
 
-def _announced(settings: Settings) -> Callable[[Progress], None]:
+def _announced(settings: TrainingSettings) -> Callable[[Progress], None]:
     print(f"split {settings.split}, seed {settings.seed}:", flush=True)
 
     def show(progress: Progress) -> None:

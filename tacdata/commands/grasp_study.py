@@ -69,13 +69,13 @@ def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | N
     from tacdata import provenance
     from tacdata.grasping.lessons import lessons
     from tacdata.grasping.press_set import FOLDER, read_presses
-    from tacdata.grasping.touch import Spread
-    from training.settings import Settings
+    from tacdata.grasping.touch import FingertipSpread
+    from training.settings import TrainingSettings
     from training.train import Progress, train
 
     path = FOLDER / "training.npz"
     origin = provenance.content_hash([provenance.file_hash(path), seed])
-    frames = _frames(lessons(read_presses(path, sensor), sensor, Spread(), seed), sensor, origin)
+    frames = _frames(lessons(read_presses(path, sensor), sensor, FingertipSpread(), seed), sensor, origin)
 
     def told(progress: Progress) -> None:
         if (line := progress.finished) is not None:
@@ -85,7 +85,7 @@ def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | N
             )
 
     begun = (run / "last.safetensors").is_file()
-    train(frames, Settings(seed=seed, epochs=epochs), run, "auto", begun, threads, told)
+    train(frames, TrainingSettings(seed=seed, epochs=epochs), run, "auto", begun, threads, told)
     return run
 
 

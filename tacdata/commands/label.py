@@ -13,7 +13,7 @@ from tacdata.commands.command import PIPELINE
 from tacdata.errors import SolveError, UsageError
 
 if TYPE_CHECKING:
-    from label_farm.labelling import Summary
+    from label_farm.labelling import LabellingSummary
 
 ORDER = 30
 PANEL = PIPELINE
@@ -143,7 +143,7 @@ class _Bars:
             print(f"  press {done} of {total} solved, about {left:.0f} s left", flush=True)
 
 
-def _report(summary: Summary, labels: Path, session: Path) -> None:
+def _report(summary: LabellingSummary, labels: Path, session: Path) -> None:
     import statistics
 
     for remark in summary.remarks:
@@ -172,7 +172,7 @@ def _report(summary: Summary, labels: Path, session: Path) -> None:
     print(f"next: tacdata pack {session} --out DATASET")
 
 
-def _report_margins(summary: Summary) -> None:
+def _report_margins(summary: LabellingSummary) -> None:
     """Say how well the labels are known."""
     from statistics import median
 

@@ -70,11 +70,11 @@ def _document(
     """Return the plan's document, and whether it was read from a plan's file as it stands."""
     from tacdata.errors import UsageError
     from tacdata.plans.recipe import write_out
-    from tacdata.plans.shipped.shipped_plan import Wishes, shipped_plan
+    from tacdata.plans.shipped.shipped_plan import PlanOptions, shipped_plan
 
     path = Path(what)
     if not (path.suffix in (".yaml", ".yml", ".json") or path.is_file()):
-        return shipped_plan(what, skin, Wishes(presses, tuple(indenter) if indenter else None, seed)), False
+        return shipped_plan(what, skin, PlanOptions(presses, tuple(indenter) if indenter else None, seed)), False
     if presses is not None or indenter:
         raise UsageError(
             f"--presses or --indenter with the file {what}", "neither: the file says both", "leave them out"

@@ -11,7 +11,7 @@ import typer
 from tacdata.commands.command import PIPELINE
 
 if TYPE_CHECKING:
-    from tacdata.registration import Settings
+    from tacdata.registration import RegistrationSettings
     from tacdata.rig import Rig
     from tacdata.sensor import Sensor
 
@@ -38,13 +38,13 @@ def run(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the first move.")] = False,
 ) -> None:
     """Touch the sensor and find its origin, yaw and tilt in the guide's frame, with uncertainties, into a file."""
-    from tacdata.registration import Settings
+    from tacdata.registration import RegistrationSettings
     from tacdata.rig import read_rig
     from tacdata.sensor import default_sensor, read_sensor
 
     bench, skin = read_rig(rig), read_sensor(sensor) if sensor else default_sensor()
     target = out or rig.with_name("registration.yaml")
-    settings = Settings(above, limit, depth, repeats, tuple(taxel or ()))
+    settings = RegistrationSettings(above, limit, depth, repeats, tuple(taxel or ()))
     specimen = _specimen(indenter)
     _check(settings, skin, target)
     try:
@@ -70,7 +70,7 @@ def _specimen(name: str) -> dict[str, Any]:
     return document
 
 
-def _check(settings: Settings, sensor: Sensor, target: Path) -> None:
+def _check(settings: RegistrationSettings, sensor: Sensor, target: Path) -> None:
     from tacdata.errors import UsageError
 
     if target.exists():
@@ -92,7 +92,7 @@ def _check(settings: Settings, sensor: Sensor, target: Path) -> None:
 
 
 def _measure(
-    rig: Rig, sensor: Sensor, settings: Settings, specimen: dict[str, Any], yes: bool
+    rig: Rig, sensor: Sensor, settings: RegistrationSettings, specimen: dict[str, Any], yes: bool
 ) -> tuple[dict[str, Any], str]:
     """Open the devices, ask, and carry the procedure out; return the file's document and the result in words."""
     from tacdata.errors import UsageError

@@ -10,7 +10,7 @@ import typer
 from tacdata.commands.command import TOOLS
 
 if TYPE_CHECKING:
-    from tacdata.replay.scene import Scene
+    from tacdata.replay.scene import ReplayScene
     from tacdata.replay.trials import Trials
 
 ORDER = 123
@@ -93,7 +93,7 @@ def _tracks(path: Path) -> Path:
     return path if path.name.endswith(ENDING) else path_of(path)
 
 
-def _save(view: Path | None, video: Path | None, tried: Trials, scene: Scene) -> None:
+def _save(view: Path | None, video: Path | None, tried: Trials, scene: ReplayScene) -> None:
     """Write the undisturbed replays of one recording, and say how they ended."""
     from viewers.pictures.replay_film import film_replays
     from viewers.rerun.replay import save_replays

@@ -44,13 +44,13 @@ def run(
     from tacdata.discrepancy.model.spec import read_spec
     from tacdata.revision.evidence.table import in_words
     from tacdata.revision.labels.retrain import Recipe
-    from tacdata.revision.revise import CARD, SPEC, Wishes, revise
+    from tacdata.revision.revise import CARD, SPEC, RevisionOptions, revise
     from viewers.rerun.gap_recording import write
 
     console = Console(stderr=True)
     farm = FarmSettings(factory=factory or FACTORY, uncertainty=uncertainty) if relabel else None
     with console.status("reading") as status:
-        wishes = Wishes(farm, store, confirm, presses, Recipe(epochs, network) if retrain else None, truth)
+        wishes = RevisionOptions(farm, store, confirm, presses, Recipe(epochs, network) if retrain else None, truth)
         done = revise(verdict, recordings, read_spec(spec), out, wishes, status.update)
         if done.shown:
             status.update("Rerun file")

@@ -53,11 +53,11 @@ def run(
     from rich.progress import Progress as Bar
 
     from training.frames.data import read_frames
-    from training.settings import Settings
+    from training.settings import TrainingSettings
     from training.tensorboard import event_log
     from training.train import METRICS, train
 
-    settings = Settings(
+    settings = TrainingSettings(
         network=network, split=split, seed=seed, epochs=epochs, batch_size=batch_size, learning_rate=learning_rate,
         schedule=schedule, mirror=mirror, gain_jitter=gain_jitter, idle_share=idle_share, precision=precision,
     )  # fmt: skip

@@ -15,7 +15,7 @@ FILE = Path("meta/tacdata_labels.json")
 
 
 @dataclass
-class SessionLabels:
+class LabelledSession:
     """A session that flows into a dataset."""
 
     name: str
@@ -40,7 +40,7 @@ class EpisodeState:
     """Why it failed or is stale."""
 
 
-def update(root: Path, session: SessionLabels, models: dict[str, str]) -> None:
+def update(root: Path, session: LabelledSession, models: dict[str, str]) -> None:
     """Write what is known of a session; other sessions stay as they are. The caller locks the dataset.
 
     Args:

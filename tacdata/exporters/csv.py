@@ -13,13 +13,13 @@ from tacdata import documents
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import Exporter, new_folder
 from tacdata.replay.columns import from_columns, to_columns
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 
 class Csv(Exporter):
     """``NAME.csv`` with units in the columns' names, and ``NAME.json`` (`schemas/fingertip_targets.schema.json`)."""
 
-    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
         """Write a new folder; numbers are written so that they are read back bit for bit."""
         new_folder(out)
         for targets in episodes:
@@ -32,7 +32,7 @@ class Csv(Exporter):
             documents.write_text(out / f"{stem}.csv", text.getvalue())
         return []
 
-    def read(self, out: Path) -> list[Targets]:
+    def read(self, out: Path) -> list[FingertipTargets]:
         """Return the targets of a folder."""
         found = sorted(Path(out).glob("*.csv"))
         if not found:
@@ -41,7 +41,7 @@ class Csv(Exporter):
         return [_read(path) for path in found]
 
 
-def _read(path: Path) -> Targets:
+def _read(path: Path) -> FingertipTargets:
     header = documents.read(path.with_suffix(".json"), "fingertip_targets")
     try:
         with path.open(newline="") as stream:

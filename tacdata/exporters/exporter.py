@@ -14,7 +14,7 @@ from typing import Any
 
 from tacdata import registry
 from tacdata.errors import UsageError
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 ROOM, BASE = "tacdata.exporters", "exporter"
 
@@ -30,7 +30,7 @@ class Exporter(ABC):
         self.robot = robot
 
     @abstractmethod
-    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
         """Write a new folder.
 
         Args:
@@ -46,7 +46,7 @@ class Exporter(ABC):
         """
 
     @abstractmethod
-    def read(self, out: Path) -> list[Targets]:
+    def read(self, out: Path) -> list[FingertipTargets]:
         """Return the targets of a folder that `write` made.
 
         Raises:

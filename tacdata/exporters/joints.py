@@ -20,7 +20,7 @@ from tacdata.replacement import replacement
 from tacdata.replay.columns import from_columns, to_columns
 from tacdata.replay.inverse_kinematics import JointPath, follow
 from tacdata.replay.robot import Robot, read_robot
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 HEADER = b"tacdata.joint_trajectory"
 JOINT = "joint."
@@ -32,7 +32,7 @@ class Joints(Exporter):
 
     needs_robot = True
 
-    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
         """Solve and write a new folder; returns what cannot be reached, in words."""
         if self.robot is None:
             raise UsageError("no robot", "a robot file", "name it with --robot")
@@ -51,12 +51,12 @@ class Joints(Exporter):
                 pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
         return said
 
-    def read(self, out: Path) -> list[Targets]:
+    def read(self, out: Path) -> list[FingertipTargets]:
         """Return the targets of a folder; `read_joints` gives the joint values."""
         return [targets for targets, _, _ in read_joints(out)]
 
 
-def read_joints(out: Path) -> list[tuple[Targets, dict[str, np.ndarray], dict[str, Any]]]:
+def read_joints(out: Path) -> list[tuple[FingertipTargets, dict[str, np.ndarray], dict[str, Any]]]:
     """Return targets, joint values by name [rad or m], shape (n,), and the header of every file in a folder.
 
     Raises:
@@ -70,7 +70,7 @@ def read_joints(out: Path) -> list[tuple[Targets, dict[str, np.ndarray], dict[st
     return [_read(path) for path in found]
 
 
-def in_words(path: JointPath, targets: Targets, turned: bool = True) -> list[str]:
+def in_words(path: JointPath, targets: FingertipTargets, turned: bool = True) -> list[str]:
     """Return what the robot cannot do, in words with times; with its turns, where those are asked for."""
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     said = []
@@ -94,7 +94,7 @@ def _when(rows: tuple[int, ...], seconds: np.ndarray) -> str:
     return ", ".join(shown) + (f" and {len(parts) - 3} more stretches" if len(parts) > 3 else "")
 
 
-def _header(targets: Targets, path: JointPath, robot: Robot, columns: dict[str, np.ndarray]) -> dict[str, Any]:
+def _header(targets: FingertipTargets, path: JointPath, robot: Robot, columns: dict[str, np.ndarray]) -> dict[str, Any]:
     good = np.isfinite(path.values).all(axis=1)
     largest = [float(e[good].max()) if good.any() else None for e in (path.position_error, path.rotation_error)]
     parents = {"recording": targets.recording_hash, "urdf": robot.urdf_hash}
@@ -110,7 +110,7 @@ def _header(targets: Targets, path: JointPath, robot: Robot, columns: dict[str, 
     }  # fmt: skip
 
 
-def _read(path: Path) -> tuple[Targets, dict[str, np.ndarray], dict[str, Any]]:
+def _read(path: Path) -> tuple[FingertipTargets, dict[str, np.ndarray], dict[str, Any]]:
     try:
         table = pq.read_table(path, page_checksum_verification=True)
         header = json.loads((table.schema.metadata or {})[HEADER])

@@ -16,7 +16,7 @@ from tacdata.dataset.format.features import INDEX_COLUMNS
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import Exporter, new_folder
 from tacdata.replay.columns import AXES, TURNS
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 META = Path("meta/tacdata_targets.json")
 """What the targets are, an entry an episode (`schemas/fingertip_targets.schema.json`)."""
@@ -34,7 +34,7 @@ class Lerobot(Exporter):
     ``tacdata.predicted_novelty.FINGER``: above 1 the estimate is from readings unlike all that the network learnt from.
     """
 
-    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
         """Write a new dataset."""
         rate = _same([targets.rate for targets in episodes], "rates")
         fingers = _same([targets.fingers for targets in episodes], "fingers")
@@ -71,7 +71,7 @@ class Lerobot(Exporter):
         note = f"fps is {info['fps']} where the grid has {rate:g} Hz: LeRobot wants whole numbers"
         return [] if info["fps"] == rate else [note]
 
-    def read(self, out: Path) -> list[Targets]:
+    def read(self, out: Path) -> list[FingertipTargets]:
         """Return the targets of a dataset, to float32."""
         info = folder.read_info(Path(out))
         try:
@@ -94,7 +94,7 @@ def _same(values: Sequence[Any], what: str) -> Any:
     return values[0]
 
 
-def _columns(targets: Targets) -> dict[str, np.ndarray]:
+def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
     count, made = len(targets.time_ns), targets.source
     columns = {
         ACTION: np.concatenate([targets.position, targets.quaternion], -1).reshape(count, -1).astype(np.float32),
@@ -116,7 +116,7 @@ def _columns(targets: Targets) -> dict[str, np.ndarray]:
     return columns
 
 
-def _features(targets: Targets, columns: dict[str, np.ndarray]) -> dict[str, dict[str, Any]]:
+def _features(targets: FingertipTargets, columns: dict[str, np.ndarray]) -> dict[str, dict[str, Any]]:
     pose = [f"{name}.{part}" for name in targets.fingers for part in (*AXES, *TURNS)]
     made: dict[str, dict[str, Any]] = {}
     for key, values in columns.items():
@@ -150,7 +150,7 @@ def _table(whole: dict[str, np.ndarray], features: dict[str, Any]) -> pa.Table:
     return pa.table(arrays).replace_schema_metadata({b"huggingface": folder.huggingface_metadata(features)})
 
 
-def _read(out: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> Targets:
+def _read(out: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> FingertipTargets:
     documents.check(header, "fingertip_targets", str(out / META))
     wanted = [ACTION, STATE, DEPTH, FELT, GAP, TIME]
     table = folder.read_parquet(out / folder.data_path(row.data_file), wanted)
@@ -164,7 +164,7 @@ def _read(out: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> Targets:
     action, state = column(ACTION, 7).astype(float), column(STATE, 7).astype(float)
     depth = np.where(column(FELT), column(DEPTH).astype(float), np.nan)
     named = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
-    return Targets(
+    return FingertipTargets(
         **{name: header[name] for name in named}, fingers=fingers, time_ns=table[TIME].to_numpy(),
         position=action[..., :3], quaternion=action[..., 3:], seen=state[..., :3], depth=depth, gap=column(GAP),
         remarks=tuple(header["remarks"]),

@@ -14,7 +14,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import Exporter, new_folder
 from tacdata.replacement import replacement
 from tacdata.replay.columns import from_columns, to_columns
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 HEADER = b"tacdata.fingertip_targets"
 
@@ -22,7 +22,7 @@ HEADER = b"tacdata.fingertip_targets"
 class Parquet(Exporter):
     """``NAME.parquet``; the header is the document of `schemas/fingertip_targets.schema.json`."""
 
-    def write(self, episodes: Sequence[Targets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
         """Write a new folder."""
         new_folder(out)
         for targets in episodes:
@@ -33,7 +33,7 @@ class Parquet(Exporter):
                 pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
         return []
 
-    def read(self, out: Path) -> list[Targets]:
+    def read(self, out: Path) -> list[FingertipTargets]:
         """Return the targets of a folder."""
         found = sorted(Path(out).glob("*.parquet"))
         if not found:
@@ -42,7 +42,7 @@ class Parquet(Exporter):
         return [_read(path) for path in found]
 
 
-def _read(path: Path) -> Targets:
+def _read(path: Path) -> FingertipTargets:
     try:
         table = pq.read_table(path, page_checksum_verification=True)
         header = json.loads((table.schema.metadata or {})[HEADER])

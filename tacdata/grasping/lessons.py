@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.grasping.press_set import PressSet
-from tacdata.grasping.touch import Spread, mirrored
+from tacdata.grasping.touch import FingertipSpread, mirrored
 from tacdata.sensor import Sensor
 
 REST, HELD = 5, 8
@@ -32,7 +32,7 @@ class Lesson:
     """Its file in tacdata/indenters."""
 
 
-def lessons(presses: PressSet, sensor: Sensor, spread: Spread, seed: int = 0) -> list[Lesson]:
+def lessons(presses: PressSet, sensor: Sensor, spread: FingertipSpread, seed: int = 0) -> list[Lesson]:
     """Return every press four times: as solved, and mirrored along x, along y and both, each with noise of its own.
 
     The fingertip that is learnt from has the sensor file's gains; those of the study differ.

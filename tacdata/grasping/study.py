@@ -11,7 +11,7 @@ import numpy as np
 from tacdata.grasping.centre import Maps
 from tacdata.grasping.lift import Grip, lift, lifting_grip
 from tacdata.grasping.strategies import strategy as strategies
-from tacdata.grasping.touch import Fingertip, OrangeTouch, Spread
+from tacdata.grasping.touch import Fingertip, FingertipSpread, OrangeTouch
 from tacdata.grasping.trial import Approach, Protocol, approach
 
 PLACES = (-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0)
@@ -59,7 +59,7 @@ class Setup:
 
     protocol: Protocol = field(default_factory=Protocol)
     grip: Grip = field(default_factory=Grip)
-    spread: Spread = field(default_factory=Spread)
+    spread: FingertipSpread = field(default_factory=FingertipSpread)
     disorder: Disorder = field(default_factory=Disorder)
     repeats: int = 5
     """Trials at each place."""
@@ -75,7 +75,7 @@ class Setup:
 
 
 @dataclass(frozen=True)
-class Trial:
+class GraspTrial:
     """One trial, as it went."""
 
     strategy: str
@@ -104,7 +104,7 @@ class Trial:
 
 def trials(
     setup: Setup, touch: OrangeTouch, maps: Maps, told: Callable[[int, int], None] = lambda done, of: None
-) -> list[Trial]:
+) -> list[GraspTrial]:
     """Run every trial; strategies meet the same oranges, fingertips and noise.
 
     Args:
@@ -113,7 +113,7 @@ def trials(
         maps: The trained network.
         told: Is told how many are done, of how many.
     """
-    found: list[Trial] = []
+    found: list[GraspTrial] = []
     names = strategy_names()
     total = len(names) * len(PLACES) * setup.repeats
     for name in names:
@@ -129,13 +129,13 @@ def trials(
                     for k, side in enumerate((1, -1))
                 ]
                 way = approach(fingers, place + aside, up, strategy, setup.protocol, touch.sensor.taxels.rate, world)
-                trial = Trial(name, position, repeat, friction, mass, up, way, False)
+                trial = GraspTrial(name, position, repeat, friction, mass, up, way, False)
                 found.append(replace(trial, held=lifted(trial, setup.grip)))
                 told(len(found), total)
     return found
 
 
-def lifted(trial: Trial, grip: Grip) -> bool:
+def lifted(trial: GraspTrial, grip: Grip) -> bool:
     """Return whether a lifting configuration holds what a trial took hold of."""
     if trial.approach.stopped:
         return False
@@ -148,12 +148,12 @@ def configured(setup: Setup, margin: float = MARGIN) -> Setup:
     return replace(setup, grip=lifting_grip(setup.grip, (setup.protocol.band + margin) / 1000))
 
 
-def rates(found: list[Trial], interval: Interval) -> dict[str, Any]:
+def rates(found: list[GraspTrial], interval: Interval) -> dict[str, Any]:
     """Return success and adjustments of every strategy: overall, at the edge and at each position."""
     return {name: _rates([t for t in found if t.strategy == name], interval) for name in strategy_names()}
 
 
-def _rates(found: list[Trial], interval: Interval) -> dict[str, Any]:
+def _rates(found: list[GraspTrial], interval: Interval) -> dict[str, Any]:
     edge = [t for t in found if t.position in EDGE]
     positions = sorted({t.position for t in found})
     return {
@@ -164,12 +164,12 @@ def _rates(found: list[Trial], interval: Interval) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _share(found: list[Trial], interval: Interval) -> dict[str, Any]:
+def _share(found: list[GraspTrial], interval: Interval) -> dict[str, Any]:
     held = sum(t.held for t in found)
     return {"held": held, "of": len(found), "wilson_95": list(interval(held, len(found)))}
 
 
-def _moves(found: list[Trial]) -> dict[str, Any]:
+def _moves(found: list[GraspTrial]) -> dict[str, Any]:
     """Return mean and standard deviation of adjustments where the orange was held, as the paper counts them."""
     moves = [t.approach.adjustments for t in found if t.held]
     if not moves:

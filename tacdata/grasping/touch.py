@@ -56,7 +56,7 @@ def mirrored(values: np.ndarray, sensor: Sensor, over_x: bool, over_y: bool) -> 
 
 
 @dataclass(frozen=True)
-class Spread:
+class FingertipSpread:
     """How a fingertip differs from the sensor file, and one frame from the next."""
 
     gain: float = 0.03
@@ -72,7 +72,7 @@ class Spread:
 class Fingertip:
     """One of the two; where it sits and what its taxels are off by is drawn once."""
 
-    def __init__(self, touch: OrangeTouch, spread: Spread, side: int, rng: np.random.Generator) -> None:
+    def __init__(self, touch: OrangeTouch, spread: FingertipSpread, side: int, rng: np.random.Generator) -> None:
         """Draw it.
 
         Args:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import Table
+from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.units import factor, split_unit
 
 Selector = str | int | list[Any]
 
 
-def select(table: Table, selector: Selector, where: str) -> list[str]:
+def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
     """Return the names of the columns that a mapping means, in its order.
 
     Args:
@@ -48,7 +48,7 @@ def select(table: Table, selector: Selector, where: str) -> list[str]:
     )
 
 
-def single(table: Table, selector: Selector, where: str) -> str:
+def single(table: SourceTable, selector: Selector, where: str) -> str:
     """Return the one column that a mapping means; raises FormatError if there are none or several."""
     names = select(table, selector, where)
     if len(names) != 1 or table.columns[names[0]].ndim != 1:
@@ -56,7 +56,7 @@ def single(table: Table, selector: Selector, where: str) -> str:
     return names[0]
 
 
-def numbers(table: Table, names: list[str], missing: list[float], where: str) -> np.ndarray:
+def numbers(table: SourceTable, names: list[str], missing: list[float], where: str) -> np.ndarray:
     """Return columns as numbers [as in the file], shape (rows, n), NaN where a value is missing.
 
     Raises:
@@ -79,7 +79,9 @@ def numbers(table: Table, names: list[str], missing: list[float], where: str) ->
     return joined
 
 
-def axis(table: Table | None, entry: float | dict[str, Any], unit: str, missing: list[float], where: str) -> np.ndarray:
+def axis(
+    table: SourceTable | None, entry: float | dict[str, Any], unit: str, missing: list[float], where: str
+) -> np.ndarray:
     """Return one quantity in ``unit``, shape (rows,), or shape () if the mapping gives a number.
 
     Raises:

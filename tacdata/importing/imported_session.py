@@ -14,7 +14,7 @@ import schemas
 from tacdata import documents, provenance
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
-from tacdata.importing.formats.source_format import Table, read_table
+from tacdata.importing.formats.source_format import SourceTable, read_table
 from tacdata.importing.presses import presses_of
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets
@@ -101,7 +101,7 @@ class _Import:
                 self.failures.append((named or self.source.name, error))
 
     def _presses(
-        self, files: FileSet, label: str, whole: dict[str, Table], rows: dict[str, Table]
+        self, files: FileSet, label: str, whole: dict[str, SourceTable], rows: dict[str, SourceTable]
     ) -> Iterator[ImportedPress]:
         below = self.source if self.source.is_dir() else self.source.parent
         record = {

@@ -14,11 +14,11 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, single
 from tacdata.importing.foreign_sensor import foreign_sensor
-from tacdata.importing.formats.source_format import Table
+from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.press_path import PressPath, press_path
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.schedule import ScheduledPress, read_schedule
-from tacdata.importing.streams import Stream, Streams, read_streams
+from tacdata.importing.streams import ImportedStreams, Stream, read_streams
 from tacdata.importing.trials import windows
 from tacdata.indenters import Indenter, from_document
 from tacdata.plans import Press
@@ -43,7 +43,7 @@ UNITS = {
 
 
 def presses_of(
-    mapping: dict[str, Any], beside: Path, tables: dict[str, Table], parts: dict[str, str], record: dict[str, Any]
+    mapping: dict[str, Any], beside: Path, tables: dict[str, SourceTable], parts: dict[str, str], record: dict[str, Any]
 ) -> Iterator[ImportedPress]:
     """Yield the recordings that the rows of a trial hold.
 
@@ -84,8 +84,8 @@ def presses_of(
 
 
 def _imported(
-    mapping: dict[str, Any], beside: Path, streams: Streams, place: Registration, planned: ScheduledPress | None,
-    known: dict[str, float], stand_ins: list[str], record: dict[str, Any],
+    mapping: dict[str, Any], beside: Path, streams: ImportedStreams, place: Registration,
+    planned: ScheduledPress | None, known: dict[str, float], stand_ins: list[str], record: dict[str, Any],
 ) -> ImportedPress:  # fmt: skip
     taxels, lost = _without_counter(streams)
     spans = np.diff(taxels.time_ns)
@@ -140,7 +140,7 @@ def _remarks(taxels: Stream, planned: ScheduledPress | None, path: PressPath, lo
     return notes
 
 
-def _without_counter(streams: Streams) -> tuple[Stream, int]:
+def _without_counter(streams: ImportedStreams) -> tuple[Stream, int]:
     taxels = streams.taxels
     if not streams.counted:
         return taxels, -1
@@ -156,7 +156,7 @@ def _indenter(mapping: dict[str, Any]) -> tuple[Indenter, str]:
     return from_document(mapping["indenter"], "indenter"), mapping["indenter"]["shape"]
 
 
-def _registration(mapping: dict[str, Any], streams: Streams) -> tuple[Registration, list[str]]:
+def _registration(mapping: dict[str, Any], streams: ImportedStreams) -> tuple[Registration, list[str]]:
     """Return where the skin lies in the machine's frame, and what of it nobody said."""
     contact, position = mapping.get("contact", {}), streams.position
     if position is None or streams.depth_given:
@@ -175,7 +175,7 @@ def _registration(mapping: dict[str, Any], streams: Streams) -> tuple[Registrati
 
 
 def _cuts(
-    mapping: dict[str, Any], streams: Streams, scheduled: list[ScheduledPress], place: Registration
+    mapping: dict[str, Any], streams: ImportedStreams, scheduled: list[ScheduledPress], place: Registration
 ) -> list[tuple[int, int, ScheduledPress | None]]:
     begin, end = int(streams.taxels.time_ns[0]), int(streams.taxels.time_ns[-1]) + 1
     if scheduled:
@@ -194,7 +194,7 @@ def _commanded(planned: ScheduledPress, begin_ns: int, end_ns: int) -> Stream:
     return Stream("position", time_ns, position[[0, 0, 1, 2, 3, 3]], ("x", "y", "z"), "mm", "aligned")
 
 
-def _shifted(streams: Streams, shift_ns: int) -> Streams:
+def _shifted(streams: ImportedStreams, shift_ns: int) -> ImportedStreams:
     if not shift_ns:
         return streams
 
@@ -207,7 +207,7 @@ def _shifted(streams: Streams, shift_ns: int) -> Streams:
     )
 
 
-def _known(mapping: dict[str, Any], tables: dict[str, Table], parts: dict[str, str]) -> dict[str, float]:
+def _known(mapping: dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str]) -> dict[str, float]:
     """Return what the mapping knows of a trial's press beyond its path."""
     found = {}
     for name, entry in mapping.get("press", {}).items():

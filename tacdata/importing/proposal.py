@@ -10,7 +10,7 @@ import numpy as np
 
 import schemas
 from tacdata.errors import UsageError
-from tacdata.importing.formats.source_format import Table, read_table
+from tacdata.importing.formats.source_format import SourceTable, read_table
 from tacdata.importing.units import FACTORS, plain, quantity_of, split_unit
 
 GUESSES = {
@@ -31,7 +31,7 @@ SHOWN = 30
 """Columns that are listed of each file."""
 
 
-def described(source: Path) -> tuple[dict[str, Table], str]:
+def described(source: Path) -> tuple[dict[str, SourceTable], str]:
     """Return one table of each kind of file in a source, and what is in them in words.
 
     Raises:
@@ -40,7 +40,7 @@ def described(source: Path) -> tuple[dict[str, Table], str]:
     if not source.exists():
         raise UsageError(f"no file or folder {source}", "measured data", "check the path")
     paths = [source] if source.is_file() else sorted(p for p in source.rglob("*") if p.is_file())
-    tables: dict[str, Table] = {}
+    tables: dict[str, SourceTable] = {}
     count: dict[str, int] = {}
     refused = []
     for path in paths:
@@ -67,7 +67,7 @@ def described(source: Path) -> tuple[dict[str, Table], str]:
     return tables, "\n".join(lines)
 
 
-def _line(table: Table, name: str) -> str:
+def _line(table: SourceTable, name: str) -> str:
     values = table.columns[name]
     unit = f" [{table.units[name]}]" if table.units.get(name) and f"[{table.units[name]}]" not in name else ""
     if values.dtype == object:
@@ -86,7 +86,7 @@ def _line(table: Table, name: str) -> str:
     return f"    {name}{unit}{shape}: {np.nanmin(numbers):.9g} to {np.nanmax(numbers):.9g}{remark}"
 
 
-def proposed_mapping(source: Path, tables: dict[str, Table]) -> dict[str, Any]:
+def proposed_mapping(source: Path, tables: dict[str, SourceTable]) -> dict[str, Any]:
     """Return a mapping's document that fits the tables as far as their names tell."""
     aliases: dict[str, str] = {}
     for kind in tables:
@@ -130,11 +130,11 @@ def proposed_mapping(source: Path, tables: dict[str, Table]) -> dict[str, Any]:
     return document
 
 
-def _unit(table: Table, name: str) -> str:
+def _unit(table: SourceTable, name: str) -> str:
     return plain(table.units.get(name, "")) or "mm"
 
 
-def _roles(table: Table) -> dict[str, list[str]]:
+def _roles(table: SourceTable) -> dict[str, list[str]]:
     roles: dict[str, list[str]] = {"channels": []}
     for name, values in table.columns.items():
         bare = split_unit(name.rsplit(".", 1)[-1])[0].lower()
@@ -159,7 +159,7 @@ def _roles(table: Table) -> dict[str, list[str]]:
     return roles
 
 
-def _file(kind: str, table: Table, roles: dict[str, list[str]]) -> dict[str, Any]:
+def _file(kind: str, table: SourceTable, roles: dict[str, list[str]]) -> dict[str, Any]:
     path = kind
     for k in range(kind.count("#")):
         path = path.replace("#", f"{{part{k}}}", 1)
@@ -169,5 +169,5 @@ def _file(kind: str, table: Table, roles: dict[str, list[str]]) -> dict[str, Any
     return {"path": path, "time": {"column": roles["time"][0], **({"unit": unit} if unit in FACTORS["s"] else {})}}
 
 
-def _axis(table: Table, name: str) -> dict[str, Any]:
+def _axis(table: SourceTable, name: str) -> dict[str, Any]:
     return {"column": name, **({} if name in table.units else {"unit": "mm"})}

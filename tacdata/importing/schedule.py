@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis
-from tacdata.importing.formats.source_format import Table
+from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.streams import Stream
 from tacdata.importing.times import times
 from tacdata.recording.episode import Phase
@@ -49,7 +49,7 @@ class ScheduledPress:
         return tuple(Phase(*mark) for mark in marks if mark[2] > mark[1])
 
 
-def read_schedule(mapping: dict[str, Any], tables: dict[str, Table], taxels: Stream) -> list[ScheduledPress]:
+def read_schedule(mapping: dict[str, Any], tables: dict[str, SourceTable], taxels: Stream) -> list[ScheduledPress]:
     """Return the presses of a mapping's schedule in the order of time; [] if it has none.
 
     A list of presses counts its times from the zero of the channels' clock; from their first row if that clock
@@ -94,7 +94,7 @@ def _listed(entry: dict[str, Any], taxels: Stream) -> list[ScheduledPress]:
     ]  # fmt: skip
 
 
-def _tabled(mapping: dict[str, Any], entry: dict[str, Any], tables: dict[str, Table]) -> list[ScheduledPress]:
+def _tabled(mapping: dict[str, Any], entry: dict[str, Any], tables: dict[str, SourceTable]) -> list[ScheduledPress]:
     if "file" not in entry or entry["file"] not in tables or "start" not in entry:
         raise FormatError(
             "schedule without presses, or without file and start",

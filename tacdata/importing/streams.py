@@ -9,7 +9,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, numbers, select, single
-from tacdata.importing.formats.source_format import Table
+from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import factor, plain, quantity_of, split_unit
 
@@ -37,7 +37,7 @@ class Stream:
 
 
 @dataclass(frozen=True)
-class Streams:
+class ImportedStreams:
     """What a set of files holds."""
 
     taxels: Stream
@@ -55,14 +55,14 @@ class Streams:
         """Every stream."""
         return (self.taxels, *((self.position,) if self.position else ()), *self.measured)
 
-    def within(self, begin_ns: int, end_ns: int) -> Streams:
+    def within(self, begin_ns: int, end_ns: int) -> ImportedStreams:
         """Return the rows from a time [ns] to before another."""
         position = self.position.within(begin_ns, end_ns) if self.position else None
         measured = tuple(stream.within(begin_ns, end_ns) for stream in self.measured)
         return replace(self, taxels=self.taxels.within(begin_ns, end_ns), position=position, measured=measured)
 
 
-def read_streams(mapping: dict[str, Any], tables: dict[str, Table]) -> Streams:
+def read_streams(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> ImportedStreams:
     """Return the streams that a mapping describes.
 
     Args:
@@ -75,7 +75,7 @@ def read_streams(mapping: dict[str, Any], tables: dict[str, Table]) -> Streams:
     taxels, counted = _taxels(mapping, tables)
     position, depth_given = _position(mapping, tables)
     measured = tuple(_measured(mapping, name, entry, tables) for name, entry in mapping.get("measured", {}).items())
-    streams = Streams(taxels, position, measured, counted, depth_given)
+    streams = ImportedStreams(taxels, position, measured, counted, depth_given)
     _check_zeros(streams)
     _check_overlap(streams)
     return replace(streams, notes=tuple(note for stream in streams.all for note in stream.notes))
@@ -91,7 +91,7 @@ def _clock(mapping: dict[str, Any], entry: dict[str, Any]) -> dict[str, Any]:
     return clock
 
 
-def _table(mapping: dict[str, Any], tables: dict[str, Table], alias: str, where: str) -> Table:
+def _table(mapping: dict[str, Any], tables: dict[str, SourceTable], alias: str, where: str) -> SourceTable:
     if alias not in tables:
         raise FormatError(f"{where}: file {alias!r}", ", ".join(mapping["files"]), "name one under files")
     return tables[alias]
@@ -103,7 +103,7 @@ def _missing(mapping: dict[str, Any], entry: dict[str, Any]) -> list[float]:
 
 
 def _timed(
-    mapping: dict[str, Any], entry: dict[str, Any], table: Table, name: str, values: np.ndarray,
+    mapping: dict[str, Any], entry: dict[str, Any], table: SourceTable, name: str, values: np.ndarray,
     names: tuple[str, ...], unit: str,
 ) -> Stream:  # fmt: skip
     clock = _clock(mapping, entry)
@@ -121,7 +121,7 @@ def _timed(
     return Stream(name, time_ns, values, names, unit, zero, (*table.notes, *notes))
 
 
-def _taxels(mapping: dict[str, Any], tables: dict[str, Table]) -> tuple[Stream, bool]:
+def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[Stream, bool]:
     entry = mapping["taxels"]
     table = _table(mapping, tables, entry["file"], "taxels")
     if ("long" in entry) == ("columns" in entry):
@@ -139,7 +139,7 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, Table]) -> tuple[Stream, 
     return _timed(mapping, entry, table, "taxels", values, tuple(split_unit(n)[0] for n in labels), unit), counted
 
 
-def _widened(mapping: dict[str, Any], table: Table, entry: dict[str, Any]) -> tuple[Table, list[str]]:
+def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any]) -> tuple[SourceTable, list[str]]:
     """Return a table with a column a channel of one with a row a channel; what was not read stays NaN."""
     clock = _clock(mapping, entry)
     time = single(table, clock["column"], "taxels: time") if "column" in clock else None
@@ -156,10 +156,10 @@ def _widened(mapping: dict[str, Any], table: Table, entry: dict[str, Any]) -> tu
     moments = moments.astype(object) if moments.dtype.kind == "U" else moments
     columns = {time: moments, **{f"channel {label}": wide[:, k] for k, label in enumerate(labels)}}
     unit = {time: table.units[time]} if time in table.units else {}
-    return Table(table.path, columns, unit, table.notes), [f"channel {label}" for label in labels]
+    return SourceTable(table.path, columns, unit, table.notes), [f"channel {label}" for label in labels]
 
 
-def _position(mapping: dict[str, Any], tables: dict[str, Table]) -> tuple[Stream | None, bool]:
+def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[Stream | None, bool]:
     entry = mapping.get("position")
     if entry is None:
         return None, False
@@ -184,7 +184,7 @@ def _position(mapping: dict[str, Any], tables: dict[str, Table]) -> tuple[Stream
     return replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept]), depth_given
 
 
-def _measured(mapping: dict[str, Any], name: str, entry: dict[str, Any], tables: dict[str, Table]) -> Stream:
+def _measured(mapping: dict[str, Any], name: str, entry: dict[str, Any], tables: dict[str, SourceTable]) -> Stream:
     table = _table(mapping, tables, entry["file"], f"measured: {name}")
     names = select(table, entry["columns"], f"measured: {name}")
     given = plain(entry.get("unit") or next((table.units[n] for n in names if n in table.units), ""))
@@ -200,7 +200,7 @@ def _measured(mapping: dict[str, Any], name: str, entry: dict[str, Any], tables:
     return replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept])
 
 
-def _check_zeros(streams: Streams) -> None:
+def _check_zeros(streams: ImportedStreams) -> None:
     zeros = {stream.name: stream.zero for stream in streams.all if stream.zero != "aligned"}
     if len(set(zeros.values())) > 1:
         listed = ", ".join(f"{name}: {zero}" for name, zero in zeros.items())
@@ -211,7 +211,7 @@ def _check_zeros(streams: Streams) -> None:
         )
 
 
-def _check_overlap(streams: Streams) -> None:
+def _check_overlap(streams: ImportedStreams) -> None:
     taxels = streams.taxels
     for stream in streams.all:
         if not len(stream.time_ns):

@@ -10,14 +10,14 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import single
-from tacdata.importing.formats.source_format import Table
+from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.units import FACTORS, plain, split_unit
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0
 """Unix times between which a clock that does not say its zero is taken for Unix time [s]."""
 
 
-def times(table: Table, clock: dict[str, Any], where: str) -> tuple[np.ndarray, str]:
+def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.ndarray, str]:
     """Return each row's time and what its zero is.
 
     Args:

@@ -11,10 +11,12 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import single
-from tacdata.importing.formats.source_format import Table
+from tacdata.importing.formats.source_format import SourceTable
 
 
-def split_tables(tables: dict[str, Table], trials: dict[str, Any]) -> Iterator[tuple[str, dict[str, Table]]]:
+def split_tables(
+    tables: dict[str, SourceTable], trials: dict[str, Any]
+) -> Iterator[tuple[str, dict[str, SourceTable]]]:
     """Yield the label and the rows of each trial that a column tells; all rows under "" without such a column.
 
     Raises:
@@ -47,7 +49,7 @@ def split_tables(tables: dict[str, Table], trials: dict[str, Any]) -> Iterator[t
             )
 
 
-def _labels(table: Table, column: str | int) -> np.ndarray:
+def _labels(table: SourceTable, column: str | int) -> np.ndarray:
     values = table.columns[single(table, column, "trials: column")]
     if values.dtype == object:
         return np.array(["" if value is None else str(value) for value in values.tolist()], dtype=object)

@@ -22,7 +22,7 @@ HEADER = b"tacdata.label"
 REMEDY = "run `tacdata label` again: labels can always be made anew"
 
 
-class VersionError(FormatError):
+class LabelVersionError(FormatError):
     """A label was written by a release with another major version of the format; it is not damaged."""
 
 
@@ -183,7 +183,7 @@ def _header(schema: pa.Schema, path: Path) -> dict[str, Any]:
 def _check_version(header: Any, path: Path) -> None:
     found, known = str(dict(header).get("version", "")), schemas.version("label")
     if found.split(".")[0] != known.split(".")[0]:
-        raise VersionError(
+        raise LabelVersionError(
             f"{path}: label format version {found}",
             f"version {known}",
             "run `tacdata label --redo`: labels can always be made anew; or use the tacdata release that wrote it",

@@ -12,7 +12,7 @@ KEPT = 2000
 
 
 @dataclass(frozen=True)
-class Latency:
+class LatencyFigures:
     """Figures over the latest estimates."""
 
     count: int
@@ -48,13 +48,13 @@ class LatencyMeter:
         self._count += 1
 
     @property
-    def figures(self) -> Latency | None:
+    def figures(self) -> LatencyFigures | None:
         """The figures; None before two estimates."""
         if len(self._times) < 2:
             return None
         sample, arrival, sent = np.array(self._times, np.int64).T
         rate = (len(sent) - 1) / max((sent[-1] - sent[0]) * 1e-9, 1e-9)
-        return Latency(self._count, float(rate), _summary(sent - sample), _summary(sent - arrival))
+        return LatencyFigures(self._count, float(rate), _summary(sent - sample), _summary(sent - arrival))
 
 
 def _summary(values_ns: np.ndarray) -> tuple[float, float, float]:

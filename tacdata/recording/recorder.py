@@ -11,7 +11,7 @@ import numpy as np
 
 from tacdata.errors import DeviceError, TacdataError, UsageError
 from tacdata.plans import Plan, Press
-from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.files.writer import EpisodeWriter, Header
@@ -20,7 +20,7 @@ from tacdata.recording.live.guarded_motion import WATCH, GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
 from tacdata.recording.live.rig_devices import RigDevices
-from tacdata.recording.live.rig_streams import Streams
+from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion import sync_tap as tap_motion
 from tacdata.recording.motion.preflight import Preflight, preflight, safe_height
 from tacdata.recording.motion.press_steps import Position, Step, steps
@@ -86,7 +86,7 @@ class Recorder:
         self._motion = GuardedMotion(self.devices.cnc, rig.clock, self._interruption)
         self._tap = tap_motion.touch(plan, sensor) if sync_tap else None
         self._say, self._watch = say or (lambda words: None), watch
-        self._latencies: dict[str, Latency] = {}
+        self._latencies: dict[str, StreamLatency] = {}
 
     def run(self, confirm: Callable[[Preflight], bool]) -> Session:
         """Check, ask, then record every press that is wanted.
@@ -117,7 +117,7 @@ class Recorder:
             if not confirm(summary):
                 raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
             session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
-            with Streams(
+            with RigStreams(
                 devices, self.rig.cameras, self._motion.stop, self._detect, self._watch, self.rig.fingers
             ) as streams:
                 try:
@@ -144,7 +144,7 @@ class Recorder:
     def _record_all(
         self,
         session: Session,
-        streams: Streams,
+        streams: RigStreams,
         limits: AxisLimits,
         summary: Preflight,
         wanted: tuple[int, ...],
@@ -163,7 +163,7 @@ class Recorder:
             if self._progress:
                 self._progress(done, len(wanted), sum(left[done:]) / self.rig.clock.rate)
 
-    def _wait_for_streams(self, streams: Streams) -> None:
+    def _wait_for_streams(self, streams: RigStreams) -> None:
         end = time.monotonic() + FIRST_FRAME
         while streams.frames < 2 or streams.position is None:
             if streams.fault:
@@ -182,7 +182,7 @@ class Recorder:
             self._interruption.check()
             time.sleep(WATCH)
 
-    def _rise(self, streams: Streams) -> Position:
+    def _rise(self, streams: RigStreams) -> Position:
         """Go straight up to the clearance from wherever the guide stands; return where that is [mm]."""
         here = streams.position or (np.nan, np.nan, np.nan)
         above = (here[0], here[1], max(here[2], self._height))
@@ -201,7 +201,7 @@ class Recorder:
                 raise
         return here
 
-    def _change_indenter(self, press: Press, position: Position, streams: Streams) -> Position:
+    def _change_indenter(self, press: Press, position: Position, streams: RigStreams) -> Position:
         """Have the press's indenter mounted, high enough for the longest; return where the guide stands [mm]."""
         wanted = press.mounting
         if wanted != self._mounted and self._mount:
@@ -214,7 +214,7 @@ class Recorder:
         return position
 
     def _touch(
-        self, session: Session, tap: Press, position: Position, streams: Streams, limits: AxisLimits
+        self, session: Session, tap: Press, position: Position, streams: RigStreams, limits: AxisLimits
     ) -> tuple[Session, Position]:
         """Carry out the sync tap and take the delays that it shows; return the session and where the guide stands."""
         position = self._change_indenter(tap, position, streams)
@@ -235,7 +235,7 @@ class Recorder:
         self,
         press: Press,
         position: Position,
-        streams: Streams,
+        streams: RigStreams,
         limits: AxisLimits,
         path: Path | None = None,
         course: tuple[Step, ...] = (),
@@ -260,7 +260,7 @@ class Recorder:
         self._close(writer, streams)
         return position
 
-    def _close(self, writer: EpisodeWriter, streams: Streams, broken_off: str = "") -> None:
+    def _close(self, writer: EpisodeWriter, streams: RigStreams, broken_off: str = "") -> None:
         streams.catch_up()
         counts = streams.counts
         streams.record_into(None)

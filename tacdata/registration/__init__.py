@@ -2,6 +2,6 @@
 
 from tacdata.registration.procedure import register
 from tacdata.registration.result import Found, document_of
-from tacdata.registration.settings import Settings
+from tacdata.registration.settings import RegistrationSettings
 
-__all__ = ["Found", "Settings", "document_of", "register"]
+__all__ = ["Found", "RegistrationSettings", "document_of", "register"]

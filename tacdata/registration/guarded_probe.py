@@ -16,9 +16,9 @@ from tacdata.errors import DeviceError, FormatError, TacdataError
 from tacdata.recording.live.guarded_motion import GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.rig_devices import RigDevices
-from tacdata.recording.live.rig_streams import Streams
+from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion.press_steps import Step
-from tacdata.registration.probe import Position, Probe, Reading
+from tacdata.registration.probe import Position, Probe, StillReading
 from tacdata.rig import Rig
 
 PATIENCE = 5.0
@@ -50,7 +50,7 @@ class GuardedProbe(Probe):
     """Drives the devices of a rig; made by `guarded_probe`."""
 
     def __init__(
-        self, rig: Rig, devices: RigDevices, streams: Streams, motion: GuardedMotion, height: float,
+        self, rig: Rig, devices: RigDevices, streams: RigStreams, motion: GuardedMotion, height: float,
         interruption: Interruption,
     ) -> None:  # fmt: skip
         """Take over devices that are open and streams that run; ``height`` [mm, machine] is safe to rise to."""
@@ -115,7 +115,7 @@ class GuardedProbe(Probe):
         x, y, z = self._position
         self.go((x, y, max(z, self._height)), speed)
 
-    def read(self, frames: int) -> Reading:
+    def read(self, frames: int) -> StillReading:
         """Collect frames sampled since the guide came to rest; see the base."""
         end = time.monotonic() + PATIENCE + PATIENCE * frames / 30 / self._rig.clock.rate
         while True:
@@ -133,7 +133,7 @@ class GuardedProbe(Probe):
         taken = np.array(rows[:frames])
         self._sink.frames.clear()
         spread = taken.std(axis=0, ddof=1) if frames > 1 else np.zeros(taken.shape[1])
-        return Reading(taken.mean(axis=0), spread, frames)
+        return StillReading(taken.mean(axis=0), spread, frames)
 
     def wait(self, seconds: float) -> None:
         """Wait on the rig's clock, watching for faults; see the base."""
@@ -157,7 +157,7 @@ def guarded_probe(
     interruption = interruption or Interruption()
     motion = GuardedMotion(devices.cnc, rig.clock, interruption)
     without_cameras = replace(devices, cameras={})
-    with Streams(without_cameras, {}, motion.stop) as streams, interruption.kept():
+    with RigStreams(without_cameras, {}, motion.stop) as streams, interruption.kept():
         probe = GuardedProbe(rig, devices, streams, motion, height, interruption)
         try:
             probe.rise(speed)
@@ -170,7 +170,7 @@ def guarded_probe(
             streams.record_into(None)
 
 
-def _free(probe: GuardedProbe, motion: GuardedMotion, streams: Streams, height: float, speed: float) -> None:
+def _free(probe: GuardedProbe, motion: GuardedMotion, streams: RigStreams, height: float, speed: float) -> None:
     """Lift the indenter after whatever went wrong; never raises."""
     if streams.fault is None and not probe.stopped:
         with suppress(TacdataError):

@@ -11,7 +11,7 @@ Position = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Reading:
+class StillReading:
     """Channels while the indenter stands still."""
 
     mean: np.ndarray
@@ -35,7 +35,7 @@ class Probe(ABC):
         """
 
     @abstractmethod
-    def read(self, frames: int) -> Reading:
+    def read(self, frames: int) -> StillReading:
         """Return the mean of so many frames, all sampled after the guide came to rest."""
 
     @abstractmethod

@@ -12,7 +12,7 @@ from tacdata.registration.cross_scan import Cross, cross_scan
 from tacdata.registration.onset import POWERS, onset, shared_power
 from tacdata.registration.probe import Probe
 from tacdata.registration.result import Found
-from tacdata.registration.settings import Settings
+from tacdata.registration.settings import RegistrationSettings
 from tacdata.registration.solution import Plane, fit_plane, fit_rigid_motion
 from tacdata.registration.touch_off import LIFT_SPEED, Touch, touch_off
 from tacdata.rig import Registration
@@ -40,7 +40,7 @@ def touch_sites(sensor: Sensor) -> dict[str, tuple[float, float]]:
             "the corner +x +y": (a, b)}  # fmt: skip
 
 
-def described(sensor: Sensor, guess: Registration, settings: Settings) -> str:
+def described(sensor: Sensor, guess: Registration, settings: RegistrationSettings) -> str:
     """Return in words what the procedure is going to do."""
     half = np.abs(sensor.taxels.centers).max(axis=0)
     x, y, z = guess.origin
@@ -57,7 +57,11 @@ def described(sensor: Sensor, guess: Registration, settings: Settings) -> str:
 
 
 def register(
-    probe: Probe, sensor: Sensor, guess: Registration, settings: Settings, say: Callable[[str], None] = lambda t: None
+    probe: Probe,
+    sensor: Sensor,
+    guess: Registration,
+    settings: RegistrationSettings,
+    say: Callable[[str], None] = lambda t: None,
 ) -> Found:
     """Find where the sensor lies.
 
@@ -90,7 +94,7 @@ def register(
     return Found(plane, motion, tuple(touches), tuple(crosses), noise, settings)
 
 
-def _noise(probe: Probe, guess: Registration, settings: Settings) -> np.ndarray:
+def _noise(probe: Probe, guess: Registration, settings: RegistrationSettings) -> np.ndarray:
     probe.go(guess.to_machine(0.0, 0.0, -settings.above), LIFT_SPEED)
     probe.wait(1.0)
     reading = probe.read(IDLE_FRAMES)
@@ -104,7 +108,7 @@ def _noise(probe: Probe, guess: Registration, settings: Settings) -> np.ndarray:
 
 
 def _touches(
-    probe: Probe, sensor: Sensor, guess: Registration, settings: Settings, noise: np.ndarray,
+    probe: Probe, sensor: Sensor, guess: Registration, settings: RegistrationSettings, noise: np.ndarray,
     say: Callable[[str], None],
 ) -> list[Touch]:  # fmt: skip
     touches: list[Touch] = []
@@ -137,7 +141,7 @@ def _with_one_power(touches: list[Touch]) -> list[Touch]:
     ]
 
 
-def _check_plane(plane: Plane, touches: list[Touch], settings: Settings) -> None:
+def _check_plane(plane: Plane, touches: list[Touch], settings: RegistrationSettings) -> None:
     tilt = float(np.degrees(np.arctan(np.hypot(*plane.slope))))
     if tilt > settings.most_tilt:
         raise DeviceError(
@@ -161,7 +165,7 @@ def _check_plane(plane: Plane, touches: list[Touch], settings: Settings) -> None
 
 
 def _crosses(
-    probe: Probe, sensor: Sensor, guess: Registration, settings: Settings, plane: Plane, noise: np.ndarray,
+    probe: Probe, sensor: Sensor, guess: Registration, settings: RegistrationSettings, plane: Plane, noise: np.ndarray,
     say: Callable[[str], None],
 ) -> list[Cross]:  # fmt: skip
     taxels = settings.taxels or reference_taxels(sensor)

@@ -11,7 +11,7 @@ import numpy as np
 import schemas
 from tacdata import provenance
 from tacdata.registration.cross_scan import Cross
-from tacdata.registration.settings import Settings
+from tacdata.registration.settings import RegistrationSettings
 from tacdata.registration.solution import Plane, RigidMotion
 from tacdata.registration.touch_off import Touch
 from tacdata.rig import Registration, Rig
@@ -28,7 +28,7 @@ class Found:
     crosses: tuple[Cross, ...]
     noise: np.ndarray
     """Standard deviation of each channel without contact [counts], shape (channels,)."""
-    settings: Settings
+    settings: RegistrationSettings
 
     @property
     def registration(self) -> Registration:

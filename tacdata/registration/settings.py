@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Settings:
+class RegistrationSettings:
     """How far and how carefully."""
 
     above: float = 1.0

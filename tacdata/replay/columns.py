@@ -8,12 +8,12 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.errors import FormatError
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 AXES, TURNS = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 
 
-def to_columns(targets: Targets) -> dict[str, np.ndarray]:
+def to_columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
     """Return the columns of targets: time_ns, and for each finger FINGER.COLUMN_UNIT, shape (n,) each."""
     columns: dict[str, np.ndarray] = {"time_ns": targets.time_ns}
     for k, name in enumerate(targets.fingers):
@@ -25,7 +25,7 @@ def to_columns(targets: Targets) -> dict[str, np.ndarray]:
     return columns
 
 
-def from_columns(header: dict[str, Any], columns: dict[str, np.ndarray], origin: str) -> Targets:
+def from_columns(header: dict[str, Any], columns: dict[str, np.ndarray], origin: str) -> FingertipTargets:
     """Return the targets that a file's header (`schemas/fingertip_targets.schema.json`) and columns hold.
 
     Raises:
@@ -48,7 +48,7 @@ def from_columns(header: dict[str, Any], columns: dict[str, np.ndarray], origin:
     if not np.isfinite(position).all() or not np.isfinite(quaternion).all():
         raise FormatError(f"{origin}: a pose that is no number", "finite poses", "export again")
     named = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
-    return Targets(
+    return FingertipTargets(
         **{name: header[name] for name in named}, fingers=tuple(header["fingers"]),
         time_ns=np.asarray(columns["time_ns"], np.int64), position=position, quaternion=quaternion,
         seen=stacked(*(f"seen_{a}_m" for a in AXES)), depth=stacked("predicted_depth_mm")[..., 0],

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.errors import UsageError
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 FELT = 0.5
 """A finger touches where it feels more than this share of its largest depth [1]."""
@@ -19,13 +19,13 @@ SHORT = 0.5
 """A touch that lasts less is no grasp [s]."""
 
 
-def touching(targets: Targets) -> np.ndarray:
+def touching(targets: FingertipTargets) -> np.ndarray:
     """Return when all fingers feel something at once, shape (n,), bool."""
     depth = np.nan_to_num(targets.depth)
     return (depth > FELT * np.maximum(depth.max(axis=0), LEAST_DEPTH / FELT)).all(axis=1)
 
 
-def first_grasp(targets: Targets) -> tuple[int, int, int]:
+def first_grasp(targets: FingertipTargets) -> tuple[int, int, int]:
     """Return the rows of the first grasp that begins with open fingers: its beginning, first touch, and end.
 
     Raises:
@@ -44,7 +44,7 @@ def first_grasp(targets: Targets) -> tuple[int, int, int]:
     )
 
 
-def cut(targets: Targets, begin: int, end: int) -> Targets:
+def cut(targets: FingertipTargets, begin: int, end: int) -> FingertipTargets:
     """Return the targets of some rows."""
     rows = slice(begin, end)
     arrays = ("time_ns", "position", "quaternion", "seen", "depth", "gap")

@@ -14,7 +14,7 @@ import numpy as np
 from tacdata.replay.kinematic_search import OTHERS, STEPS, KinematicSearch
 from tacdata.replay.kinematics import Joint, Kinematics
 from tacdata.replay.robot import Robot
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 COUPLED = 1e-4
 """How far a mimic joint may be off the joint that it follows [rad or m]; beyond, no target of that time is reached."""
@@ -43,7 +43,7 @@ class JointPath:
     """Joint -> rows that are reached only faster than the joint's limit."""
 
 
-def follow(robot: Robot, targets: Targets) -> tuple[JointPath, Kinematics]:
+def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinematics]:
     """Return the joint path that follows the targets, with everything that cannot be followed named.
 
     Raises:

@@ -14,9 +14,9 @@ import numpy as np
 
 from tacdata.errors import UsageError
 from tacdata.replay.grasp import touching
-from tacdata.replay.scene import Scene
+from tacdata.replay.scene import ReplayScene
 from tacdata.replay.scene_model import PAD, SceneModel
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 HIGH = 0.9
 """The object is held high while the fingers are above this share of their lift [1]."""
@@ -29,7 +29,7 @@ BEHIND = 0.015
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class ReplayOutcome:
     """What became of the ball."""
 
     held: bool
@@ -49,7 +49,7 @@ class Outcome:
     """How far an eraser fell behind the fingertips along the strokes [m]; 0 of a ball."""
 
 
-def ball_centre(targets: Targets, touch: int, radius: float) -> np.ndarray:
+def ball_centre(targets: FingertipTargets, touch: int, radius: float) -> np.ndarray:
     """Return where a ball's centre was in a row in which all fingers touch it [m], shape (3,).
 
     Each pad touches the ball, so the centre lies a radius along its normal, less the depth that it felt.
@@ -58,13 +58,13 @@ def ball_centre(targets: Targets, touch: int, radius: float) -> np.ndarray:
     return (targets.seen[touch] + reach * normals(targets)[touch]).mean(axis=0)
 
 
-def normals(targets: Targets) -> np.ndarray:
+def normals(targets: FingertipTargets) -> np.ndarray:
     """Return the normals out of the pads [1], shape (n, f, 3)."""
     x, y, z, w = np.moveaxis(targets.quaternion, -1, 0)
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
 
 
-def replay_targets(targets: Targets, scene: Scene, centre: np.ndarray) -> Outcome:
+def replay_targets(targets: FingertipTargets, scene: ReplayScene, centre: np.ndarray) -> ReplayOutcome:
     """Return what becomes of an object that lies with its centre at ``centre`` [m] when fingertips follow targets.
 
     A ball is held if it stays high while the fingers are; an eraser, if it never falls behind the fingers' strokes.
@@ -88,7 +88,7 @@ def replay_targets(targets: Targets, scene: Scene, centre: np.ndarray) -> Outcom
     else:
         slip = _slip(path.tips[high].mean(axis=1), path.ball[high])
         held = slip < BEHIND
-    return Outcome(bool(held), lowest, force, depth, seconds, path.ball, path.tips, slip)
+    return ReplayOutcome(bool(held), lowest, force, depth, seconds, path.ball, path.tips, slip)
 
 
 def _lift(pads: np.ndarray) -> float:
@@ -102,7 +102,7 @@ def _high(pads: np.ndarray) -> np.ndarray:
     return height > height.min() + HIGH * lift
 
 
-def _wiping(pads: np.ndarray, targets: Targets) -> np.ndarray:
+def _wiping(pads: np.ndarray, targets: FingertipTargets) -> np.ndarray:
     """Return the rows from the first stroke to the last: while all fingers feel something."""
     rows = touching(targets)
     rows[np.argmax(rows) : len(rows) - np.argmax(rows[::-1])] = rows.any()

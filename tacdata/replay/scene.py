@@ -9,7 +9,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Scene:
+class ReplayScene:
     """What the robot and the object are; the spreads are those of `drawn`."""
 
     radius: float = 0.035
@@ -63,7 +63,7 @@ class Scene:
         return self.radius if self.task == "grasp" else self.eraser[0]
 
 
-def scene_of(task: str, **values: Any) -> Scene:
+def scene_of(task: str, **values: Any) -> ReplayScene:
     """Return the usual scene of a task; a wipe's eraser weighs 120 g and holds to its board by a magnet of 2 N.
 
     Args:
@@ -71,10 +71,10 @@ def scene_of(task: str, **values: Any) -> Scene:
         values: Fields that differ from the usual ones.
     """
     wiped: dict[str, Any] = {"mass": 0.12, "pull": 2.0} if task == "wipe" else {}
-    return Scene(task="wipe" if task == "wipe" else "grasp", **{**wiped, **values})
+    return ReplayScene(task="wipe" if task == "wipe" else "grasp", **{**wiped, **values})
 
 
-def drawn(scene: Scene, fingers: int, seed: int) -> Scene:
+def drawn(scene: ReplayScene, fingers: int, seed: int) -> ReplayScene:
     """Return the scene of a seed: mass and stiffness +-20 %, friction +-15 %, ball +-1.5 mm, fingertips 0.7 mm."""
     rng = np.random.default_rng([seed, 21])
     x, y = rng.uniform(-0.0015, 0.0015, 2).tolist()

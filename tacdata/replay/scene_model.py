@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.replay.engine import mujoco
-from tacdata.replay.scene import Scene
+from tacdata.replay.scene import ReplayScene
 
 STEP = 0.001
 """Time step [s]."""
@@ -45,7 +45,7 @@ SPRING = '<position name="{joint}" joint="{joint}" kp="{kp}" kv="{kv}"/>'
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class Rollout:
     """What happened, at the times of the targets."""
 
     ball: np.ndarray
@@ -61,7 +61,7 @@ class Course:
 class SceneModel:
     """One trial."""
 
-    def __init__(self, scene: Scene, begin: np.ndarray, centre: np.ndarray) -> None:
+    def __init__(self, scene: ReplayScene, begin: np.ndarray, centre: np.ndarray) -> None:
         """Build it with the pads' centres at ``begin`` [m], shape (f, 3), and the ball's at ``centre`` [m]."""
         engine = mujoco()
         count, critical = len(begin), 2 * np.sqrt(scene.stiffness * TIP_MASS)
@@ -92,7 +92,7 @@ class SceneModel:
         self._ball_geom = self._model.geom("ball").id
         self._data.xfrc_applied[self._ball, 2] = -scene.pull
 
-    def run(self, pads: np.ndarray, seconds: np.ndarray) -> Course:
+    def run(self, pads: np.ndarray, seconds: np.ndarray) -> Rollout:
         """Follow pads' centres [m], shape (n, f, 3), at times [s], shape (n,), ascending from 0."""
         engine = mujoco()
         count = len(self._tips)
@@ -108,7 +108,7 @@ class SceneModel:
                 ball[row], tips[row] = self._data.xpos[self._ball], self._data.xpos[self._tips]
                 force[row], depth[row] = self._contacts(count)
                 row += 1
-        return Course(ball, tips, force, depth)
+        return Rollout(ball, tips, force, depth)
 
     def _contacts(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Return normal force [N] and depth [m] of each pad on the ball, shapes (f,)."""

@@ -18,7 +18,7 @@ UNITS = {"time_ns": "ns", "position": "m", "quaternion": "1 (xyzw)", "seen": "m"
 
 
 @dataclass(frozen=True, eq=False)
-class Targets:
+class FingertipTargets:
     """Fingertip targets of one demonstration."""
 
     recording: str
@@ -65,7 +65,7 @@ class Targets:
         }  # fmt: skip
 
 
-def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Iterable[str] = ()) -> Targets:
+def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Iterable[str] = ()) -> FingertipTargets:
     """Return a demonstration's targets, over the times at which every finger's pose is known.
 
     Args:
@@ -107,7 +107,7 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
     kind, parents = "direct" if gains is None else "compensated", {"recording": made.recording_hash}
     if made.network:
         parents["checkpoint"] = made.network["hash"]
-    return Targets(
+    return FingertipTargets(
         made.recording, made.recording_hash, made.task, made.frame, made.rate, names, kind, used,
         made.time_ns[rows], position[rows], np.stack([t.quaternion for t in tracks], axis=1)[rows], seen[rows],
         np.stack(depths, axis=1)[rows], np.stack([t.gap for t in tracks], axis=1)[rows], made.network,

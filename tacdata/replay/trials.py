@@ -10,9 +10,9 @@ from tacdata import provenance
 from tacdata.demonstrations.compensation import smallest_gain
 from tacdata.demonstrations.demonstration import Demonstration
 from tacdata.replay.grasp import cut, first_grasp
-from tacdata.replay.outcome import Outcome, ball_centre, replay_targets
-from tacdata.replay.scene import Scene, drawn
-from tacdata.replay.targets import Targets, targets_of
+from tacdata.replay.outcome import ReplayOutcome, ball_centre, replay_targets
+from tacdata.replay.scene import ReplayScene, drawn
+from tacdata.replay.targets import FingertipTargets, targets_of
 
 DIRECT = "direct"
 Interval = Callable[[int, int], tuple[float, float]]
@@ -21,7 +21,7 @@ Interval = Callable[[int, int], tuple[float, float]]
 class Trials:
     """The first grasp or wipe of a demonstration, to be tried."""
 
-    def __init__(self, made: Demonstration, gains: dict[str, dict[str, float]], scene: Scene) -> None:
+    def __init__(self, made: Demonstration, gains: dict[str, dict[str, float]], scene: ReplayScene) -> None:
         """Cut it out and find where the object lay.
 
         Args:
@@ -38,7 +38,7 @@ class Trials:
         self._centre = ball_centre(whole, self._span[1], scene.reach)
         self.paths = {DIRECT: self._cut(None), **{kind: self._cut(own) for kind, own in gains.items()}}
 
-    def one(self, kind: str, scene: Scene) -> Outcome:
+    def one(self, kind: str, scene: ReplayScene) -> ReplayOutcome:
         """Return the outcome of one trial, of a kind of replay, in a scene."""
         return replay_targets(self.paths[kind], scene, self._centre)
 
@@ -68,12 +68,12 @@ class Trials:
                 )  # fmt: skip
         return found
 
-    def _cut(self, gains: dict[str, float] | None) -> Targets:
+    def _cut(self, gains: dict[str, float] | None) -> FingertipTargets:
         return cut(targets_of(self.made, gains), self._span[0], self._span[2])
 
 
 def result(
-    tried: Sequence[Trials], seeds: int, interval: Interval, scene: Scene, chosen: dict[str, Any] | None = None
+    tried: Sequence[Trials], seeds: int, interval: Interval, scene: ReplayScene, chosen: dict[str, Any] | None = None
 ) -> dict[str, Any]:
     """Return the result over recordings and seeds (`schemas/replay_result.schema.json`).
 

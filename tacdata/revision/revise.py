@@ -25,7 +25,7 @@ from tacdata.revision.episodes import sealed
 from tacdata.revision.evidence import table
 from tacdata.revision.evidence.card import card
 from tacdata.revision.evidence.curves import EpisodeCurves, curves
-from tacdata.revision.evidence.gap import Change, Gap, gap
+from tacdata.revision.evidence.gap import GapReduction, ResidualChange, gap
 from tacdata.revision.evidence.picture import draw
 from tacdata.revision.evidence.worst_slice import sealed_slices
 from tacdata.revision.labels.confirm import Confirmed, confirm, touches_fem
@@ -50,7 +50,7 @@ Note = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Wishes:
+class RevisionOptions:
     """What is to be done beside the card."""
 
     relabel: FarmSettings | None = None
@@ -79,7 +79,7 @@ class Revised:
 
 
 def revise(
-    judged: Path, recordings: list[Path], spec: Spec, out: Path, wishes: Wishes | None = None,
+    judged: Path, recordings: list[Path], spec: Spec, out: Path, wishes: RevisionOptions | None = None,
     note: Note = lambda text: None,
 ) -> Revised:  # fmt: skip
     """Do all that follows a verdict.
@@ -96,7 +96,7 @@ def revise(
         UsageError: If ``out`` exists, or the verdict was reached from other recordings or another model.
         FormatError: If the verdict is none.
     """
-    asked = wishes or Wishes()
+    asked = wishes or RevisionOptions()
     if out.exists():
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
     verdict = documents.read(judged / VERDICT, "verdict")
@@ -160,7 +160,7 @@ def _sessions(recordings: list[Path]) -> list[Path]:
 
 
 def _labels(
-    recordings: list[Path], answer: list[Placed], out: Path, asked: Wishes, note: Note
+    recordings: list[Path], answer: list[Placed], out: Path, asked: RevisionOptions, note: Note
 ) -> list[tuple[str, Moved]]:
     if not moves_labels(answer):
         return []
@@ -176,7 +176,9 @@ def _labels(
     return found
 
 
-def _tips(recordings: list[Path], answer: list[Placed], asked: Wishes, note: Note) -> list[tuple[str, TipError]]:
+def _tips(
+    recordings: list[Path], answer: list[Placed], asked: RevisionOptions, note: Note
+) -> list[tuple[str, TipError]]:
     if not answer or not any(p.stage == "kinematics" for p in answer):
         return []
     note("where the tip truly was")
@@ -185,7 +187,7 @@ def _tips(recordings: list[Path], answer: list[Placed], asked: Wishes, note: Not
 
 
 def _retrained(
-    recordings: list[Path], held: Comparison, answer: list[Placed], out: Path, asked: Wishes, note: Note
+    recordings: list[Path], held: Comparison, answer: list[Placed], out: Path, asked: RevisionOptions, note: Note
 ) -> Retrained | None:
     if asked.retrain is None:
         return None
@@ -199,7 +201,7 @@ def _told(note: Note, name: str) -> Callable[[str, int, int], None]:
 
 
 def _confirmed(
-    recordings: list[Path], held: Comparison, answer: list[Placed], asked: Wishes, note: Note
+    recordings: list[Path], held: Comparison, answer: list[Placed], asked: RevisionOptions, note: Note
 ) -> list[Confirmed]:
     given = held.spec.document["response"]
     if asked.confirm < 1 or given["kind"] != "table" or not touches_fem(answer):
@@ -245,7 +247,7 @@ def _added(verdict: dict[str, Any], judged: Path, spec: Spec, answer: list[Place
 
 
 def _next(
-    recordings: list[Path], held: Comparison, verdict: dict[str, Any], asked: Wishes, out: Path, note: Note
+    recordings: list[Path], held: Comparison, verdict: dict[str, Any], asked: RevisionOptions, out: Path, note: Note
 ) -> dict[str, Any]:
     status = verdict["status"]
     if status not in ("ambiguous", "unknown"):
@@ -275,7 +277,7 @@ def _next(
     return {"plan": PLAN, "presses": told, "remark": "judge the new session together with those there are"}
 
 
-def _gap(found: Gap | None, slices: list[Change]) -> dict[str, Any] | None:
+def _gap(found: GapReduction | None, slices: list[ResidualChange]) -> dict[str, Any] | None:
     if found is None:
         return None
     changes = {
@@ -297,8 +299,8 @@ def _finite(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _show(
-    document: dict[str, Any], verdict: dict[str, Any], held: Comparison, answer: list[Placed], found: Gap | None,
-    out: Path, note: Note,
+    document: dict[str, Any], verdict: dict[str, Any], held: Comparison, answer: list[Placed],
+    found: GapReduction | None, out: Path, note: Note,
 ) -> tuple[EpisodeCurves, ...]:  # fmt: skip
     note("picture, table, card")
     drawn, shown = None, []

@@ -2,12 +2,12 @@
 
 from tacdata.sensor.adhesion import Adhesion
 from tacdata.sensor.material import Material, PronyTerm
-from tacdata.sensor.sensor import Contact, DepthMap, Sensor, Skin, Taxels, default_sensor, read_sensor
+from tacdata.sensor.sensor import ContactProperties, DepthMap, Sensor, Skin, Taxels, default_sensor, read_sensor
 from tacdata.sensor.transduction import Transduction
 
 __all__ = [
     "Adhesion",
-    "Contact",
+    "ContactProperties",
     "DepthMap",
     "Material",
     "PronyTerm",

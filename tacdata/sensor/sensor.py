@@ -49,7 +49,7 @@ class Taxels:
 
 
 @dataclass(frozen=True)
-class Contact:
+class ContactProperties:
     """What touches and holds the skin."""
 
     friction: float
@@ -118,7 +118,7 @@ class Sensor:
     taxels: Taxels
     skin: Skin
     material: Material
-    contact: Contact
+    contact: ContactProperties
     map: DepthMap
     assumptions: dict[str, str]
     """Field path -> why the value is an assumption."""
@@ -171,7 +171,7 @@ class Sensor:
             taxels=Taxels(**document["taxels"]),
             skin=Skin.from_document(document["skin"], origin, folder),
             material=Material.from_document(document["material"], origin),
-            contact=Contact(**contact),
+            contact=ContactProperties(**contact),
             map=DepthMap(**document["map"]),
             assumptions=dict(document["assumptions"]),
             source=document.get("source", ""),

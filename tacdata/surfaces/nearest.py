@@ -24,7 +24,7 @@ def _query(
 
 
 @dataclass(frozen=True)
-class Places:
+class NearestPoints:
     """Nearest places of some points."""
 
     face: np.ndarray
@@ -45,7 +45,7 @@ class Nearest:
         points = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device="cpu")
         self._mesh = wp.Mesh(points=points, indices=indices)
 
-    def places(self, points: np.ndarray) -> Places:
+    def places(self, points: np.ndarray) -> NearestPoints:
         """Return the nearest places of points [mm], shape (n, 3).
 
         The tree is searched in single precision, the place itself computed in double.
@@ -57,7 +57,7 @@ class Nearest:
         wp.launch(_query, n, inputs=[self._mesh.id, queries, face, place, side], device="cpu")
         which = face.numpy()
         nearest = _on_triangle(points, self._corners[which], place.numpy().astype(float))
-        return Places(which, nearest, side.numpy() * np.linalg.norm(points - nearest, axis=1))
+        return NearestPoints(which, nearest, side.numpy() * np.linalg.norm(points - nearest, axis=1))
 
 
 def _on_triangle(points: np.ndarray, corners: np.ndarray, place: np.ndarray) -> np.ndarray:

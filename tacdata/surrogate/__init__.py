@@ -3,6 +3,6 @@
 from tacdata.surrogate.build import LeftOut, TableSettings, Work, work
 from tacdata.surrogate.grid import Reach
 from tacdata.surrogate.spec import written_spec
-from tacdata.surrogate.table import Table
+from tacdata.surrogate.table import LoadTable
 
-__all__ = ["LeftOut", "Reach", "Table", "TableSettings", "Work", "work", "written_spec"]
+__all__ = ["LeftOut", "LoadTable", "Reach", "TableSettings", "Work", "work", "written_spec"]

@@ -17,7 +17,7 @@ from tacdata.surrogate.grid import Grid, Reach, covering, request
 from tacdata.surrogate.press_store import PressStore
 from tacdata.surrogate.reading import reading_of
 from tacdata.surrogate.solved import Solved
-from tacdata.surrogate.table import Table, assembled
+from tacdata.surrogate.table import LoadTable, assembled
 from tacdata.transduction import Loads, Transducer
 
 COARSE = MeshSettings(outer=0.8, tip=0.24)
@@ -127,7 +127,7 @@ class Work:
         asked = [press for _, _, press in self.requests] + [press for _, press in self.probes]
         return self.store.expected_seconds(asked)
 
-    def done(self, progress: Progress = lambda *_: None) -> tuple[Table, LeftOut | None]:
+    def done(self, progress: Progress = lambda *_: None) -> tuple[LoadTable, LeftOut | None]:
         """Solve what is missing and return the table with its error; broken off, a second call goes on.
 
         Raises:
@@ -147,7 +147,7 @@ class Work:
         return table, self._off(table, probes, answers[len(asked) :])
 
     def _off(
-        self, table: Table, probes: list[tuple[int, PressRequest]], answers: Sequence[Solved | SolveError]
+        self, table: LoadTable, probes: list[tuple[int, PressRequest]], answers: Sequence[Solved | SolveError]
     ) -> LeftOut | None:
         response, transducer = table.response, Transducer.of(self.sensor)
         loads, normals = [], []

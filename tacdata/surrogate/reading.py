@@ -16,7 +16,7 @@ _NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadingCurve:
     """How a table's loads become readings."""
 
     by: str
@@ -37,7 +37,7 @@ class Reading:
         return np.asarray(getattr(loads, self.by))
 
 
-def reading_of(sensor: Sensor, loads: Loads) -> Reading:
+def reading_of(sensor: Sensor, loads: Loads) -> ReadingCurve:
     """Return how loads such as these become readings, by the sensor file's transduction.
 
     A reading that follows the force alone, or the closure alone, by one curve for all taxels, keeps it as the load:
@@ -59,9 +59,9 @@ def reading_of(sensor: Sensor, loads: Loads) -> Reading:
     if by == "capacitance":
         top = float(np.abs(transducer.principle.capacitance(loads) - transducer.rest).max())
         at = np.array([0.0, max(top, 1e-9)])
-        return Reading(by, at, at, transducer.gain, transducer.offset)
+        return ReadingCurve(by, at, at, transducer.gain, transducer.offset)
     at = np.linspace(0.0, 1.5 * float(getattr(loads, by).max()), POINTS)
     none = np.zeros((POINTS, transducer.taxels))
     own = {"force": none, "closure": none, "area": none, by: np.repeat(at[:, None], transducer.taxels, axis=1)}
     change = transducer.principle.capacitance(Loads(**own)) - transducer.rest
-    return Reading(by, at, change[:, 0], transducer.gain, transducer.offset)
+    return ReadingCurve(by, at, change[:, 0], transducer.gain, transducer.offset)

@@ -10,12 +10,12 @@ import schemas
 from tacdata import documents, provenance
 from tacdata.errors import UsageError
 from tacdata.surrogate.build import LeftOut, Work
-from tacdata.surrogate.table import Table
+from tacdata.surrogate.table import LoadTable
 
 SPEC, TABLE = "spec.json", "response.npz"
 
 
-def written_spec(folder: Path, work: Work, table: Table, off: LeftOut | None) -> Path:
+def written_spec(folder: Path, work: Work, table: LoadTable, off: LeftOut | None) -> Path:
     """Write the table and a model spec without effects that starts from it; return the spec's path.
 
     Args:

@@ -15,7 +15,7 @@ from tacdata.errors import SolveError
 from tacdata.replacement import replacement
 from tacdata.sensor import Sensor
 from tacdata.surrogate.grid import EDGE, Grid
-from tacdata.surrogate.reading import Reading
+from tacdata.surrogate.reading import ReadingCurve
 from tacdata.surrogate.solved import Solved
 from tacdata.surrogate.symmetry import mirrored
 from tacdata.transduction import Transducer
@@ -25,19 +25,19 @@ _STEEPEST = 3.0
 
 
 @dataclass(frozen=True)
-class Table:
+class LoadTable:
     """Loads by place and depth, and how they become readings."""
 
     grid: Grid
     tools: tuple[str, ...]
     """Name of each tool."""
     load: np.ndarray
-    """Of every taxel [N, mm or pF, as `Reading.by` says], shape (tools, a, b, d, channels)."""
+    """Of every taxel [N, mm or pF, as `ReadingCurve.by` says], shape (tools, a, b, d, channels)."""
     normal: np.ndarray
     """Normal force on the indenter [N], shape (tools, a, b, d)."""
     solved: np.ndarray
     """Whether a node is a solved press (or the mirror image of one), shape (tools, a, b, d), bool."""
-    reading: Reading
+    reading: ReadingCurve
 
     @property
     def response(self) -> TableResponse:
@@ -81,9 +81,9 @@ class Table:
 
 
 def assembled(
-    grid: Grid, presses: Sequence[dict[tuple[int, int], Solved]], tools: tuple[str, ...], reading: Reading,
+    grid: Grid, presses: Sequence[dict[tuple[int, int], Solved]], tools: tuple[str, ...], reading: ReadingCurve,
     sensor: Sensor,
-) -> Table:  # fmt: skip
+) -> LoadTable:  # fmt: skip
     """Return the table of presses solved for each tool, by node.
 
     Args:
@@ -108,11 +108,11 @@ def assembled(
             )  # fmt: skip
         _place(grid, found, reading, transducer, sensor, load[t], normal[t], solved[t])
         _continue(grid, load[t], normal[t], solved[t])
-    return Table(grid, tools, load, normal, solved, reading)
+    return LoadTable(grid, tools, load, normal, solved, reading)
 
 
 def _place(
-    grid: Grid, found: dict[tuple[int, int], Solved], reading: Reading, transducer: Transducer, sensor: Sensor,
+    grid: Grid, found: dict[tuple[int, int], Solved], reading: ReadingCurve, transducer: Transducer, sensor: Sensor,
     load: np.ndarray, normal: np.ndarray, solved: np.ndarray,
 ) -> None:  # fmt: skip
     times = np.zeros(normal.shape)

@@ -12,7 +12,7 @@ from tacdata.errors import FormatError, UsageError
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class PinholeCamera:
     """Pinhole with OpenCV's distortion. Frame: x right, y down, z forward; whole pixels at pixel centres."""
 
     width: int
@@ -25,7 +25,7 @@ class Camera:
     """k1 k2 p1 p2 [k3 ...], shape (n,)."""
 
     @classmethod
-    def from_document(cls, document: dict[str, Any], origin: str = "intrinsics") -> Camera:
+    def from_document(cls, document: dict[str, Any], origin: str = "intrinsics") -> PinholeCamera:
         """Build a camera from a rig file's ``intrinsics`` entry.
 
         Raises:

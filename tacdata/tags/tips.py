@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.tags.camera import Camera
+from tacdata.tags.camera import PinholeCamera
 from tacdata.tags.cube.pose import CubePose, detect_cube, solve_cube
 from tacdata.tags.detection.detector import detect_tags, to_grey
 from tacdata.tags.detection.tag import Tag
@@ -64,7 +64,7 @@ def detect_fingers(
         UsageError: If the image is no image or of another size than the intrinsics.
         FormatError: If the intrinsics contradict themselves.
     """
-    grey, camera = to_grey(image), Camera.from_document(intrinsics)
+    grey, camera = to_grey(image), PinholeCamera.from_document(intrinsics)
     camera.check(grey)
     return view_of(grey, detect_tags(grey, whole=False), camera, fingers, hints or {})
 
@@ -96,7 +96,7 @@ def _known(document: str) -> dict[str, Finger]:
 
 
 def view_of(
-    grey: np.ndarray, tags: list[Tag], camera: Camera, fingers: dict[str, Finger], hints: dict[str, CubePose]
+    grey: np.ndarray, tags: list[Tag], camera: PinholeCamera, fingers: dict[str, Finger], hints: dict[str, CubePose]
 ) -> View:
     """Return the fingertips from tags that were read in an image, uint8, shape (height, width)."""
     cubes = {}

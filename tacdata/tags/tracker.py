@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.tags.camera import Camera
+from tacdata.tags.camera import PinholeCamera
 from tacdata.tags.cube.pose import CubePose, surroundings
 from tacdata.tags.detection.detector import detect_tags, to_grey
 from tacdata.tags.detection.tag import Tag
@@ -39,7 +39,7 @@ class FingerTracker:
         """
         if not fingers:
             raise FormatError("no fingers", "one or more", "name them in the fingers file")
-        self.camera, self.fingers = Camera.from_document(intrinsics), fingers
+        self.camera, self.fingers = PinholeCamera.from_document(intrinsics), fingers
         self._every = max(search_every, 1)
         self._hints: dict[str, CubePose] = {}
         self._ages: dict[str, int] = {}

@@ -15,7 +15,7 @@ from tacdata.transduction.principles.principle import BASE, ROOM, Principle
 
 
 @dataclass(frozen=True)
-class Readings:
+class TaxelReadings:
     """What the taxels say of n states."""
 
     capacitance: np.ndarray
@@ -71,7 +71,7 @@ class Transducer:
         """Capacitance without load [pF], shape (taxels,)."""
         return self.principle.capacitance(self._no_loads())[0]
 
-    def read(self, loads: Loads) -> Readings:
+    def read(self, loads: Loads) -> TaxelReadings:
         """Return the readings of n states.
 
         Raises:
@@ -88,7 +88,7 @@ class Transducer:
             *self._remarks(low, "reading below 0 counts"),
         )
         counts = counts if self.full_scale is None else np.clip(counts, 0.0, self.full_scale)
-        return Readings(capacitance, counts, end | low | high, remarks)
+        return TaxelReadings(capacitance, counts, end | low | high, remarks)
 
     def derivatives(self, loads: Loads) -> Loads:
         """Return the change of counts with force [1/N], closure [1/mm] and area [1/mm^2]; 0 where they are clipped.

@@ -49,7 +49,7 @@ def draw_timing(seed: int, start_ns: int, rate: float) -> Timing:
     return Timing(start_ns, 1 / rate, float(rng.uniform(-60, 60)), 0.0003, 600.0, 0.001, 0.016)
 
 
-class Board:
+class VirtualBoard:
     """Samples the world and streams frames, all on the time of ``clock``."""
 
     def __init__(

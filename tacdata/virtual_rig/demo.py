@@ -16,8 +16,8 @@ from tacdata.errors import UsageError
 from tacdata.indenters.sphere import Sphere
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
-from tacdata.virtual_rig.board import Board, draw_timing
-from tacdata.virtual_rig.optics.camera import Camera
+from tacdata.virtual_rig.board import VirtualBoard, draw_timing
+from tacdata.virtual_rig.optics.camera import VirtualCamera
 from tacdata.virtual_rig.rig import BAUDS, board_format
 from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, draw_hand
 from tacdata.virtual_rig.world.world import World, draw
@@ -89,7 +89,7 @@ class VirtualDemo:
         baud = next((b for b in BAUDS if b >= layout.size * 10 * layout.rate / 0.8), BAUDS[-1])
         self.layout = layout
         self.boards = {
-            name: Board(
+            name: VirtualBoard(
                 self.clock, layout, draw_timing(10 * seed + k, self.start_ns, layout.rate), self._reader(name, k), baud,
                 10 * seed + k,
             )
@@ -98,7 +98,7 @@ class VirtualDemo:
         self.eyes = {name: _look_at(EYES[name]) for name in list(EYES)[:cameras]}
         self._rng = np.random.default_rng([seed, 12])
         self.cameras = {
-            name: Camera(self.clock, RATE, self._painter(pose), DELAY, seed, ahead=True)
+            name: VirtualCamera(self.clock, RATE, self._painter(pose), DELAY, seed, ahead=True)
             for name, pose in self.eyes.items()
         }
 

@@ -18,9 +18,9 @@ from tacdata.clock import Clock
 from tacdata.errors import UsageError
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
-from tacdata.virtual_rig.board import Board, draw_timing
+from tacdata.virtual_rig.board import VirtualBoard, draw_timing
 from tacdata.virtual_rig.firmware.controller import Controller
-from tacdata.virtual_rig.optics.camera import Camera
+from tacdata.virtual_rig.optics.camera import VirtualCamera
 from tacdata.virtual_rig.optics.scene import CUBE, INTRINSICS, draw_scene
 from tacdata.virtual_rig.world.hidden import HiddenWorld
 from tacdata.virtual_rig.world.mounting import Mounted
@@ -84,11 +84,11 @@ class VirtualRig:
         baud = next((b for b in BAUDS if b >= needed), BAUDS[-1])
         timing = draw_timing(seed, self.clock.now_ns(), layout.rate)
         self.layout = layout
-        self.board = Board(self.clock, layout, timing, self._readings, baud, seed)
+        self.board = VirtualBoard(self.clock, layout, timing, self._readings, baud, seed)
         self.scene = draw_scene(seed, NOMINAL.to_machine(0.0, 0.0, 0.0))
         self._rng = np.random.default_rng([seed, 7])
         rate = min(30.0, IMAGES / speed)
-        self.camera = Camera(self.clock, rate, self._picture, seed=seed) if camera else None
+        self.camera = VirtualCamera(self.clock, rate, self._picture, seed=seed) if camera else None
 
     @property
     def document(self) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import pytest
 from tacdata.clock import Clock
 from tacdata.devices.capacitive_board import CapacitiveBoard
 from tacdata.errors import DeviceError, FormatError, UsageError
-from tacdata.virtual_rig.board import Board, Timing, draw_timing
+from tacdata.virtual_rig.board import Timing, VirtualBoard, draw_timing
 from tacdata.virtual_rig.port import VirtualPort
 from tacdata.wire import default_format
 from tacdata.wire.frames.frame_format import from_document
@@ -25,7 +25,7 @@ def impatient(monkeypatch):
 @pytest.fixture
 def board():
     clock = Clock.start(RATE)
-    emulated = Board(
+    emulated = VirtualBoard(
         clock, default_format(), draw_timing(3, clock.now_ns(), 30.0),
         lambda t: np.full(24, t // 1_000_000 % 50_000),
     )  # fmt: skip
@@ -141,7 +141,7 @@ def test_1_khz_through_a_fast_line():
     clock = Clock.start(1.0)
     layout = from_document({**default_format().document, "rate": 1000}, "test")
     timing = Timing(clock.now_ns(), 0.001, 100.0, 0.0, 600.0, 0.0001, 0.001)
-    emulated = Board(clock, layout, timing, lambda t: np.zeros(24), baud=921600)
+    emulated = VirtualBoard(clock, layout, timing, lambda t: np.zeros(24), baud=921600)
     emulated.start()
     try:
         with CapacitiveBoard(clock, emulated.port.path, 921600, layout.document) as driver:

@@ -20,12 +20,12 @@ from tacdata.grasping.presses import LEFT_OUT, RADIUS
 from tacdata.grasping.strategies import strategy as strategies
 from tacdata.grasping.strategies.strategy import Strategy
 from tacdata.grasping.study import Setup, strategy_names
-from tacdata.grasping.touch import Fingertip, OrangeTouch, Spread, mirrored
+from tacdata.grasping.touch import Fingertip, FingertipSpread, OrangeTouch, mirrored
 from tacdata.grasping.trial import Protocol, approach, fused
 from tacdata.sensor import default_sensor
 from training.scoring.wilson import interval
 
-PERFECT = Spread(0.0, 0.0, 0.0, 0.0)
+PERFECT = FingertipSpread(0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_what_is_learnt_from_never_is_the_orange(sensor):
     assert LEFT_OUT[0] < RADIUS < LEFT_OUT[1]
     assert not [radius for radius in radii if LEFT_OUT[0] <= radius <= LEFT_OUT[1]]
     few = replace(learnt, counts=np.where(np.arange(len(learnt.counts)) < 2, learnt.counts, 0))
-    found = lessons(few, sensor, Spread())
+    found = lessons(few, sensor, FingertipSpread())
     assert len(found) == 8
     for one in found:
         assert one.depth.min() >= 0 and one.depth[:REST].max() == 0

@@ -140,7 +140,7 @@ def test_another_major_version(tmp_path: Path) -> None:
     header = json.loads(content.schema.metadata[table.HEADER])
     header["version"] = "9.0"
     pq.write_table(content.replace_schema_metadata({table.HEADER: json.dumps(header)}), path)
-    with pytest.raises(table.VersionError, match=r"version 9\.0"):
+    with pytest.raises(table.LabelVersionError, match=r"version 9\.0"):
         read_label(path)
 
 

@@ -10,7 +10,7 @@ import pytest
 from tacdata import registry
 from tacdata.errors import UsageError
 from tacdata.plans import Plan
-from tacdata.plans.shipped.shipped_plan import BASE, ROOM, Wishes, shipped_plan
+from tacdata.plans.shipped.shipped_plan import BASE, ROOM, PlanOptions, shipped_plan
 from tacdata.sensor import default_sensor
 
 SENSOR = default_sensor()
@@ -18,7 +18,7 @@ NAMES = registry.names(ROOM, BASE)
 
 
 def plan(name, sensor=SENSOR, **wishes):
-    return Plan.from_document(shipped_plan(name, sensor, Wishes(**wishes)), name)
+    return Plan.from_document(shipped_plan(name, sensor, PlanOptions(**wishes)), name)
 
 
 @pytest.mark.parametrize("name", NAMES)

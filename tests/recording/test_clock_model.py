@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tacdata.clock import Clock
-from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.envelope_fit import EnvelopeFit, fit
 from tacdata.recording.clocks.polled_clock import polled_clock
 from tacdata.recording.clocks.running_clock import StreamClock
@@ -207,7 +207,7 @@ def test_numbers_given_on_arrival_are_left_alone_when_they_fit_no_line():
     arrival = START + np.cumsum(rng.integers(20_000_000, 400_000_000, 500))
     model = fit(arrival, np.arange(500), "order")
     assert not model.steady
-    moved = model.with_latency(Latency(40_000_000, 1_000_000))
+    moved = model.with_latency(StreamLatency(40_000_000, 1_000_000))
     np.testing.assert_array_equal(moved.sample_times(arrival, np.arange(500)), arrival - 40_000_000)
 
 
@@ -225,7 +225,7 @@ def test_a_stream_is_timed_while_it_arrives():
     sample = np.array([clock.take(int(a), k) for k, a in enumerate(arrival)])
     assert (sample <= arrival).all()
     assert np.abs((sample - true)[500:] / 1e6 - 3.0).max() < 2.0
-    clock.set_latency(Latency(2_000_000, 100_000))
+    clock.set_latency(StreamLatency(2_000_000, 100_000))
     assert clock.model().latency == clock.latency
     assert StreamClock().take(5, -1) == 5
 
@@ -241,12 +241,12 @@ def test_a_measured_delay_holds_when_the_line_finds_quicker_arrivals():
             clock.take(int(arrival[k]), k)
         middle = slice(500, 1500)
         tap = np.mean(clock.model().sample_times(arrival[middle], counter[middle]) - true[middle])
-        clock.set_latency(Latency(round(tap), 100_000))
+        clock.set_latency(StreamLatency(round(tap), 100_000))
         for k in range(2000, len(true)):
             clock.take(int(arrival[k]), k)
         for k in range(len(true)):
             plain.take(int(arrival[k]), k)
-        fixed = plain.model().with_latency(Latency(round(tap), 100_000))
+        fixed = plain.model().with_latency(StreamLatency(round(tap), 100_000))
         error = [(m.sample_times(arrival, counter) - true) / 1e6 for m in (clock.model(), fixed)]
         worst.append([np.abs(e).max() for e in error])
     followed, kept = np.array(worst).T
@@ -264,5 +264,5 @@ def test_model_survives_its_document():
     old = ClockModel(7, START, 33_333_333.25, 900)
     assert ClockModel.from_document(old.document) == old
     whole = ClockModel(9, START, 1e7, 80, START, 2e6, 1e6, 5e5, 0.001, "device_ns", None, (old,))
-    whole = whole.with_latency(Latency(6_000_000, 200_000))
+    whole = whole.with_latency(StreamLatency(6_000_000, 200_000))
     assert ClockModel.from_document(whole.document) == whole

@@ -25,7 +25,7 @@ def bench():
 
 
 def fail(bench, seconds):
-    """A stream fails so long after now [s, real time], as `Streams` does it: stop first, then say why."""
+    """A stream fails so long after now [s, real time], as `RigStreams` does it: stop first, then say why."""
 
     def later():
         bench.motion.stop()

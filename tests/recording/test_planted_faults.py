@@ -11,7 +11,7 @@ from tacdata.devices.device import CncStatus, StreamCounts
 from tacdata.plans import Plan
 from tacdata.recording.check.report import check
 from tacdata.recording.clocks import envelope_fit
-from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.recording.clocks.polled_clock import polled_clock
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.files.writer import EpisodeWriter
@@ -345,7 +345,7 @@ def test_clocks_are_shown_for_every_stream(tmp_path):
     path = tmp_path / "episode-000000.mcap"
     writer = EpisodeWriter(path, press.header, Clock(T0, 0, 1.0), ("side",))
     press.feed(writer)
-    model = envelope_fit.fit(press.arrival, press.counter).with_latency(Latency(6_100_000, 300_000))
+    model = envelope_fit.fit(press.arrival, press.counter).with_latency(StreamLatency(6_100_000, 300_000))
     writer.close(True, "", {"taxels": model, "cnc": polled_clock(np.array([0]), np.array([8 * MS]))})
     report = check(path)
     values = report.document["episodes"][0]

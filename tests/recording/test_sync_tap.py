@@ -10,7 +10,7 @@ from sync_tap_example import CAMERA_DELAY, Tap
 
 from tacdata.errors import UsageError
 from tacdata.plans import Plan
-from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.motion import sync_tap
 from tacdata.recording.recorder import Recorder
@@ -60,7 +60,7 @@ def test_sample_times_are_right_after_a_sync_tap(tmp_path, rate, delay, timer, l
     raw = (recording.episode.taxels.sample_ns - tap.true) / MS
     assert np.abs(raw).min() > 0.9 * delay * 1e3, "without the tap the constant delay stays"
     latency = delays.taxel_latency(recording)
-    assert isinstance(latency, Latency), latency
+    assert isinstance(latency, StreamLatency), latency
     error = raw - latency.latency_ns / MS
     assert np.abs(error).max() < limit
     assert np.abs(error.mean()) < 4 * latency.uncertainty_ns / MS + 0.3, "what is said of the error is about right"
@@ -70,7 +70,7 @@ def test_a_slow_machine_will_do(tmp_path):
     tap = Tap(1, 30.0, 0.02, acceleration=15.0)
     recording = read_recording(tap.write(tmp_path / "sync_tap-000.mcap"))
     latency = delays.taxel_latency(recording)
-    assert isinstance(latency, Latency), latency
+    assert isinstance(latency, StreamLatency), latency
     assert np.abs((recording.episode.taxels.sample_ns - latency.latency_ns - tap.true) / MS).max() < 3.0
 
 
@@ -96,7 +96,7 @@ def test_dead_and_undefined_channels_do_not_matter(tmp_path):
     tap = Tap(4)
     tap.counts[:, 3], tap.counts[:, 20] = np.nan, 65535.0
     latency = delays.taxel_latency(read_recording(tap.write(tmp_path / "sync_tap-000.mcap")))
-    assert isinstance(latency, Latency)
+    assert isinstance(latency, StreamLatency)
     assert latency.latency_ns / MS == pytest.approx(6.0, abs=1.0)
 
 
@@ -115,11 +115,11 @@ def test_touches_are_no_deeper_than_the_plan_and_lie_on_a_taxel():
 def test_the_session_keeps_the_delays_and_says_when_they_change(tmp_path):
     session = before = create_session(tmp_path / "session", plan(1), SENSOR, rig_document())
     assert latencies(session) == {}
-    first = delays.SyncTap({"taxels": Latency(6_000_000, 300_000)}, ("camera side: no tag",))
+    first = delays.SyncTap({"taxels": StreamLatency(6_000_000, 300_000)}, ("camera side: no tag",))
     session = add_sync(session, tmp_path / "sync_tap-000.mcap", first)
     assert latencies(read_session(session.folder)) == first.latencies
-    assert changes(session, {"taxels": Latency(6_500_000, 300_000)}) == ()
-    (words,) = changes(session, {"taxels": Latency(16_000_000, 300_000)})
+    assert changes(session, {"taxels": StreamLatency(6_500_000, 300_000)}) == ()
+    (words,) = changes(session, {"taxels": StreamLatency(16_000_000, 300_000)})
     assert "+10.0 ms" in words
     kept = json.loads((session.folder / "session.json").read_text())["sync"][0]
     assert kept["remarks"] == ["camera side: no tag"]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tacdata.registration.probe import Probe, Reading
+from tacdata.registration.probe import Probe, StillReading
 from tacdata.rig import Registration
 from tacdata.sensor import default_sensor
 
@@ -28,7 +28,7 @@ class FakeSensor(Probe):
     def read(self, frames):
         clean = self.offset + self.answer()
         rows = np.round(clean + self.rng.normal(0, self.noise, (frames, len(clean))))
-        return Reading(rows.mean(axis=0), rows.std(axis=0, ddof=1), frames)
+        return StillReading(rows.mean(axis=0), rows.std(axis=0, ddof=1), frames)
 
     def wait(self, seconds):
         pass

@@ -5,7 +5,7 @@ import pytest
 from fake_sensor import GUESS, SENSOR, FakeSensor, put_down
 
 from tacdata.errors import DeviceError
-from tacdata.registration import Settings, register
+from tacdata.registration import RegistrationSettings, register
 from tacdata.registration.onset import onset
 from tacdata.registration.procedure import reference_taxels
 from tacdata.registration.solution import fit_rigid_motion
@@ -20,7 +20,7 @@ CORNERS = [(-4.75, -3.75), (4.75, -3.75), (4.75, 3.75), (-4.75, 3.75), (0.0, 0.0
 @pytest.mark.parametrize(("seed", "power"), [(0, 1.5), (1, 1.0), (2, 2.0), (3, 1.3), (4, 1.5), (5, 1.7)])
 def test_a_sensor_put_down_by_eye_is_found_within_what_is_claimed(seed, power):
     place = put_down(seed)
-    found = register(FakeSensor(place, seed, power), SENSOR, GUESS, Settings())
+    found = register(FakeSensor(place, seed, power), SENSOR, GUESS, RegistrationSettings())
     got, sigma = found.registration, found.uncertainty
     for have, want, limit in zip(got.origin, place.origin, (0.1, 0.1, 0.02), strict=True):
         assert abs(have - want) < limit
@@ -40,7 +40,7 @@ def test_the_claimed_uncertainties_are_neither_idle_nor_false():
     ratio = []
     for seed in range(20, 27):
         place = put_down(seed)
-        found = register(FakeSensor(place, seed), SENSOR, GUESS, Settings())
+        found = register(FakeSensor(place, seed), SENSOR, GUESS, RegistrationSettings())
         error = np.subtract(found.registration.origin, place.origin)
         ratio.append(error / found.uncertainty["origin"])
     spread = np.sqrt((np.array(ratio) ** 2).mean(axis=0))
@@ -50,7 +50,7 @@ def test_the_claimed_uncertainties_are_neither_idle_nor_false():
 
 def test_the_indenter_never_goes_deeper_than_it_says():
     probe = FakeSensor(put_down(1), 1)
-    settings = Settings()
+    settings = RegistrationSettings()
     register(probe, SENSOR, GUESS, settings)
     depth = probe.place.to_sensor(np.array(probe.path))[:, 2]
     assert depth.max() < settings.depth + 0.05
@@ -60,7 +60,7 @@ def test_the_indenter_never_goes_deeper_than_it_says():
 
 def test_travel_between_the_places_is_clear_of_the_skin():
     probe = FakeSensor(put_down(2), 2)
-    register(probe, SENSOR, GUESS, Settings())
+    register(probe, SENSOR, GUESS, RegistrationSettings())
     tip = probe.place.to_sensor(np.array(probe.path))
     sideways = np.linalg.norm(np.diff(tip[:, :2], axis=0), axis=1) > 0.2
     assert sideways.sum() > 50
@@ -70,7 +70,7 @@ def test_travel_between_the_places_is_clear_of_the_skin():
 
 def refused(probe, settings=None):
     with pytest.raises(DeviceError) as caught:
-        register(probe, SENSOR, GUESS, settings or Settings())
+        register(probe, SENSOR, GUESS, settings or RegistrationSettings())
     return caught.value
 
 
@@ -91,7 +91,7 @@ def test_a_search_that_begins_in_contact_is_said():
 def test_a_dead_taxel_is_named():
     taxel = reference_taxels(SENSOR)[1]
     assert f"taxel {taxel}" in refused(FakeSensor(GUESS, dead=(taxel,))).given
-    others = Settings(taxels=(6, 10, 14))
+    others = RegistrationSettings(taxels=(6, 10, 14))
     register(FakeSensor(GUESS, dead=(taxel,)), SENSOR, GUESS, others)
 
 
@@ -111,7 +111,7 @@ def test_too_much_noise_is_said():
 def test_another_pitch_than_the_sensor_files_is_noticed():
     other = replace(SENSOR, taxels=replace(SENSOR.taxels, pitch_x=2.1, pitch_y=2.76))
     with pytest.raises(DeviceError, match="times as far apart"):
-        register(FakeSensor(GUESS), other, GUESS, Settings())
+        register(FakeSensor(GUESS), other, GUESS, RegistrationSettings())
 
 
 @pytest.mark.parametrize("power", [1.0, 1.5, 2.0])

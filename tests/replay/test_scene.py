@@ -10,8 +10,8 @@ from tacdata.demonstrations.compensation import read_gains, smallest_gain
 from tacdata.errors import UsageError
 from tacdata.replay.grasp import cut, first_grasp, touching
 from tacdata.replay.outcome import ball_centre, replay_targets
-from tacdata.replay.scene import Scene, drawn
-from tacdata.replay.targets import Targets
+from tacdata.replay.scene import ReplayScene, drawn
+from tacdata.replay.targets import FingertipTargets
 from tacdata.virtual_rig.world.hand import DIRECTIONS, HEIGHT, RADIUS, draw_hand
 
 HAND, RATE = draw_hand(1), 30.0
@@ -25,7 +25,7 @@ def targets(gain=0.0, begin=0.0, seconds=8.4):
     turns = Rotation.from_matrix(poses[..., :3, :3].reshape(-1, 3, 3)).as_quat().reshape(*poses.shape[:2], 4)
     moved = poses[..., :3, 3] + gain * depth[..., None] * poses[..., :3, 2]
     gains = dict.fromkeys(DIRECTIONS, gain) if gain else {}
-    return Targets(
+    return FingertipTargets(
         "x.mcap", "0", "grasp", "table", RATE, tuple(DIRECTIONS), "compensated" if gain else "direct", gains,
         np.rint(times * 1e9).astype(np.int64), moved, turns, poses[..., :3, 3], depth, np.zeros(depth.shape, bool),
     )  # fmt: skip
@@ -46,22 +46,22 @@ def test_direct_replay_loses_the_ball_and_compensated_replay_holds_it():
     direct, centre = grasp()
     alpha = read_gains().of("grasp")["index"]
     compensated, _ = grasp(alpha)
-    lost, held = (replay_targets(path, Scene(), centre) for path in (direct, compensated))
+    lost, held = (replay_targets(path, ReplayScene(), centre) for path in (direct, compensated))
     assert not lost.held and lost.lift < 0.005
     assert held.held and held.lift > 0.07
     # The thumb presses against the two others; each skin gives way as its stiffness says.
     across = DIRECTIONS["index"][0] / np.linalg.norm(DIRECTIONS["index"])
     assert held.force["thumb"] == pytest.approx(across * (held.force["index"] + held.force["middle"]), rel=0.1)
     for name in DIRECTIONS:
-        assert held.force[name] / (held.depth[name] / 1000) == pytest.approx(Scene().skin, rel=0.1)
+        assert held.force[name] / (held.depth[name] / 1000) == pytest.approx(ReplayScene().skin, rel=0.1)
 
 
 def test_physics_decides():
     """The same compensated path loses a ball that is heavy or slippery, and holds more with stiffer springs."""
     compensated, centre = grasp(0.005)
     for worse in ({"mass": 0.9}, {"friction": 0.1}):
-        assert not replay_targets(compensated, replace(Scene(), **worse), centre).held
-    soft, stiff = (replay_targets(compensated, Scene(stiffness=k), centre).force["thumb"] for k in (300.0, 600.0))
+        assert not replay_targets(compensated, replace(ReplayScene(), **worse), centre).held
+    soft, stiff = (replay_targets(compensated, ReplayScene(stiffness=k), centre).force["thumb"] for k in (300.0, 600.0))
     assert 1.4 < stiff / soft < 2.2
 
 
@@ -69,15 +69,15 @@ def test_the_smallest_gain_reaches_the_depth_that_is_wanted():
     _, centre = grasp()
 
     def reached(gain):
-        return min(replay_targets(grasp(gain)[0], Scene(), centre).depth.values())
+        return min(replay_targets(grasp(gain)[0], ReplayScene(), centre).depth.values())
 
     found = smallest_gain(reached, 0.4, largest=0.012, tolerance=5e-4)
     assert reached(found) >= 0.4 > reached(found - 0.001)
 
 
 def test_a_seed_draws_the_same_scene_again_and_another_seed_another():
-    assert drawn(Scene(), 3, 4) == drawn(Scene(), 3, 4) != drawn(Scene(), 3, 5)
-    first, again = (replay_targets(grasp(0.005)[0], drawn(Scene(), 3, 1), grasp()[1]) for _ in range(2))
+    assert drawn(ReplayScene(), 3, 4) == drawn(ReplayScene(), 3, 4) != drawn(ReplayScene(), 3, 5)
+    first, again = (replay_targets(grasp(0.005)[0], drawn(ReplayScene(), 3, 1), grasp()[1]) for _ in range(2))
     assert np.array_equal(first.ball, again.ball)
 
 
@@ -97,4 +97,4 @@ def test_what_is_no_grasp_is_refused():
     with pytest.raises(UsageError, match="rise by"):
         rows = np.zeros(len(flat.position), int)
         still = replace(flat, position=flat.position[rows], quaternion=flat.quaternion[rows])
-        replay_targets(still, Scene(), np.zeros(3))
+        replay_targets(still, ReplayScene(), np.zeros(3))

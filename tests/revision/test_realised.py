@@ -9,7 +9,7 @@ from tacdata.effects import Placed, load
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording import read_episode, read_session
 from tacdata.revision.labels.realised import COLUMNS, tip_error
-from tacdata.revision.revise import Wishes, revise
+from tacdata.revision.revise import RevisionOptions, revise
 
 PLAY = 0.06
 
@@ -50,7 +50,7 @@ def test_a_wrong_effect_is_seen_to_make_labels_worse(loose, truth):
 
 def test_the_revision_says_how_far_labels_were_off(loose, truth, tmp_path):
     judged = verdict(tmp_path / "verdict", "backlash", {"b": PLAY})
-    made = revise(judged, [loose], read_spec(None), tmp_path / "revision", Wishes(truth=truth))
+    made = revise(judged, [loose], read_spec(None), tmp_path / "revision", RevisionOptions(truth=truth))
     [told] = made.document["tips"]
     assert told["better"] == 16 and told["after"] < 0.1 * told["before"]
     assert "How far the labels' tip is off" in (made.folder / "card.html").read_text()

@@ -18,7 +18,7 @@ from tacdata.errors import UsageError
 from tacdata.importing.imported_session import import_session
 from tacdata.recording import read_episode, read_session
 from tacdata.revision.labels.retrain import Recipe
-from tacdata.revision.revise import Wishes, revise
+from tacdata.revision.revise import RevisionOptions, revise
 from tacdata.sensor import default_sensor
 
 SETTINGS = FarmSettings(factory="fast_model:FastModel", workers=1)
@@ -61,7 +61,7 @@ def both(tmp_path_factory):
         folder = tmp_path_factory.mktemp("retrained")
         session = recorded(folder / "bench", 0.3)
         judged = verdict(folder / "verdict", "latency", {"L": 0.3})
-        wishes = Wishes(SETTINGS, retrain=Recipe(epochs=4, network="direct", threads=1))
+        wishes = RevisionOptions(SETTINGS, retrain=Recipe(epochs=4, network="direct", threads=1))
         yield revise(judged, [session], read_spec(None), folder / "revision", wishes)
 
 
@@ -80,7 +80,7 @@ def test_a_network_learns_better_from_labels_that_are_paired_rightly(both):
 def test_new_labels_are_needed_where_labels_move(both, tmp_path):
     judged = verdict(tmp_path / "verdict", "latency", {"L": 0.3})
     with pytest.raises(UsageError, match="--relabel"):
-        revise(judged, [tmp_path], read_spec(None), tmp_path / "new", Wishes(retrain=Recipe()))
+        revise(judged, [tmp_path], read_spec(None), tmp_path / "new", RevisionOptions(retrain=Recipe()))
     assert not (tmp_path / "new").exists()
 
 
@@ -90,7 +90,7 @@ def test_readings_that_the_right_model_says_teach_more(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(HERE))
     session = recorded(tmp_path / "bench", 0.3)
     judged = verdict(tmp_path / "verdict", "low_pass_filter", {"tau": 0.3})
-    wishes = Wishes(retrain=Recipe(epochs=2, network="direct", threads=1))
+    wishes = RevisionOptions(retrain=Recipe(epochs=2, network="direct", threads=1))
     made = revise(judged, [session], read_spec(None), tmp_path / "revision", wishes)
     told = made.document["retrained"]
     assert told["by"] == "readings" and made.document["labels"] == []

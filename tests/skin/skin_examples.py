@@ -8,7 +8,7 @@ import torch
 import warp as wp
 
 from tacdata.sensor import Material, Sensor, default_sensor
-from tacdata.sensor.sensor import Contact, DepthMap, Skin, Taxels
+from tacdata.sensor.sensor import ContactProperties, DepthMap, Skin, Taxels
 from tacdata.skin.linear.rest_stiffness import rest_stiffness
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.mesh import elements
@@ -36,7 +36,7 @@ def slab_sensor(size=6.0, thickness=2.0, friction=0.0, bonded=("bottom",), pixel
         name="slab",
         taxels=Taxels(1, 1, 1.0, 1.0),
         skin=Skin(size, size, thickness, 0.0),
-        contact=Contact(friction, bonded, False),
+        contact=ContactProperties(friction, bonded, False),
         map=DepthMap(pixels, pixels, 0.4, 1.0),
     )
 
@@ -48,7 +48,7 @@ def bumps_sensor() -> Sensor:
         name="bumps",
         taxels=Taxels(2, 2, 2.0, 1.8),
         skin=Skin(5.0, 5.0, 2.0, 0.7),
-        contact=Contact(0.2, ("sides",), True),
+        contact=ContactProperties(0.2, ("sides",), True),
         map=DepthMap(11, 11, 0.4, 1.0),
     )
 

@@ -9,7 +9,7 @@ from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata.errors import SolveError
 from tacdata.sensor import default_sensor
-from tacdata.sensor.sensor import Contact, Skin
+from tacdata.sensor.sensor import ContactProperties, Skin
 from tacdata.skin.contact.contact import face_quadrature
 from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.build import PINNED, MeshSettings, build_mesh, make_mesh, mesh_key, surface
@@ -164,6 +164,6 @@ def test_an_inverted_element_is_named_with_its_place(slab):
 
 
 def test_nothing_to_hold_the_skin_is_refused(bumps):
-    sensor = replace(bumps.sensor, contact=Contact(0.2, (), True))
+    sensor = replace(bumps.sensor, contact=ContactProperties(0.2, (), True))
     with pytest.raises(SolveError, match="no bonded face"):
         SkinModel(sensor, mesh=bumps.mesh)

@@ -16,7 +16,7 @@ from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata import documents
 from tacdata.cases.case import read_case
-from tacdata.sensor.sensor import Contact, Skin
+from tacdata.sensor.sensor import ContactProperties, Skin
 from tacdata.skin.mesh.build import build_mesh
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
@@ -109,7 +109,7 @@ def test_a_curved_pad_is_pressed_alike(underside, tmp_path):
 
 @needs_getfem
 def test_protrusions_stand_on_the_board_alike(tmp_path):
-    sensor = replace(bumps_sensor(), contact=Contact(0.0, ("sides",), True))
+    sensor = replace(bumps_sensor(), contact=ContactProperties(0.0, ("sides",), True))
     found = rows(tmp_path, SAME_CONTACT, sensor, BUMPS, (0.25,))
     assert_bar(found)
     assert max(row["protrusion"] for row in found) < 1.0

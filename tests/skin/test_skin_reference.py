@@ -17,7 +17,7 @@ from scipy.interpolate import LinearNDInterpolator
 
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
-from tacdata.sensor.sensor import Contact, Skin
+from tacdata.sensor.sensor import ContactProperties, Skin
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
@@ -31,8 +31,8 @@ pytestmark = [
     pytest.mark.skipif(not (FOLDER / "A1.parquet").exists(), reason=f"no reference solutions in {FOLDER}"),
 ]
 DEPTHS = (0.25, 0.5, 0.75)
-SLAB = replace(default_sensor(), skin=Skin(16.0, 12.0, 4.0, 0.0), contact=Contact(0.0, ("bottom",), False))
-BUMPS = replace(default_sensor(), contact=Contact(0.0, ("sides",), True))
+SLAB = replace(default_sensor(), skin=Skin(16.0, 12.0, 4.0, 0.0), contact=ContactProperties(0.0, ("bottom",), False))
+BUMPS = replace(default_sensor(), contact=ContactProperties(0.0, ("sides",), True))
 
 
 def reference(case):

@@ -15,7 +15,7 @@ from tacdata.errors import SolveError
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.ring import Ring
 from tacdata.indenters.sphere import Sphere
-from tacdata.sensor.sensor import Contact, Skin
+from tacdata.sensor.sensor import ContactProperties, Skin
 from tacdata.skin.contact import first_touch as touching
 from tacdata.skin.contact.first_touch import reach, rise, room, rotation, touch
 from tacdata.skin.contact.press_limits import check_press
@@ -115,7 +115,7 @@ def test_a_press_through_the_thin_border_of_a_curved_pad_is_refused():
 
 
 def test_a_tilt_may_bring_a_shape_over_the_rim():
-    sensor = replace(slab_sensor(), contact=Contact(0.0, ("sides",), False))
+    sensor = replace(slab_sensor(), contact=ContactProperties(0.0, ("sides",), False))
     long = FlatPunch(1.5, 0.2)
     check_press(press(long, 0.3, x=1.45), sensor)
     with pytest.raises(SolveError, match="over the rim"):

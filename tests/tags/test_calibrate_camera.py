@@ -12,7 +12,7 @@ from tacdata import cli, documents
 from tacdata.errors import TacdataError
 from tacdata.tags.calibration.board import read_board
 from tacdata.tags.calibration.board_view import find_board
-from tacdata.tags.camera import Camera
+from tacdata.tags.camera import PinholeCamera
 
 
 def calibrate(*options):
@@ -43,7 +43,7 @@ def test_images_become_a_calibration_that_a_rig_file_takes(folder, tmp_path):
     assert cv2.imread(str(out.with_suffix(".png"))) is not None
     printed = yaml.safe_load(shown.output[shown.output.index("intrinsics:") :])
     assert printed["intrinsics"] == document["intrinsics"]
-    assert Camera.from_document(printed["intrinsics"]).width == 640
+    assert PinholeCamera.from_document(printed["intrinsics"]).width == 640
     again = calibrate(*options, "--out", out)
     assert isinstance(again.exception, TacdataError) and "not overwritten" in str(again.exception)
 

@@ -4,11 +4,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tacdata.tags import Cube
-from tacdata.tags.camera import Camera
+from tacdata.tags.camera import PinholeCamera
 from tacdata.tags.cube.corners import contradicting
 from tacdata.tags.detection.tag import Tag
 
-CAMERA = Camera.from_document({"width": 1280, "height": 720, "fx": 900.0, "fy": 900.0, "cx": 639.5, "cy": 359.5})
+CAMERA = PinholeCamera.from_document({"width": 1280, "height": 720, "fx": 900.0, "fy": 900.0, "cx": 639.5, "cy": 359.5})
 CUBE = Cube.from_document({"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}})
 TURN = Rotation.from_euler("xyz", [180 + 35, 30, 0], degrees=True).as_matrix()
 PLACE = np.array([0.02, 0.01, 0.4])

@@ -17,13 +17,13 @@ from training.scoring import baselines
 from training.scoring.evaluate import METRICS
 from training.scoring.evaluate import evaluate as evaluate_on
 from training.scoring.published import TABLE_1
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.train import train
 
 
 @pytest.fixture(scope="module")
 def trained(frames, tmp_path_factory):
-    settings = Settings(arguments={"hidden": 16, "channels": 4}, epochs=1)
+    settings = TrainingSettings(arguments={"hidden": 16, "channels": 4}, epochs=1)
     return train(frames, settings, tmp_path_factory.mktemp("training") / "run", device="cpu", threads=1)
 
 

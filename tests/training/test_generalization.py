@@ -12,9 +12,9 @@ from training.generalization import generalize
 from training.inference import checkpoint
 from training.reports.comparison import groups, verdicts
 from training.reports.report_page import Scored, page
-from training.settings import Settings
+from training.settings import TrainingSettings
 
-RECIPE = Settings(network="direct", arguments={"hidden": 16}, epochs=2, batch_size=64)
+RECIPE = TrainingSettings(network="direct", arguments={"hidden": 16}, epochs=2, batch_size=64)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from training.inference import onnx_export
 from training.inference.onnx_export import export
 from training.inference.sequence import window_map
 from training.networks.network import BASE, ROOM
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.train import train
 
 onnxruntime = pytest.importorskip("onnxruntime")
@@ -20,7 +20,7 @@ onnx = pytest.importorskip("onnx")
 
 @pytest.mark.parametrize("name", registry.names(ROOM, BASE))
 def test_every_network_answers_like_torch(name, frames, tmp_path):
-    trained = train(frames, Settings(network=name, epochs=1), tmp_path / "run", device="cpu", threads=1)
+    trained = train(frames, TrainingSettings(network=name, epochs=1), tmp_path / "run", device="cpu", threads=1)
     made = export(trained, tmp_path / "network.onnx")
     assert made.difference < 1e-4
     session = onnxruntime.InferenceSession(str(made.path), providers=["CPUExecutionProvider"])
@@ -36,7 +36,7 @@ def test_every_network_answers_like_torch(name, frames, tmp_path):
 
 
 def test_a_network_that_answers_differently_is_not_kept(frames, tmp_path, monkeypatch):
-    trained = train(frames, Settings(network="direct", epochs=1), tmp_path / "run", device="cpu", threads=1)
+    trained = train(frames, TrainingSettings(network="direct", epochs=1), tmp_path / "run", device="cpu", threads=1)
     monkeypatch.setattr(onnx_export, "TOLERANCE", -1.0)
     with pytest.raises(FormatError, match="differs from torch"):
         export(trained, tmp_path / "network.onnx")

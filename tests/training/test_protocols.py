@@ -12,7 +12,7 @@ from training.frames.trials import DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL, t
 from training.networks.network import Network
 from training.reports.protocol_sheet import markdown
 from training.scoring.protocols import protocols
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.train import train
 
 PURPOSES = [DEPTH_TRIAL] * 4 + [POSITION_TRIAL] * 4 + [WEARING_TRIAL] * 4
@@ -33,7 +33,7 @@ class Answers(Network):
 
 @pytest.fixture(scope="module")
 def trained(frames, tmp_path_factory):
-    settings = Settings(arguments={"hidden": 8, "channels": 4}, epochs=1)
+    settings = TrainingSettings(arguments={"hidden": 8, "channels": 4}, epochs=1)
     return train(frames, settings, tmp_path_factory.mktemp("protocols") / "run", device="cpu", threads=1)
 
 

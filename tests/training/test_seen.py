@@ -7,7 +7,7 @@ import pytest
 
 from tacdata.errors import FormatError
 from training.metrics import seen
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.train import train
 
 LEARNED, VALIDATED, KEPT_APART = slice(0, 60), slice(60, 80), slice(80, 100)
@@ -70,7 +70,7 @@ def test_what_is_written_is_read_for_its_checkpoint_alone(many, tmp_path):
 
 def test_a_training_run_says_what_it_has_seen(make_frames, tmp_path):
     frames = make_frames(episodes=30)
-    small = Settings(arguments={"hidden": 8, "channels": 4}, epochs=1)
+    small = TrainingSettings(arguments={"hidden": 8, "channels": 4}, epochs=1)
     run = tmp_path / "run"
     trained = train(frames, small, run, "cpu", threads=1)
     known = seen.read(run, trained.content_hash)

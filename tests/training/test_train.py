@@ -12,10 +12,10 @@ from training.frames.windows import Windows
 from training.inference import checkpoint
 from training.inference.predictor import predict
 from training.loss import WeightedLoss
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.train import normalization, train
 
-SMALL = Settings(arguments={"hidden": 24, "channels": 8}, epochs=3)
+SMALL = TrainingSettings(arguments={"hidden": 24, "channels": 8}, epochs=3)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -40,7 +40,7 @@ def same(a, b):
 
 def test_it_learns_and_beats_the_mean_map(make_frames, tmp_path):
     frames = make_frames(episodes=40, length=18)
-    settings = Settings(arguments={"hidden": 48, "channels": 8}, epochs=12, batch_size=16)
+    settings = TrainingSettings(arguments={"hidden": 48, "channels": 8}, epochs=12, batch_size=16)
     trained = run(frames, settings, tmp_path / "run")
     history = [json.loads(line) for line in (tmp_path / "run/metrics.jsonl").read_text().splitlines()]
     assert [h["epoch"] for h in history] == list(range(1, 13))
@@ -122,7 +122,7 @@ def test_a_loss_that_is_no_number_stops_with_words(frames, tmp_path):
 @pytest.mark.parametrize("settings", [{"epochs": 0}, {"batch_size": 0}, {"seed": -1}, {"learning_rate": 0.0}])
 def test_settings_that_cannot_train_are_refused(settings):
     with pytest.raises(UsageError, match=next(iter(settings))):
-        Settings(**settings)
+        TrainingSettings(**settings)
 
 
 def test_damaged_checkpoints_are_refused(frames, tmp_path):
@@ -143,8 +143,8 @@ def test_an_unknown_device_is_refused(frames, tmp_path):
 
 
 def test_the_rate_falls_along_the_cosine_and_the_paper_keeps_it():
-    assert {Settings(epochs=5).rate_at(e) for e in range(1, 6)} == {1e-3}
-    rates = [Settings(epochs=5, schedule="cosine").rate_at(e) for e in range(1, 6)]
+    assert {TrainingSettings(epochs=5).rate_at(e) for e in range(1, 6)} == {1e-3}
+    rates = [TrainingSettings(epochs=5, schedule="cosine").rate_at(e) for e in range(1, 6)]
     assert rates == sorted(rates, reverse=True)
     assert rates[0] == pytest.approx(1e-3)
     assert rates[-1] == pytest.approx(2e-5)
@@ -195,7 +195,7 @@ def test_bfloat16_learns_alike(frames, tmp_path):
                                      {"idle_share": 1.5}])  # fmt: skip
 def test_variations_that_make_no_sense_are_refused(changed):
     with pytest.raises(UsageError, match=next(iter(changed))):
-        Settings(**changed)
+        TrainingSettings(**changed)
 
 
 def test_tensorboard_shows_what_the_metrics_file_holds(frames, tmp_path):

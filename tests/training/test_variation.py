@@ -7,14 +7,14 @@ import torch
 from tacdata.sensor import default_sensor
 from training.frames.variation import Variation
 from training.networks.network import create
-from training.settings import Settings
+from training.settings import TrainingSettings
 
 
 def prepared(**settings):
     sensor = default_sensor()
     network = create("direct", sensor, {"hidden": 4})
     network.set_normalization(np.linspace(-5, 5, 24), np.linspace(1, 3, 24))
-    return sensor, network, Variation(network, sensor, Settings(**settings))
+    return sensor, network, Variation(network, sensor, TrainingSettings(**settings))
 
 
 def test_a_press_on_a_taxel_moves_with_its_map():

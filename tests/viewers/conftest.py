@@ -11,7 +11,7 @@ from tacdata.labels import Label
 from tacdata.plans import Press
 from tacdata.recording.episode import CncStream, Episode, Phase, TagStream, TaxelStream
 from tacdata.sensor import default_sensor
-from training.inference.prediction import Prediction
+from training.inference.prediction import PredictedMaps
 
 START = 1_760_000_000_000_000_000
 FRAMES, RATE = 120, 30.0
@@ -120,7 +120,7 @@ def label(episode):
 def prediction(label, episode):
     tip = label.tip + np.array([0.4, 0.2, 0.0])
     depth = np.maximum(0.9 * dent(episode.sensor, tip), 0)
-    return Prediction(
+    return PredictedMaps(
         episode=0,
         time_ns=label.time_ns[2:],
         depth=depth[2:],

@@ -21,7 +21,7 @@ from viewers.pictures.backend import PictureBackend
 from viewers.rerun.backend import LAYOUTS, RerunBackend
 from viewers.rerun.bar_table import bar_table
 from viewers.rerun.gap_recording import write as write_gap
-from viewers.scene.scene import Bars, Trail
+from viewers.scene.scene import Bars, MotionTrail
 from viewers.source import scene_at
 
 START = 1_760_000_000_000_000_000
@@ -203,7 +203,7 @@ def test_a_trail_breaks_where_nothing_is_known_and_bridges_join_what_is():
     place[7] = np.nan
     doubtful = np.zeros(10, bool)
     doubtful[3:5] = True
-    trail = Trail("t", place, doubtful)
+    trail = MotionTrail("t", place, doubtful)
     assert [len(s) for s in trail.strips(False)] == [3, 2, 2]
     (bridge,) = trail.strips(True)
     assert bridge[0].tolist() == place[2].tolist() and bridge[-1].tolist() == place[5].tolist()

@@ -15,7 +15,7 @@ DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL = "depth trial", "position trial", "w
 
 
 @dataclass(frozen=True)
-class Trial:
+class PressTrial:
     """One press at full depth."""
 
     span: EpisodeSpan
@@ -39,7 +39,7 @@ def at_full_depth(frames: Frames, span: EpisodeSpan) -> np.ndarray:
     return full if full.any() else valid & (tip >= tip.max() - 0.01)
 
 
-def trials(frames: Frames, purpose: str) -> tuple[Trial, ...]:
+def trials(frames: Frames, purpose: str) -> tuple[PressTrial, ...]:
     """Return the presses of a purpose as trials; every press if none in the dataset has a purpose.
 
     Presses into the air and presses without a valid frame at full depth are left out.
@@ -51,11 +51,11 @@ def trials(frames: Frames, purpose: str) -> tuple[Trial, ...]:
         full = span.start + np.flatnonzero(at_full_depth(frames, span))
         if len(full):
             label = np.clip(frames.depth[full], 0.0, frames.sensor.map.depth_max).mean(axis=0)
-            found.append(Trial(span, frames.tip[full].mean(axis=0), label, full))
+            found.append(PressTrial(span, frames.tip[full].mean(axis=0), label, full))
     return tuple(found)
 
 
-def some(found: tuple[Trial, ...], purpose: str, origin: str) -> tuple[Trial, ...]:
+def some(found: tuple[PressTrial, ...], purpose: str, origin: str) -> tuple[PressTrial, ...]:
     """Return trials, of which there must be one.
 
     Raises:

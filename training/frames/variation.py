@@ -6,13 +6,13 @@ import torch
 
 from tacdata.sensor import Sensor
 from training.networks.network import Network
-from training.settings import Settings
+from training.settings import TrainingSettings
 
 
 class Variation:
     """Changes batches as the settings ask; without such settings it returns them as they are."""
 
-    def __init__(self, network: Network, sensor: Sensor, settings: Settings) -> None:
+    def __init__(self, network: Network, sensor: Sensor, settings: TrainingSettings) -> None:
         """Prepare the mirrored orders of the taxels (k = i + columns j)."""
         self.mirror, self.jitter = settings.mirror, settings.gain_jitter
         self.mean, self.sd = network.get_buffer("mean"), network.get_buffer("sd")

@@ -22,7 +22,7 @@ from tacdata import documents, provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import Sensor
 from training.networks.network import Network, create
-from training.settings import Settings
+from training.settings import TrainingSettings
 from training.splits.split import Split
 
 KEY = "checkpoint"
@@ -48,9 +48,9 @@ class Checkpoint:
         return Split.from_document(self.document["split"])
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> TrainingSettings:
         """The recipe that it was trained with."""
-        return Settings.from_document(self.document["settings"])
+        return TrainingSettings.from_document(self.document["settings"])
 
     @property
     def content_hash(self) -> str:

@@ -23,7 +23,7 @@ TOLERANCE = 1e-4
 KEY = "tacdata"
 
 
-class Estimator(nn.Module):
+class DepthNetwork(nn.Module):
     """Windows of tared readings [counts] to depth maps [mm]: normalization, network and clipping in one."""
 
     def __init__(self, trained: Checkpoint) -> None:
@@ -71,10 +71,10 @@ def export(trained: Checkpoint, path: Path, windows: np.ndarray | None = None) -
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     os.close(handle)
     try:
-        _write(onnx, trained, Estimator(trained).eval(), torch.from_numpy(given[:2]), temporary)
+        _write(onnx, trained, DepthNetwork(trained).eval(), torch.from_numpy(given[:2]), temporary)
         session = runtime.InferenceSession(temporary, providers=["CPUExecutionProvider"])
         with torch.inference_mode():
-            wanted = Estimator(trained).eval()(torch.from_numpy(given)).numpy()
+            wanted = DepthNetwork(trained).eval()(torch.from_numpy(given)).numpy()
         whole = session.run(None, {"windows": given})[0]
         single = np.concatenate([session.run(None, {"windows": one[None]})[0] for one in given[:16]])
         difference = float(max(np.abs(whole - wanted).max(), np.abs(single - wanted[:16]).max()))
@@ -110,7 +110,7 @@ def _packages() -> tuple[Any, Any]:
     return onnx, onnxruntime
 
 
-def _write(onnx: Any, trained: Checkpoint, estimator: Estimator, example: torch.Tensor, path: str) -> None:
+def _write(onnx: Any, trained: Checkpoint, estimator: DepthNetwork, example: torch.Tensor, path: str) -> None:
     with warnings.catch_warnings():
         # torch recommends its newer exporter, which needs a package more and takes ten times as long.
         warnings.simplefilter("ignore")

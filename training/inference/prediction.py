@@ -22,7 +22,7 @@ REMEDY = "run `tacdata evaluate` again: predictions can always be made anew"
 
 
 @dataclass(frozen=True)
-class Prediction:
+class PredictedMaps:
     """The predicted maps of one episode, frame by frame."""
 
     episode: int
@@ -50,7 +50,7 @@ def file_name(episode: int) -> str:
     return f"episode-{episode:06d}.parquet"
 
 
-def write_prediction(path: Path, prediction: Prediction) -> None:
+def write_prediction(path: Path, prediction: PredictedMaps) -> None:
     """Write a prediction file; a crash leaves the old file or the new one.
 
     Raises:
@@ -84,7 +84,7 @@ def write_prediction(path: Path, prediction: Prediction) -> None:
         pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
 
 
-def read_prediction(path: Path) -> Prediction:
+def read_prediction(path: Path) -> PredictedMaps:
     """Read a prediction file.
 
     Raises:
@@ -110,4 +110,4 @@ def read_prediction(path: Path) -> Prediction:
     except (KeyError, ValueError, AttributeError, pa.ArrowException) as error:
         raise FormatError(f"{path}: {error}", "columns as its header says", REMEDY) from None
     named = {k: header[k] for k in ("episode", "part", "checkpoint", "network", "dataset", "sensor", "provenance")}
-    return Prediction(time_ns=time_ns, depth=depth, **named)
+    return PredictedMaps(time_ns=time_ns, depth=depth, **named)

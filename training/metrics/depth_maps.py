@@ -45,7 +45,7 @@ class FrameScores:
 
 
 @dataclass(frozen=True)
-class Summary:
+class MetricSummary:
     """A metric over many frames."""
 
     median: float | None
@@ -108,11 +108,13 @@ def centroid(depth: np.ndarray, threshold: float, weighted: bool = True) -> np.n
         return moments / total[:, None]
 
 
-def summarize(values: np.ndarray) -> Summary:
+def summarize(values: np.ndarray) -> MetricSummary:
     """Summarize a metric, shape (n,); frames where it is NaN are left out and counted."""
     kept = values[np.isfinite(values)]
     left_out = len(values) - len(kept)
     if not len(kept):
-        return Summary(None, None, None, None, 0, left_out)
+        return MetricSummary(None, None, None, None, 0, left_out)
     sd = float(kept.std(ddof=1)) if len(kept) > 1 else None
-    return Summary(float(np.median(kept)), float(np.percentile(kept, 90)), float(kept.mean()), sd, len(kept), left_out)
+    return MetricSummary(
+        float(np.median(kept)), float(np.percentile(kept, 90)), float(kept.mean()), sd, len(kept), left_out
+    )

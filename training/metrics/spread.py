@@ -43,7 +43,7 @@ FLOOR = 1e-4
 
 
 @dataclass(frozen=True)
-class Spread:
+class CalibratedSpread:
     """Deviation by cell, and how many deviations hold each share of the errors."""
 
     deviation: np.ndarray
@@ -93,7 +93,7 @@ def cells(depth: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
     return np.digitize(depth, DEPTHS), np.digitize(np.hypot(along_x, along_y), SLOPES)
 
 
-def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, checkpoint: str) -> Spread:
+def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, checkpoint: str) -> CalibratedSpread:
     """Calibrate on episodes that the network did not learn from.
 
     Args:
@@ -115,7 +115,7 @@ def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, ch
         square += np.bincount(place, error**2, minlength=square.size).reshape(shape)
         count += np.bincount(place, minlength=square.size).reshape(shape)
     deviation = _filled(square, count)
-    draft = Spread(deviation, (1.0,) * len(LEVELS), checkpoint)
+    draft = CalibratedSpread(deviation, (1.0,) * len(LEVELS), checkpoint)
     ratios = [
         np.abs(depth - label)[_interesting(depth, label)] / draft.sigma(depth, pitch)[_interesting(depth, label)]
         for depth, label in zip(maps[1::2], labels[1::2], strict=True)
@@ -123,12 +123,12 @@ def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, ch
     together = np.concatenate(ratios)
     if not len(together):
         # Nothing touched: there is nothing to calibrate on, and the widest claim is the honest one.
-        return Spread(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint)
-    return Spread(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint)
+        return CalibratedSpread(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint)
+    return CalibratedSpread(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint)
 
 
 def reliability(
-    spread: Spread, maps: list[np.ndarray], labels: list[np.ndarray], pitch: float
+    spread: CalibratedSpread, maps: list[np.ndarray], labels: list[np.ndarray], pitch: float
 ) -> list[dict[str, float | int]]:
     """Return for each level the share of errors inside its interval, over pixels in contact in label or prediction.
 
@@ -157,12 +157,12 @@ def reliability(
     ]
 
 
-def write(run: Path, spread: Spread) -> None:
+def write(run: Path, spread: CalibratedSpread) -> None:
     """Write RUN/spread.json; an older one is replaced, as it belongs to an older checkpoint."""
     documents.write(run / FILE, spread.document, "spread")
 
 
-def read(run: Path, checkpoint: str) -> Spread | None:
+def read(run: Path, checkpoint: str) -> CalibratedSpread | None:
     """Return the calibration of a run's checkpoint; None if the run has none for it.
 
     Raises:
@@ -179,7 +179,7 @@ def read(run: Path, checkpoint: str) -> Spread | None:
         raise FormatError(f"{path}: cells of another release", "cells of this release", "remove it and train again")
     if document["checkpoint"] != checkpoint:
         return None
-    return Spread(deviation, tuple(document["factors"]), checkpoint)
+    return CalibratedSpread(deviation, tuple(document["factors"]), checkpoint)
 
 
 def _interesting(depth: np.ndarray, label: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from pathlib import Path
 from tacdata import documents, provenance
 from tacdata.errors import UsageError
 from training.frames.frames import Frames
-from training.inference.prediction import Prediction, file_name, write_prediction
+from training.inference.prediction import PredictedMaps, file_name, write_prediction
 from training.reports.score_picture import draw
 from training.reports.score_sheet import markdown
 from training.scoring.evaluate import Evaluation
@@ -18,7 +18,7 @@ JSON, SHEET, PICTURE = "scores.json", "scores.md", "scores.png"
 
 
 @dataclass(frozen=True)
-class Places:
+class EvaluationPaths:
     """Where an evaluation goes."""
 
     scores: Path
@@ -41,14 +41,18 @@ class Places:
             )
 
 
-def places(run: Path, out: Path | None) -> Places:
+def places(run: Path, out: Path | None) -> EvaluationPaths:
     """Return where a run's evaluation goes: RUN/scores and RUN/predictions, or OUT and OUT/predictions."""
     folder = run if run.is_dir() else run.parent
-    return Places(folder / "scores", folder / "predictions") if out is None else Places(out, out / "predictions")
+    return (
+        EvaluationPaths(folder / "scores", folder / "predictions")
+        if out is None
+        else EvaluationPaths(out, out / "predictions")
+    )
 
 
 def write(
-    place: Places,
+    place: EvaluationPaths,
     evaluation: Evaluation,
     frames: Frames,
     listener: Callable[[int, int], None] = lambda k, n: None,
@@ -67,7 +71,7 @@ def write(
     }
     for count, result in enumerate(evaluation.episodes, start=1):
         span = result.span
-        prediction = Prediction(
+        prediction = PredictedMaps(
             episode=span.number,
             time_ns=frames.time_ns[span.start : span.stop],
             depth=result.depth,

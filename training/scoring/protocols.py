@@ -18,7 +18,7 @@ import schemas
 from tacdata import provenance
 from tacdata.errors import UsageError
 from training.frames.frames import Frames
-from training.frames.trials import DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL, Trial, trials
+from training.frames.trials import DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL, PressTrial, trials
 from training.frames.windows import Windows
 from training.inference.checkpoint import Checkpoint
 from training.inference.predictor import predict
@@ -28,7 +28,7 @@ from training.metrics.physical import REGION_THRESHOLD, score_press
 THRESHOLDS = (0.3, 0.4, 0.5)
 """Depths above which a pixel belongs to the region [mm] (paper, section on labels)."""
 
-MapOf = Callable[[Trial], np.ndarray]
+MapOf = Callable[[PressTrial], np.ndarray]
 
 
 def protocols(frames: Frames, trained: Checkpoint | None = None) -> dict[str, Any]:
@@ -92,20 +92,20 @@ def _check_unseen(frames: Frames, trained: Checkpoint) -> None:
         )
 
 
-def _label(trial: Trial) -> np.ndarray:
+def _label(trial: PressTrial) -> np.ndarray:
     return trial.label
 
 
-def _predicted(frames: Frames, trained: Checkpoint, kinds: dict[str, tuple[Trial, ...]]) -> dict[str, Any]:
+def _predicted(frames: Frames, trained: Checkpoint, kinds: dict[str, tuple[PressTrial, ...]]) -> dict[str, Any]:
     windows = Windows(frames, trained.network.offsets)
     network = trained.network.to("cpu")
 
-    def mapped(trial: Trial) -> np.ndarray:
+    def mapped(trial: PressTrial) -> np.ndarray:
         return predict(network, windows, trial.full, frames.sensor.map.depth_max).mean(axis=0)
 
     known = {t.span.number: mapped(t) for found in kinds.values() for t in found}
 
-    def of(trial: Trial) -> np.ndarray:
+    def of(trial: PressTrial) -> np.ndarray:
         return known[trial.span.number]
 
     tables: dict[str, Any] = {}
@@ -119,14 +119,14 @@ def _predicted(frames: Frames, trained: Checkpoint, kinds: dict[str, tuple[Trial
     return tables
 
 
-def _centre_depth(found: tuple[Trial, ...], of: MapOf, frames: Frames) -> dict[str, Any]:
+def _centre_depth(found: tuple[PressTrial, ...], of: MapOf, frames: Frames) -> dict[str, Any]:
     grid = frames.sensor.map
     scored = [score_press(t.span.number, of(t), t.label, t.tip, grid) for t in found]
     errors = np.array([np.nan if s.centre_depth_error is None else s.centre_depth_error for s in scored])
     return {**_summary(np.abs(errors)), "bias": None if np.isnan(errors).all() else float(np.nanmean(errors))}
 
 
-def _position(found: tuple[Trial, ...], of: MapOf, frames: Frames, threshold: float) -> dict[str, Any]:
+def _position(found: tuple[PressTrial, ...], of: MapOf, frames: Frames, threshold: float) -> dict[str, Any]:
     grid = frames.sensor.map
     scored = [score_press(t.span.number, of(t), t.label, t.tip, grid, threshold) for t in found]
     errors = np.array([np.nan if s.position_error is None else s.position_error for s in scored])
@@ -134,7 +134,7 @@ def _position(found: tuple[Trial, ...], of: MapOf, frames: Frames, threshold: fl
     return {"threshold_mm": threshold, "all": _summary(errors), "not_truncated": _summary(errors[whole])}
 
 
-def _wearing(found: tuple[Trial, ...], of: MapOf) -> dict[str, Any]:
+def _wearing(found: tuple[PressTrial, ...], of: MapOf) -> dict[str, Any]:
     by_person: dict[str, list[float]] = {}
     for trial in found:
         overlap = aligned_iou(of(trial), trial.label)

@@ -16,7 +16,7 @@ from tacdata.dataset.format import features, folder, metadata
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.recording.files import file_names
 from tacdata.recording.session import read_session
-from training.inference.prediction import Prediction, read_prediction
+from training.inference.prediction import PredictedMaps, read_prediction
 from viewers.browse.episode_list import Entry, EpisodeList, errors_of, of_press, with_flags
 from viewers.parts.label import shown_label
 from viewers.parts.prediction_files import prediction_paths
@@ -137,7 +137,7 @@ def _with_dataset_errors(root: Path, entries: tuple[Entry, ...], predictions: Pa
 
     dataset = read_dataset(root)
     time, depth = dataset[features.TIME], dataset[features.DEPTH]
-    known: dict[int, Prediction] = {}
+    known: dict[int, PredictedMaps] = {}
     for path in prediction_paths(predictions):
         own = read_prediction(path)
         known[int(own.time_ns[0])] = own

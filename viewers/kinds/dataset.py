@@ -14,7 +14,7 @@ from viewers.scene.scene import Scene
 MARK = Path("meta/info.json")
 
 
-class Dataset(Kind):
+class DatasetKind(Kind):
     """An episode of a dataset that `tacdata pack` wrote."""
 
     ORDER, NOUN = 40, "a dataset folder"

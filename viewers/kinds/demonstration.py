@@ -17,7 +17,7 @@ HEAD = 1 << 20
 """Bytes at a recording's beginning in which its attachments are looked for."""
 
 
-class Demonstration(Kind):
+class DemonstrationKind(Kind):
     """A demonstration that `tacdata record --demo` recorded and `tacdata track` worked up."""
 
     ORDER, NOUN = 20, "a demonstration or its tracks"

@@ -9,7 +9,7 @@ from viewers.scene.request import Asked
 from viewers.scene.scene import Scene
 
 
-class Recording(Kind):
+class RecordingKind(Kind):
     """One recording with what lies beside it."""
 
     ORDER, NOUN = 60, "a recording (.mcap)"

@@ -17,7 +17,7 @@ EARLIER = 1_000_000_000
 """By how much the first frame may have been sampled before its arrival [ns]."""
 
 
-class Session(Kind):
+class SessionKind(Kind):
     """An episode of a folder that `tacdata record` wrote."""
 
     ORDER, NOUN = 90, "a session folder"

@@ -20,7 +20,7 @@ OURS = ("*.mcap", "*.tracks.parquet")
 """What a folder of targets never holds."""
 
 
-class Targets(Kind):
+class TargetsKind(Kind):
     """One demonstration's targets."""
 
     ORDER, NOUN = 30, "a folder of tacdata export"

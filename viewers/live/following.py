@@ -93,9 +93,9 @@ class Follower:
 def is_growing(path: Path) -> bool:
     """Say whether a recording of a press has no end yet, by its name: it is being written, or a crash left it."""
     from viewers.kinds.kind import kind_of
-    from viewers.kinds.recording import Recording
+    from viewers.kinds.recording import RecordingKind
 
-    return path.is_file() and path.name.endswith(file_names.PARTIAL) and isinstance(kind_of(path), Recording)
+    return path.is_file() and path.name.endswith(file_names.PARTIAL) and isinstance(kind_of(path), RecordingKind)
 
 
 def meant(path: Path) -> Path:

@@ -7,7 +7,7 @@ import numpy as np
 from tacdata.demonstrations.compensation import contact_depth
 from tacdata.demonstrations.demonstration import Demonstration
 from tacdata.demonstrations.recording.reader import DemoRecording
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 
 
 def of_demonstration(
@@ -54,7 +54,7 @@ def _tracks(made: Demonstration) -> list[str]:
     return lines
 
 
-def of_targets(title: str, targets: Targets, others: int, joints: dict[str, np.ndarray] | None) -> str:
+def of_targets(title: str, targets: FingertipTargets, others: int, joints: dict[str, np.ndarray] | None) -> str:
     """Return what a robot is asked to do."""
     seconds = (targets.time_ns[-1] - targets.time_ns[0]) / 1e9
     moved = 1000 * np.linalg.norm(targets.position - targets.seen, axis=-1)

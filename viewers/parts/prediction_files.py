@@ -10,12 +10,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tacdata.errors import FormatError, UsageError
-from training.inference.prediction import Prediction, read_prediction
+from training.inference.prediction import PredictedMaps, read_prediction
 
 PATTERN = "episode-*.parquet"
 
 
-def find_prediction(folder: Path, time_ns: np.ndarray) -> Prediction | None:
+def find_prediction(folder: Path, time_ns: np.ndarray) -> PredictedMaps | None:
     """Return the prediction whose frames are those of an episode, or None if the folder holds none.
 
     A prediction is numbered by its dataset, a recording by its session; the frames' times tell what belongs.

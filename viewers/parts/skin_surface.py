@@ -10,12 +10,12 @@ from tacdata.sensor import Sensor
 from viewers.parts.maps import DEPTH_FLOOR
 from viewers.scene import thinning
 from viewers.scene.color_scale import scale_of
-from viewers.scene.scene import Body, Cloud, DepthMaps, Surface
+from viewers.scene.scene import Body, Cloud, DepthMaps, SkinSurface
 
 
 def surfaces(
     sensor: Sensor, start_ns: int, maps: tuple[DepthMaps, ...], signed: tuple[np.ndarray, np.ndarray] | None
-) -> tuple[Surface, ...]:
+) -> tuple[SkinSurface, ...]:
     """Return the face at z = thickness - depth for the label and the prediction; without either, undeformed.
 
     Args:
@@ -33,12 +33,12 @@ def surfaces(
             drop = signed[1][np.searchsorted(signed[0], shown.time_ns)]
         height = (top - drop).astype(np.float32)
         depth = shown.values.astype(np.float32)
-        result.append(Surface(shown.name, shown.x, shown.y, shown.time_ns, height, depth, shown.scale))
+        result.append(SkinSurface(shown.name, shown.x, shown.y, shown.time_ns, height, depth, shown.scale))
     if not result:
         flat = np.full((1, *sensor.map.shape), top, dtype=np.float32)
         scale = scale_of(np.zeros(1), "mm", floor=DEPTH_FLOOR)
         result.append(
-            Surface(
+            SkinSurface(
                 "undeformed",
                 sensor.map.x,
                 sensor.map.y,
@@ -51,13 +51,13 @@ def surfaces(
     return tuple(result)
 
 
-def faces(sensor: Sensor, maps: tuple[DepthMaps, ...]) -> tuple[Surface, ...]:
+def faces(sensor: Sensor, maps: tuple[DepthMaps, ...]) -> tuple[SkinSurface, ...]:
     """Return one face for each of some maps, under the map's name."""
     top = np.float32(sensor.skin.thickness)
-    return tuple(Surface(m.name, m.x, m.y, m.time_ns, top - m.values, m.values, m.scale) for m in maps)
+    return tuple(SkinSurface(m.name, m.x, m.y, m.time_ns, top - m.values, m.values, m.scale) for m in maps)
 
 
-def contact_cloud(surface: Surface, threshold: float = DEPTH_FLOOR) -> Cloud:
+def contact_cloud(surface: SkinSurface, threshold: float = DEPTH_FLOOR) -> Cloud:
     """Return the points of a skin that are pressed in by more than a threshold [mm], time by time."""
     touched = surface.depth.reshape(len(surface.depth), -1) > threshold
     return Cloud(

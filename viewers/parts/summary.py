@@ -11,7 +11,7 @@ from tacdata.labels import Label
 from tacdata.plans import Press
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
-from training.inference.prediction import Prediction
+from training.inference.prediction import PredictedMaps
 from viewers.parts.label import ShownLabel
 from viewers.scene.scene import CameraView, DepthMaps
 
@@ -38,7 +38,7 @@ def of_sensor(sensor: Sensor) -> str:
 def of_episode(
     episode: Episode,
     label: Label | ShownLabel | None,
-    prediction: Prediction | None,
+    prediction: PredictedMaps | None,
     maps: tuple[DepthMaps, ...],
     cameras: tuple[CameraView, ...],
     remarks: tuple[str, ...] = (),
@@ -73,7 +73,7 @@ def of_episode(
 def of_dataset_episode(
     dataset: Dataset,
     entry: DatasetEpisode,
-    prediction: Prediction | None,
+    prediction: PredictedMaps | None,
     maps: tuple[DepthMaps, ...],
     remarks: tuple[str, ...],
     count: int,
@@ -101,7 +101,7 @@ def of_dataset_episode(
     return "\n".join([*lines, *(["", *(f"- {note}" for note in notes)] if notes else [])])
 
 
-def of_prediction(prediction: Prediction | None, maps: tuple[DepthMaps, ...]) -> list[str]:
+def of_prediction(prediction: PredictedMaps | None, maps: tuple[DepthMaps, ...]) -> list[str]:
     """Return whose prediction it is and how it does; nothing without one."""
     if prediction is None:
         return []
@@ -122,7 +122,7 @@ def rmse(maps: tuple[DepthMaps, ...]) -> str:
 def missing(
     episode: Episode,
     label: Label | ShownLabel | None,
-    prediction: Prediction | None,
+    prediction: PredictedMaps | None,
     maps: tuple[DepthMaps, ...],
     cameras: tuple[CameraView, ...],
 ) -> list[str]:

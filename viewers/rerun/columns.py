@@ -14,7 +14,18 @@ import rerun as rr
 
 from viewers.rerun.bar_table import bar_table
 from viewers.scene.color_scale import HUES, ColorScale, taxel_colors
-from viewers.scene.scene import Bars, Body, CameraView, Cloud, Curves, DepthMaps, Scene, Surface, TaxelArray, Trail
+from viewers.scene.scene import (
+    Bars,
+    Body,
+    CameraView,
+    Cloud,
+    Curves,
+    DepthMaps,
+    MotionTrail,
+    Scene,
+    SkinSurface,
+    TaxelArray,
+)
 from viewers.scene.shading import body_normals, cube_axes, normals
 
 HOST, DEVICE, DEVICE_TIME = "host_time", "device_frame", "device_time"
@@ -153,7 +164,7 @@ class RerunParts:
         )
         self._static("world/footprint", box)
 
-    def _surface(self, surface: Surface) -> None:
+    def _surface(self, surface: SkinSurface) -> None:
         path, vertices = entity("world/skin", surface.name), surface.vertices
         count = np.full(len(vertices), vertices.shape[1])
         flat = vertices.reshape(-1, 3)
@@ -183,7 +194,7 @@ class RerunParts:
             columns = rr.Transform3D.columns(translation=body.position, quaternion=body.quaternion)
             self._columns(path, body.time_ns, columns)
 
-    def _trail(self, trail: Trail) -> None:
+    def _trail(self, trail: MotionTrail) -> None:
         color = HUES[trail.hue % len(HUES)]
         for name, doubtful, own in (("seen", False, (*color, 255)), ("bridged", True, (*color, 90))):
             strips = trail.strips(doubtful)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewers.scene.color_scale import ColorScale
-from viewers.scene.space import Body, Cloud, Surface, Trail
+from viewers.scene.space import Body, Cloud, MotionTrail, SkinSurface
 
 __all__ = [
     "Bars",
@@ -20,12 +20,12 @@ __all__ = [
     "Cloud",
     "Curves",
     "DepthMaps",
+    "MotionTrail",
     "Page",
     "Scene",
+    "SkinSurface",
     "Span",
-    "Surface",
     "TaxelArray",
-    "Trail",
 ]
 
 
@@ -188,11 +188,11 @@ class Scene:
     tip: Curves | None = None
     """Nominal x, y, depth of the indenter's lowest point [mm], or None if unknown."""
     maps: tuple[DepthMaps, ...] = ()
-    surfaces: tuple[Surface, ...] = ()
+    surfaces: tuple[SkinSurface, ...] = ()
     bodies: tuple[Body, ...] = ()
     cameras: tuple[CameraView, ...] = ()
     phases: tuple[Span, ...] = ()
-    trails: tuple[Trail, ...] = ()
+    trails: tuple[MotionTrail, ...] = ()
     clouds: tuple[Cloud, ...] = ()
     bars: tuple[Bars, ...] = ()
     pages: tuple[Page, ...] = ()

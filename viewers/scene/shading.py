@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from viewers.scene.scene import Body, CameraView, Surface
+from viewers.scene.scene import Body, CameraView, SkinSurface
 
 
 def cube_axes(camera: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -21,7 +21,7 @@ def cube_axes(camera: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.repeat(camera.cube_position[seen], 3, axis=0), vectors, np.where(seen, 3, 0)
 
 
-def normals(surface: Surface) -> np.ndarray:
+def normals(surface: SkinSurface) -> np.ndarray:
     """Return a surface's unit normals at its vertices [1], shape (n, pixels_x * pixels_y, 3), float32."""
     slope_x, slope_y = np.gradient(surface.height, surface.x, surface.y, axis=(1, 2))
     raw = np.stack([-slope_x, -slope_y, np.ones_like(slope_x)], axis=-1)

@@ -13,7 +13,7 @@ UNKNOWN = 160
 
 
 @dataclass(frozen=True)
-class Surface:
+class SkinSurface:
     """The skin's outer face at the pixel centres."""
 
     name: str
@@ -72,7 +72,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Trail:
+class MotionTrail:
     """The path of a point in space."""
 
     name: str

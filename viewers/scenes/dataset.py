@@ -8,7 +8,7 @@ from tacdata.dataset.format import features
 from tacdata.dataset.reader import Dataset
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.episode import PHASES
-from training.inference.prediction import Prediction
+from training.inference.prediction import PredictedMaps
 from viewers.parts import maps, signals, skin_surface, summary
 from viewers.scene.scene import Curves, Scene, Span
 from viewers.scenes.episode import thinned_remark
@@ -17,7 +17,7 @@ from viewers.scenes.episode import thinned_remark
 def dataset_scene(
     dataset: Dataset,
     number: int,
-    prediction: Prediction | None = None,
+    prediction: PredictedMaps | None = None,
     remarks: tuple[str, ...] = (),
     total: int | None = None,
 ) -> Scene:

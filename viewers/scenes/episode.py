@@ -10,7 +10,7 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.labels import Label
 from tacdata.recording.episode import PHASES, Episode, TaxelStream
-from training.inference.prediction import Prediction
+from training.inference.prediction import PredictedMaps
 from viewers.parts import camera_view, maps, signals, skin_surface, summary
 from viewers.parts.label import ShownLabel
 from viewers.scene.scene import DepthMaps, Scene
@@ -19,7 +19,7 @@ from viewers.scene.scene import DepthMaps, Scene
 def episode_scene(
     episode: Episode,
     label: Label | ShownLabel | None = None,
-    prediction: Prediction | None = None,
+    prediction: PredictedMaps | None = None,
     images: Iterable[tuple[str, int, bytes]] = (),
     remarks: tuple[str, ...] = (),
     image_times: Mapping[str, tuple[np.ndarray, np.ndarray]] | None = None,

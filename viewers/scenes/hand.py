@@ -12,13 +12,13 @@ from tacdata.demonstrations.compensation import contact_depth
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.demonstrations.touch import baseline
-from tacdata.replay.targets import Targets
+from tacdata.replay.targets import FingertipTargets
 from tacdata.sensor import Sensor
 from viewers.parts import camera_view, hand_summary, signals
 from viewers.parts.maps import DEPTH_FLOOR, thinned
 from viewers.scene import thinning
 from viewers.scene.color_scale import ColorScale, scale_of
-from viewers.scene.scene import Body, Cloud, Curves, DepthMaps, Scene, Trail
+from viewers.scene.scene import Body, Cloud, Curves, DepthMaps, MotionTrail, Scene
 
 PAD = (18.0, 14.0, 3.0)
 """Size at which a fingertip without a sensor description is drawn [mm]."""
@@ -50,7 +50,9 @@ def demonstration_scene(
     return replace(scene, summary=hand_summary.of_demonstration(title, made, recorded, remarks))
 
 
-def targets_scene(title: str, targets: Targets, others: int = 0, joints: dict[str, np.ndarray] | None = None) -> Scene:
+def targets_scene(
+    title: str, targets: FingertipTargets, others: int = 0, joints: dict[str, np.ndarray] | None = None
+) -> Scene:
     """Return what a robot is asked to do: where the fingers were seen, and where they are to be.
 
     Args:
@@ -62,8 +64,8 @@ def targets_scene(title: str, targets: Targets, others: int = 0, joints: dict[st
     time, trails, bodies, curves = targets.time_ns, [], [], []
     for k, name in enumerate(targets.fingers):
         wanted, seen = 1000 * targets.position[:, k], 1000 * targets.seen[:, k]
-        trails.append(Trail(f"{name}/seen", seen, targets.gap[:, k], 5))
-        trails.append(Trail(f"{name}/target", wanted, targets.gap[:, k], k))
+        trails.append(MotionTrail(f"{name}/seen", seen, targets.gap[:, k], 5))
+        trails.append(MotionTrail(f"{name}/target", wanted, targets.gap[:, k], k))
         bodies.append(pad(name, time, wanted, targets.quaternion[:, k], None))
         curves.append(Curves(f"target/{name}", "mm", ("x", "y", "z"), time, wanted))
         moved = np.linalg.norm(wanted - seen, axis=1)[:, None]
@@ -121,7 +123,7 @@ def _with_tracks(scene: Scene, made: Demonstration) -> Scene:
         curves=tuple(map(signals.thinned, curves)) + scene.curves,
         maps=tuple(maps),
         clouds=tuple(clouds),
-        trails=tuple(Trail(n, 1000 * t.position, t.gap, k) for k, (n, t) in enumerate(made.tracks.items())),
+        trails=tuple(MotionTrail(n, 1000 * t.position, t.gap, k) for k, (n, t) in enumerate(made.tracks.items())),
         bodies=tuple(
             pad(n, time, 1000 * t.position, t.quaternion, made.sensors.get(n)) for n, t in made.tracks.items()
         ),

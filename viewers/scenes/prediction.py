@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.sensor import Sensor
-from training.inference.prediction import Prediction
+from training.inference.prediction import PredictedMaps
 from viewers.parts import maps as depth_maps
 from viewers.parts import signals, skin_surface
 from viewers.parts.maps import DEPTH_FLOOR
@@ -13,7 +13,7 @@ from viewers.scene.color_scale import scale_of
 from viewers.scene.scene import Curves, DepthMaps, Scene
 
 
-def prediction_scene(title: str, prediction: Prediction, sensor: Sensor | None, files: int) -> Scene:
+def prediction_scene(title: str, prediction: PredictedMaps, sensor: Sensor | None, files: int) -> Scene:
     """Return predicted maps, without label and signals.
 
     Args:

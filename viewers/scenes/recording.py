@@ -14,7 +14,7 @@ import numpy as np
 from tacdata import documents
 from tacdata.errors import UsageError
 from tacdata.recording.files import file_names
-from training.inference.prediction import Prediction
+from training.inference.prediction import PredictedMaps
 from viewers.parts.label import ShownLabel, shown_label
 from viewers.scene import thinning
 from viewers.scene.request import Asked
@@ -100,7 +100,7 @@ def find_label(recording: Path, labels: Path | None, most: int | None = None) ->
     return None, []
 
 
-def prediction_for(folder: Path, time_ns: np.ndarray, sensor: str) -> tuple[Prediction | None, list[str]]:
+def prediction_for(folder: Path, time_ns: np.ndarray, sensor: str) -> tuple[PredictedMaps | None, list[str]]:
     """Return the prediction of an episode's frames, and what should be said of it.
 
     Args:

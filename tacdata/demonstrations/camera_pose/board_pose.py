@@ -9,13 +9,13 @@ import numpy as np
 
 from tacdata.demonstrations.paths.motion_filter import exponential
 from tacdata.errors import UsageError
-from tacdata.tags.calibration.board import Board
+from tacdata.tags.calibration.board import CharucoBoard
 from tacdata.tags.calibration.board_view import find_board
-from tacdata.tags.camera import Camera
+from tacdata.tags.camera import PinholeCamera
 
 
 def board_poses(
-    images: Iterable[tuple[str, np.ndarray]], board: Board, intrinsics: dict[str, Any]
+    images: Iterable[tuple[str, np.ndarray]], board: CharucoBoard, intrinsics: dict[str, Any]
 ) -> tuple[list[np.ndarray], float, float]:
     """Return the board in the camera for every image that shows it.
 
@@ -35,7 +35,10 @@ def board_poses(
     """
     import cv2
 
-    camera, corners = Camera.from_document(intrinsics), np.asarray(board.opencv.getChessboardCorners(), float) / 1000
+    camera, corners = (
+        PinholeCamera.from_document(intrinsics),
+        np.asarray(board.opencv.getChessboardCorners(), float) / 1000,
+    )
     poses, squares, spreads = [], [], []
     for name, image in images:
         camera.check(image)
@@ -60,7 +63,7 @@ def board_poses(
     return poses, float(np.sqrt(np.mean(squares))), float(np.median(spreads))
 
 
-def _pixels(places: np.ndarray, pose: np.ndarray, camera: Camera) -> np.ndarray:
+def _pixels(places: np.ndarray, pose: np.ndarray, camera: PinholeCamera) -> np.ndarray:
     """Return where points of the board [m], shape (n, 3), are seen [px], shape (n, 2)."""
     import cv2
 
@@ -68,7 +71,7 @@ def _pixels(places: np.ndarray, pose: np.ndarray, camera: Camera) -> np.ndarray:
     return cv2.projectPoints(seen, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0][:, 0]
 
 
-def _camera_spread(places: np.ndarray, pose: np.ndarray, camera: Camera, variance: float) -> float:
+def _camera_spread(places: np.ndarray, pose: np.ndarray, camera: PinholeCamera, variance: float) -> float:
     """Return the standard uncertainty of the camera's place in the board's frame [m]: -R^T t, with both in doubt."""
     start, step, columns = _pixels(places, pose, camera), 1e-6, []
     for k in range(6):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tacdata.demonstrations.paths.motion_filter import Wander, smooth
+from tacdata.demonstrations.paths.motion_filter import ProcessNoise, smooth
 from tacdata.demonstrations.paths.sightings import Sightings
 
 VELOCITIES = (0.0001, 0.001, 0.01, 0.1, 1.0, 10.0, 100.0)
@@ -17,17 +17,17 @@ ENOUGH = 250
 """Sightings from which the choice is made."""
 
 
-def choose(seen: Sightings) -> Wander:
+def choose(seen: Sightings) -> ProcessNoise:
     """Return the densities, out of `VELOCITIES` and `TURNINGS`, under which the sightings are likeliest."""
     kept = np.zeros(len(seen), bool)
     kept[:ENOUGH] = True
     part, nothing = seen.where(kept), np.zeros(0, np.int64)
 
     def likelihood(velocity: float, turning: float) -> float:
-        return smooth(part, nothing, Wander(velocity, turning), back=False).log_likelihood
+        return smooth(part, nothing, ProcessNoise(velocity, turning), back=False).log_likelihood
 
     velocity = _climb(VELOCITIES, lambda value: likelihood(value, TURNINGS[len(TURNINGS) // 2]))
-    return Wander(velocity, _climb(TURNINGS, lambda value: likelihood(velocity, value)))
+    return ProcessNoise(velocity, _climb(TURNINGS, lambda value: likelihood(velocity, value)))
 
 
 def _climb(values: Sequence[float], worth: Callable[[float], float]) -> float:

@@ -23,7 +23,7 @@ NS = 1e-9
 
 
 @dataclass(frozen=True)
-class Wander:
+class ProcessNoise:
     """How freely a finger moves."""
 
     velocity: float
@@ -82,7 +82,7 @@ class _State:
         return np.concatenate([turn, *rest])
 
 
-def smooth(seen: Sightings, times_ns: np.ndarray, wander: Wander, back: bool = True) -> Smoothed:
+def smooth(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise, back: bool = True) -> Smoothed:
     """Return the pose at given times.
 
     Args:
@@ -150,7 +150,9 @@ def _first(seen: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
     return _State(seen.rotation[k], seen.position[k], np.zeros(3), np.zeros(3)), known, int(seen.time_ns[k])
 
 
-def _predicted(state: _State, known: np.ndarray, dt: float, wander: Wander) -> tuple[_State, np.ndarray, np.ndarray]:
+def _predicted(
+    state: _State, known: np.ndarray, dt: float, wander: ProcessNoise
+) -> tuple[_State, np.ndarray, np.ndarray]:
     turn = exponential(state.turning * dt)
     step = np.eye(12)
     step[:3, :3] = turn

@@ -12,7 +12,7 @@ from tacdata import documents
 from tacdata.clock import Clock
 from tacdata.demonstrations.camera_world import CameraWorld
 from tacdata.errors import FormatError
-from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.tags.fingers import Finger, fingers_of
 
@@ -34,7 +34,7 @@ class DemoRig:
     worlds: dict[str, CameraWorld]
     """Camera -> where it stands; cameras that were not calibrated are missing."""
     fingers: dict[str, Finger]
-    latencies: dict[str, Latency]
+    latencies: dict[str, StreamLatency]
     """Stream ("camera NAME", "taxels FINGER") -> its constant delay, where it was measured."""
     clock: Clock
     document: dict[str, Any]
@@ -80,7 +80,7 @@ def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
     _agree(document, known, worlds, origin)
     clock = Clock(**document["clock"]) if "clock" in document else Clock.start()
     devices = {name: {k: v for k, v in entry.items() if k != "world"} for name, entry in cameras.items()}
-    delays = {name: Latency.from_document(entry) for name, entry in document.get("latencies", {}).items()}
+    delays = {name: StreamLatency.from_document(entry) for name, entry in document.get("latencies", {}).items()}
     return DemoRig(document["name"], document["boards"], sensors, devices, worlds, known, delays, clock, whole)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from tacdata.devices.device import Camera, TaxelBoard
 from tacdata.errors import TacdataError
-from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.detection_process import Detect
 from tacdata.recording.live.device_streams import DeviceStreams
@@ -21,7 +21,7 @@ class DemoStreams(DeviceStreams):
     def __init__(
         self, boards: dict[str, TaxelBoard], cameras: dict[str, Camera], entries: dict[str, dict[str, Any]],
         fingers: dict[str, Any], detect: Detect | None, say: Callable[[str], None],
-        latencies: dict[str, Latency] | None = None,
+        latencies: dict[str, StreamLatency] | None = None,
     ) -> None:  # fmt: skip
         """Prepare the threads.
 

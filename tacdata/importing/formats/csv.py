@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, Table
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 from tacdata.importing.text_layout import COMMENTS, MISSING, TextLayout, is_number, text_layout
 
 SNIFFED = 256 * 1024
@@ -22,7 +22,7 @@ class Csv(SourceFormat):
 
     endings = (".csv", ".tsv", ".txt", ".dat", ".asc", ".csv.gz", ".txt.gz", ".tsv.gz")
 
-    def read(self, path: Path, options: dict[str, Any]) -> Table:
+    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the file by Arrow's reader, whose layout `text_layout` tells; see the base."""
         data, notes = _decoded(path, options)
         layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
@@ -33,7 +33,7 @@ class Csv(SourceFormat):
         columns, skipped = _parsed(body, layout, missing, path)
         if skipped:
             notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
-        return Table(path, columns, dict(layout.units), tuple(notes))
+        return SourceTable(path, columns, dict(layout.units), tuple(notes))
 
 
 def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import rows_of
-from tacdata.importing.formats.source_format import SourceFormat, Table
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
 
 class Mat(SourceFormat):
@@ -21,7 +21,7 @@ class Mat(SourceFormat):
 
     endings = (".mat",)
 
-    def read(self, path: Path, options: dict[str, Any]) -> Table:
+    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the variables; ``table`` in the options names a variable to take alone. See the base."""
         from scipy.io import loadmat
         from scipy.io.matlab import MatReadError

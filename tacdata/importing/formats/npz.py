@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, Table
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
 
 class Npz(SourceFormat):
@@ -17,7 +17,7 @@ class Npz(SourceFormat):
 
     endings = (".npz", ".npy")
 
-    def read(self, path: Path, options: dict[str, Any]) -> Table:
+    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the arrays; nothing pickled is ever loaded. See the base."""
         try:
             with np.load(path, allow_pickle=False) as loaded:
@@ -35,7 +35,7 @@ class Npz(SourceFormat):
         return rows_of(path, arrays)
 
 
-def rows_of(path: Path, arrays: dict[str, np.ndarray]) -> Table:
+def rows_of(path: Path, arrays: dict[str, np.ndarray]) -> SourceTable:
     """Return the arrays that share one number of rows as a table: structured ones by field, others whole."""
     flat: dict[str, np.ndarray] = {}
     for name, array in arrays.items():
@@ -45,13 +45,13 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray]) -> Table:
             flat[name] = array
     columns = {name: _column(array) for name, array in flat.items() if array.size > 1}
     if not columns:
-        return Table(path, {})
+        return SourceTable(path, {})
     lengths = [len(values) for values in columns.values()]
     rows = max(set(lengths), key=lambda length: (lengths.count(length), length))
     kept = {name: values for name, values in columns.items() if len(values) == rows}
     dropped = [f"{name} ({len(values)} rows)" for name, values in columns.items() if name not in kept]
     note = (f"{path.name}: not of {rows} rows, left out: {', '.join(dropped)}",) if dropped else ()
-    return Table(path, kept, notes=note)
+    return SourceTable(path, kept, notes=note)
 
 
 def _column(array: np.ndarray) -> np.ndarray:

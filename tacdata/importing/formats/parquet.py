@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, Table
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
 
 class Parquet(SourceFormat):
@@ -16,7 +16,7 @@ class Parquet(SourceFormat):
 
     endings = (".parquet", ".feather")
 
-    def read(self, path: Path, options: dict[str, Any]) -> Table:
+    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read all columns; nulls become NaN. See the base."""
         import pyarrow as pa
         from pyarrow import feather, parquet
@@ -35,7 +35,7 @@ class Parquet(SourceFormat):
             for field in table.schema
             if field.metadata and b"unit" in field.metadata
         }
-        return Table(path, columns, units)
+        return SourceTable(path, columns, units)
 
 
 def _column(column: Any) -> np.ndarray:

@@ -1,7 +1,7 @@
 """What a source format's file holds.
 
 ``tacdata/importing/formats/my_format.py`` defines one class derived from `SourceFormat`. It says which endings are its
-own and reads a file into a `Table`: named columns as they stand in the file, nothing converted, nothing filled in.
+own and reads a file into a `SourceTable`: named columns as they stand in the file, nothing converted or filled in.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROOM, BASE = "tacdata.importing.formats", "source_format"
 
 
 @dataclass(frozen=True)
-class Table:
+class SourceTable:
     """A file's columns."""
 
     path: Path
@@ -44,7 +44,7 @@ class SourceFormat(ABC):
     """File name endings, lower case, with the dot."""
 
     @abstractmethod
-    def read(self, path: Path, options: dict[str, Any]) -> Table:
+    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read a file.
 
         Args:
@@ -57,7 +57,7 @@ class SourceFormat(ABC):
         """
 
 
-def read_table(path: Path, options: dict[str, Any]) -> Table:
+def read_table(path: Path, options: dict[str, Any]) -> SourceTable:
     """Read a file by the format that its mapping names, or that its ending says.
 
     Raises:
@@ -68,7 +68,7 @@ def read_table(path: Path, options: dict[str, Any]) -> Table:
         raise UsageError(f"no file {path}", "a file of measured data", "check the path and the mapping's files")
     name = options.get("format") or _by_ending(path)
     kind: type[Any] = registry.load(ROOM, BASE, name, SourceFormat)
-    table: Table = kind().read(path, options)
+    table: SourceTable = kind().read(path, options)
     if not table.rows:
         raise FormatError(f"{path} holds no rows of data", "one row or more", "leave it out, or correct the mapping")
     return table

@@ -14,7 +14,7 @@ import numpy as np
 
 from tacdata.errors import UsageError
 from tacdata.plans.recipe import write_out
-from tacdata.plans.shipped.shipped_plan import ShippedPlan, Wishes
+from tacdata.plans.shipped.shipped_plan import PlanOptions, ShippedPlan
 from tacdata.plans.sites import clear_of_rim, half_box
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
@@ -40,7 +40,7 @@ class Evaluation(ShippedPlan):
 
     usual = ("sphere_4",)
 
-    def document(self, sensor: Sensor, wishes: Wishes) -> dict[str, Any]:
+    def document(self, sensor: Sensor, wishes: PlanOptions) -> dict[str, Any]:
         """Return the plan; ``purpose`` of each press says which kind of trial it is."""
         names = self.specimen_names(wishes)
         if len(names) != 1:

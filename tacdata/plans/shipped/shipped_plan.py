@@ -18,7 +18,7 @@ ROOM, BASE = "tacdata.plans.shipped", "shipped_plan"
 
 
 @dataclass(frozen=True)
-class Wishes:
+class PlanOptions:
     """What the person asked for; None where they left it open."""
 
     presses: int | None = None
@@ -38,7 +38,7 @@ class ShippedPlan(ABC):
     """Whether the number of presses may be chosen."""
 
     @abstractmethod
-    def document(self, sensor: Sensor, wishes: Wishes) -> dict[str, Any]:
+    def document(self, sensor: Sensor, wishes: PlanOptions) -> dict[str, Any]:
         """Return the plan's document (`schemas/plan.schema.json`).
 
         Raises:
@@ -46,12 +46,12 @@ class ShippedPlan(ABC):
             FormatError: If the sensor is too small or too thin for the plan.
         """
 
-    def specimen_names(self, wishes: Wishes) -> tuple[str, ...]:
+    def specimen_names(self, wishes: PlanOptions) -> tuple[str, ...]:
         """Return the names of the specimens to use."""
         return wishes.indenters or self.usual
 
 
-def shipped_plan(name: str, sensor: Sensor, wishes: Wishes | None = None) -> dict[str, Any]:
+def shipped_plan(name: str, sensor: Sensor, wishes: PlanOptions | None = None) -> dict[str, Any]:
     """Return the document of a shipped plan.
 
     Raises:
@@ -59,7 +59,7 @@ def shipped_plan(name: str, sensor: Sensor, wishes: Wishes | None = None) -> dic
     """
     kind: type[Any] = registry.load(ROOM, BASE, name, ShippedPlan)
     plan: ShippedPlan = kind()
-    wishes = wishes or Wishes()
+    wishes = wishes or PlanOptions()
     if wishes.presses is not None and not plan.adjustable:
         raise UsageError(
             f"{wishes.presses} presses of the plan {name}", "the number that the plan has",

@@ -10,7 +10,7 @@ import schemas
 from tacdata import documents
 from tacdata.errors import UsageError
 from tacdata.indenters import from_document
-from tacdata.plans.shipped.shipped_plan import ShippedPlan, Wishes
+from tacdata.plans.shipped.shipped_plan import PlanOptions, ShippedPlan
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
 
@@ -41,7 +41,7 @@ class Training(ShippedPlan):
     usual = USUAL
     adjustable = True
 
-    def document(self, sensor: Sensor, wishes: Wishes) -> dict[str, Any]:
+    def document(self, sensor: Sensor, wishes: PlanOptions) -> dict[str, Any]:
         """Return the plan; 24 presses if no number is wished for."""
         return training_plan(
             sensor, 24 if wishes.presses is None else wishes.presses, wishes.seed, self.specimen_names(wishes)

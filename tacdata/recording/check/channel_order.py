@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from tacdata.recording.check.figures import Figures
+from tacdata.recording.check.figures import RecordingFigures
 from tacdata.sensor.sensor import Taxels
 
 PRESSES = 10
@@ -59,7 +59,7 @@ class Answers:
         return np.linalg.norm(self.sites[:, None] - self.taxels.centers, axis=-1)
 
 
-def answers(recordings: list[Figures]) -> Answers | None:
+def answers(recordings: list[RecordingFigures]) -> Answers | None:
     """Collect the answers of a session's whole presses; None without any."""
     chosen = [f for f in recordings if counts_as_press(f)]
     if not chosen:
@@ -78,7 +78,7 @@ def answers(recordings: list[Figures]) -> Answers | None:
     )
 
 
-def counts_as_press(figures: Figures) -> bool:
+def counts_as_press(figures: RecordingFigures) -> bool:
     """Say whether a recording is a press whose answers tell something."""
     press, response = figures.recording.episode.press, figures.document["taxels"]["response"]
     return press.depth > DEPTH and any(value is not None for value in response)

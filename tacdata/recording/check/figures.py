@@ -26,7 +26,7 @@ COUNTS = "counts"
 
 
 @dataclass(frozen=True)
-class Figures:
+class RecordingFigures:
     """What was measured in one recording."""
 
     recording: Recording
@@ -36,7 +36,7 @@ class Figures:
     """Arrival minus sample time [ms], shape (n,)."""
 
 
-def figures(recording: Recording) -> Figures:
+def figures(recording: Recording) -> RecordingFigures:
     """Measure one recording."""
     episode = recording.episode
     lag = (episode.taxels.arrival_ns - episode.taxels.sample_ns) / 1e6
@@ -48,7 +48,7 @@ def figures(recording: Recording) -> Figures:
         "cnc": _cnc(recording),
         "cameras": {name: camera_figures(recording, name) for name in recording.images},
     }
-    return Figures(recording, document, lag)
+    return RecordingFigures(recording, document, lag)
 
 
 def _taxels(recording: Recording, lag: np.ndarray) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.recording.check.camera_findings import camera_doubts
 from tacdata.recording.check.clocks import clock_doubts
-from tacdata.recording.check.figures import COUNTS, Figures
+from tacdata.recording.check.figures import COUNTS, RecordingFigures
 from tacdata.recording.check.imported import imported_findings, is_imported
 
 WARNING, UNUSABLE = "warning", "unusable"
@@ -46,7 +46,7 @@ class Finding:
     """In words."""
 
 
-def findings(figures: Figures) -> list[Finding]:
+def findings(figures: RecordingFigures) -> list[Finding]:
     """Judge one recording."""
     if is_imported(figures.recording.episode):
         # Quantised or resting channels of a foreign sensor are no proof of a fault.
@@ -61,11 +61,11 @@ def findings(figures: Figures) -> list[Finding]:
 Judgement = tuple[str, str, str]
 
 
-def _rate_of_clock(figures: Figures) -> float:
+def _rate_of_clock(figures: RecordingFigures) -> float:
     return float(figures.recording.episode.rig.get("clock", {}).get("rate", 1.0))
 
 
-def _recording(figures: Figures) -> list[Judgement]:
+def _recording(figures: RecordingFigures) -> list[Judgement]:
     episode, found = figures.recording.episode, []
     if not episode.complete:
         found.append((UNUSABLE, "recording", "; ".join(episode.notes) or "it was broken off"))
@@ -85,7 +85,7 @@ def _recording(figures: Figures) -> list[Judgement]:
     return found
 
 
-def _taxels(figures: Figures) -> list[Judgement]:
+def _taxels(figures: RecordingFigures) -> list[Judgement]:
     values, found = figures.document["taxels"], []
     if values["frames"] < 2:
         return [(UNUSABLE, "taxels", f"{values['frames']} frames")]
@@ -122,7 +122,7 @@ def _line(counts: dict) -> list[str]:
     return [*found, *counts.get("notes", [])]
 
 
-def _channels(figures: Figures) -> list[Judgement]:
+def _channels(figures: RecordingFigures) -> list[Judgement]:
     values, found = figures.document["taxels"], []
     if values["undefined"]:
         found.append((UNUSABLE, "taxels", f"channel {_list(values['undefined'])} has readings that are no numbers"))
@@ -147,7 +147,7 @@ def _channels(figures: Figures) -> list[Judgement]:
     return found
 
 
-def _cnc(figures: Figures) -> list[Judgement]:
+def _cnc(figures: RecordingFigures) -> list[Judgement]:
     values, found = figures.document["cnc"], []
     if not values["reports"]:
         return [(UNUSABLE, "cnc", "no status report")]
@@ -168,7 +168,7 @@ def _cnc(figures: Figures) -> list[Judgement]:
     return found
 
 
-def _cameras(figures: Figures) -> list[Judgement]:
+def _cameras(figures: RecordingFigures) -> list[Judgement]:
     entries = figures.recording.episode.rig.get("cameras", {})
     doubts = camera_doubts(entries, figures.document["cameras"], _rate_of_clock(figures))
     return [(WARNING, stream, text) for stream, text in doubts]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tacdata.recording.check.figures import Figures
+from tacdata.recording.check.figures import RecordingFigures
 from tacdata.recording.episode import Episode
 
 GAP_PERIODS = 5.0
@@ -18,7 +18,7 @@ def is_imported(episode: Episode) -> bool:
     return "imported" in episode.rig
 
 
-def imported_summary(entries: Sequence[Figures]) -> list[str]:
+def imported_summary(entries: Sequence[RecordingFigures]) -> list[str]:
     """Return figures of imported recordings in words: of times as the source stamps them, in the source's unit."""
     taxels = [entry.document["taxels"] for entry in entries]
     noise = [v for t in taxels for v in t["idle_noise"] if v is not None]
@@ -34,7 +34,7 @@ def imported_summary(entries: Sequence[Figures]) -> list[str]:
     return lines + ([f"  position  {np.median(reports):.1f} rows/s"] if reports else [])
 
 
-def imported_findings(figures: Figures) -> list[tuple[str, str, str]]:
+def imported_findings(figures: RecordingFigures) -> list[tuple[str, str, str]]:
     """Return (severity, stream, text) of what is wrong or doubtful in an imported recording."""
     episode, values = figures.recording.episode, figures.document["taxels"]
     if values["frames"] < 2:

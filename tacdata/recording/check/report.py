@@ -11,7 +11,7 @@ import numpy as np
 import schemas
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.check.clocks import clock_words
-from tacdata.recording.check.figures import Figures, figures
+from tacdata.recording.check.figures import RecordingFigures, figures
 from tacdata.recording.check.findings import UNUSABLE, WARNING, Finding, findings
 from tacdata.recording.check.imported import imported_summary, is_imported
 from tacdata.recording.check.session import session_findings
@@ -25,7 +25,7 @@ class Report:
 
     source: Path
     """File or folder that was checked."""
-    episodes: tuple[Figures, ...]
+    episodes: tuple[RecordingFigures, ...]
     """Figures of every recording that could be read."""
     findings: tuple[Finding, ...]
 
@@ -80,7 +80,7 @@ def check(path: Path) -> Report:
     return Report(path, tuple(entries), (*found, *_of_session(session, entries)))
 
 
-def _of_session(session: Any, entries: list[Figures]) -> list[Finding]:
+def _of_session(session: Any, entries: list[RecordingFigures]) -> list[Finding]:
     found = []
     if not session.episodes:
         found.append(Finding(UNUSABLE, "session", "", "no finished recording"))

@@ -14,7 +14,7 @@ from tacdata.recording.check.channel_order import (
     silent,
     unanswered,
 )
-from tacdata.recording.check.figures import Figures
+from tacdata.recording.check.figures import RecordingFigures
 from tacdata.recording.check.findings import UNUSABLE, WARNING, Finding
 
 TURNED = ("turned by 180 deg", "mirrored along x", "mirrored along y")
@@ -25,7 +25,7 @@ OFFSET_SHARE = 0.3
 """... and at least so much of the channel's strongest answer [1]: what relaxes slowly is less."""
 
 
-def session_findings(entries: list[Figures]) -> list[Finding]:
+def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
     """Judge the channels of a session by how they answered to its presses."""
     found = answers(entries)
     if found is None:
@@ -57,7 +57,7 @@ def _places(found: Answers, moved: dict[int, int]) -> list[str]:
     ]
 
 
-def _offsets(entries: list[Figures], found: Answers) -> list[str]:
+def _offsets(entries: list[RecordingFigures], found: Answers) -> list[str]:
     """Return in words which channels' idle readings step from one recording to the next, and others' do not."""
     idle = np.array(
         [[np.nan if v is None else v for v in f.document["taxels"]["idle_reading"]] for f in entries], float

@@ -16,7 +16,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Latency:
+class StreamLatency:
     """The constant part of a stream's delay, which arrivals alone do not show."""
 
     latency_ns: int
@@ -32,7 +32,7 @@ class Latency:
         return {"latency_ns": self.latency_ns, "uncertainty_ns": self.uncertainty_ns, "source": self.source}
 
     @classmethod
-    def from_document(cls, document: dict) -> Latency:
+    def from_document(cls, document: dict) -> StreamLatency:
         """Rebuild one; raises KeyError or ValueError if it is damaged."""
         return cls(int(document["latency_ns"]), int(document["uncertainty_ns"]), str(document["source"]))
 
@@ -61,7 +61,7 @@ class ClockModel:
     """Uncertainty of the period that follows from it [1]."""
     axis: str = "counter"
     """What the line is over: ``counter``, ``device_ns``, or ``order`` (a number given on arrival: it misses losses)."""
-    latency: Latency | None = None
+    latency: StreamLatency | None = None
     """The link's smallest delay, if something measured it."""
     earlier: tuple[ClockModel, ...] = ()
     """Lines before a restart or a step of the device's clock, oldest first."""
@@ -75,7 +75,7 @@ class ClockModel:
         """Return how much slower the device runs than ``nominal_period_ns`` [ns] says [ppm]."""
         return (self.period_ns / (1.0 if self.axis == "device_ns" else nominal_period_ns) - 1) * 1e6
 
-    def with_latency(self, latency: Latency | None) -> ClockModel:
+    def with_latency(self, latency: StreamLatency | None) -> ClockModel:
         """Return the model with another constant delay, on all its lines."""
         return replace(self, latency=latency, earlier=tuple(replace(line, latency=latency) for line in self.earlier))
 
@@ -156,6 +156,6 @@ class ClockModel:
             float(document.get("uncertainty_ns", 0)),
             float(document.get("drift_uncertainty", 0)),
             document.get("axis", "counter"),
-            Latency.from_document(json.loads(latency)) if latency else None,
+            StreamLatency.from_document(json.loads(latency)) if latency else None,
             tuple(cls.from_document(line) for line in json.loads(document.get("earlier", "[]"))),
         )

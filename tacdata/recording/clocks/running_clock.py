@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.envelope_fit import EnvelopeFit
 
 REFIT = 8
@@ -20,11 +20,11 @@ class StreamClock:
     def __init__(self, axis: str = "counter", rate: float = 1.0, nominal_ns: float | None = None) -> None:
         """Begin without arrivals; ``axis``, ``rate`` and ``nominal_ns`` as in `EnvelopeFit`."""
         self.axis, self.rate = axis, rate
-        self.latency: Latency | None = None
+        self.latency: StreamLatency | None = None
         """The link's smallest delay, once measured, against the line as it is known now."""
         self._fit = EnvelopeFit(axis, rate, nominal_ns)
         self._line: tuple[int, int, float] | None = None
-        self._measured: tuple[Latency, int, int] | None = None  # with a counter, and where the line was then [ns]
+        self._measured: tuple[StreamLatency, int, int] | None = None  # with a counter, and where the line was then [ns]
         self.frames = 0
         """Arrivals taken."""
 
@@ -45,7 +45,7 @@ class StreamClock:
         origin, host_ns, period = self._line
         return min(host_ns + round(period * (counter - origin)), arrival_ns) - constant
 
-    def set_latency(self, latency: Latency | None) -> None:
+    def set_latency(self, latency: StreamLatency | None) -> None:
         """Take a constant delay that a sync tap has just shown against the present line, or none.
 
         Arrivals that are quicker than any before let the line sink afterwards; where it was at the tap says by how

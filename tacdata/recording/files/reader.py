@@ -14,7 +14,7 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from schemas import tacdata_pb2 as pb
 from tacdata.errors import FormatError
 from tacdata.plans import Press
-from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.envelope_fit import fit
 from tacdata.recording.clocks.running_clock import nominal_period_ns
 from tacdata.recording.episode import CncStream, Episode, TaxelStream
@@ -212,7 +212,7 @@ def _fitted(records: Records, frames: TaxelFrames, stream: str, rate: float) -> 
         arrival, sequence, device = image_stamps(records, stream.removeprefix("camera "))
         on_device = len(device) > 0 and bool((device >= 0).all())
         model = fit(arrival, device if on_device else sequence, "device_ns" if on_device else "order", rate)
-    return model.with_latency(Latency.from_document(latency)) if model and latency else model
+    return model.with_latency(StreamLatency.from_document(latency)) if model and latency else model
 
 
 def _taxels(path: Path, frames: TaxelFrames, count: int, clock: ClockModel | None) -> TaxelStream:

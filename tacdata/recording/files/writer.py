@@ -23,7 +23,7 @@ from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
 from tacdata.errors import DeviceError, UsageError
 from tacdata.plans import Press
-from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.polled_clock import PolledClock
 from tacdata.recording.files import file_names, topics
 from tacdata.recording.files.chunked_file import ChunkedFile
@@ -49,7 +49,7 @@ class Header:
     """The board's description of itself: channels, frame format, units, nominal rate."""
     controller: dict[str, Any] = field(default_factory=dict)
     """``settings`` as read, ``acceleration`` [mm/s^2] and ``max_rate`` [mm/s] of each axis."""
-    latencies: dict[str, Latency] = field(default_factory=dict)
+    latencies: dict[str, StreamLatency] = field(default_factory=dict)
     """Constant delay of each stream that a sync tap measured, by the stream's name."""
 
     @property

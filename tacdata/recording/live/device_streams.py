@@ -11,7 +11,7 @@ from typing import Any
 
 from tacdata.devices.device import Camera, ImageFrame, StreamCounts, TaxelBoard
 from tacdata.errors import DeviceError, TacdataError
-from tacdata.recording.clocks.clock_model import ClockModel, Latency
+from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.polled_clock import PolledClock
 from tacdata.recording.clocks.running_clock import StreamClock, nominal_period_ns
 from tacdata.recording.files.writer import EpisodeWriter
@@ -118,7 +118,7 @@ class DeviceStreams(ABC):
             for name in self._cameras:
                 self._before[name].notes.clear()  # what a camera did not take at opening holds for all
 
-    def set_latencies(self, latencies: dict[str, Latency]) -> None:
+    def set_latencies(self, latencies: dict[str, StreamLatency]) -> None:
         """Take these constant delays of streams, by name, into all sample times from now on, and no others."""
         with self._lock:
             for name, clock in self._clocks.items():

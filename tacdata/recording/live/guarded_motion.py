@@ -12,7 +12,7 @@ from tacdata.devices.device import MotionController
 from tacdata.errors import TacdataError
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.interruption import Interruption
-from tacdata.recording.live.rig_streams import Streams
+from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion.move_times import Command
 from tacdata.recording.motion.press_steps import Position, Step
 
@@ -40,7 +40,7 @@ class GuardedMotion:
         self._cnc.feed_hold()
 
     def drive(
-        self, path: tuple[Step, ...], start: Position, streams: Streams, writer: EpisodeWriter | None
+        self, path: tuple[Step, ...], start: Position, streams: RigStreams, writer: EpisodeWriter | None
     ) -> Position:
         """Carry out the steps and return where they end [mm].
 

@@ -21,7 +21,7 @@ TRIPS = 4096
 """Round trips of the controller's reports that are remembered for its clock [count]."""
 
 
-class Streams(DeviceStreams):
+class RigStreams(DeviceStreams):
     """Runs while the session runs; what arrives between recordings feeds the clock models only."""
 
     silence = 3.0
@@ -55,7 +55,7 @@ class Streams(DeviceStreams):
         """Latest reported machine position [mm]."""
         self._work["motion controller"] = self._read_status
 
-    def __enter__(self) -> Streams:
+    def __enter__(self) -> RigStreams:
         """Start the threads."""
         super().__enter__()
         return self

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.optimize import least_squares, minimize_scalar
 
-from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.recording.episode import TagStream
 from tacdata.recording.files.reader import Recording
 from tacdata.recording.motion.move_times import AnchoredMove
@@ -51,7 +51,7 @@ LEAST_WAY = 1.0
 class SyncTap:
     """What the touches said."""
 
-    latencies: dict[str, Latency]
+    latencies: dict[str, StreamLatency]
     """Delay of each stream that could be measured: "taxels", "camera NAME"."""
     remarks: tuple[str, ...]
     """Why others could not be, in words."""
@@ -68,16 +68,16 @@ class SyncTap:
 
 def measure(recording: Recording) -> SyncTap:
     """Measure the delays of all streams in the recording of a sync tap (`sync_tap_motion`)."""
-    latencies: dict[str, Latency] = {}
+    latencies: dict[str, StreamLatency] = {}
     remarks: list[str] = []
     found = taxel_latency(recording)
-    if isinstance(found, Latency):
+    if isinstance(found, StreamLatency):
         latencies["taxels"] = found
     else:
         remarks.append(f"taxels: {found}")
     for tags in recording.episode.tags:
         seen = camera_latency(recording, tags)
-        if isinstance(seen, Latency):
+        if isinstance(seen, StreamLatency):
             latencies[f"camera {tags.camera}"] = seen
         else:
             remarks.append(f"camera {tags.camera}: {seen}")
@@ -106,7 +106,7 @@ class _Touch:
         return self.move.profile.peak
 
 
-def taxel_latency(recording: Recording) -> Latency | str:
+def taxel_latency(recording: Recording) -> StreamLatency | str:
     """Return the taxel stream's delay, or in words why it cannot be said."""
     episode = recording.episode
     moves = [m for m in recording.moves if m.command.phase == "press" and m.profile.length]
@@ -127,7 +127,7 @@ def taxel_latency(recording: Recording) -> Latency | str:
     spread = float(np.sqrt((n - 1) / n * np.sum((np.array(others) - np.mean(others)) ** 2)))
     clock = recording.clocks.get("taxels")
     line = clock.uncertainty_ns if clock else 0.0
-    return Latency(round(delay * 1e9), round(float(np.hypot(spread * 1e9, line))))
+    return StreamLatency(round(delay * 1e9), round(float(np.hypot(spread * 1e9, line))))
 
 
 def _signal(sample_ns: np.ndarray, counts: np.ndarray, moves: list[AnchoredMove]) -> tuple[np.ndarray, float]:
@@ -216,7 +216,7 @@ def _curve(slow: list[_Touch], origin: float, delay: float) -> Callable[[np.ndar
     return curve
 
 
-def camera_latency(recording: Recording, tags: TagStream) -> Latency | str:
+def camera_latency(recording: Recording, tags: TagStream) -> StreamLatency | str:
     """Return a camera's delay from its tag's motion, or in words why it cannot be said."""
     seen = tags.faces > 0
     if seen.sum() < LEAST_VIEWS:
@@ -252,4 +252,4 @@ def camera_latency(recording: Recording, tags: TagStream) -> Latency | str:
     spread = float(np.sqrt(7 / 8 * np.sum((others - others.mean()) ** 2)))
     if spread > LEAST_SURE or not RANGE[0] + 0.006 < whole < RANGE[1] - 0.006:
         return "the tag's motion does not show the delay; let the tag be larger in the image, or the host less busy"
-    return Latency(round(whole * 1e9), round(spread * 1e9))
+    return StreamLatency(round(whole * 1e9), round(spread * 1e9))

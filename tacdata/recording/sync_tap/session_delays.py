@@ -7,7 +7,7 @@ from pathlib import Path
 
 import schemas
 from tacdata import documents
-from tacdata.recording.clocks.clock_model import Latency
+from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.recording.session import FILE, Session
 from tacdata.recording.sync_tap.delays import SyncTap
 
@@ -17,15 +17,15 @@ LEAST_CHANGE_NS = 2_000_000
 """... and at least so much [ns]."""
 
 
-def latencies(session: Session) -> dict[str, Latency]:
+def latencies(session: Session) -> dict[str, StreamLatency]:
     """Return the latest delay of each stream; {} without a sync tap."""
-    found: dict[str, Latency] = {}
+    found: dict[str, StreamLatency] = {}
     for entry in session.document.get("sync", []):
-        found |= {name: Latency.from_document(values) for name, values in entry["latencies"].items()}
+        found |= {name: StreamLatency.from_document(values) for name, values in entry["latencies"].items()}
     return found
 
 
-def changes(session: Session, now: dict[str, Latency]) -> tuple[str, ...]:
+def changes(session: Session, now: dict[str, StreamLatency]) -> tuple[str, ...]:
     """Return in words which delays are not what an earlier sync tap of the session found."""
     words = []
     for name, before in latencies(session).items():

@@ -16,7 +16,7 @@ DRAWS = 2000
 
 
 @dataclass(frozen=True)
-class Change:
+class ResidualChange:
     """One set of episodes, before and after."""
 
     name: str
@@ -35,18 +35,18 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Gap:
+class GapReduction:
     """How much smaller the gap is, and where it is not."""
 
-    whole: Change
+    whole: ResidualChange
     """On the sealed episodes."""
     interval: tuple[float, float]
     """90 % interval of the share closed, over resampled sealed episodes [1]."""
     unseen: bool
     """Whether the verdict itself was reached without the sealed episodes."""
-    worst: Change
+    worst: ResidualChange
     """The sealed episode that is worst after."""
-    elsewhere: tuple[Change, ...]
+    elsewhere: tuple[ResidualChange, ...]
     """Groups whose episodes the effects' numbers were not fitted to: another rate, depth, indenter."""
     fitted: tuple[Placed, ...]
     """The effects with numbers fitted without the sealed episodes."""
@@ -54,7 +54,7 @@ class Gap:
 
 def gap(
     held: Comparison, placed: Sequence[Placed], chosen: Sealed, note: Callable[[str], None] = lambda text: None
-) -> Gap:
+) -> GapReduction:
     """Measure the gap.
 
     Args:
@@ -66,19 +66,21 @@ def gap(
     numbers = chosen.numbers
     fitted = held.fitted_without(placed, numbers)
     before, after = held.before, held.after(fitted)
-    whole = Change("sealed episodes", len(numbers), held.mean_square(before, numbers), held.mean_square(after, numbers))
+    whole = ResidualChange(
+        "sealed episodes", len(numbers), held.mean_square(before, numbers), held.mean_square(after, numbers)
+    )
     ratio = [2 * after.energy[n] / held.values[n] for n in numbers]
     at = int(numbers[int(np.argmax(ratio))])
-    worst = Change(
+    worst = ResidualChange(
         held.course.names[at], 1, held.mean_square(before, np.array([at])), held.mean_square(after, np.array([at]))
     )
     elsewhere = []
     for name, own in groups(held.course):
         note(f"gap, fitted without: {name}")
         there = held.after(held.fitted_without(placed, own))
-        elsewhere.append(Change(name, len(own), held.mean_square(before, own), held.mean_square(there, own)))
+        elsewhere.append(ResidualChange(name, len(own), held.mean_square(before, own), held.mean_square(there, own)))
     pair = np.array([before.energy[numbers], after.energy[numbers]])
-    return Gap(whole, _interval(pair, held.values[numbers]), chosen.unseen, worst, tuple(elsewhere), fitted)
+    return GapReduction(whole, _interval(pair, held.values[numbers]), chosen.unseen, worst, tuple(elsewhere), fitted)
 
 
 def _interval(energy: np.ndarray, values: np.ndarray) -> tuple[float, float]:

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from tacdata.revision.evidence.curves import EpisodeCurves
-from tacdata.revision.evidence.gap import Change, Gap
+from tacdata.revision.evidence.gap import GapReduction, ResidualChange
 
 BEFORE, AFTER, MEASURED = "#d55e00", "#0072b2", "#000000"
 """Okabe and Ito's vermilion and blue, which all eyes tell apart."""
 
 
 def draw(
-    title: str, shown: Sequence[EpisodeCurves], found: Gap, path: Path, networks: Sequence[dict[str, Any]] = ()
+    title: str, shown: Sequence[EpisodeCurves], found: GapReduction, path: Path, networks: Sequence[dict[str, Any]] = ()
 ) -> None:
     """Draw the page into a PNG file.
 
@@ -75,8 +75,8 @@ def _residuals(axis: Any, shown: Sequence[EpisodeCurves]) -> None:
     axis.legend(loc="best", fontsize=8)
 
 
-def _groups(axis: Any, found: Gap) -> None:
-    rows: list[Change] = [found.whole, *found.elsewhere]
+def _groups(axis: Any, found: GapReduction) -> None:
+    rows: list[ResidualChange] = [found.whole, *found.elsewhere]
     where = np.arange(len(rows))
     axis.barh(where - 0.2, [c.before for c in rows], 0.38, color=BEFORE, label="before")
     axis.barh(where + 0.2, [c.after for c in rows], 0.38, color=AFTER, label="after")

@@ -10,14 +10,14 @@ from tacdata.chain import Course
 from tacdata.discrepancy.verdict.residual_slices import PHASES, phases
 from tacdata.effects import Placed
 from tacdata.revision.comparison import Comparison
-from tacdata.revision.evidence.gap import Change
+from tacdata.revision.evidence.gap import ResidualChange
 
 FEW = 20
 """Readings below which a slice tells nothing."""
 THIRDS = [0, 1 / 3, 2 / 3, 1]
 
 
-def sealed_slices(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray) -> list[Change]:
+def sealed_slices(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray) -> list[ResidualChange]:
     """Return the mean square by phase, depth, rate and channel, over the noise; an offset an episode is taken off.
 
     Args:
@@ -37,9 +37,9 @@ def sealed_slices(held: Comparison, placed: Sequence[Placed], episodes: np.ndarr
     for name, rows in _parts(course, there):
         if rows.sum() >= FEW:
             count = len(np.unique(course.episode[rows]))
-            found.append(Change(name, count, *(float(np.nanmean(s[rows])) for s in square)))
+            found.append(ResidualChange(name, count, *(float(np.nanmean(s[rows])) for s in square)))
     for k, name in enumerate(course.channel_names):
-        found.append(Change(name, len(episodes), *(float(np.nanmean(s[there, k])) for s in square)))
+        found.append(ResidualChange(name, len(episodes), *(float(np.nanmean(s[there, k])) for s in square)))
     return found
 
 

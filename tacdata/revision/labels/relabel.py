@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from label_farm.labelling import FarmSettings, Labelling, Summary
+from label_farm.labelling import FarmSettings, Labelling, LabellingSummary
 from label_farm.store.store import Store
 from tacdata.effects import Placed
 from tacdata.labels import read_label
@@ -107,7 +107,7 @@ def changed_skin(sensor: Sensor, placed: Sequence[Placed]) -> Sensor | None:
     return replace(sensor, skin=replace(sensor.skin, thickness=sensor.skin.thickness * factor))
 
 
-def _compared(moved: Moved, before: Path, after: Path, summary: Summary) -> Moved:
+def _compared(moved: Moved, before: Path, after: Path, summary: LabellingSummary) -> Moved:
     squares, count, most, labels = 0.0, 0, 0.0, 0
     for path in sorted(after.glob("episode-*.parquet")):
         if not (before / path.name).is_file():

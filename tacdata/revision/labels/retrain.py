@@ -167,10 +167,10 @@ def _frames(folder: Path, episodes: list[Episode], labels: list[Label]) -> Frame
 def _scored(frames: Frames, judge: Frames, folder: Path, recipe: Recipe, note: Callable[[str], None]) -> dict[str, Any]:
     """Return the scores of a network on the episodes of another dataset that are its test episodes in its own."""
     from training.scoring.evaluate import evaluate
-    from training.settings import Settings
+    from training.settings import TrainingSettings
     from training.train import train
 
-    settings = Settings(network=recipe.network, epochs=recipe.epochs, seed=recipe.seed)
+    settings = TrainingSettings(network=recipe.network, epochs=recipe.epochs, seed=recipe.seed)
 
     def told(progress: Any) -> None:
         if progress.finished is not None:

@@ -19,7 +19,7 @@ from tacdata.chain import predict
 from tacdata.plans import Plan
 from tacdata.revision.comparison import Comparison
 from tacdata.revision.next_presses.rivals import Rival
-from tacdata.revision.next_presses.trial import Trial, elsewhere, foretold, laid_out, trials
+from tacdata.revision.next_presses.trial import CandidatePress, elsewhere, foretold, laid_out, trials
 
 PRESSES, REPEATS = 4, 3
 """Different presses, and how often each is done: an episode is the unit of all statistics."""
@@ -35,7 +35,7 @@ NOISY = 1.0
 class Choice:
     """One press and what it is for."""
 
-    trial: Trial
+    trial: CandidatePress
     nats: dict[tuple[str, str], float]
     """Half the whitened squared distance of each pair of rivals [nats], for one press."""
 
@@ -107,7 +107,7 @@ def _probabilities(found: list[Rival]) -> dict[str, float]:
     return {r.mechanism: float(w) for r, w in zip(found, weight / weight.sum(), strict=True)}
 
 
-def _distances(held: Comparison, found: list[Rival], trial: Trial) -> dict[tuple[str, str], float]:
+def _distances(held: Comparison, found: list[Rival], trial: CandidatePress) -> dict[tuple[str, str], float]:
     course, noise = held.course, held.frame.noise
     given, said = list(held.setting.given), []
     for rival in found:
@@ -130,7 +130,7 @@ def _distances(held: Comparison, found: list[Rival], trial: Trial) -> dict[tuple
     return nats
 
 
-def _slope(held: Comparison, rival: Rival, trial: Trial) -> np.ndarray:
+def _slope(held: Comparison, rival: Rival, trial: CandidatePress) -> np.ndarray:
     """Return how readings change with the press's depth [counts/mm], each channel's mean taken out."""
     own = laid_out(held.course, trial)
     response = elsewhere(rival.model.response, held.course, own, trial)

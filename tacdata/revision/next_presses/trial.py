@@ -27,7 +27,7 @@ PLACES = 2
 
 
 @dataclass(frozen=True)
-class Trial:
+class CandidatePress:
     """One press that could be recorded."""
 
     tool: int
@@ -73,7 +73,7 @@ class Trial:
         return found
 
 
-def trials(course: Course, plan: Plan) -> list[Trial]:
+def trials(course: Course, plan: Plan) -> list[CandidatePress]:
     """Return presses within what was recorded: its places, its tools, nowhere deeper; no faster than the guide moves.
 
     Args:
@@ -94,12 +94,12 @@ def trials(course: Course, plan: Plan) -> list[Trial]:
                 continue
             for share, speed, hold in product(DEPTHS, rates, HOLDS):
                 common = (tool, int(site), float(at[0]), float(at[1]))
-                found.append(Trial(*common, share * deepest, speed, hold, 0.0, 0.0))
+                found.append(CandidatePress(*common, share * deepest, speed, hold, 0.0, 0.0))
                 if share == DEPTHS[-1] and hold == HOLDS[-1]:
-                    found.append(Trial(*common, deepest, speed, hold, RECOVERY, 0.0))
+                    found.append(CandidatePress(*common, deepest, speed, hold, RECOVERY, 0.0))
                 if share == DEPTHS[-1] and hold != HOLDS[-1]:
                     over = (1 - OVERSHOOT) * deepest
-                    found.append(Trial(*common, OVERSHOOT * deepest, speed, hold, 0.0, over))
+                    found.append(CandidatePress(*common, OVERSHOOT * deepest, speed, hold, 0.0, over))
     return found
 
 
@@ -114,7 +114,7 @@ def _telling(course: Course, episodes: np.ndarray) -> list[int]:
     return sorted(spread, key=lambda s: -spread[s])
 
 
-def laid_out(course: Course, trial: Trial) -> Course:
+def laid_out(course: Course, trial: CandidatePress) -> Course:
     """Return the course of one press that was not recorded; its readings are 0."""
     deep = trial.depth + trial.overshoot
     corners = [(-0.3, 1.0), (deep, (deep + 0.3) / trial.speed)]
@@ -137,13 +137,15 @@ def laid_out(course: Course, trial: Trial) -> Course:
     )  # fmt: skip
 
 
-def foretold(course: Course, response: Response, placed: Sequence[Placed], trial: Trial) -> tuple[Course, np.ndarray]:
+def foretold(
+    course: Course, response: Response, placed: Sequence[Placed], trial: CandidatePress
+) -> tuple[Course, np.ndarray]:
     """Return the trial's course and the readings that a model says of it, shape (rows, channels)."""
     own = laid_out(course, trial)
     return own, predict(own, elsewhere(response, course, own, trial), placed).signal
 
 
-def elsewhere(response: Response, course: Course, own: Course, trial: Trial) -> Response:
+def elsewhere(response: Response, course: Course, own: Course, trial: CandidatePress) -> Response:
     """Return a response for another course at a place and tool that it knows."""
     if not isinstance(response, FittedResponse):
         return response

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.tags.calibration.board import Board
+from tacdata.tags.calibration.board import CharucoBoard
 from tacdata.tags.calibration.board_view import BoardView, find_board
 
 STILL = 1.0
@@ -21,7 +21,7 @@ ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 class ViewPicker:
     """Takes images one after the other; `views` holds those worth keeping."""
 
-    def __init__(self, board: Board, still: bool = True) -> None:
+    def __init__(self, board: CharucoBoard, still: bool = True) -> None:
         """Keep the board; ``still``: the images follow each other as those of a film do."""
         self.board, self.still = board, still
         self.views: list[BoardView] = []

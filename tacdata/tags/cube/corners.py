@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.tags.camera import Camera
+from tacdata.tags.camera import PinholeCamera
 from tacdata.tags.cube.cube import AXES, Cube
 from tacdata.tags.detection.tag import Tag
 
@@ -24,7 +24,7 @@ LEAST = 1.2
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class PoseCandidate:
     """A pose and the tags that it explains."""
 
     rotation: np.ndarray
@@ -36,13 +36,13 @@ class Candidate:
     reprojection: float
     """Root mean square distance of their corners from where the pose puts them [px]."""
 
-    def moved(self, rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: Camera) -> float:
+    def moved(self, rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: PinholeCamera) -> float:
         """Return the reprojection [px] of the same tags at another pose."""
         errors = [_error(rotation, translation, tag, cube, camera) for tag in self.tags]
         return float(np.sqrt(np.mean(np.square(errors))))
 
 
-def candidates(tags: list[Tag], cube: Cube, camera: Camera) -> list[Candidate]:
+def candidates(tags: list[Tag], cube: Cube, camera: PinholeCamera) -> list[PoseCandidate]:
     """Return the different poses that explain the most tags, best first; none if there are no tags.
 
     Args:
@@ -50,7 +50,7 @@ def candidates(tags: list[Tag], cube: Cube, camera: Camera) -> list[Candidate]:
         cube: The cube.
         camera: The camera.
     """
-    found: list[Candidate] = []
+    found: list[PoseCandidate] = []
     several = len({tag.id for tag in tags}) > 1
     for tag in sorted(tags, key=lambda tag: -tag.size):
         for candidate in _solved(tag, tags, cube, camera):
@@ -58,7 +58,7 @@ def candidates(tags: list[Tag], cube: Cube, camera: Camera) -> list[Candidate]:
             if several and len(candidate.tags) == len(tags) and candidate.reprojection < LEAST:
                 return [candidate]  # several faces allow one pose only
     most = max((len(c.tags) for c in found), default=0)
-    kept: list[Candidate] = []
+    kept: list[PoseCandidate] = []
     for candidate in sorted((c for c in found if len(c.tags) == most), key=lambda c: c.reprojection):
         if all(angle_between(candidate.rotation, other.rotation) > np.radians(2.0) for other in kept):
             kept.append(candidate)
@@ -66,7 +66,7 @@ def candidates(tags: list[Tag], cube: Cube, camera: Camera) -> list[Candidate]:
 
 
 def contradicting(
-    tags: list[Tag], rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: Camera
+    tags: list[Tag], rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: PinholeCamera
 ) -> list[Tag]:
     """Return the tags that lie elsewhere than a pose has them; what is merely read badly, as at a slant, is not meant.
 
@@ -88,7 +88,7 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.arccos(np.clip(((a * b).sum() - 1) / 2, -1.0, 1.0)))
 
 
-def _solved(start: Tag, tags: list[Tag], cube: Cube, camera: Camera) -> Iterator[Candidate]:
+def _solved(start: Tag, tags: list[Tag], cube: Cube, camera: PinholeCamera) -> Iterator[PoseCandidate]:
     """Yield the two poses that one tag gives, each refined on all tags that fit it."""
     import cv2
 
@@ -105,8 +105,8 @@ def _solved(start: Tag, tags: list[Tag], cube: Cube, camera: Camera) -> Iterator
 
 
 def _settle(
-    rotation: np.ndarray, translation: np.ndarray, tags: list[Tag], cube: Cube, camera: Camera
-) -> Candidate | None:
+    rotation: np.ndarray, translation: np.ndarray, tags: list[Tag], cube: Cube, camera: PinholeCamera
+) -> PoseCandidate | None:
     """Refine a pose (rotation vector [rad] and translation [m]) on the tags that fit it; None if none do."""
     import cv2
 
@@ -125,11 +125,11 @@ def _settle(
         return None
     square, place = cv2.Rodrigues(rotation)[0], translation.ravel()
     errors = [_error(square, place, tag, cube, camera) for tag in group]
-    return Candidate(square, place, tuple(group), float(np.sqrt(np.mean(np.square(errors)))))
+    return PoseCandidate(square, place, tuple(group), float(np.sqrt(np.mean(np.square(errors)))))
 
 
 def _fitting(
-    rotation: np.ndarray, translation: np.ndarray, tags: list[Tag], cube: Cube, camera: Camera, limit: float
+    rotation: np.ndarray, translation: np.ndarray, tags: list[Tag], cube: Cube, camera: PinholeCamera, limit: float
 ) -> list[Tag]:
     """Return the tags, one an id, that a pose explains and whose faces it turns to the camera."""
     import cv2
@@ -148,7 +148,7 @@ def _fitting(
     return [tag for _, tag in chosen.values()]
 
 
-def _error(rotation: np.ndarray, translation: np.ndarray, tag: Tag, cube: Cube, camera: Camera) -> float:
+def _error(rotation: np.ndarray, translation: np.ndarray, tag: Tag, cube: Cube, camera: PinholeCamera) -> float:
     """Return the root mean square distance [px] of a tag's corners from where a pose puts them."""
     points = cube.corners(cube.faces[tag.id]) @ rotation.T + translation
     return float(np.sqrt(((camera.project(points) - tag.corners) ** 2).sum(axis=1).mean()))

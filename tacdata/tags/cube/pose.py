@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.tags.camera import Camera
+from tacdata.tags.camera import PinholeCamera
 from tacdata.tags.cube.corners import contradicting
 from tacdata.tags.cube.cube import Cube
-from tacdata.tags.cube.rivals import Before, Rival, best_rival
+from tacdata.tags.cube.rivals import Before, PoseHypothesis, best_rival
 from tacdata.tags.detection.detector import detect_tags, to_grey
 from tacdata.tags.detection.tag import Tag
 
@@ -70,7 +70,7 @@ def detect_cube(
         UsageError: If the image is no image or of another size than the intrinsics.
         FormatError: If intrinsics or cube contradict themselves.
     """
-    grey, camera, known = to_grey(image), Camera.from_document(intrinsics), Cube.from_document(cube)
+    grey, camera, known = to_grey(image), PinholeCamera.from_document(intrinsics), Cube.from_document(cube)
     camera.check(grey)
     near = None if hint is None else surroundings(hint, known, camera)
     for within in (near, None) if near else (None,):
@@ -81,7 +81,7 @@ def detect_cube(
 
 
 def solve_cube(
-    grey: np.ndarray, tags: list[Tag], cube: Cube, camera: Camera, hint: CubePose | None = None
+    grey: np.ndarray, tags: list[Tag], cube: Cube, camera: PinholeCamera, hint: CubePose | None = None
 ) -> CubePose | None:
     """Return the pose of a cube from tags that were read in an image, or None if none of them is the cube's.
 
@@ -107,7 +107,7 @@ def solve_cube(
     return _pose(best, strays, None if other is None else _pose(other, strays, None))
 
 
-def surroundings(pose: CubePose, cube: Cube, camera: Camera) -> tuple[int, int, int, int] | None:
+def surroundings(pose: CubePose, cube: Cube, camera: PinholeCamera) -> tuple[int, int, int, int] | None:
     """Return left, top, right, bottom [px] of where a cube is to be expected soon; None if out of the image."""
     if pose.position[2] <= cube.side / 1000:
         return None
@@ -119,7 +119,7 @@ def surroundings(pose: CubePose, cube: Cube, camera: Camera) -> tuple[int, int, 
     return (int(left), int(top), int(right), int(bottom)) if right > left and bottom > top else None
 
 
-def _pose(rival: Rival, strays: tuple[int, ...], other: CubePose | None) -> CubePose:
+def _pose(rival: PoseHypothesis, strays: tuple[int, ...], other: CubePose | None) -> CubePose:
     from scipy.spatial.transform import Rotation
 
     ids = tuple(sorted(tag.id for tag in rival.tags))

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.tags.camera import Camera
+from tacdata.tags.camera import PinholeCamera
 from tacdata.tags.cube.alignment import ALIKE, STEPS, Alignment, align
-from tacdata.tags.cube.corners import TIGHT, Candidate, angle_between, candidates
+from tacdata.tags.cube.corners import TIGHT, PoseCandidate, angle_between, candidates
 from tacdata.tags.cube.cube import AXES, Cube
 from tacdata.tags.detection.tag import Tag
 
@@ -32,10 +32,10 @@ APART = np.radians(2.0)
 """Angle [rad] from which two poses are different ones."""
 
 
-class Rival:
+class PoseHypothesis:
     """A pose that explains the detected corners, aligned with the image."""
 
-    def __init__(self, candidate: Candidate, grey: np.ndarray, cube: Cube, camera: Camera) -> None:
+    def __init__(self, candidate: PoseCandidate, grey: np.ndarray, cube: Cube, camera: PinholeCamera) -> None:
         """Align a candidate with an image, uint8, shape (height, width)."""
         self.tags = candidate.tags
         self.seen = {cube.faces[tag.id] for tag in self.tags}
@@ -71,8 +71,8 @@ class Before:
 
 
 def best_rival(
-    tags: list[Tag], grey: np.ndarray, cube: Cube, camera: Camera, before: Before | None
-) -> tuple[Rival, Rival | None] | None:
+    tags: list[Tag], grey: np.ndarray, cube: Cube, camera: PinholeCamera, before: Before | None
+) -> tuple[PoseHypothesis, PoseHypothesis | None] | None:
     """Return the pose that the image supports best, and another that it supports about as well, if any.
 
     Args:
@@ -88,14 +88,14 @@ def best_rival(
             return None
         start = None if before is None else _continuing(starts, before)
         if before is not None and start is not None:
-            rival = Rival(start, grey, cube, camera)
+            rival = PoseHypothesis(start, grey, cube, camera)
             if not rival.false and rival.alignment.residual < CLEARLY * before.residual:
                 return rival, None
-        rivals = [Rival(candidate, grey, cube, camera) for candidate in starts]
+        rivals = [PoseHypothesis(candidate, grey, cube, camera) for candidate in starts]
         first = rivals[0]
         turns = [angle_between(first.alignment.rotation, r.alignment.rotation) for r in rivals]
         if len(first.seen) == 1 and max(turns) < APART:
-            rivals = [first, Rival(_mirrored(first, cube), grey, cube, camera)]
+            rivals = [first, PoseHypothesis(_mirrored(first, cube), grey, cube, camera)]
         best, other = _choose(rivals, before)
         if not best.false:
             return best, other
@@ -103,7 +103,7 @@ def best_rival(
     return None
 
 
-def _continuing(starts: list[Candidate], before: Before) -> Candidate | None:
+def _continuing(starts: list[PoseCandidate], before: Before) -> PoseCandidate | None:
     """Return the pose that goes on from the one before, if the other is far from it; None if that is not sure."""
     angles = sorted((angle_between(start.rotation, before.rotation), k) for k, start in enumerate(starts))
     if len(angles) < 2 or angles[0][0] > STRIDE or angles[1][0] < AWAY * angles[0][0] + 2 * STRIDE:
@@ -111,7 +111,7 @@ def _continuing(starts: list[Candidate], before: Before) -> Candidate | None:
     return starts[angles[0][1]]
 
 
-def _mirrored(rival: Rival, cube: Cube) -> Candidate:
+def _mirrored(rival: PoseHypothesis, cube: Cube) -> PoseCandidate:
     """Return the pose whose one face is tilted the other way about the line of sight, at the same place.
 
     Noise lets both poses of a face that is looked at squarely end up in one minimum of its four corners,
@@ -127,7 +127,7 @@ def _mirrored(rival: Rival, cube: Cube) -> Candidate:
     angle = np.arctan2(np.linalg.norm(axis), normal @ towards)
     turned = _turn(axis, max(angle, LEAST_TILT)) @ rotation
     place = centre - turned @ AXES[face][:, 2] * cube.side / 2000
-    return Candidate(turned, place, rival.tags, rival.reprojection)
+    return PoseCandidate(turned, place, rival.tags, rival.reprojection)
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
@@ -137,7 +137,7 @@ def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
     return cv2.Rodrigues(axis * (angle / length))[0] if length > 1e-9 else np.eye(3)
 
 
-def _choose(rivals: list[Rival], before: Before | None) -> tuple[Rival, Rival | None]:
+def _choose(rivals: list[PoseHypothesis], before: Before | None) -> tuple[PoseHypothesis, PoseHypothesis | None]:
     rivals = [r for r in rivals if not r.false] or rivals
     most = max(rival.support for rival in rivals)
     rivals = sorted((r for r in rivals if r.support == most), key=lambda r: r.alignment.residual)
@@ -158,7 +158,7 @@ def _choose(rivals: list[Rival], before: Before | None) -> tuple[Rival, Rival | 
 
 
 def _aligned(
-    start: Alignment, seen: set[str], grey: np.ndarray, cube: Cube, camera: Camera, steps: int = STEPS
+    start: Alignment, seen: set[str], grey: np.ndarray, cube: Cube, camera: PinholeCamera, steps: int = STEPS
 ) -> Alignment:
     """Align with a window of the image that holds the whole cube, in half size or less where it is large."""
     half = cube.side / 2000

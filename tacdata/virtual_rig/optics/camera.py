@@ -15,7 +15,7 @@ BOUNDARY = "image"
 QUALITY = 92
 
 
-class Camera:
+class VirtualCamera:
     """Exposes `rate` times a second of ``clock`` and sends every image some tens of milliseconds later."""
 
     def __init__(

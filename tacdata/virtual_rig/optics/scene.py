@@ -16,7 +16,7 @@ CAMERA_OFFSET = (170.0, -190.0, 140.0)
 
 
 @dataclass(frozen=True)
-class Scene:
+class CubeScene:
     """A fixed camera and a cube that rides on the carriage."""
 
     machine_camera: np.ndarray
@@ -39,7 +39,7 @@ class Scene:
         }
 
 
-def draw_scene(seed: int, over: tuple[float, float, float]) -> Scene:
+def draw_scene(seed: int, over: tuple[float, float, float]) -> CubeScene:
     """Set the camera up, by hand, to look at the cube when the carriage is at ``over`` [mm]."""
     from scipy.spatial.transform import Rotation
 
@@ -55,4 +55,4 @@ def draw_scene(seed: int, over: tuple[float, float, float]) -> Scene:
     riding = np.eye(4)
     riding[:3, :3] = Rotation.from_rotvec(rng.normal(0, 0.5, 3), degrees=True).as_matrix()
     riding[:3, 3] = (np.array([0, 0, CUBE_HEIGHT]) + rng.normal(0, 0.3, 3)) / 1000
-    return Scene(camera, riding)
+    return CubeScene(camera, riding)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tacdata.errors import UsageError
 from tacdata.sensor import Sensor
-from tacdata.virtual_rig.world.world import Surface, Truth, World
+from tacdata.virtual_rig.world.world import IndenterProfile, Truth, World
 
 KINDS = {
     "play": "mm that the depth drive stands still after turning",
@@ -56,7 +56,7 @@ class HiddenWorld(World):
         directory.mkdir(parents=True, exist_ok=True)
         self._path.write_text("time_ns,x,y,depth\n")
 
-    def readings(self, tip: np.ndarray, indenter: Surface | None, yaw: float, time_ns: int) -> np.ndarray:
+    def readings(self, tip: np.ndarray, indenter: IndenterProfile | None, yaw: float, time_ns: int) -> np.ndarray:
         """Return a frame of where the tip truly is, or was."""
         true = np.array([tip[0], tip[1], self._dragged(float(tip[2]))])
         true = self._pushed_back(true, indenter, yaw)
@@ -75,7 +75,7 @@ class HiddenWorld(World):
         self._carriage = z if self._carriage is None else min(max(self._carriage, z - play), z)
         return self._carriage
 
-    def _pushed_back(self, tip: np.ndarray, indenter: Surface | None, yaw: float) -> np.ndarray:
+    def _pushed_back(self, tip: np.ndarray, indenter: IndenterProfile | None, yaw: float) -> np.ndarray:
         """Return the tip where frame and skin balance: secant steps on the push-back."""
         give = self._hidden.get("give", 0.0)
         if give == 0.0:

@@ -108,7 +108,7 @@ def draw(seed: int, sensor: Sensor, nominal: Registration, rough: bool = False) 
     )
 
 
-class Surface(Protocol):
+class IndenterProfile(Protocol):
     """What the skin feels of an indenter (`tacdata.indenters.Indenter` is one)."""
 
     @property
@@ -140,7 +140,7 @@ class World:
         self._wander = np.zeros(len(centers))
         self._time_ns: int | None = None
 
-    def taxel_force(self, tip: np.ndarray, indenter: Surface | None, yaw: float) -> np.ndarray:
+    def taxel_force(self, tip: np.ndarray, indenter: IndenterProfile | None, yaw: float) -> np.ndarray:
         """Return the instantaneous elastic force on each protrusion [N], shape (taxels,).
 
         Args:
@@ -159,7 +159,7 @@ class World:
         pressure = self.truth.stiffness * depression / (1 - depression / self.truth.thickness)
         return np.tensordot(self.share[:, i, j], pressure, axes=2)
 
-    def readings(self, tip: np.ndarray, indenter: Surface | None, yaw: float, time_ns: int) -> np.ndarray:
+    def readings(self, tip: np.ndarray, indenter: IndenterProfile | None, yaw: float, time_ns: int) -> np.ndarray:
         """Return one raw frame [counts], shape (taxels,), of a tip position [mm, machine] at a time [ns]."""
         force = self._relaxed(self.taxel_force(tip, indenter, yaw), time_ns)
         closure = (np.maximum(force, 0.0) / self.truth.protrusion) ** (2 / 3)

@@ -1,0 +1,49 @@
+"""One word, one thing: a public class name stands for one class in the whole code."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+from tacdata import catalogue, registry
+
+ROOT = Path(__file__).resolve().parents[2]
+ROOMS = ("tacdata", "label_farm", "training", "viewers")
+FILES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py") if not path.name.endswith("_pb2.py"))
+BEING_RENAMED = {"Press", "State"}
+"""Names of a press of a plan and of a batch, of a state of a chain and of an equilibrium."""
+
+
+def registry_files():
+    """Return the files of registries: a member is asked for by its file's name, which a person reads in a list."""
+    found = set()
+    for each in catalogue.registries().values():
+        folder = ROOT / each.room.replace(".", "/")
+        found |= {folder / f"{name}.py" for name in registry.names(each.room, each.base)}
+    return found
+
+
+def stand_for_several(files):
+    """Return the public class names that stand in several files, with these files."""
+    found = defaultdict(list)
+    for path in files:
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found[node.name].append(path)
+    return {name: places for name, places in found.items() if len(places) > 1}
+
+
+def test_two_classes_of_one_name_are_found(tmp_path):
+    for name in ("a.py", "b.py"):
+        (tmp_path / name).write_text("class Same: pass\nclass _Own: pass\n")
+    assert list(stand_for_several(sorted(tmp_path.glob("*.py")))) == ["Same"]
+
+
+def test_registries_are_found():
+    assert ROOT / "tacdata/exporters/csv.py" in registry_files()
+    assert ROOT / "tacdata/exporters/exporter.py" not in registry_files()
+
+
+def test_a_public_class_name_stands_for_one_thing():
+    members = registry_files()
+    found = stand_for_several(path for path in FILES if path not in members)
+    assert not {name: places for name, places in found.items() if name not in BEING_RENAMED}
