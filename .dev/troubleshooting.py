@@ -79,7 +79,7 @@ def error_classes(trees) -> set[str]:
     """Return the names of `TacdataError` and of all classes below it."""
     bases = {
         node.name: {ast.unparse(base).rsplit(".", 1)[-1] for base in node.bases}
-        for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
+        for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)
     }  # fmt: skip
     found = {BASE}
     while more := {name for name, above in bases.items() if above & found} - found:
@@ -89,29 +89,48 @@ def error_classes(trees) -> set[str]:
 
 def constructions(tree: ast.Module, errors: set[str]) -> list[tuple[list[ast.expr], dict[str, ast.expr]]]:
     """Return the three parts of every error of a file, each with what names stood for before it."""
-    found: dict[ast.expr, dict[str, ast.expr]] = {}
-    scopes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
-    makers = errors | {scope.name for scope in scopes if PARTS == tuple(a.arg for a in scope.args.args)[-len(PARTS) :]}
-    tuples = any(isinstance(node, ast.Name) and node.id == WORDS for node in ast.walk(tree))
-    for scope in [tree, *scopes]:  # outer ones first: the innermost says last what a name is
-        returns = getattr(scope, "returns", None)
-        triple = tuples or (returns is not None and ast.unparse(returns) == TRIPLE)
-        for node in ast.walk(scope):
-            called = isinstance(node, ast.Call) and ast.unparse(node.func).rsplit(".", 1)[-1] in makers
-            if called or (triple and isinstance(node, ast.Tuple) and len(node.elts) == len(PARTS)):
-                found[node] = {**found.get(node, {}), **named(scope, node.lineno)}
-    return [(parts_of(node), known) for node, known in found.items()]
+    within = {child: node for node in ast.walk(tree) for child in ast.iter_child_nodes(node)}
+    functions = [node for node in within if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    makers = errors | {f.name for f in functions if tuple(a.arg for a in f.args.args)[-len(PARTS) :] == PARTS}
+    tuples = any(isinstance(node, ast.Name) and node.id == WORDS for node in within)
+    given = {scope: assignments(scope) for scope in [tree, *functions]}
+    found = []
+    for node in within:
+        if not isinstance(node, ast.Call | ast.Tuple):
+            continue
+        scopes = outward(node, within)
+        triple = tuples or any(f.returns is not None and ast.unparse(f.returns) == TRIPLE for f in scopes[1:])
+        called = isinstance(node, ast.Call) and name_of(node.func) in makers
+        if called or (triple and isinstance(node, ast.Tuple) and len(node.elts) == len(PARTS)):
+            known = {name: value for scope in scopes for at, name, value in given[scope] if at < node.lineno}
+            found.append((parts_of(node), known))
+    return found
 
 
-def named(scope: ast.AST, line: int) -> dict[str, ast.expr]:
-    """Return what names were last given to before a line of a function, or at the top of a file."""
+def name_of(function: ast.expr) -> str:
+    """Return the last part of a called name."""
+    return getattr(function, "attr", getattr(function, "id", ""))
+
+
+def outward(node: ast.AST, within: dict[ast.AST, ast.AST]) -> list[ast.AST]:
+    """Return the file and the functions that a node stands in, the outermost first."""
+    found = []
+    while node in within:
+        node = within[node]
+        if isinstance(node, ast.Module | ast.FunctionDef | ast.AsyncFunctionDef):
+            found.insert(0, node)
+    return found
+
+
+def assignments(scope: ast.AST) -> list[tuple[int, str, ast.expr]]:
+    """Return what a function, or the top of a file, gives names to, with the line from which on; in their order."""
     top = isinstance(scope, ast.Module)
     nodes = [node for node in (scope.body if top else ast.walk(scope)) if isinstance(node, ast.Assign)]
-    return {
-        target.id: node.value
-        for node in sorted(nodes, key=lambda node: node.lineno) if top or node.lineno < line
+    return [
+        (0 if top else node.lineno, target.id, node.value)
+        for node in sorted(nodes, key=lambda node: node.lineno)
         for target in node.targets if isinstance(target, ast.Name)
-    }  # fmt: skip
+    ]  # fmt: skip
 
 
 def parts_of(node: ast.expr) -> list[ast.expr]:

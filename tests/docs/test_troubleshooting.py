@@ -14,6 +14,7 @@ SCRIPT = ROOT / ".dev" / "troubleshooting.py"
 @pytest.fixture(scope="module")
 def script():
     spec = importlib.util.spec_from_file_location("troubleshooting", SCRIPT)
+    assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
     sys.modules["troubleshooting"] = module
     spec.loader.exec_module(module)
@@ -21,14 +22,18 @@ def script():
     del sys.modules["troubleshooting"]
 
 
-def test_the_page_is_current(script):
-    assert script.PAGE.read_text() == script.page(script.entries()), f"run {SCRIPT.relative_to(ROOT)}"
+@pytest.fixture(scope="module")
+def entries(script):
+    return script.entries()
 
 
-def test_every_entry_says_what_was_given_what_is_allowed_and_what_to_do(script):
-    found = script.entries()
-    assert len(found) > 500
-    for entry in found:
+def test_the_page_is_current(script, entries):
+    assert script.PAGE.read_text() == script.page(entries), f"run {SCRIPT.relative_to(ROOT)}"
+
+
+def test_every_entry_says_what_was_given_what_is_allowed_and_what_to_do(entries):
+    assert len(entries) > 500
+    for entry in entries:
         for part in (entry.given, entry.allowed, entry.remedy):
             assert re.search(r"[A-Za-z]{2}", part), entry
 
