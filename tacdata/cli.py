@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext, redirect_stdout
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from tacdata import registry, stages
-from tacdata.errors import TacdataError
+from tacdata import progress, registry
+from tacdata.commands.command import Result
+from tacdata.errors import Exit, TacdataError
+from tacdata.extras import missing_package
 
 ROOM, BASE = "tacdata.commands", "command"
+QUIET, JSON = "quiet", "as_json"
+OPTIONS = {
+    QUIET: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no hints: only results and errors.")],
+    JSON: Annotated[bool, typer.Option("--json", help="Print the result as JSON; words go to standard error.")],
+}
+"""What the command line adds to verbs: the first to all, the second to those that return a `Result`."""
 
 
 def application() -> typer.Typer:
@@ -22,55 +32,106 @@ def application() -> typer.Typer:
         name="tacdata",
         help="The data engine for soft tactile skins. Verbs stand in the order of the pipeline.",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode="markdown",
+        callback=_before,
     )
-    modules = [registry.load_module(ROOM, BASE, name) for name in registry.names(ROOM, BASE)]
-    for module in sorted(modules, key=lambda m: (m.ORDER, m.__name__)):
-        name = module.__name__.rsplit(".", 1)[-1].replace("_", "-")
+    for module, name in _members(ROOM):
         if hasattr(module, "__path__"):
-            app.add_typer(_group(module), name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)
+            app.add_typer(_group(module, name), name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)
         else:
-            verb = interruptible(module.run)
+            verb = answering(f"tacdata {name}", module.run)
             app.command(name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)(verb)
     return app
 
 
-def _group(room: ModuleType) -> typer.Typer:
+def _group(room: ModuleType, name: str) -> typer.Typer:
     """Return a verb that is a folder: each file in it is a verb below it."""
     group = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown")
-    modules = [registry.load_module(room.__name__, BASE, name) for name in registry.names(room.__name__, BASE)]
-    for module in sorted(modules, key=lambda m: (m.ORDER, m.__name__)):
-        name = module.__name__.rsplit(".", 1)[-1].replace("_", "-")
-        group.command(name=name, help=module.run.__doc__)(interruptible(module.run))
+    for module, below in _members(room.__name__):
+        verb = answering(f"tacdata {name} {below}", module.run)
+        group.command(name=below, help=module.run.__doc__)(verb)
     return group
 
 
-def interruptible(verb: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the verb with an answer to Ctrl-C; Typer would end it without a word."""
+def _members(room: str) -> list[tuple[ModuleType, str]]:
+    """Return a room's verbs and how they are typed, in their order."""
+    modules = [registry.load_module(room, BASE, name) for name in registry.names(room, BASE)]
+    modules.sort(key=lambda module: (module.ORDER, module.__name__))
+    return [(module, module.__name__.rsplit(".", 1)[-1].replace("_", "-")) for module in modules]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from tacdata.provenance import code_version
+
+        release, _, commit = code_version().partition("+g")
+        print(f"tacdata {release}" + (f" (commit {commit})" if commit else ""))
+        raise typer.Exit(Exit.DONE)
+
+
+def _before(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print release and commit.", is_eager=True, callback=_version)
+    ] = False,
+    quiet: OPTIONS[QUIET] = False,  # pyright: ignore[reportInvalidTypeForm]
+) -> None:
+    context.with_resource(progress.silenced(quiet))
+
+
+def answering(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a verb as the command line runs it.
+
+    It gets ``--quiet``, and ``--json`` if it returns a `Result`. Ctrl-C and a missing package are answered in words.
+    """
+    signature = inspect.signature(verb, eval_str=True)
+    added = [QUIET, *([JSON] if signature.return_annotation is Result else [])]
 
     @functools.wraps(verb)
     def run(*arguments: Any, **options: Any) -> Any:
+        quiet, as_json = options.pop(QUIET, False), options.pop(JSON, False)
         try:
-            return verb(*arguments, **options)
+            with progress.silenced(quiet), redirect_stdout(sys.stderr) if as_json else nullcontext():
+                result = verb(*arguments, **options)
         except KeyboardInterrupt:
             print("interrupted: what was finished is kept", file=sys.stderr)
-            raise typer.Exit(130) from None
+            raise typer.Exit(Exit.INTERRUPTED) from None
+        except ModuleNotFoundError as error:
+            raise missing_package(error, name) or error from None
+        if isinstance(result, Result):
+            _end(result, as_json)
+        return result
 
+    extra = [
+        inspect.Parameter(option, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=OPTIONS[option])
+        for option in added
+    ]
+    parameters = [*signature.parameters.values(), *extra]
+    run.__signature__ = signature.replace(parameters=parameters)  # pyright: ignore[reportAttributeAccessIssue]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return run
+
+
+def _end(result: Result, as_json: bool) -> None:
+    """Print a result as JSON if that was asked for, and end as the verb says."""
+    if as_json:
+        print(result.text, flush=True)
+    if isinstance(result.ends, TacdataError):
+        raise result.ends
+    if result.ends is not Exit.DONE:
+        raise typer.Exit(result.ends)
 
 
 def main() -> None:
     """Run the command line; an error meant for a person ends in words and a non-zero exit, never a traceback."""
-    stages.follow()
     try:
         application()(prog_name="tacdata")
     except TacdataError as error:
         print(f"error: {error}", file=sys.stderr)
-        raise SystemExit(error.exit_code) from None
+        raise SystemExit(int(error.exit_code)) from None
     except KeyboardInterrupt:
-        raise SystemExit(130) from None
+        raise SystemExit(int(Exit.INTERRUPTED)) from None
 
 
 if __name__ == "__main__":

@@ -42,11 +42,17 @@ def source_hash(package: str) -> str:
 
 @cache
 def code_version() -> str:
-    """Return the release and, in a checkout, the commit, for example ``0.1.0+g1a2b3c4`` (``.dirty`` if edited)."""
+    """Return the release and its commit, for example ``0.1.0+g1a2b3c4`` (``.dirty`` if edited).
+
+    A clone is asked for the commit. A wheel carries what was said when it was built (.dev/commit_hook.py).
+    """
     try:
         release = version("tacdata")
     except PackageNotFoundError:
         release = "0+unknown"
+    carried = Path(__file__).resolve().with_name("commit.txt")
+    if carried.is_file():
+        return f"{release}+g{carried.read_text().strip()}"
     root = Path(__file__).resolve().parent.parent
     if not (root / ".git").exists():
         return release

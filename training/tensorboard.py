@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tacdata.errors import UsageError
+from tacdata.extras import missing_package
 from training.train import Progress
 
 FOLDER = "tensorboard"
@@ -18,16 +18,13 @@ def event_log(run: Path) -> Callable[[Progress], None]:
     The file is made with the first epoch, so that a run which is refused leaves nothing.
 
     Raises:
-        UsageError: If tensorboard is not installed.
+        PackageError: If tensorboard is not installed.
     """
     try:
         from torch.utils.tensorboard import SummaryWriter
-    except ModuleNotFoundError:
-        raise UsageError(
-            "--tensorboard without tensorboard",
-            "an installation with it",
-            "pip install tensorboard, or leave the option out: metrics.jsonl holds the same figures",
-        ) from None
+    except ModuleNotFoundError as error:
+        instead = "leave the option out: metrics.jsonl holds the same figures"
+        raise missing_package(error, "--tensorboard", instead) or error from None
     writers: list[Any] = []
 
     def write(progress: Progress) -> None:

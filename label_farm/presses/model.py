@@ -15,6 +15,7 @@ import tacdata.errors
 from label_farm import environment
 from label_farm.presses.job import Job
 from tacdata.errors import SolveError, TacdataError, UsageError
+from tacdata.extras import missing_package
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 
@@ -52,12 +53,15 @@ def build(factory: str, sensor: Sensor) -> Model:
 
     Raises:
         UsageError: If ``factory`` names nothing ("package.module:name").
+        PackageError: If it needs a package of an extra that is not installed.
         SolveError: If the sensor cannot be modelled.
     """
     module, _, name = factory.partition(":")
     try:
         return getattr(importlib.import_module(module), name)(sensor)
     except (ImportError, AttributeError) as error:
+        if isinstance(error, ImportError) and (lacking := missing_package(error, "the skin model")):
+            raise lacking from None
         raise UsageError(f"no model {factory!r}: {error}", "package.module:name", "check the name") from error
 
 

@@ -49,17 +49,11 @@ def up(asked: UpSettings) -> None:
     Raises:
         UsageError: If the address is taken or not allowed, the token too short, or the store in use.
     """
-    try:
-        import uvicorn
+    import uvicorn
 
-        from label_farm.service.app import application
-        from label_farm.service.foreman import Foreman
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"the service needs {error.name}, not installed",
-            "tacdata with its extra",
-            "pip install 'tacdata[farm]'",
-        ) from None
+    from label_farm.service.app import application
+    from label_farm.service.foreman import Foreman
+
     _check_token(asked)
     if not asked.root.is_dir():
         raise UsageError(f"no folder {asked.root}", "the folder that the sessions lie in", "name it with --root")

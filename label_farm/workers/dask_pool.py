@@ -321,14 +321,11 @@ def dask_engine(address: str) -> EngineMaker:
     """Return an engine for a scheduler's address, or "here" for a cluster of this machine's processes.
 
     Raises:
-        UsageError: If Dask is not installed, or the address is none.
+        UsageError: If the address is none.
+        ModuleNotFoundError: If Dask is not installed: at once, not when all is planned.
     """
-    try:
-        import distributed  # noqa: F401
-    except ModuleNotFoundError:
-        raise UsageError(
-            "Dask's package distributed is not installed", "tacdata with its extra", "pip install 'tacdata[cluster]'"
-        ) from None
+    import distributed  # noqa: F401
+
     if address != "here" and not address.startswith(("tcp://", "tls://")):
         raise UsageError(f"the scheduler {address!r}", "tcp://HOST:PORT, tls://HOST:PORT or here", "correct --dask")
 

@@ -8,8 +8,53 @@ A module in this folder named ``my_verb.py`` becomes ``tacdata my-verb``. It hol
 - ``run(...)``: a Typer command. Its docstring's first line is what ``--help`` shows. Heavy imports stay inside it.
   Bad input raises a `tacdata.errors.TacdataError`; the command line prints it and exits with its code.
 
+A verb that finds something out prints it and returns it as a `Result`. The command line then gives it ``--json``. Every
+verb has ``--quiet``: it prints results with ``print``, progress and the next command with `tacdata.progress.say`.
+
 A verb joins rooms and prints; if it grows logic, a room is missing a function.
 """
 
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass, is_dataclass
+from pathlib import PurePath
+from typing import Any
+
+from tacdata.errors import Exit, TacdataError
+
 PIPELINE = "The pipeline, in order"
 TOOLS = "Around it"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a verb found, for ``--json``, and how it ends."""
+
+    document: Any
+    """Dictionaries, lists, numbers, texts, paths, arrays and dataclasses."""
+    ends: Exit | TacdataError = Exit.DONE
+    """The exit code, or the error that is printed and gives it."""
+
+    @property
+    def text(self) -> str:
+        """The document as JSON."""
+        return json.dumps(plain(self.document), indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def plain(value: Any) -> Any:
+    """Return a value in JSON's types: arrays as lists, what is not finite as null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(item) for item in value]
+    if isinstance(value, PurePath):
+        return str(value)
+    if lists := getattr(value, "tolist", None):  # a numpy array or number
+        return plain(lists())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -6,7 +6,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import FormatError
+from tacdata.extras import missing_package
 
 if TYPE_CHECKING:
     import trimesh
@@ -32,20 +33,16 @@ def read_step(path: Path, what: str) -> trimesh.Trimesh:
         what: What it is to be, for errors.
 
     Raises:
-        UsageError: If cascadio is not installed.
+        PackageError: If cascadio is not installed.
         FormatError: If the file cannot be read.
     """
     import trimesh
 
     try:
         import cascadio
-    except ImportError:
-        raise UsageError(
-            f"{what} surface {path.name}: reading STEP needs the package cascadio, which is not installed",
-            "cascadio, or an STL file",
-            "pip install cascadio, or export the solid as STL from the CAD program (in mm; chord tolerance "
-            f"{CHORD:g} mm or less)",
-        ) from None
+    except ModuleNotFoundError as error:
+        instead = f"export the solid as STL from the CAD program (in mm; chord tolerance {CHORD:g} mm or less)"
+        raise missing_package(error, f"{what} surface {path.name}: reading STEP", instead) or error from None
     with tempfile.TemporaryDirectory() as scratch:
         converted = Path(scratch) / "solid.glb"
         cascadio.step_to_glb(str(path), str(converted), tol_linear=CHORD, tol_angular=TURN)

@@ -3,7 +3,7 @@
 import pytest
 import typer
 
-from tacdata.cli import interruptible
+from tacdata.cli import answering
 
 
 def test_ctrl_c_is_answered(capsys):
@@ -11,7 +11,7 @@ def test_ctrl_c_is_answered(capsys):
         raise KeyboardInterrupt
 
     with pytest.raises(typer.Exit) as ended:
-        interruptible(verb)()
+        answering("tacdata verb", verb)()
     assert ended.value.exit_code == 130
     assert "what was finished is kept" in capsys.readouterr().err
 
@@ -23,6 +23,6 @@ def test_a_verb_keeps_its_options_and_its_answer():
         """Say a number."""
         return number
 
-    app.command()(interruptible(verb))
-    assert interruptible(verb)(5) == 5
-    assert interruptible(verb).__doc__ == "Say a number."
+    app.command()(answering("tacdata verb", verb))
+    assert answering("tacdata verb", verb)(5) == 5
+    assert answering("tacdata verb", verb).__doc__ == "Say a number."

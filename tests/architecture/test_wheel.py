@@ -41,6 +41,14 @@ def test_the_wheel_carries_nothing_else(contents):
     assert {n.split("/")[0] for n in contents if ".dist-info/" not in n} == set(PACKAGES)
 
 
+def test_the_wheel_says_its_commit(contents):
+    """Where it is installed there is no clone to ask, and every label names the code that made it."""
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.strip()
+    assert contents["tacdata/commit.txt"].decode().startswith(commit)
+
+
 def test_the_wheel_gives_the_command(contents):
     (entry_points,) = (text.decode() for n, text in contents.items() if n.endswith("entry_points.txt"))
     assert "tacdata = tacdata.cli:main" in entry_points

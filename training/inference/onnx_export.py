@@ -100,13 +100,9 @@ def random_windows(trained: Checkpoint, count: int = 64, seed: int = 0) -> np.nd
 
 
 def _packages() -> tuple[Any, Any]:
-    try:
-        import onnx
-        import onnxruntime
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"the package {error.name} is not installed", "onnx and onnxruntime", "pip install onnx onnxruntime"
-        ) from None
+    import onnx
+    import onnxruntime
+
     return onnx, onnxruntime
 
 

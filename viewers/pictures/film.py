@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tacdata.errors import UsageError
+from tacdata.extras import missing_package
 from viewers.backend import Backend
 from viewers.output_file import FILMS, new_file, written_beside
 from viewers.pictures import panels as panels
@@ -122,7 +123,7 @@ def write_film(path: Path, frames: Iterator[np.ndarray]) -> None:
     """Write frames, uint8, shape (height, width, 3) each, at the rate of the file's kind; whole or not at all.
 
     Raises:
-        UsageError: If the package that writes such films is missing.
+        PackageError: If the package that writes such films is missing.
     """
     with written_beside(path) as temporary:
         write = _write_gif if path.suffix == ".gif" else _write_mp4
@@ -143,9 +144,8 @@ def _write_gif(path: Path, frames: Iterator[np.ndarray], rate: float) -> None:
 def _write_mp4(path: Path, frames: Iterator[np.ndarray], rate: float) -> None:
     try:
         import av
-    except ImportError:
-        given = "no package av, which writes MP4 films"
-        raise UsageError(given, ".gif without it", "pip install av, or name a file that ends in .gif") from None
+    except ModuleNotFoundError as error:
+        raise missing_package(error, "an MP4 film", "name a file that ends in .gif") or error from None
 
     with av.open(str(path), "w") as film:
         stream: Any = None

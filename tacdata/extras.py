@@ -1,0 +1,70 @@
+"""Which extra of the install brings a package that is missing, read from tacdata's own metadata."""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import PackageNotFoundError, requires
+from types import TracebackType
+
+from tacdata.errors import PackageError
+
+IMPORTED_AS = {"rerun": "rerun-sdk", "warp": "warp-lang"}
+"""What is imported by another name than it is installed by."""
+ALL = "all"
+"""The extra that brings everything: never the least that is needed."""
+ROOMS = {"training": "learn"}
+"""Who asks decides, where two extras bring the same package: torch solves for `fem` and trains for `learn`."""
+
+
+def missing_package(error: ImportError, asked: str, instead: str = "") -> PackageError | None:
+    """Return what to tell a person of a package that is not installed; None if no extra brings it.
+
+    Args:
+        error: What the import raised.
+        asked: Who needs the package, for example ``"tacdata label"``.
+        instead: What else would do, beside installing it.
+    """
+    if not isinstance(error, ModuleNotFoundError) or not error.name:
+        return None
+    module = error.name.split(".")[0]
+    package = IMPORTED_AS.get(module, module)
+    extras = extras_of(package)
+    if not extras:
+        return None
+    extra = next((ROOMS[room] for room in _askers(error.__traceback__) if ROOMS.get(room) in extras), extras[0])
+    name = package if package == module else f"{module.capitalize()} ({package})"
+    line = f"pip install 'tacdata[{extra}]' (from a clone: pip install '.[{extra}]')"
+    return PackageError(
+        f"{asked} needs {name}, which is not installed",
+        f"an install with the extra {extra}",
+        f"{line}, or {instead}" if instead else line,
+    )
+
+
+def extras_of(package: str) -> tuple[str, ...]:
+    """Return the extras that bring a package, sorted, without the one that brings everything."""
+    try:
+        lines = requires("tacdata") or ()
+    except PackageNotFoundError:
+        return ()
+    found = set()
+    for line in lines:
+        name = re.match(r"[A-Za-z0-9._-]+", line)
+        extra = re.search(r"extra == ['\"]([\w-]+)['\"]", line)
+        if name and extra and _same(name[0], package):
+            found.add(extra[1])
+    return tuple(sorted(found - {ALL}))
+
+
+def _same(one: str, other: str) -> bool:
+    one, other = (re.sub(r"[-_.]+", "-", name).lower() for name in (one, other))
+    return one == other
+
+
+def _askers(trace: TracebackType | None) -> list[str]:
+    """Return the top-level packages that an error passed through, the innermost first."""
+    found = []
+    while trace is not None:
+        found.insert(0, trace.tb_frame.f_globals.get("__name__", "").split(".")[0])
+        trace = trace.tb_next
+    return found

@@ -1,0 +1,49 @@
+"""What a person sees while a verb works, and what it suggests next: all that ``--quiet`` leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, ProgressColumn
+
+_quiet = False
+
+
+@contextmanager
+def silenced(quiet: bool) -> Iterator[None]:
+    """Leave progress and hints out while the block runs, if ``quiet``."""
+    global _quiet
+    before, _quiet = _quiet, _quiet or quiet
+    try:
+        yield
+    finally:
+        _quiet = before
+
+
+def is_quiet() -> bool:
+    """Return whether progress and hints are left out."""
+    return _quiet
+
+
+def say(words: str) -> None:
+    """Print what happens meanwhile, or what to do next."""
+    if not _quiet:
+        print(words, flush=True)
+
+
+def console() -> Console:
+    """Return where spinners and words about the work go: standard error."""
+    from rich.console import Console
+
+    return Console(stderr=True, quiet=_quiet)
+
+
+def bars(*columns: str | ProgressColumn, **options: Any) -> Progress:
+    """Return rich's progress bars, with its arguments."""
+    from rich.progress import Progress
+
+    return Progress(*columns, disable=_quiet, **options)
