@@ -1,4 +1,4 @@
-"""Recording: devices in, one MCAP file per episode out, and back again."""
+"""Records presses: one MCAP file per episode, and back to arrays."""
 
 from tacdata.recording.episode import PHASES, Episode
 from tacdata.recording.files.reader import read_episode

@@ -1,4 +1,4 @@
-"""An episode as arrays: what one recording says, on the host's clock, in the sensor's frame."""
+"""One recording as arrays, on the host's clock and in the sensor's frame."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tacdata.sensor import Sensor
 
 @dataclass(frozen=True)
 class TaxelStream:
-    """The capacitive channels, un-tared."""
+    """Readings of the taxels, not tared."""
 
     arrival_ns: np.ndarray
     """Host time of receipt [ns], shape (n,), int64."""
@@ -59,7 +59,9 @@ class TagStream:
     faces: np.ndarray
     """Faces seen [count], shape (p,), int64."""
     covariance: np.ndarray | None = None
-    """Of a small turn in the camera frame [rad] and the position [m], shape (p, 6, 6); NaN where it is not known."""
+    """Covariance of a small rotation in the camera frame [rad] and the position [m], shape (p, 6, 6); NaN where
+    unknown.
+    """
     ambiguous: np.ndarray | None = None
     """Whether a second pose explains the image about as well, shape (p,), bool."""
     ids: tuple[tuple[int, ...], ...] = ()
@@ -101,7 +103,7 @@ PHASES = ("rest", "approach", "press", "hold", "release")
 
 @dataclass(frozen=True)
 class Episode:
-    """One recorded press."""
+    """One recorded press: taxel readings, tip path, tags and everything that is attached to them."""
 
     path: Path
     """The MCAP file."""
@@ -110,7 +112,7 @@ class Episode:
     sensor: Sensor
     """The sensor description attached to the recording."""
     rig: dict[str, Any]
-    """The rig file's document attached to the recording."""
+    """The rig file's document, as attached to the recording."""
     taxels: TaxelStream
     cnc: CncStream
     tags: tuple[TagStream, ...]
@@ -124,7 +126,7 @@ class Episode:
     complete: bool
     """False if the recording was interrupted or salvaged."""
     notes: tuple[str, ...]
-    """What a person should know of it, in words."""
+    """Remarks for a person, as sentences."""
     measured: tuple[MeasuredStream, ...] = ()
     """Further quantities, each with times of its own."""
     fingers: tuple[TagStream, ...] = ()
@@ -136,7 +138,7 @@ class Episode:
         return self.press.index
 
     def tip_at(self, time_ns: np.ndarray) -> np.ndarray:
-        """Return the nominal x, y, depth [mm], shape (n, 3), at times [ns], shape (n,); held constant outside."""
+        """Return the nominal x, y, depth [mm], shape (n, 3), at times [ns], shape (n,); constant beyond both ends."""
         return np.stack([np.interp(time_ns, self.tip_ns, self.tip[:, axis]) for axis in range(3)], axis=-1)
 
     def phase_at(self, time_ns: np.ndarray) -> np.ndarray:

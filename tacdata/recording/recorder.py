@@ -1,4 +1,4 @@
-"""Drives a rig through a plan and records every press; whatever goes wrong, the motion stops first."""
+"""Drives a rig through a plan and records every press; on any fault the motion stops first."""
 
 from __future__ import annotations
 
@@ -32,13 +32,15 @@ from tacdata.rig import Rig
 from tacdata.sensor import Sensor
 
 FIRST_FRAME = 5.0
-"""How long the streams may take to begin [s of real time]."""
+"""Time allowed for the streams to begin [s of real time]."""
 FIRST_SEARCH = 20.0
-"""How long the motion waits for the tag detector to load [s of real time]; then it goes on without."""
+"""Time that the motion waits for the tag detector to load [s of real time]; then it starts without."""
 
 
 class Recorder:
     """One session of recording.
+
+    Example: ``Recorder(rig, sensor, plan, Path("session")).run(confirm=lambda summary: True)``
 
     Example:
         ``Recorder(rig, sensor, plan, Path("session")).run(confirm=lambda summary: True)``
@@ -65,17 +67,17 @@ class Recorder:
         Args:
             rig: The rig; its clock is the recording's.
             sensor: The skin that is pressed.
-            plan: What to press. Without a plan there is no motion.
+            plan: What to press. There is no motion without a plan.
             out: Session folder to create, or to continue with ``resume``.
             resume: Continue with the next press that has no finished recording.
             devices: Drivers; by default those that the rig file names.
-            mount: Called when another indenter, or another turn of it, is wanted; returns once it sits.
-            detect: Searches an image for its cube (`detection_process`); without it images are only stored.
+            mount: Called when another indenter, or another yaw of it, is needed; returns when it is mounted.
+            detect: Searches an image for its cube (`detection_process`); if None, images are only stored.
             progress: Called with (presses done, presses wanted, real seconds left) after each press.
-            sync_tap: Begin with a few touches that measure the streams' constant delays.
-            say: Is told in words what a person should know meanwhile.
-            watch: Is shown some of what arrives (`live_feed`); must return at once.
-            interruption: Keeps Ctrl-C while the guide moves; without it, it is raised wherever it finds the thread.
+            sync_tap: Begin with touches that measure each stream's constant latency.
+            say: Called with messages for a person.
+            watch: Called with a sample of the data (`live_feed`); must return at once.
+            interruption: Holds Ctrl-C back while the guide moves; without it, Python raises it anywhere.
         """
         self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(out), resume
         self.devices = devices or RigDevices.of(rig)
@@ -89,7 +91,7 @@ class Recorder:
         self._latencies: dict[str, StreamLatency] = {}
 
     def run(self, confirm: Callable[[Preflight], bool]) -> Session:
-        """Check, ask, then record every press that is wanted.
+        """Check, ask for confirmation, then record every remaining press.
 
         Args:
             confirm: Is shown the preflight summary before the first move; False ends the session without one.
@@ -124,7 +126,7 @@ class Recorder:
                     with self._interruption.kept():
                         self._record_all(session, streams, limits, summary, wanted)
                 except BaseException:
-                    with suppress(TacdataError):  # the fault itself is what the person must hear of
+                    with suppress(TacdataError):  # the fault itself must be reported first
                         refresh(session)
                     raise
             session = refresh(session)
@@ -154,7 +156,7 @@ class Recorder:
         position = self._rise(streams)
         if self._tap is not None:
             session, position = self._touch(session, self._tap, position, streams, limits)
-        left = summary.seconds[-len(wanted) :]  # what comes before belongs to the sync tap
+        left = summary.seconds[-len(wanted) :]  # everything before this belongs to the sync tap
         for done, number in enumerate(wanted, start=1):
             press = self.plan.presses[number]
             position = self._change_indenter(press, position, streams)
@@ -183,7 +185,7 @@ class Recorder:
             time.sleep(WATCH)
 
     def _rise(self, streams: RigStreams) -> Position:
-        """Go straight up to the clearance from wherever the guide stands; return where that is [mm]."""
+        """Go straight up to the clearance height; return the position there [mm]."""
         here = streams.position or (np.nan, np.nan, np.nan)
         above = (here[0], here[1], max(here[2], self._height))
         if not self.rig.envelope.contains(above):
@@ -202,7 +204,7 @@ class Recorder:
         return here
 
     def _change_indenter(self, press: Press, position: Position, streams: RigStreams) -> Position:
-        """Have the press's indenter mounted, high enough for the longest; return where the guide stands [mm]."""
+        """Have the press's indenter mounted, at a height that clears the longest; return the position [mm]."""
         wanted = press.mounting
         if wanted != self._mounted and self._mount:
             if position[2] < self._height:
@@ -216,7 +218,7 @@ class Recorder:
     def _touch(
         self, session: Session, tap: Press, position: Position, streams: RigStreams, limits: AxisLimits
     ) -> tuple[Session, Position]:
-        """Carry out the sync tap and take the delays that it shows; return the session and where the guide stands."""
+        """Carry out the sync tap and use the latencies that it measures; return the session and the position [mm]."""
         position = self._change_indenter(tap, position, streams)
         before, self._latencies = self._latencies, {}
         streams.set_latencies({})
@@ -240,7 +242,7 @@ class Recorder:
         path: Path | None = None,
         course: tuple[Step, ...] = (),
     ) -> Position:
-        """Record one press from ``position`` [mm], or another course; return where the guide stands then."""
+        """Record one press from ``position`` [mm], or another course of steps; return the position at its end."""
         path = path or file_names.episode(self.out, press.index)
         course = course or steps(press, self.plan.motion, self.rig.registration_for(press.indenter_name))
         cameras, fingers = tuple(self.devices.cameras), tuple((self.rig.fingers or {}).get("fingers", ()))
@@ -254,7 +256,7 @@ class Recorder:
                 lifted = self._motion.lift(self._height, self.plan.motion.approach_speed)
                 writer.note(f"broken off: {reason}; {lifted}", "error")
             finally:
-                with suppress(DeviceError):  # the fault itself is what the person must hear of
+                with suppress(DeviceError):  # the fault itself must be reported first
                     self._close(writer, streams, reason)
             raise
         self._close(writer, streams)

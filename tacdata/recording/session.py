@@ -20,14 +20,14 @@ FILE = "session.json"
 
 @dataclass(frozen=True)
 class Session:
-    """The folder as it stands."""
+    """A session folder: its recordings and its document."""
 
     folder: Path
-    """Where it lies."""
+    """The folder."""
     episodes: tuple[Path, ...]
     """Finished recordings, in the order of the plan."""
     unfinished: tuple[Path, ...]
-    """Recordings that were broken off; readable, but never a label."""
+    """Recordings that were interrupted; readable, but never labelled."""
     plan: Plan
     sensor: Sensor
     document: dict[str, Any]
@@ -40,7 +40,7 @@ class Session:
 
     @property
     def remaining(self) -> tuple[int, ...]:
-        """Numbers of the presses still to be recorded, in order."""
+        """Numbers of the presses that are not recorded yet, in order."""
         done = self.done
         return tuple(press.index for press in self.plan.presses if press.index not in done)
 
@@ -49,7 +49,7 @@ def read_session(folder: Path) -> Session:
     """Read a session folder.
 
     Raises:
-        UsageError: If it is no session.
+        UsageError: If the folder is no session.
         FormatError: If its document is damaged or names recordings that are missing.
     """
     folder = Path(folder)
@@ -86,7 +86,7 @@ def create_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
     """Create the folder with its document.
 
     Raises:
-        UsageError: If it exists.
+        UsageError: If the folder exists.
         DeviceError: If the disk refuses it.
     """
     if folder.exists():
@@ -118,7 +118,7 @@ def create_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
 
 
 def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]) -> Session:
-    """Take up a session again; what a crash left half written is put aside under a name of its own.
+    """Continue a session; a file that a crash left half written is renamed and kept.
 
     Raises:
         UsageError: If it was made with another plan or sensor, or the skin lies elsewhere on the rig.
@@ -144,8 +144,8 @@ def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
 
 
 def refresh(session: Session) -> Session:
-    """Bring the document up to the folder's finished recordings and return the session as it stands."""
-    # What stands on the disk counts: a sync tap may have been added since this session was read.
+    """Update the document to the finished recordings of the folder; return the session."""
+    # The disk decides: a sync tap may have been added since this session was read.
     document = read_session(session.folder).document
     known = {entry["number"]: entry for entry in document["episodes"]}
     episodes = [

@@ -1,1 +1,1 @@
-"""Whether a recording or a session is fit to be labelled and learned from."""
+"""Checks whether a recording or a session is fit to be labelled and learned from."""

@@ -1,4 +1,4 @@
-"""The figures of one camera in one recording by which it is judged."""
+"""Figures of one camera in one recording: rate, gaps, lost images, tags seen."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def missed(device_ns: np.ndarray) -> int | None:
 
 
 def _ambiguous(tags: TagStream | None) -> float | None:
-    """Return the share of the poses that a second one explains as well."""
+    """Return the share of poses that a second pose explains as well."""
     if tags is None or tags.ambiguous is None or not (tags.faces > 0).any():
         return None
     return _rounded(np.mean(tags.ambiguous[tags.faces > 0]))
@@ -72,7 +72,7 @@ def _longest_gap(arrival_ns: np.ndarray, within: tuple[int, int]) -> float | Non
 
 
 def _longest_still(arrival_ns: np.ndarray, digest: np.ndarray) -> float:
-    """Return the longest time over which the same image came again and again [ms]."""
+    """Return the longest time over which the same image was repeated [ms]."""
     if len(digest) < 2:
         return 0.0
     edges = np.flatnonzero(np.concatenate([[True], digest[1:] != digest[:-1], [True]]))

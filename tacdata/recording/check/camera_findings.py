@@ -1,4 +1,4 @@
-"""What is worth a word about a recording's cameras."""
+"""Warnings about the cameras of a recording."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from typing import Any
 from tacdata.recording.check.clocks import clock_doubts
 
 IMAGE_GAP_MS = 1000.0
-"""Time without an image, or with the same one, that is worth a word [ms of real time]; at least ten periods."""
+"""Warning threshold: time without an image, or with a repeated one [ms of real time]; at least ten periods."""
 SEEN_SHARE = 0.5
-"""Share of images with a face in view under which it is worth a word [1]."""
+"""Warning threshold: smaller share of images with a face in view [1]."""
 MISSED_SHARE = 0.05
-"""Share of images that a camera's own times miss from which it is worth a word [1]."""
+"""Warning threshold: share of images lost by the camera's own times [1]."""
 SLOW_SHARE = 0.75
-"""Share of the nominal rate under which a camera is worth a word [1]; on a fast clock, whose cameras
-are drawn by a host that may be too slow for it, so many times less."""
+"""Warning threshold: smaller share of the nominal rate [1]. On a fast clock it is divided by the clock's rate, since
+the host renders the images and may be too slow.
+"""
 
 
 def camera_doubts(entries: dict[str, Any], values: dict[str, Any], rate_of_clock: float) -> list[tuple[str, str]]:
-    """Return (stream, words) of what is doubtful about the cameras.
+    """Return the warnings about the cameras as (stream, text).
 
     Args:
         entries: The rig file's ``cameras``.
@@ -55,7 +56,7 @@ def _view(what: str, values: dict[str, Any], images: int) -> list[str]:
 
 
 def _losses(values: dict[str, Any], rate_of_clock: float) -> list[str]:
-    """Return in words which images are missing."""
+    """Describe the images that are missing."""
     found = []
     if values["lost"]:
         found.append(f"{values['lost']} images lost: the host did not fetch them in time")
@@ -70,7 +71,7 @@ def _losses(values: dict[str, Any], rate_of_clock: float) -> list[str]:
 
 
 def _still(values: dict, rate_of_clock: float) -> list[str]:
-    """Return in words whether a camera stopped sending, or sent the same image again and again."""
+    """Describe a camera that stopped sending, or that repeated the same image."""
     period = 1000 / (values["nominal_rate"] or values["rate"] or 1.0)
     limit = max(IMAGE_GAP_MS * rate_of_clock, 10 * period)
     found = []

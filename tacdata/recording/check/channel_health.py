@@ -1,4 +1,4 @@
-"""What the readings of one recording say of each channel: stuck, at a limit, undefined, tied to another, jumping."""
+"""Health of each channel in one recording: stuck, saturated, undefined, coupled to another, jumping."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from tacdata.recording.check.idle import idle_rows
 from tacdata.recording.episode import PHASES, Episode
 
 RUN = 12
-"""Identical readings in a row that a live, noisy channel does not give [frames]."""
+"""Identical readings in a row that a live, noisy channel does not produce [frames]."""
 LIVE = 0.3
-"""Noise from which the channels of a board count as live [counts]."""
+"""Noise above which the channels of a board count as live [counts]."""
 EDGE = 2
-"""Frames at both ends of a still stretch that are not looked at: its bounds are estimates [frames]."""
+"""Frames ignored at both ends of a still stretch, because its bounds are estimates [frames]."""
 JUMP = 12.0
-"""Change between neighbouring frames of a still stretch that noise does not give [times the noise]."""
+"""Minimum jump: change between neighbouring frames of a still stretch [times the noise]."""
 JUMP_SHARE = 0.05
-"""... and no relaxation either [of the channel's answer to the press]."""
+"""Minimum jump as a share of the channel's answer to the press [1]; relaxation stays below it."""
 LASTS = 3
-"""Frames before and after a jump over which it must last: a spike is none [frames]."""
+"""Frames before and after over which a jump must last; a spike is no jump."""
 
 
 @dataclass(frozen=True)
@@ -36,17 +36,17 @@ class Jump:
 
 
 def in_phase(episode: Episode, name: str) -> np.ndarray:
-    """Return the readings of a phase [counts], shape (n, taxels); those of rest also where no phase is marked."""
+    """Return the readings of a phase [counts], shape (n, taxels); for rest also where no phase is marked."""
     if name == "rest":
         return episode.taxels.counts[idle_rows(episode)]
     return episode.taxels.counts[episode.phase_at(episode.taxels.sample_ns) == PHASES.index(name)]
 
 
 def idle_noise(episode: Episode) -> np.ndarray:
-    """Return each channel's noise without contact [counts], shape (taxels,); NaN with under 5 frames of rest.
+    """Return each channel's noise without contact [counts], shape (taxels,); NaN with fewer than 5 frames of rest.
 
-    The standard deviation of neighbouring differences over sqrt(2): slow drift and recovery do not enter, and a
-    single jump does not either, as the middle half of the differences decides (interquartile range / 1.349).
+    The standard deviation of neighbouring differences over sqrt(2), so that slow drift does not enter. It is taken from
+    the interquartile range / 1.349, so that a single jump does not enter either.
     """
     rest = in_phase(episode, "rest")
     if len(rest) < 5:
@@ -54,17 +54,17 @@ def idle_noise(episode: Episode) -> np.ndarray:
     changes = np.diff(rest, axis=0)
     spread, quartiles = changes.std(axis=0), np.percentile(changes, [25, 75], axis=0)
     middle = (quartiles[1] - quartiles[0]) / 1.349
-    # Quantised readings have quartiles of whole counts; the plain deviation is right for them.
+    # Quantised readings have quartiles of whole counts; the plain standard deviation is right for them.
     return np.where(spread > 3 * np.maximum(middle, 1.0), middle, spread) / np.sqrt(2)
 
 
 def undefined_channels(counts: np.ndarray) -> list[int]:
-    """Return the channels with readings that are no numbers; ``counts`` has shape (n, taxels)."""
+    """Return the channels with readings that are not finite; ``counts`` has shape (n, taxels)."""
     return np.flatnonzero(~np.isfinite(counts).all(axis=0)).tolist()
 
 
 def tied_channels(counts: np.ndarray) -> list[list[int]]:
-    """Return the pairs of live channels whose readings are the same throughout."""
+    """Return the pairs of live channels whose readings are identical throughout."""
     pairs, count = [], counts.shape[1]
     if len(counts) < RUN:
         return pairs
@@ -78,11 +78,11 @@ def tied_channels(counts: np.ndarray) -> list[list[int]]:
 
 
 def frozen_channels(counts: np.ndarray, noise: np.ndarray, limits: tuple[float, float]) -> tuple[list[int], list[int]]:
-    """Return the channels that stopped changing, and those that ran into a limit, among otherwise noisy ones.
+    """Return the channels that are stuck, and those that are saturated, among otherwise noisy ones.
 
-    A run of identical readings that a live channel does not give is a limit if it is the channel's extreme
-    and the channel moves elsewhere, and stuck otherwise. A board whose channels are all quiet (under `LIVE`
-    counts of noise) proves nothing either way. A reading that the wire cannot exceed is a limit in any case.
+    A run of identical readings that a live channel does not produce is saturation if it is the channel's extreme and
+    the channel moves elsewhere. Otherwise the channel is stuck. A board whose channels are all quiet (under `LIVE`
+    counts of noise) proves nothing. A reading that the wire cannot exceed always counts as saturated.
 
     Args:
         counts: Readings [counts], shape (n, taxels).

@@ -1,8 +1,8 @@
-"""Whether the channels are where the sensor file says, and as sensitive as before: presses tell.
+"""Tests whether the channels sit where the sensor file says, and whether their gain steps.
 
-Every press stirs the taxels around its site. How much falls off with distance alike in all directions, so the
-answers of a session fit ``gain of channel * amplitude of press * exp(-distance^2 / 2 width^2)``. A channel that is
-wired to another place fits there better than at its own; one whose gain steps leaves the fit from some press on.
+Every press excites the taxels around its site, less with distance and alike in all directions. So the answers of a
+session fit ``gain of channel * amplitude of press * exp(-distance^2 / 2 width^2)``. A channel that is wired to another
+place fits better there than at its own. One whose gain steps leaves the fit from some press on.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ from tacdata.recording.check.figures import RecordingFigures
 from tacdata.sensor.sensor import Taxels
 
 PRESSES = 10
-"""Presses from which the question can be asked [count]."""
+"""Presses needed for testing the order [count]."""
 STEP_PRESSES = 16
-"""Presses from which a step of a gain can be told from chance [count]."""
+"""Presses needed for telling a gain step from chance [count]."""
 DEPTH = 0.15
 """Depth from which a press counts [mm]."""
 WIDTHS = np.linspace(1.0, 4.0, 13)
-"""Widths that are tried for what an indenter stirs [mm]."""
+"""Widths tried for the area that an indenter excites [mm]."""
 ROUNDS = 4
 """Passes in which width, amplitudes and gains are fitted in turn [count]."""
 CLEAR = 8.0
-"""Gain in log-likelihood with which another place explains a channel's answers beyond doubt [1]."""
+"""Minimum gain in log-likelihood by which another place must explain a channel's answers [1]."""
 STEP = 0.5
-"""Change of a gain that is worth a word [1]."""
+"""Minimum gain step that is reported [1]."""
 SURE = 7.0
-"""... if it is so many times its own uncertainty [1]."""
+"""... and minimum ratio to its own standard error [1]."""
 NEAR = 0.15
 """Share of a press's strongest answer from which a channel counts as near it [1]."""
 SIDE = 3
 """Presses that a channel must have answered on both sides of a step [count]."""
 SILENT = 6.0
-"""Answer to a press close by that a working channel exceeds [times its noise]."""
+"""Answer to a near press that a working channel exceeds [times its noise]."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Answers:
 
 
 def answers(recordings: list[RecordingFigures]) -> Answers | None:
-    """Collect the answers of a session's whole presses; None without any."""
+    """Collect the answers of a session's complete presses; None if there are none."""
     chosen = [f for f in recordings if counts_as_press(f)]
     if not chosen:
         return None
@@ -79,23 +79,23 @@ def answers(recordings: list[RecordingFigures]) -> Answers | None:
 
 
 def counts_as_press(figures: RecordingFigures) -> bool:
-    """Say whether a recording is a press whose answers tell something."""
+    """Whether a recording is a press deep enough to be used."""
     press, response = figures.recording.episode.press, figures.document["taxels"]["response"]
     return press.depth > DEPTH and any(value is not None for value in response)
 
 
 @dataclass(frozen=True)
 class AnswerFit:
-    """The answers as gains, amplitudes and widths."""
+    """Fitted gains, amplitudes and widths."""
 
     gain: np.ndarray
-    """Gain of each channel against the others [1], shape (taxels,)."""
+    """Gain of each channel relative to the others [1], shape (taxels,)."""
     pattern: np.ndarray
-    """What a channel of gain 1 would answer at each place [counts], shape (presses, taxels)."""
+    """Predicted answer of a channel of gain 1 at each place [counts], shape (presses, taxels)."""
 
 
 def fit_answers(found: Answers, place: np.ndarray | None = None) -> AnswerFit:
-    """Fit the answers, robustly, with channel k at place ``place[k]`` (default: its own)."""
+    """Fit the answers robustly, with channel k at place ``place[k]`` (default: its own)."""
     place = np.arange(found.response.shape[1]) if place is None else place
     response, squared = found.response, found.distance[:, place] ** 2
     gain, pattern = np.ones(response.shape[1]), np.zeros_like(response)
@@ -127,11 +127,12 @@ def _trust(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
 
 
 def misplaced(found: Answers) -> dict[int, int]:
-    """Return the channels that answer like another taxel, with that taxel; {} with too few presses to say."""
+    """Return the channels that answer like another taxel, with that taxel; {} with too few presses."""
     if len(found.response) < PRESSES:
         return {}
     score = max((likelihood(found, fit_answers(found, place).pattern) for place in orders(found.taxels)), key=_best)
-    # Who is wrong spoils what the others are held against: those that fit elsewhere are moved there and asked again.
+    # A wrong channel spoils the fit that the others are compared with. So channels that fit elsewhere are moved there,
+    # and all are tested again.
     _, place = linear_sum_assignment(-score)
     score = likelihood(found, fit_answers(found, place).pattern)
     _, place = linear_sum_assignment(-score)
@@ -143,7 +144,7 @@ def misplaced(found: Answers) -> dict[int, int]:
 
 
 def orders(taxels: Taxels) -> list[np.ndarray]:
-    """Return the orders in which a plug is easily connected: as it should be, turned by 180 deg, and mirrored."""
+    """Return the usual orders of a plug: correct, turned by 180 deg, and mirrored."""
     grid = np.arange(taxels.count).reshape(taxels.rows, taxels.columns)
     return [order.ravel() for order in (grid, grid[::-1, ::-1], grid[:, ::-1], grid[::-1])]
 
@@ -153,7 +154,7 @@ def _best(score: np.ndarray) -> float:
 
 
 def _cycle_gain(place: np.ndarray, gain: np.ndarray, start: int) -> float:
-    """Return the least gain among the channels that change places with ``start``."""
+    """Return the smallest log-likelihood gain among the channels that change places with ``start``."""
     least, at = gain[start], int(place[start])
     while at != start:
         least, at = min(least, gain[at]), int(place[at])
@@ -161,7 +162,7 @@ def _cycle_gain(place: np.ndarray, gain: np.ndarray, start: int) -> float:
 
 
 def likelihood(found: Answers, pattern: np.ndarray) -> np.ndarray:
-    """Return how well each channel fits each place: log-likelihood with a gain of its own, shape (taxels, taxels)."""
+    """Return the log-likelihood of each channel at each place, with a gain of its own, shape (taxels, taxels)."""
     response, count = found.response, len(found.response)
     scale = np.maximum(np.abs(pattern).max(axis=1, keepdims=True), 1e-12)  # deep presses must not outweigh all others
     a, b = response / scale, pattern / scale
@@ -193,7 +194,7 @@ def gain_steps(found: Answers) -> dict[int, tuple[int, float]]:
 
 
 def _common(found: Answers, ratio: np.ndarray) -> np.ndarray:
-    """Return what all channels share of the misfit: an indenter's answer is no Gaussian, and deep ones saturate."""
+    """Return the residual that all channels share: an indenter's answer is not Gaussian, and deep presses saturate."""
     shared = np.zeros_like(ratio)
     own = np.zeros(ratio.shape[1])
     distance = found.distance
@@ -212,7 +213,7 @@ def _common(found: Answers, ratio: np.ndarray) -> np.ndarray:
                 weight = 1 / np.sqrt(1 + (off / (2 * np.median(np.abs(off)) + 1e-9)) ** 2)
             shared[rows] = (terms @ fitted)[rows]
         rest = ratio - shared
-        # A press that stirs more or less than its fit says does so for all channels near it.
+        # A press that excites more or less than its fit does so for all channels near it.
         level = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else 0.0 for row in rest - own])
         shared += level[:, None]
         own = np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in (ratio - shared).T])
@@ -220,9 +221,10 @@ def _common(found: Answers, ratio: np.ndarray) -> np.ndarray:
 
 
 def _scatter(found: Answers, rest: np.ndarray, usual: float) -> np.ndarray:
-    """Return what every press's answers are off by [1], shape (presses,): an indenter that is not round fits worse.
+    """Return the scatter of every press's residuals [1], shape (presses,).
 
-    Presses of one indenter often follow each other, and its misfit must not pass for a step.
+    An indenter that is not round fits worse. Presses of one indenter often follow each other, and its misfit must not
+    pass for a step.
     """
     scatter = np.full(len(rest), max(usual, 0.03))
     for name in np.unique(found.indenters):
@@ -234,12 +236,14 @@ def _scatter(found: Answers, rest: np.ndarray, usual: float) -> np.ndarray:
 
 
 def _step(values: np.ndarray, usual: np.ndarray) -> tuple[int, float] | None:
-    """Return where values step and by how much, if they do beyond doubt; ``usual``: scatter of each, shape (n,)."""
+    """Return where values step and by how much, or None without a significant step; ``usual``: scatter of each, shape
+    (n,).
+    """
     best: tuple[float, int, float] | None = None
     for at in range(SIDE, len(values) - SIDE + 1):
         before, after = values[:at], values[at:]
         change = float(np.median(after) - np.median(before))
-        # By standard deviation on either side: an answer after the step that is as before speaks against it.
+        # Standard deviation on either side: an answer after the step that is as before speaks against it.
         variance = sum(
             max(float(np.var(side, ddof=1)), float(np.mean(np.square(said)))) / len(side)
             for side, said in ((before, usual[:at]), (after, usual[at:]))
@@ -253,7 +257,7 @@ def _step(values: np.ndarray, usual: np.ndarray) -> tuple[int, float] | None:
 
 
 def silent(found: Answers) -> list[int]:
-    """Return the channels that did not answer to any press close by, while others did."""
+    """Return the channels that did not answer to any near press, while others did."""
     close = found.distance < 0.75 * max(found.taxels.pitch_x, found.taxels.pitch_y)
     answered = (np.abs(found.response) > SILENT * found.noise) & close
     if not answered.any():
@@ -262,6 +266,6 @@ def silent(found: Answers) -> list[int]:
 
 
 def unanswered(found: Answers) -> bool:
-    """Say whether presses close to taxels, at least two, stirred no channel at all."""
+    """Whether at least two presses close to taxels excited no channel at all."""
     close = (found.distance < 0.75 * max(found.taxels.pitch_x, found.taxels.pitch_y)).any(axis=1)
     return bool(close.sum() >= 2 and not (np.abs(found.response[close]) > SILENT * found.noise).any())

@@ -1,4 +1,4 @@
-"""What a recording says of its streams' clocks, as figures and in words."""
+"""Figures and warnings about the clocks of a recording's streams."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.files.reader import Recording
 
 DRIFT_PPM = 250.0
-"""Drift against the nominal rate that is worth a word [ppm]: three times what a poor crystal has."""
+"""Warning threshold: drift against the nominal rate [ppm]; three times that of a poor crystal."""
 STEP_MS = 15.0
-"""Step of a device's clock that is worth a word [ms]: less is a host that was late for long."""
+"""Warning threshold: step of a device's clock [ms]; smaller steps are a host that was late for long."""
 UNCERTAIN_MS = 5.0
-"""Uncertainty of sample times that is worth a word [ms of real time]."""
+"""Warning threshold: uncertainty of sample times [ms of real time]."""
 
 
 def clock_figures(clock: ClockModel | None, nominal_period_ns: float, within: tuple[int, int]) -> dict[str, Any] | None:
@@ -44,13 +44,13 @@ def clock_figures(clock: ClockModel | None, nominal_period_ns: float, within: tu
 
 
 def round_trip(recording: Recording) -> float | None:
-    """Return the median time from query to answer of the motion controller [ms]; None if the file does not say."""
+    """Return the median time from query to answer of the motion controller [ms]; None if the file does not hold it."""
     said = recording.polled.get("round_trip_ns")
     return None if said is None else _rounded(float(said) / 1e6)
 
 
 def clock_doubts(clock: dict[str, Any] | None, rate_of_clock: float) -> list[str]:
-    """Return in words what is doubtful about a stream's clock; ``rate_of_clock``: seconds shown per real second."""
+    """Return the warnings about a stream's clock as text; ``rate_of_clock``: seconds shown per real second."""
     if clock is None or not clock["steady"]:
         return []
     found = []
@@ -71,7 +71,7 @@ def clock_doubts(clock: dict[str, Any] | None, rate_of_clock: float) -> list[str
 
 
 def clock_words(clock: dict[str, Any] | None) -> str:
-    """Return a clock in half a line, for people."""
+    """Describe a clock in half a line."""
     if clock is None:
         return "no counter, so sample times are arrival times"
     if not clock["steady"]:

@@ -1,4 +1,4 @@
-"""The figures of one recording by which it is judged."""
+"""Figures of one recording: rates, losses, gaps, depth uncertainty, noise."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tacdata.recording.episode import Episode
 from tacdata.recording.files.reader import Recording
 
 COUNTS = "counts"
-"""Unit of readings of which no board says another."""
+"""Unit of readings where the board names none."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class RecordingFigures:
 
 
 def figures(recording: Recording) -> RecordingFigures:
-    """Measure one recording."""
+    """Compute the figures of one recording."""
     episode = recording.episode
     lag = (episode.taxels.arrival_ns - episode.taxels.sample_ns) / 1e6
     document = {
@@ -104,7 +104,7 @@ def hold_response(episode: Episode) -> np.ndarray:
 
 def _cnc(recording: Recording) -> dict[str, Any]:
     stream = recording.episode.cnc
-    # A move that was broken off did not run to its end: its profile cannot be compared.
+    # A move that was interrupted did not run to its end, so its profile cannot be compared.
     moves = recording.moves if recording.episode.complete else recording.moves[:-1]
     loaded = [move for move in moves if move.command.phase in ("press", "release")]
     slack = [(move.uncertainty_ns + move.contradiction_ns) * 1e-9 * move.profile.peak for move in loaded]
@@ -127,7 +127,7 @@ def _hold_error(recording: Recording) -> float | None:
     if hold is None or press is None:
         return None
     stream = recording.episode.cnc
-    # The hold's end is an acknowledgement; its beginning is what the reports may put in doubt.
+    # The hold's end is an acknowledgement; only its beginning depends on the reports.
     # A report's own time is only known between query and answer.
     margin = int(np.max(stream.arrival_ns - stream.sample_ns, initial=0))
     begin = hold.end_ns - round(recording.episode.press.hold / 2 * 1e9)
@@ -143,7 +143,7 @@ def _rate(time_ns: np.ndarray) -> float | None:
 
 
 def _spread(time_ns: np.ndarray) -> float:
-    """Return by how much the times between samples vary: half of what the middle 68 % of them span [ms]."""
+    """Return the jitter of sample times: half of what the middle 68 % of the intervals span [ms]."""
     return _rounded(np.ptp(np.percentile(np.diff(time_ns), [16, 84])) / 2e6) if len(time_ns) > 2 else 0.0
 
 

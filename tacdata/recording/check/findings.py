@@ -1,4 +1,4 @@
-"""What a person must know of a recording, judged by its figures."""
+"""Findings about a recording, judged by its figures: warnings, and reasons why it is unusable."""
 
 from __future__ import annotations
 
@@ -15,41 +15,41 @@ WARNING, UNUSABLE = "warning", "unusable"
 LOST_SHARE = 0.01
 """Share of lost frames from which a recording is unusable [1]."""
 GAP_MS = 200.0
-"""Time without a sample from which a recording is unusable [ms]: its 9-frame windows would lie."""
+"""Time without a sample from which a recording is unusable [ms]: windows of 9 frames would bridge it unnoticed."""
 RATE_SHARE = 0.02
-"""Deviation from the nominal rate that is worth a word [1]."""
+"""Warning threshold: deviation from the nominal rate [1]."""
 LATENCY_MS = 250.0
-"""Delay of the host that is worth a word [ms of real time]."""
+"""Warning threshold: latency of the host [ms of real time]."""
 REPORT_GAP_MS = 1500.0
-"""Time without a status report that is worth a word [ms of real time]."""
+"""Warning threshold: time without a status report [ms of real time]."""
 DEPTH_MM = (0.05, 0.2)
-"""Depth uncertainty that is worth a word, and that makes a recording unusable [mm]."""
+"""Depth uncertainty from which a warning is given, and from which a recording is unusable [mm]."""
 HOLD_MM = 0.05
-"""Distance of the guide from the commanded position in the hold that makes a recording unusable [mm]."""
+"""Distance between reported and commanded position in the hold that makes a recording unusable [mm]."""
 NOISE_RATIO = 5.0
-"""How much noisier than the median a channel may be [1]."""
+"""Warning threshold: noise of a channel over the median noise [1]."""
 DEAD_DEPTH = 0.3
-"""Depth of a press from which a board with all channels at rest is dead [mm]."""
+"""Depth of a press [mm] from which a board without any answer counts as dead."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a person should know."""
+    """One warning, or one reason why a recording is unusable."""
 
     severity: str
     """``warning`` or ``unusable``."""
     stream: str
-    """What it concerns."""
+    """Stream or channel that it concerns."""
     file: str
     """Name of the recording; empty for the session."""
     text: str
-    """In words."""
+    """What was found, as a sentence."""
 
 
 def findings(figures: RecordingFigures) -> list[Finding]:
     """Judge one recording."""
     if is_imported(figures.recording.episode):
-        # Quantised or resting channels of a foreign sensor are no proof of a fault.
+        # Quantised or resting channels of a foreign sensor do not prove a fault.
         doubts = [(WARNING, stream, text) for _, stream, text in _channels(figures)]
         found = [*imported_findings(figures), *doubts]
     else:
@@ -111,7 +111,7 @@ def _taxels(figures: RecordingFigures) -> list[Judgement]:
 
 
 def _line(counts: dict) -> list[str]:
-    """Return in words what the driver saw on the line."""
+    """Describe what the driver counted on the line."""
     found = []
     if counts.get("corrupt", 0):
         found.append(f"{counts['corrupt']} damaged frames discarded")

@@ -1,4 +1,4 @@
-"""Readings without contact, whether a phase marks them or the path alone tells of them."""
+"""Readings without contact, from the phase of rest or, without phases, from the path."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from tacdata.recording.episode import PHASES, Episode
 
 LOW = 0.02
-"""Share of the stroke above the surface, or above the highest point, up to which nothing is pressed [1]."""
+"""Share of the stroke, from its highest point, within which nothing is pressed [1]."""
 FEWEST = 5
-"""Readings that a stretch needs to tell of noise."""
+"""Readings that a stretch needs for an estimate of noise."""
 
 
 def idle_rows(episode: Episode) -> np.ndarray:
-    """Return which readings are taken off the skin, shape (n,), bool.
+    """Return which readings were taken without contact, shape (n,), bool.
 
     Those of the phase of rest; in a path without phases, which holds several presses, those before the first of them,
     or the longest stretch between two.

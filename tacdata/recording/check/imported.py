@@ -1,4 +1,4 @@
-"""What a person must know of an imported recording, which no rig of ours made: less is asked of it."""
+"""Findings about imported recordings, of which less is demanded than of our own."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from tacdata.recording.check.figures import RecordingFigures
 from tacdata.recording.episode import Episode
 
 GAP_PERIODS = 5.0
-"""Time without a sample that is worth a word [periods]."""
+"""Warning threshold: time without a sample [periods]."""
 
 
 def is_imported(episode: Episode) -> bool:
-    """Say whether `tacdata import` made the recording."""
+    """Whether `tacdata import` made the recording."""
     return "imported" in episode.rig
 
 
 def imported_summary(entries: Sequence[RecordingFigures]) -> list[str]:
-    """Return figures of imported recordings in words: of times as the source stamps them, in the source's unit."""
+    """Summarize imported recordings; times are in the source's unit."""
     taxels = [entry.document["taxels"] for entry in entries]
     noise = [v for t in taxels for v in t["idle_noise"] if v is not None]
     rates = [t["rate"] for t in taxels if t["rate"]]

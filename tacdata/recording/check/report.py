@@ -1,4 +1,4 @@
-"""Judges a recording or a session: is it fit to be labelled and learned from?"""
+"""Checks a recording or a session: is it fit to be labelled and learned from?"""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tacdata.recording.session import read_session
 
 @dataclass(frozen=True)
 class Report:
-    """What was found."""
+    """Result of a check: figures, findings, usable or not."""
 
     source: Path
     """File or folder that was checked."""
@@ -47,7 +47,7 @@ class Report:
 
     @property
     def text(self) -> str:
-        """One page of words."""
+        """The report as one page of text."""
         lines = [f"{self.source}: {len(self.episodes)} recordings"]
         imported = bool(self.episodes) and is_imported(self.episodes[0].recording.episode)
         told = imported_summary(self.episodes) if imported else _summary([entry.document for entry in self.episodes])
@@ -88,7 +88,7 @@ def _of_session(session: Any, entries: list[RecordingFigures]) -> list[Finding]:
         text = f"{len(session.remaining)} of {len(session.plan.presses)} presses of the plan are not recorded"
         found.append(Finding(WARNING, "session", "", f"{text}; go on with tacdata record --resume"))
     if entries and is_imported(entries[0].recording.episode):
-        return found  # its channels' places may be stand-ins
+        return found  # the positions of its channels may be stand-ins
     return [*found, *session_findings(entries)]
 
 
@@ -119,7 +119,7 @@ def _summary(documents: list[dict[str, Any]]) -> list[str]:
 
 
 def _seen(views: list[dict[str, Any]]) -> str:
-    """Return in words what one camera saw of its cube and of fingers, over several recordings."""
+    """Describe what one camera saw of its cube and of fingers, over several recordings."""
     fingers = sorted({finger for view in views for finger in view["fingers"]})
     looked = {finger: [v["fingers"][finger] for v in views if finger in v["fingers"]] for finger in fingers}
     if any(view["searched"] for view in views) or not fingers:
@@ -138,7 +138,7 @@ def _middle(values: Any) -> float:
 
 
 def _grouped(found: tuple[Finding, ...]) -> list[str]:
-    """Return a line per finding; what several recordings share is said once."""
+    """Return one line per finding; findings that several recordings share are merged."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for finding in found:
         groups.setdefault((finding.severity, finding.stream, finding.text), []).append(finding.file)

@@ -1,4 +1,4 @@
-"""What only a session as a whole tells of its channels, in words."""
+"""Findings that only a whole session shows: channel order, gain steps, offset steps."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from tacdata.recording.check.figures import RecordingFigures
 from tacdata.recording.check.findings import UNUSABLE, WARNING, Finding
 
 TURNED = ("turned by 180 deg", "mirrored along x", "mirrored along y")
-"""Words for the orders in which a plug is wrongly connected (`channel_map.orders`)."""
+"""Texts for the usual wrong orders of a plug (`channel_order.orders`)."""
 OFFSET = 20.0
-"""Change of an idle reading from one recording to the next that is worth a word [times the noise]."""
+"""Warning threshold: change of an idle reading between two recordings [times the noise]."""
 OFFSET_SHARE = 0.3
-"""... and at least so much of the channel's strongest answer [1]: what relaxes slowly is less."""
+"""... and its minimum share of the channel's strongest answer [1], so that slow relaxation is not reported."""
 
 
 def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
-    """Judge the channels of a session by how they answered to its presses."""
+    """Return findings on the channels, from their answers to the session's presses."""
     found = answers(entries)
     if found is None:
         return []
@@ -46,7 +46,7 @@ def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
 
 
 def _places(found: Answers, moved: dict[int, int]) -> list[str]:
-    """Return in words which channels are wired to other taxels than the sensor file says."""
+    """Describe the channels that are wired to other taxels than the sensor file says."""
     for words, order in zip(TURNED, orders(found.taxels)[1:], strict=True):
         same = sum(int(order[k]) == j for k, j in moved.items())
         if len(moved) > 0.6 * len(order) and same > 0.9 * len(moved):
@@ -58,7 +58,7 @@ def _places(found: Answers, moved: dict[int, int]) -> list[str]:
 
 
 def _offsets(entries: list[RecordingFigures], found: Answers) -> list[str]:
-    """Return in words which channels' idle readings step from one recording to the next, and others' do not."""
+    """Describe the channels whose idle reading steps between two recordings while others' do not."""
     idle = np.array(
         [[np.nan if v is None else v for v in f.document["taxels"]["idle_reading"]] for f in entries], float
     )

@@ -1,9 +1,10 @@
-"""A stream's clock: the device's counter against the host's clock, as a line that can be redone from the file.
+"""The clock of a stream: a line from the device's counter to the host's clock, stored in the file.
 
-A frame k leaves the device at ``offset + period k`` and arrives a delay d_k >= 0 later. Delays only ever add,
-so the line under the least delayed arrivals (`clock_fit`) gives the sample times up to the link's smallest
-delay. That delay is constant and cannot be seen from arrivals; a sync tap (`sync_tap`) measures it, and the
-model carries it with its uncertainty. A device that restarts or steps begins a new line; the earlier ones stay.
+A frame k leaves the device at ``offset + period k`` and arrives after a latency d_k >= 0. Latencies only add. So the
+line under the earliest arrivals (`envelope_fit`) gives the sample times up to the link's minimum latency.
+
+That minimum is constant and cannot be seen from arrivals. A sync tap (`sync_tap`) measures it, and the model carries it
+with its uncertainty. A device that restarts or steps begins a new line; the earlier ones stay.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class StreamLatency:
-    """The constant part of a stream's delay, which arrivals alone do not show."""
+    """The constant part of a stream's latency, which arrivals alone do not show."""
 
     latency_ns: int
     """From sampling to the fitted line [ns]."""
     uncertainty_ns: int
     """Its standard uncertainty [ns]."""
     source: str = "sync tap"
-    """What measured it."""
+    """What measured it, for example a sync tap."""
 
     @property
     def document(self) -> dict[str, int | str]:
@@ -33,50 +34,50 @@ class StreamLatency:
 
     @classmethod
     def from_document(cls, document: dict) -> StreamLatency:
-        """Rebuild one; raises KeyError or ValueError if it is damaged."""
+        """Read a latency from plain data; raises KeyError or ValueError if it is damaged."""
         return cls(int(document["latency_ns"]), int(document["uncertainty_ns"]), str(document["source"]))
 
 
 @dataclass(frozen=True)
 class ClockModel:
-    """Sample time = reference + period (counter - first counter) - latency."""
+    """A linear clock: sample time = reference + period (counter - first counter) - latency."""
 
     first_counter: int
     """Counter at the reference [frames], or the device's own time [ns] if `axis` says so."""
     reference_ns: int
     """Fitted host time of that frame's earliest arrival [ns]."""
     period_ns: float
-    """Frame period on the host's clock [ns]; host time per device time [1] on the device's own time."""
+    """Frame period on the host's clock [ns]; with the axis ``device_ns``: host time per device time [1]."""
     frames: int
-    """Arrivals behind the fit."""
+    """Arrivals that were fitted."""
     first_arrival_ns: int = 0
     """Arrival from which this line holds [ns]."""
     delay_ns: float = 0.0
-    """Mean delay beyond the smallest [ns]."""
+    """Mean latency beyond the minimum [ns]."""
     jitter_ns: float = 0.0
-    """Standard deviation of the delay [ns]."""
+    """Standard deviation of the latency [ns]."""
     uncertainty_ns: float = 0.0
-    """How far the smallest delay of a few seconds lies from the line, root mean square [ns]."""
+    """Distance of the smallest latency of a few seconds from the line, root mean square [ns]."""
     drift_uncertainty: float = 0.0
-    """Uncertainty of the period that follows from it [1]."""
+    """Standard uncertainty of the period that follows from it [1]."""
     axis: str = "counter"
-    """What the line is over: ``counter``, ``device_ns``, or ``order`` (a number given on arrival: it misses losses)."""
+    """Abscissa of the line: ``counter``, ``device_ns``, or ``order`` (numbered on arrival, so losses are not seen)."""
     latency: StreamLatency | None = None
-    """The link's smallest delay, if something measured it."""
+    """The link's minimum latency, if it was measured."""
     earlier: tuple[ClockModel, ...] = ()
     """Lines before a restart or a step of the device's clock, oldest first."""
 
     @property
     def steady(self) -> bool:
-        """Whether the line can be relied on: numbers given on arrival must fit it to half a period."""
+        """Whether the line can be used: numbers given on arrival must fit it within half a period."""
         return self.axis != "order" or self.jitter_ns < 0.5 * self.period_ns
 
     def drift(self, nominal_period_ns: float) -> float:
-        """Return how much slower the device runs than ``nominal_period_ns`` [ns] says [ppm]."""
+        """Return how much slower the device runs than ``nominal_period_ns`` [ns], in ppm."""
         return (self.period_ns / (1.0 if self.axis == "device_ns" else nominal_period_ns) - 1) * 1e6
 
     def with_latency(self, latency: StreamLatency | None) -> ClockModel:
-        """Return the model with another constant delay, on all its lines."""
+        """Return the model with another constant latency, on all its lines."""
         return replace(self, latency=latency, earlier=tuple(replace(line, latency=latency) for line in self.earlier))
 
     def sample_ns(self, counter: np.ndarray) -> np.ndarray:
@@ -91,7 +92,7 @@ class ClockModel:
         return self.reference_ns - constant + round(self.period_ns * (counter - self.first_counter))
 
     def sample_times(self, arrival_ns: np.ndarray, counter: np.ndarray) -> np.ndarray:
-        """Return sample times [ns], shape (n,), int64, each frame on the line that held when it arrived.
+        """Return sample times [ns], shape (n,), int64, each by the line that was valid when it arrived.
 
         Args:
             arrival_ns: Host times of receipt [ns], shape (n,).
@@ -113,7 +114,7 @@ class ClockModel:
 
     @property
     def steps_ns(self) -> tuple[int, ...]:
-        """By how much the device's clock fell behind (positive) at each beginning of a new line [ns]."""
+        """Steps of the device's clock at the beginning of each new line [ns]; positive if it fell behind."""
         lines = (*self.earlier, self)
         return tuple(
             new.sample_of(new.first_counter) - old.sample_of(new.first_counter) for old, new in pairwise(lines)
@@ -143,7 +144,7 @@ class ClockModel:
 
     @classmethod
     def from_document(cls, document: dict[str, str]) -> ClockModel:
-        """Rebuild a model from `document`; raises KeyError or ValueError if it is damaged."""
+        """Read a model from its `document`; raises KeyError or ValueError if it is damaged."""
         latency = document.get("latency")
         return cls(
             int(document["first_counter"]),

@@ -1,12 +1,14 @@
 """Fits a stream's clock under the lower envelope of its arrivals, while they come.
 
-A least squares line would be late by the mean delay (9 ms behind an FTDI adapter, whose latency timer is
-16 ms). The line here is the one below all points with the smallest sum of distances: the edge of their lower
-convex hull under the mean counter (Moon, Skelly and Towsley, INFOCOM 1999).
+A least squares line would be late by the mean latency (9 ms behind an FTDI adapter, whose latency timer is 16 ms). The
+line here lies below all points and has the smallest sum of distances: the edge of their lower convex hull under the
+mean counter (Moon, Skelly and Towsley, INFOCOM 1999).
 
-Frames that arrive late for a moment (a stalled host) come back to the line; frames that stay late for seconds,
-or come before they can have been sent, say that the device's clock stepped, and a new line begins there. A line over
-few seconds knows its slope badly: until the arrivals contradict it, the nominal period bounds the slope.
+Frames that arrive late for a moment (a stalled host) return to the line. Frames that stay late for seconds, or come too
+early, show that the device's clock stepped. A new line begins there.
+
+A few seconds of arrivals determine the slope badly. Until the arrivals contradict it, the nominal period bounds the
+slope.
 """
 
 from __future__ import annotations
@@ -19,37 +21,37 @@ import numpy as np
 from tacdata.recording.clocks.clock_model import ClockModel
 
 BLOCK_NS = 4_000_000_000
-"""Stretch of arrivals whose smallest delay is looked at by itself [ns]."""
+"""Length of a block of arrivals; each block's smallest latency is used [ns]."""
 BLOCKS = 75
-"""Stretches that a running fit remembers: five minutes, within which drift is a line."""
+"""Blocks that a running fit keeps: five minutes, over which drift is linear."""
 LATE_NS = 20_000_000
-"""Lateness, if it lasts, that is a step of the device's clock and no delay [ns]; at least 0.6 periods."""
+"""Lateness that is a step of the device's clock if it lasts [ns]; at least 0.6 periods."""
 LASTING_NS = 1_000_000_000
-"""How long lateness must last to be one [ns]; host stalls end in a backlog that comes back to the line."""
+"""How long lateness must last to be a step [ns]; a host stall ends in a backlog that returns to the line."""
 LASTING_FRAMES = 20
 """... and for how many frames."""
 RETURN_NS = 60_000_000_000
-"""How long after a step a frame on the old line still says that the host was late and nothing stepped [ns]."""
+"""Time after a step within which a frame on the old line shows that the host was late and nothing stepped [ns]."""
 EARLY_NS = 100_000_000
-"""Arrival before the line that no delay explains [ns]; at least 2.5 periods."""
+"""Arrival before the line that no latency explains [ns]; at least 2.5 periods."""
 DRIFT = 500e-6
-"""What a period may change in a silent gap [1]."""
+"""Change of the period that is allowed for in a silent gap [1]."""
 TYPICAL = 1.2
-"""Root mean square over median of a delay spread evenly from 0 [1]."""
+"""Root mean square over median of a latency that is uniform from 0 [1]."""
 HIDDEN = 0.1
-"""Share of the usual delay that may never be seen missing [1]: 1.6 ms of a 16 ms timer."""
+"""Share of the typical latency that may stay hidden in every block [1]: 1.6 ms of a 16 ms timer."""
 CRYSTAL = 250e-6
-"""By how much a crystal may be off its nominal rate [1]: three times what a poor one has."""
+"""Largest deviation of a crystal from its nominal rate [1]: three times that of a poor one."""
 KEPT = 32
-"""Arrivals of a block that are kept for the usual delay [count]."""
+"""Arrivals of a block that are kept for the typical latency [count]."""
 EARLIER = 16
-"""Lines before steps that are remembered."""
+"""Lines before steps that are kept."""
 
 Point = tuple[int, int]
 
 
 def append_to_hull(hull: list[Point], point: Point) -> None:
-    """Add a (counter, arrival) point right of all others to a lower convex hull; integers, so exact."""
+    """Add a (counter, arrival) point right of all others to a lower convex hull, in exact integers."""
     while len(hull) >= 2:
         (x1, y1), (x2, y2) = hull[-2:]
         if (x2 - x1) * (point[1] - y1) > (y2 - y1) * (point[0] - x1):
@@ -87,7 +89,7 @@ class _Stretch:
         self.frames = 0
         self._total = 0  # of the counters beyond the origin's, within the blocks
         self._count = 0
-        self._doubt = (0, math.inf)  # frames at the last look, and what it gave [ns]
+        self._doubt = (0, math.inf)  # frames at the last evaluation, and its result [ns]
 
     def add(self, point: Point) -> None:
         if not self.frames:
@@ -112,7 +114,7 @@ class _Stretch:
         return self.frames >= LASTING_FRAMES and self.last[1] - self.origin[1] >= LASTING_NS * rate
 
     def swallow(self, other: _Stretch) -> None:
-        """Take in a later stretch that turned out to be this one, arriving late: what matters of it is its hull."""
+        """Merge a later block that turned out to belong to this one, arriving late; only its hull matters."""
         for point in other.hull:
             self.add(point)
         self.frames += other.frames - len(other.hull)
@@ -123,16 +125,16 @@ class _Stretch:
 
     @property
     def span_ns(self) -> int:
-        """Time over which arrivals are remembered [ns], at least 1."""
+        """Time over which arrivals are kept [ns], at least 1."""
         return max(self.last[1] - self.blocks[0].begin_ns, 1) if self.blocks else 1
 
     def doubt_ns(self) -> float:
-        """Return how far the line may be off within its span [ns], looked at again from time to time."""
+        """Return the uncertainty of the line within its span [ns], evaluated from time to time."""
         frames, doubt = self._doubt
         if self.frames >= frames + max(frames // 16, LASTING_FRAMES):
             line = self._free_line()
             _, jitter, doubt = (0.0, 0.0, math.inf) if line is None else self._spread(line)
-            # While there are few stretches to compare, all of them may have been late.
+            # With few blocks to compare, all of them may have been late.
             self._doubt = self.frames, doubt if len(self.blocks) > 3 else max(doubt, jitter)
         return doubt
 
@@ -144,7 +146,7 @@ class _Stretch:
         slope = min(max(free[2], self.nominal_ns * (1 - CRYSTAL)), self.nominal_ns * (1 + CRYSTAL))
         off = abs(slope - free[2])
         if off == 0 or off > self.nominal_ns * 2 * self.doubt_ns() / self.span_ns:
-            return free  # what the arrivals say for certain counts more than what the device is said to do
+            return free  # what the arrivals prove outweighs the nominal rate
         x0, y0 = min(self.hull, key=lambda point: point[1] - self.origin[1] - slope * (point[0] - self.origin[0]))
         return x0, y0, slope
 
@@ -172,7 +174,7 @@ class _Stretch:
         )  # fmt: skip
 
     def _spread(self, line: tuple[int, int, float]) -> tuple[float, float, float]:
-        """Return mean and standard deviation of the delays over a line, and its uncertainty [ns]."""
+        """Return mean and standard deviation of the latencies above a line, and its uncertainty [ns]."""
         x0, y0, slope = line
         n, sx, sy, sxx, sxy, syy = (sum(parts) for parts in zip(*(b.sums for b in self.blocks), strict=True))
         variance = ((n * syy - sy * sy) - 2 * slope * (n * sxy - sx * sy) + slope**2 * (n * sxx - sx * sx)) / n**2
@@ -181,34 +183,33 @@ class _Stretch:
         whole = self.blocks[:-1] or self.blocks
         least = [min(y - y0 - slope * (x - x0) for x, y in block.hull) for block in whole]
         usual = np.median([y - y0 - slope * (x - x0) for block in self.blocks for x, y in block.first])
-        # Delays that come in steps (a latency timer) can all hide the same part of one from every block.
+        # Latencies that come in steps (a latency timer) can hide the same part in every block.
         uncertainty = max(TYPICAL * float(np.median(least)), HIDDEN * float(usual))
-        if len(whole) < 3:  # too short to compare stretches: what the scatter makes of a mean is the bound
+        if len(whole) < 3:  # too short to compare blocks: the scatter of the mean is the bound
             uncertainty = max(uncertainty, jitter / math.sqrt(n))
         return delay, jitter, uncertainty
 
 
 class EnvelopeFit:
-    """A fit that goes on while frames arrive; memory and time stay small, as only hulls and sums are kept."""
+    """A fit that goes on while frames arrive; only hulls and sums are kept, so memory and time stay small."""
 
     def __init__(self, axis: str = "counter", rate: float = 1.0, nominal_ns: float | None = None) -> None:
         """Begin without arrivals.
 
         Args:
             axis: What `add` is given: ``counter``, ``device_ns`` or ``order`` (see `ClockModel`).
-            rate: Seconds that the host's clock shows per real second; a host's delays grow with it.
-            nominal_ns: What a crystal is said to keep: time per count [ns], or 1 on the device's own time; None
-                if nothing is known.
+            rate: Seconds that the host's clock shows per real second; host latencies grow with it.
+            nominal_ns: Nominal time per count [ns], or 1 on the device's own time; None if unknown.
         """
         self.axis, self._rate = axis, rate
         self._nominal_ns = 1.0 if axis == "device_ns" else nominal_ns
         self._stretch = _Stretch(self._nominal_ns)
-        self._before: _Stretch | None = None  # the stretch that lasting lateness ended, while it may come back
+        self._before: _Stretch | None = None  # the block that a lasting lateness ended, while it may still return
         self._late: list[Point] = []
         self._earlier: list[ClockModel] = []
 
     def add(self, arrival_ns: int, counter: int) -> None:
-        """Take one arrival [ns]; a counter that falls back (a reset device) starts a new line."""
+        """Take one arrival [ns]; a counter that falls back (a device reset) starts a new line."""
         if counter < 0:
             return
         now, last = self._stretch, self._late[-1] if self._late else self._stretch.last
@@ -243,7 +244,7 @@ class EnvelopeFit:
             self._before = ended
 
     def _came_back(self, before: _Stretch, point: Point) -> bool:
-        """Undo a new line if a frame is on the old one again: then the host was late for long, and nothing stepped."""
+        """Undo a new line if a frame lies on the old one again: then the host was late, and nothing stepped."""
         line = before.line()
         if line is None or point[1] - before.last[1] > RETURN_NS * self._rate:
             self._before = None
@@ -273,20 +274,22 @@ class EnvelopeFit:
 
     @property
     def last_counter(self) -> int:
-        """Counter of the latest arrival on the line [frames], or device time [ns]; -1 before one."""
+        """Counter of the latest arrival on the line [frames], or device time [ns]; -1 before the first."""
         return self._stretch.last[0]
 
     def remembers(self, counter: int) -> bool:
-        """Say whether arrivals as old as a counter [frames] still take part in the present line."""
+        """Whether arrivals as old as a counter [frames] still belong to the present line."""
         blocks = self._stretch.blocks
         return bool(blocks) and blocks[0].hull[0][0] <= counter
 
     def line(self) -> tuple[int, int, float] | None:
-        """Return (counter, host time [ns], period [ns]) of the present line, quickly; None before there is one."""
+        """Return (counter, host time [ns], period [ns]) of the present line without a new fit; None before there is
+        one.
+        """
         return self._stretch.line()
 
     def model(self) -> ClockModel | None:
-        """Return the model of what has arrived, or None before two different counters are known."""
+        """Return the model of all arrivals so far, or None before two different counters are known."""
         model = self._stretch.model(self.axis)
         if model is None:
             return replace(self._earlier[-1], earlier=tuple(self._earlier[:-1])) if self._earlier else None

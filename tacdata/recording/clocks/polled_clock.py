@@ -1,4 +1,4 @@
-"""The clock of a stream that answers questions: each answer's time lies between query and receipt."""
+"""The clock of a device that answers queries: each answer's time lies between query and receipt."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class PolledClock:
-    """Sample time = middle of query and answer; half the round trip bounds the error."""
+    """Clock of a polled stream: sample time = middle of query and answer, error at most half the round trip."""
 
     reports: int
-    """Answers looked at."""
+    """Answers used [count]."""
     round_trip_ns: float
     """Median time from query to answer [ns]."""
     longest_ns: float
@@ -34,7 +34,7 @@ class PolledClock:
 
 
 def polled_clock(sent_ns: np.ndarray, arrival_ns: np.ndarray) -> PolledClock | None:
-    """Return the clock of answers that arrived [ns], shape (n,), to queries sent [ns], shape (n,)."""
+    """Return the clock from queries sent [ns], shape (n,), and their answers' arrivals [ns], shape (n,)."""
     trip = np.asarray(arrival_ns, np.int64) - np.asarray(sent_ns, np.int64)
     if not len(trip):
         return None

@@ -9,13 +9,13 @@ from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.envelope_fit import EnvelopeFit
 
 REFIT = 8
-"""Frames between two looks at the line while recording; the stored model uses all."""
+"""Frames between two updates of the line while recording; the stored model uses all frames."""
 TAP_MIDDLE_NS = 10_000_000_000
-"""How long before its end the middle of a sync tap lies [ns]."""
+"""Time from the middle of a sync tap to its end [ns]."""
 
 
 class StreamClock:
-    """Takes every arrival of a stream and says when it was sampled, as far as is known by then."""
+    """Takes every arrival of a stream and returns its sample time by the clock known so far."""
 
     def __init__(self, axis: str = "counter", rate: float = 1.0, nominal_ns: float | None = None) -> None:
         """Begin without arrivals; ``axis``, ``rate`` and ``nominal_ns`` as in `EnvelopeFit`."""
@@ -46,10 +46,10 @@ class StreamClock:
         return min(host_ns + round(period * (counter - origin)), arrival_ns) - constant
 
     def set_latency(self, latency: StreamLatency | None) -> None:
-        """Take a constant delay that a sync tap has just shown against the present line, or none.
+        """Take a constant latency that a sync tap has just measured against the present line, or None.
 
-        Arrivals that are quicker than any before let the line sink afterwards; where it was at the tap says by how
-        much, and the delay over it becomes less by that.
+        Later arrivals with less latency let the line sink. The stored position at the tap shows by how much, and the
+        latency over the line is reduced by that.
         """
         self.latency, self._measured = latency, None
         line = self._fit.line()
@@ -80,6 +80,6 @@ def _at(line: tuple[int, int, float], counter: int) -> int:
 
 
 def nominal_period_ns(board: dict[str, Any]) -> float | None:
-    """Return the time between frames [ns] that a board's description of itself says; None if it says none."""
+    """Return the time between frames [ns] by a board's description of itself; None if it names none."""
     rate = board.get("rate", {}).get("nominal")
     return 1e9 / rate if rate else None

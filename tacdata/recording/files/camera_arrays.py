@@ -1,4 +1,4 @@
-"""A recording's camera channels as arrays: when images were taken, and what was seen of cubes and fingertips."""
+"""Camera channels of a recording as arrays: image times, cube poses, fingertip poses."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from tacdata.recording.files.mcap_records import Records
 
 @dataclass(frozen=True)
 class ImageTimes:
-    """When one camera's images came, and which of them are the same."""
+    """When one camera's images came, and which of them are identical."""
 
     arrival_ns: np.ndarray
     """Host times of receipt [ns], shape (n,), int64."""
     sample_ns: np.ndarray
     """Estimated times of exposure [ns], shape (n,), int64."""
     digest: np.ndarray
-    """CRC32 of each compressed picture, shape (n,), int64; 0 where none was asked for."""
+    """CRC32 of each compressed picture, shape (n,), int64; 0 where it was not computed."""
     sequence: np.ndarray
-    """Number of each image since the camera was opened, shape (n,), int64; gaps are images not fetched in time."""
+    """Number of each image since the camera was opened, shape (n,), int64; gaps are lost images."""
     device_ns: np.ndarray
     """The camera's own time of each image [ns], shape (n,), int64; -1 without one."""
 
@@ -45,19 +45,19 @@ def device_times(records: Records, camera: str) -> dict[int, int]:
 
 
 def image_times(records: Records, camera: str, clock: ClockModel | None) -> ImageTimes:
-    """Return when a camera's images were taken by its clock."""
+    """Return the times of a camera's images by its clock."""
     arrival, sequence, device = image_stamps(records, camera)
     digest = _array([int.from_bytes(own, "little") for own in records.columns_of(topics.image(camera)).data])
     return ImageTimes(arrival, _sample(clock, arrival, sequence, device), digest, sequence, device)
 
 
 def cube_stream(records: Records, camera: str, clock: ClockModel | None) -> TagStream:
-    """Return what a camera saw of its cube."""
+    """Return the poses of a camera's cube."""
     return _stream(records, camera, clock, (topics.cube(camera), topics.pose(camera)), "")
 
 
 def finger_streams(records: Records, camera: str, clock: ClockModel | None) -> tuple[TagStream, ...]:
-    """Return what a camera saw of each fingertip it looked for."""
+    """Return the poses of each fingertip that a camera looked for."""
     names = topics.fingers((c.topic for c in records.channels.values()), camera)
     found = (_stream(records, camera, clock, topics.finger(camera, name), name) for name in names)
     return tuple(stream for stream in found if len(stream.faces))

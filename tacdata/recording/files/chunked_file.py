@@ -1,4 +1,4 @@
-"""An MCAP file that never holds back more than a moment: chunks are closed by time, not by size alone."""
+"""An MCAP file that holds back less than a second of data: chunks are closed by age, not only by size."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from tacdata.provenance import code_version
 from tacdata.recording.files.mcap_records import PROFILE
 
 CHUNK_BYTES = 1024 * 1024
-"""A chunk is closed at this size at the latest [bytes]; few chunks keep the index that grows in memory small."""
+"""A chunk is closed at this size at the latest [bytes]; few chunks keep the index in memory small."""
 CHUNK_SECONDS = 0.5
-"""... and at this age [s of real time]: what a kill can cost."""
+"""... and at this age [s of real time]: the most that a kill can cost."""
 
 
 class ChunkedFile:
-    """A new MCAP file of protobuf channels. Not for several threads at once."""
+    """A new MCAP file of protobuf channels. Not thread-safe."""
 
     def __init__(self, path: Path, chunk_seconds: float = CHUNK_SECONDS) -> None:
         """Create the file.
@@ -55,7 +55,7 @@ class ChunkedFile:
         self._channels[topic] = self._writer.register_channel(topic, "protobuf", self._schemas[name])
 
     def add(self, topic: str, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
-        """Append one message; ``sequence`` is cut to 32 bits as MCAP stores it."""
+        """Append one message; ``sequence`` is truncated to the 32 bits of MCAP."""
         self._writer.add_message(self._channels[topic], log_ns, data, publish_ns, sequence & 0xFFFFFFFF)
         self.tick()
 
@@ -68,12 +68,12 @@ class ChunkedFile:
         self._writer.add_metadata(name, values)
 
     def tick(self) -> None:
-        """Close the chunk and hand everything to the disk if it is old enough; call at least that often."""
+        """Close the chunk and sync it to the disk if it is old enough; call at least that often."""
         if time.monotonic() - self._flushed_at >= self._chunk_seconds:
             self.flush()
 
     def flush(self) -> None:
-        """Close the chunk and hand everything to the disk now.
+        """Close the chunk and sync it to the disk now.
 
         Raises:
             OSError: If the disk refuses it.
@@ -83,7 +83,7 @@ class ChunkedFile:
         self._flushed_at = time.monotonic()
 
     def close(self) -> None:
-        """Write the summary and close; if the disk refuses, what is on it stays readable."""
+        """Write the summary and close; if the disk refuses, what was written stays readable."""
         try:
             self._writer.finish()
             self._stream.flush()
@@ -92,13 +92,13 @@ class ChunkedFile:
             self.let_go()
 
     def let_go(self) -> None:
-        """Close the file as it is, without a summary; never raises."""
+        """Close the file without a summary; never raises."""
         with suppress(OSError):
             self._stream.close()
 
 
 def _sync_folder(folder: Path) -> None:
-    """Hand a folder's list of names to the disk, so that a power cut does not lose a new file's name (Unix)."""
+    """Sync a folder's entries to the disk, so that a power cut does not lose a new file's name (Unix)."""
     if os.name != "posix":
         return
     handle = os.open(folder, os.O_RDONLY)

@@ -1,4 +1,4 @@
-"""A recording that is still being written, read on from where it was read to."""
+"""Follows a recording that is still being written."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.recording.files.mcap_records import HEAD, MAGIC, Records, content, 
 
 
 class GrowingFile:
-    """Follows one file, under whatever name it is given at its end (a recorder renames it)."""
+    """Follows one file, also when the recorder renames it at its end."""
 
     def __init__(self, path: Path, seen: Callable[[str, memoryview], None] | None = None) -> None:
         """Open the file.
@@ -36,7 +36,7 @@ class GrowingFile:
             raise FormatError(f"{path} is no MCAP file", "a recording made by tacdata record", "check the path")
 
     def update(self) -> bool:
-        """Read what was appended as far as its records are whole; return whether there was anything."""
+        """Read what was appended, up to the last complete record; return whether there was anything."""
         found = False
         while not self.finished:
             at = self._stream.tell()
@@ -49,7 +49,7 @@ class GrowingFile:
             try:
                 for block in content(head[0], head, body, self.records.damage):
                     take(self.records, block, images=False, digests=False, seen=self._seen)
-            except Exception as error:  # damaged lengths raise whatever the parser stumbles over
+            except Exception as error:  # damaged lengths raise any of the parser's errors
                 name = type(error).__name__
                 self.records.damage.append(f"an unreadable record at byte {at} is left out ({name})")
             self.finished, found = head[0] == Opcode.FOOTER, True
@@ -62,5 +62,5 @@ class GrowingFile:
         return size - at
 
     def close(self) -> None:
-        """Let the file go."""
+        """Close the file."""
         self._stream.close()

@@ -1,4 +1,4 @@
-"""Everything that can be read from an MCAP file, finished or cut off; what cannot is named, never guessed."""
+"""Reads everything readable from an MCAP file, finished or cut off; reports what is not."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.recording.files.message_table import ChunkContent, MessageTable, Topic
 
 PROFILE = "tacdata"
-"""MCAP profile of a recording of ours."""
+"""MCAP profile of our recordings."""
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = 9
 """Opcode and length before each record's body [bytes] (MCAP specification, "Records")."""
 SEARCH = 1 << 20
-"""Bytes read at a time while looking for the next chunk behind damage [bytes]."""
+"""Bytes read at a time while searching the next chunk behind damage [bytes]."""
 MESSAGE = struct.Struct("<HIQQ")
 """Channel, sequence, log and publish time before a message's data (MCAP specification, "Message")."""
 CHUNK = struct.Struct("<QQQII")
 """First and last time, size and checksum of a chunk's content, length of its compression's name (same place)."""
 KNOWN = frozenset(opcode.value for opcode in Opcode)
 PRIVATE = 0x80
-"""Opcodes from here on are other programs' own."""
+"""Opcodes from here on are private to other programs."""
 
 
 @dataclass
@@ -50,7 +50,7 @@ class Records:
     attachments: dict[str, Attachment] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
-    """What could not be read, in words; empty for a file that was closed properly."""
+    """What could not be read, as sentences; empty for a file that was closed properly."""
 
     @property
     def messages(self) -> list[Message]:
@@ -62,7 +62,7 @@ class Records:
         return self.table.objects(self._ids(topic))
 
     def columns_of(self, topic: str) -> Topic:
-        """Return the same by column, in a fraction of the time."""
+        """Return the messages of one topic by column, in a fraction of the time."""
         return self.table.topic(self._ids(topic))
 
     def _ids(self, topic: str) -> set[int]:
@@ -72,14 +72,14 @@ class Records:
 def read_records(
     path: Path, images: bool = True, digests: bool = True, seen: Callable[[str, memoryview], None] | None = None
 ) -> Records:
-    """Read a file from its beginning to its end or to where it breaks off.
+    """Read a file to its end, or to where it was cut off.
 
     Args:
         path: The file.
         images: Whether to keep the pictures; without them each message is replaced by its picture's CRC32,
             4 bytes, and a long recording needs little memory.
-        digests: Whether to compute it; else nothing stands in for the picture, and much time is saved.
-        seen: Takes the topic and message of each picture that is not kept; what it wants to keep, it copies.
+        digests: Whether to compute the CRC32. Without it a picture leaves no data, which is much faster.
+        seen: Takes the topic and message of each picture that is not kept; it must copy what it keeps.
 
     Raises:
         UsageError: If there is no such file.
@@ -102,7 +102,7 @@ def read_records(
 def take(
     records: Records, block: Any, images: bool, digests: bool, seen: Callable[[str, memoryview], None] | None
 ) -> None:
-    """Add a record or an open chunk (`content`) to what was read; the rest as `read_records` says."""
+    """Add a record or an open chunk (`content`) to ``records``; other arguments as in `read_records`."""
     if not isinstance(block, ChunkContent):
         if isinstance(block, Message) and not images and block.channel_id in (cameras := _cameras(records, {})):
             block = replace(block, data=_stand_in(cameras[block.channel_id], memoryview(block.data), digests, seen))
@@ -130,7 +130,7 @@ def _stand_in(topic: str, message: memoryview, digests: bool, seen: Callable[[st
 
 
 def _cameras(records: Records, named: dict[int, str]) -> dict[int, str]:
-    """Return the channels of pictures, those known before and those that a chunk names."""
+    """Return the camera channels: those known before and those that a chunk names."""
     known = {channel.id: channel.topic for channel in records.channels.values()} | named
     return {number: topic for number, topic in known.items() if topic.endswith("/image")}
 
@@ -161,7 +161,7 @@ def _digest(message: bytes) -> bytes:
 def walk(path: Path, damage: list[str]) -> Iterator[Any]:
     """Yield every readable header, schema, channel, message, attachment and metadata record of a file.
 
-    A record that does not fit is left out; reading goes on at the next whole chunk behind it.
+    A record that cannot be read is left out. Reading continues at the next complete chunk behind it.
 
     Args:
         path: The file.
@@ -180,7 +180,7 @@ def walk(path: Path, damage: list[str]) -> Iterator[Any]:
 
 
 def _blocks(path: Path, damage: list[str]) -> Iterator[Any]:
-    """Yield as `walk`, but chunks as they are, their checksums checked."""
+    """Yield as `walk` does, but chunks as a whole, their checksums verified."""
     size = path.stat().st_size
     with path.open("rb") as stream:
         if stream.read(len(MAGIC)) != MAGIC:
@@ -199,7 +199,7 @@ def _blocks(path: Path, damage: list[str]) -> Iterator[Any]:
                 continue
             try:
                 yield from content(head[0], head, stream.read(length), damage)
-            except Exception as error:  # damaged lengths raise whatever the parser stumbles over
+            except Exception as error:  # damaged lengths raise any of the parser's errors
                 damage.append(f"an unreadable record at byte {at} is left out ({type(error).__name__})")
             ended = head[0] == Opcode.FOOTER
         if ended and head[:1] == bytes([Opcode.FOOTER]) and stream.read() != MAGIC:
@@ -211,7 +211,7 @@ def _plausible(opcode: int, length: int) -> bool:
 
 
 def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterator[Any]:
-    """Yield what one record of a file says, a chunk as it is (`ChunkContent`), its checksum checked.
+    """Yield the content of one record; a chunk as a whole (`ChunkContent`), its checksum verified.
 
     Raises:
         Exception: Whatever the parser of mcap stumbles over.
@@ -237,14 +237,14 @@ def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterato
             try:
                 stream, length = get_chunk_data_stream(_chunk(body), validate_crc=True)
                 opened = ChunkContent.split(stream.read(length))
-            except Exception as error:  # zstd's, struct's and mcap's own errors share no base
+            except Exception as error:  # the errors of zstd, struct and mcap share no base class
                 damage.append(f"a damaged chunk is left out ({type(error).__name__})")
                 return
             yield opened
 
 
 def _chunk(body: bytes) -> Chunk:
-    """Return a chunk as `Chunk.read` does, its records not copied.
+    """Return a chunk as `Chunk.read` does, without copying its records.
 
     Raises:
         struct.error: If it is too short.
@@ -274,7 +274,7 @@ def _intact_attachment(body: bytes) -> bool:
 
 
 def _skip_to_chunk(stream: IO[bytes], at: int, size: int, damage: list[str]) -> bool:
-    """Move on to the next whole chunk behind a record that cannot be; return whether there is one."""
+    """Move on to the next complete chunk behind a damaged record; return whether there is one."""
     for start in _candidates(stream, at + 1, size):
         stream.seek(start)
         head = stream.read(HEAD)
@@ -291,7 +291,7 @@ def _skip_to_chunk(stream: IO[bytes], at: int, size: int, damage: list[str]) -> 
 
 
 def _candidates(stream: IO[bytes], begin: int, size: int) -> Iterator[int]:
-    """Yield places at which a chunk that fits into the file could begin."""
+    """Yield positions at which a chunk that fits into the file could begin."""
     for block in range(begin, size, SEARCH):
         stream.seek(block)
         data = stream.read(SEARCH + HEAD)

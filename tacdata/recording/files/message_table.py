@@ -1,4 +1,4 @@
-"""Messages of an MCAP file by column, so that a long recording costs little: few objects, heads as arrays."""
+"""Messages of an MCAP file by column: few objects, so that long recordings are read fast."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ class Topic:
     log_ns: np.ndarray
     """Times of receipt [ns], shape (n,), int64."""
     data: list[bytes]
-    """What they say, n entries."""
+    """Content of each message, n entries."""
 
 
 @dataclass(frozen=True)
 class ChunkContent:
-    """An open chunk whose records fit into each other."""
+    """An open chunk, verified to contain whole records."""
 
     content: bytes
     starts: list[int]
-    """Where each record begins [bytes]."""
+    """Start of each record [bytes]."""
 
     @classmethod
     def split(cls, content: bytes) -> ChunkContent:
@@ -94,7 +94,7 @@ class MessageTable:
     _heads: list[np.ndarray] = field(default_factory=list)
     """Heads (`HEAD`) of each part that was added [in the file's own units], shape (messages of the part,)."""
     data: list[bytes] = field(default_factory=list)
-    """What each says."""
+    """Content of each message."""
 
     def extend(self, heads: np.ndarray, data: list[bytes]) -> None:
         """Append messages by their heads (`HEAD`), shape (n,), and data."""
@@ -114,7 +114,7 @@ class MessageTable:
         return self._heads[0]
 
     def topic(self, channels: set[int]) -> Topic:
-        """Return the messages of some channels."""
+        """Return the messages of some channels by column."""
         heads = self.heads
         rows = np.flatnonzero(np.isin(heads["channel"], sorted(channels)))
         own, data = heads[rows], self.data

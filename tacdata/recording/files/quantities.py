@@ -1,4 +1,4 @@
-"""What a recording holds beside taxels, guide and cameras: force, temperature, ... and phases that were marked."""
+"""Further quantities of a recording (force, temperature, ...) and its marked phases."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tacdata.recording.files.mcap_records import Records
 
 
 def measured_streams(records: Records) -> tuple[MeasuredStream, ...]:
-    """Return every further quantity of a recording, by its name."""
+    """Return every further quantity of a recording, by name."""
     measured = sorted({c.topic for c in records.channels.values() if c.topic.startswith(topics.MEASURED)})
     return tuple(_stream(records, topic.removeprefix(topics.MEASURED)) for topic in measured)
 
@@ -29,7 +29,7 @@ def _stream(records: Records, name: str) -> MeasuredStream:
 
 
 def marked_phases(records: Records) -> tuple[Phase, ...]:
-    """Return the phases as their marks say; for recordings without commands, whose motions could not tell them."""
+    """Return the phases as they were marked, for recordings without motion commands."""
     marks = [pb.Phase.FromString(message.data) for message in records.of_topic(topics.PHASE)]
     return tuple(
         Phase(mark.name, mark.start_ns, following.start_ns)

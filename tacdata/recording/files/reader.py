@@ -1,4 +1,4 @@
-"""A recording as an `Episode`, from a finished file or from what a crash left."""
+"""Reads a recording as an `Episode`, from a finished or a damaged file."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from tacdata.sensor import Sensor
 
 @dataclass(frozen=True)
 class Recording:
-    """An episode with what only `tacdata check` and curious people ask for."""
+    """An episode with all that `tacdata check` needs beyond it."""
 
     episode: Episode
     moves: tuple[AnchoredMove, ...]
-    """Every move with its anchored start and uncertainty."""
+    """Every move with its estimated start and uncertainty."""
     counts: dict[str, dict[str, Any]]
     """Stream name -> received, lost, repeated, corrupt, garbage_bytes, notes, as the drivers counted."""
     plan: dict[str, Any]
@@ -46,19 +46,19 @@ class Recording:
     images: dict[str, int]
     """Camera name -> images in the file."""
     log: tuple[str, ...]
-    """Warnings and errors noted while recording."""
+    """Warnings and errors logged while recording."""
     clocks: dict[str, ClockModel]
     """Stream name ("taxels", "camera NAME") -> its clock, as stored or fitted anew."""
     cameras: dict[str, ImageTimes]
     """Camera name -> its images' times."""
     polled: dict[str, str]
-    """What the file says of the motion controller's clock (`polled_clock`)."""
+    """The motion controller's clock, as stored (`polled_clock`)."""
     height_resolution: float
-    """What the controller's reported height may be off its command [mm]."""
+    """Largest difference between reported and commanded height at rest [mm]."""
 
 
 def read_episode(path: Path) -> Episode:
-    """Read one recording; a file without its end is salvaged without being asked.
+    """Read one recording as an `Episode`; a file that a crash cut off is salvaged.
 
     Raises:
         UsageError: If there is no such file.
@@ -70,11 +70,11 @@ def read_episode(path: Path) -> Episode:
 def read_recording(
     path: Path, digests: bool = True, seen: Callable[[str, memoryview], None] | None = None
 ) -> Recording:
-    """Read one recording with everything in it.
+    """Read one recording with everything in it, also what `Episode` leaves out.
 
     Args:
         path: The file.
-        digests: Whether pictures are told apart (`ImageTimes.digest`); without it reading is faster.
+        digests: Whether to compute a checksum of each picture (`ImageTimes.digest`); reading is faster without.
         seen: Takes the topic and message of each picture as it is read (`mcap_records.read_records`).
 
     Raises:
@@ -85,7 +85,9 @@ def read_recording(
 
 
 def recording_of(records: Records) -> Recording:
-    """Return what the records of a file say, also of one that is still being written. Raises as `read_episode`."""
+    """Return the recording that a file's records hold, also of one that is still being written; raises as
+    `read_episode`.
+    """
     try:
         return _recording(records)
     except (KeyError, ValueError, TypeError) as error:
@@ -174,7 +176,7 @@ def _notes(records: Records, complete: bool, moves: list[AnchoredMove], log: tup
         notes.append("the recording was never closed; everything up to its last chunk is here")
     elif end.get("reason"):
         notes.append(end["reason"])
-    # What was broken off (a hold, an alarm) did not run to its end: nothing contradicts its profile.
+    # An interrupted move (a hold, an alarm) did not run to its end: nothing contradicts its profile.
     judged = moves if complete else moves[:-1]
     clashes = [move.contradiction_ns for move in judged if move.contradiction_ns > 0]
     if clashes:
@@ -191,7 +193,7 @@ def _array(values: list[int]) -> np.ndarray:
 
 
 def _clocks(records: Records, frames: TaxelFrames, cameras: list[str], rate: float) -> dict[str, ClockModel]:
-    """Return each stream's clock: the session's from the file, or one fitted to what a crash left."""
+    """Return each stream's clock: as stored, or fitted anew to what a crash left."""
     clocks = {}
     for name in ("taxels", *(f"camera {camera}" for camera in cameras)):
         stored = records.metadata.get(f"clock_model/{name}")

@@ -1,4 +1,4 @@
-"""A damaged recording, written anew with a summary, so that every MCAP reader opens it."""
+"""Rewrites a damaged recording with a summary, so that every MCAP reader opens it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tacdata.recording.files.mcap_records import walk
 
 @dataclass
 class Recovered:
-    """What could be restored."""
+    """Result of a recovery."""
 
     path: Path
     """The new file."""
@@ -26,14 +26,13 @@ class Recovered:
     attachments: int = 0
     """Attachments in it."""
     damage: list[str] = field(default_factory=list)
-    """What was wrong with the old file, in words; empty if nothing was."""
+    """What was wrong with the old file, as sentences; empty if nothing was."""
 
 
 def recover(path: Path, target: Path | None = None) -> Recovered:
-    """Write what can be read of ``path`` beside it, as ``NAME.recovered.mcap``; the old file stays as it is.
+    """Write what can be read of ``path`` beside it, as ``NAME.recovered.mcap``; the old file is kept.
 
-    The copy says that it is not complete, names the damage, and keeps every message, time and attachment as
-    it was.
+    The copy is marked incomplete and names the damage. It keeps every message, time and attachment.
 
     Raises:
         UsageError: If there is no such file or the target exists.
@@ -68,7 +67,7 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
 
 
 class _Copy:
-    """Copies record by record, so that a long recording needs little memory."""
+    """Copies record by record, so that memory stays small."""
 
     def __init__(self, writer: Writer, found: Recovered) -> None:
         self.writer, self.found = writer, found

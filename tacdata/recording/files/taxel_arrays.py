@@ -1,4 +1,4 @@
-"""Taxel frames of a recording as arrays: the bytes of many messages at once, as long as they are laid out alike."""
+"""Taxel frames of a recording as arrays, decoded many messages at once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FIELDS = {1: "arrival_ns", 3: "counter", 4: "counts", 5: "device_ns"}
 
 @dataclass(frozen=True)
 class TaxelFrames:
-    """What a board's frames say, in the order of writing."""
+    """Frames of a board, in the order of writing."""
 
     arrival_ns: np.ndarray
     """Host times of receipt [ns], shape (n,), int64."""
@@ -27,15 +27,16 @@ class TaxelFrames:
     counts: np.ndarray
     """Raw readings [counts], shape (n, channels); without frames (0, 0)."""
     widths: tuple[int, ...]
-    """Channels that frames have, ascending; more than one only if frames contradict each other, and then ``counts``
-    is empty."""
+    """Numbers of channels found, ascending. More than one means that frames contradict each other; then ``counts`` is
+    empty.
+    """
 
 
 def taxel_frames(data: list[bytes]) -> TaxelFrames:
     """Return the frames of messages `Taxels`.
 
     Raises:
-        google.protobuf.message.DecodeError: If one is no such message.
+        google.protobuf.message.DecodeError: If a message is damaged.
     """
     found: dict[str, np.ndarray] = {}
     lengths = np.fromiter(map(len, data), np.int64, len(data))
@@ -56,7 +57,7 @@ def taxel_frames(data: list[bytes]) -> TaxelFrames:
 
 
 def _columns(flat: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Read messages of one length, shape (n, bytes), as the first of them is laid out.
+    """Decode messages of one length, shape (n, bytes), by the layout of the first.
 
     Returns:
         Which messages are laid out like it, shape (n,), bool; field name -> values, shape (n,) or (n, channels).
@@ -75,23 +76,23 @@ def _columns(flat: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
             place += values.shape[1] * 8
         elif wire != VARINT or width == 0:
             return np.zeros(len(flat), dtype=bool), {}
-        if FIELDS.get(number) in columns:  # said twice
+        if FIELDS.get(number) in columns:  # the field occurs twice
             return np.zeros(len(flat), dtype=bool), {}
         if number in FIELDS:
             columns[FIELDS[number]] = values
-    if set(columns) != set(FIELDS.values()):  # protobuf leaves out a 0
+    if set(columns) != set(FIELDS.values()):  # protobuf omits a 0
         return np.zeros(len(flat), dtype=bool), {}
     return alike, columns
 
 
 def _varint_bytes(message: np.ndarray, place: int) -> int:
-    """Return how many bytes a number takes; 0 if it does not end within ten."""
+    """Return the length of a varint [bytes]; 0 if it does not end within ten."""
     ends = np.flatnonzero(message[place : place + 10] < 0x80)
     return int(ends[0]) + 1 if len(ends) else 0
 
 
 def _varints(octets: np.ndarray, alike: np.ndarray) -> np.ndarray:
-    """Return numbers of as many bytes, shape (n, bytes), as int64; where one has another length, ``alike`` is lost."""
+    """Return varints of equal length, shape (n, bytes), as int64; clears ``alike`` where a length differs."""
     more = octets >= 0x80
     alike &= (more[:, :-1].all(axis=1)) & ~more[:, -1] if octets.shape[1] else False
     values = np.zeros(len(octets), np.uint64)
@@ -101,7 +102,7 @@ def _varints(octets: np.ndarray, alike: np.ndarray) -> np.ndarray:
 
 
 def _with_rest(data: list[bytes], found: dict[str, np.ndarray], rest: np.ndarray) -> TaxelFrames:
-    """Return the frames, those that were laid out otherwise read one by one."""
+    """Return all frames; messages of another layout are decoded one by one."""
     frames = [pb.Taxels.FromString(data[k]) for k in rest.tolist()]
     widths = {len(frame.counts) for frame in frames}
     if len(rest) < len(data):

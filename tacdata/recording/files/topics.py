@@ -1,4 +1,4 @@
-"""Which channel carries which protobuf message: the one place that names topics."""
+"""Topic names of a recording and the protobuf message of each: the only place that names topics."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FIXED: dict[str, Any] = {
 
 
 def taxels(board: str = "") -> str:
-    """Return the topic of a board's readings; a demonstration's boards have names, those of the fingers."""
+    """Return the topic of a board's readings; boards of a demonstration are named by finger."""
     return f"{TAXELS}/{board}" if board else TAXELS
 
 
@@ -44,7 +44,7 @@ def measured(name: str) -> str:
 
 
 def cube(camera: str) -> str:
-    """Return the topic of what the tag detector says of each image."""
+    """Return the topic of the cube detections in each image."""
     return f"/camera/{camera}/cube"
 
 
@@ -54,24 +54,24 @@ def pose(camera: str) -> str:
 
 
 def image_time(camera: str) -> str:
-    """Return the topic of when each image was taken."""
+    """Return the topic of the times of images."""
     return f"/camera/{camera}/time"
 
 
 def finger(camera: str, name: str) -> tuple[str, str]:
-    """Return the topics of what the tag detector says of a finger, and of its tip's poses."""
+    """Return the topics of a finger's detections and of its tip's poses."""
     return f"/camera/{camera}/finger/{name}/view", f"/camera/{camera}/finger/{name}/pose"
 
 
 def fingers(topics: Iterable[str], camera: str) -> tuple[str, ...]:
-    """Return the names of the fingers for which there are topics of a camera."""
+    """Return the fingers for which topics of a camera exist."""
     found = (topic.split("/") for topic in topics)
     ours = ["", "camera", camera, "finger"]
     return tuple(sorted(parts[4] for parts in found if parts[:4] == ours and parts[5:] == ["view"]))
 
 
 def of_camera(camera: str, fingers: Iterable[str] = ()) -> dict[str, Any]:
-    """Return the channels of one camera that looks at these fingers, by name."""
+    """Return the topics of one camera that looks at these fingers, by name."""
     own = {
         image(camera): CompressedImage,
         image_time(camera): tacdata_pb2.ImageTime,

@@ -1,8 +1,7 @@
-"""One press into one MCAP file, from any thread, safe against kill -9 but for the last second.
+"""Writes one press to one MCAP file, from any thread; kill -9 costs at most the last second.
 
-While it is written the file is called ``*.partial.mcap``. Closed complete, it takes its final name; closed
-for a fault, it becomes ``*.interrupted-K.mcap``. Whatever the name, everything that reached the disk can be
-read.
+While it is written the file is called ``*.partial.mcap``. Closed complete, it gets its final name. Closed after a
+fault, it becomes ``*.interrupted-K.mcap``. Under any name, all that reached the disk can be read.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ LEVELS = {"info": Log.Level.INFO, "warning": Log.Level.WARNING, "error": Log.Lev
 
 @dataclass(frozen=True)
 class Header:
-    """What is attached to every recording."""
+    """The documents that are attached to every recording."""
 
     press: Press
     sensor: Sensor
@@ -50,7 +49,7 @@ class Header:
     controller: dict[str, Any] = field(default_factory=dict)
     """``settings`` as read, ``acceleration`` [mm/s^2] and ``max_rate`` [mm/s] of each axis."""
     latencies: dict[str, StreamLatency] = field(default_factory=dict)
-    """Constant delay of each stream that a sync tap measured, by the stream's name."""
+    """Constant latency of each stream, measured by a sync tap, by the stream's name."""
 
     @property
     def attachments(self) -> dict[str, Any]:
@@ -69,7 +68,7 @@ class Header:
 
 @dataclass(frozen=True)
 class CubePoseRecord:
-    """A cube's pose, or that of the fingertip that carries it, as the detector gives it."""
+    """Pose of a cube, or of the fingertip that carries it, as detected."""
 
     position: tuple[float, float, float]
     """Origin of the cube or tip in the camera frame [m]."""
@@ -84,13 +83,14 @@ class CubePoseRecord:
     ambiguous: bool = False
     """Whether a second pose explains the image about as well."""
     covariance: tuple[float, ...] = ()
-    """Of a small turn in the camera frame [rad] and the position [m], 6 x 6 by rows; empty if it is not known."""
+    """Covariance of a small rotation in the camera frame [rad] and the position [m], 6 x 6 by rows; empty if unknown.
+    """
     strays: tuple[int, ...] = ()
-    """Tags of this cube that were read where the pose has none."""
+    """Outlier tags: tags of this cube that the pose does not explain."""
 
 
 class Attached(Protocol):
-    """What says which documents a recording carries."""
+    """Anything that lists documents to attach to a recording."""
 
     @property
     def attachments(self) -> dict[str, Any]:
@@ -99,13 +99,13 @@ class Attached(Protocol):
 
 
 class EpisodeWriter:
-    """A recording in progress. Methods may be called from any thread; writing happens in one of its own."""
+    """A recording in progress. Thread-safe; a thread of its own writes."""
 
     def __init__(
         self, path: Path, header: Attached, clock: Clock, cameras: tuple[str, ...] = (),
         fingers: tuple[str, ...] = (), boards: tuple[str, ...] = (),
     ) -> None:  # fmt: skip
-        """Create the file under its partial name and put the attachments on disk.
+        """Create the file under its partial name and write the attachments.
 
         Args:
             path: The finished file's name.
@@ -113,7 +113,7 @@ class EpisodeWriter:
             clock: The recording's clock.
             cameras: Names of the cameras.
             fingers: Names of the fingers that cameras may look at.
-            boards: Names of several boards, where there is not just one.
+            boards: Names of the boards, if there are several.
 
         Raises:
             UsageError: If a recording of that name, finished or partial, exists.
@@ -131,7 +131,7 @@ class EpisodeWriter:
                 f"{path} cannot be begun: {error}", "a disk with room for the recording", "make room, then --resume"
             ) from error
         self._queue: queue.SimpleQueue[tuple[str, int, int, int, bytes] | None] = queue.SimpleQueue()
-        self._taken = self._written = 0  # bytes handed over and bytes dealt with
+        self._taken = self._written = 0  # bytes received and bytes written
         self._failure: Exception | None = None
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._drain, name=f"write {path.name}", daemon=True)
@@ -140,7 +140,7 @@ class EpisodeWriter:
 
     @property
     def failure(self) -> Exception | None:
-        """What stopped the writing (a full disk, say), or None."""
+        """The error that stopped the writing (a full disk, for example), or None."""
         return self._failure
 
     @property
@@ -160,7 +160,7 @@ class EpisodeWriter:
             try:
                 if self._failure is None:
                     self._file.add(*item) if item else self._file.tick()
-            except Exception as error:  # whatever stops the writing stops the motion
+            except Exception as error:  # any error of writing stops the motion
                 self._failure = error
             if item:
                 self._written += len(item[-1])
@@ -176,7 +176,7 @@ class EpisodeWriter:
             self._queue.put((topic, log_ns, publish_ns, sequence, data))
 
     def taxels(self, frame: TaxelFrame, sample_ns: int, board: str = "") -> None:
-        """Write one reading of the board, or of one of several, with its sample time as estimated so far [ns]."""
+        """Write one frame of the board, or of one of several, with its estimated sample time [ns]."""
         message = pb.Taxels(
             arrival_ns=frame.arrival_ns,
             sample_ns=sample_ns,
@@ -213,13 +213,13 @@ class EpisodeWriter:
         self._add(topics.MOTION, command.acknowledged_ns, command.sent_ns, 0, message)
 
     def phase(self, name: str, start_ns: int) -> None:
-        """Mark the beginning of a phase; an empty name ends the one before."""
+        """Mark the beginning of a phase; an empty name ends the current one."""
         self._add(topics.PHASE, start_ns, start_ns, 0, pb.Phase(name=name, start_ns=start_ns))
 
     def image(
         self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, jpeg: bytes, device_ns: int = -1
     ) -> None:
-        """Write one compressed image, and when it was taken."""
+        """Write one compressed image and its times."""
         message = CompressedImage(frame_id=camera, data=jpeg, format="jpeg")
         message.timestamp.FromNanoseconds(sample_ns)
         time = pb.ImageTime(arrival_ns=arrival_ns, sample_ns=sample_ns, sequence=sequence, device_ns=device_ns)
@@ -230,7 +230,7 @@ class EpisodeWriter:
         self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None,
         finger: str = "",
     ) -> None:  # fmt: skip
-        """Write what the tag detector says of the cube, or of a finger, in one image; ``None`` if no face was seen."""
+        """Write the detection of the cube, or of a finger, in one image; ``None`` if no face was seen."""
         pair = topics.finger(camera, finger) if finger else (topics.cube(camera), topics.pose(camera))
         stamps = arrival_ns, sample_ns, sequence
         if pose is not None:
@@ -254,13 +254,13 @@ class EpisodeWriter:
         clock_models: dict[str, ClockModel | PolledClock] | None = None,
         counts: dict[str, StreamCounts] | None = None,
     ) -> Path:
-        """Finish the file and give it its name.
+        """Finish the file and rename it.
 
         Args:
-            complete: Whether the press was carried out and recorded whole.
-            reason: Why not, in words.
+            complete: Whether the press was carried out and recorded completely.
+            reason: Why not, as a sentence.
             clock_models: Clock model of each stream, by its name ("taxels").
-            counts: What each stream delivered and lost.
+            counts: Frames received and lost by each stream.
 
         Returns:
             The file's path: the final one, or that of an interrupted recording.
@@ -280,7 +280,7 @@ class EpisodeWriter:
                 self._file.describe(f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()})
             self._file.describe("episode", {"complete": json.dumps(complete), "reason": reason})
             self._file.close()
-        except Exception as error:  # whatever stops the writing is said, and the file let go
+        except Exception as error:  # any error of writing is reported, and the file closed
             self._file.let_go()
             partial = self._file.path
             raise DeviceError(
@@ -316,7 +316,7 @@ def _begun(
     path: Path, header: Attached, clock: Clock, cameras: tuple[str, ...], fingers: tuple[str, ...],
     boards: tuple[str, ...],
 ) -> ChunkedFile:  # fmt: skip
-    """Create the file with its channels and attachments and hand it to the disk."""
+    """Create the file with its channels and attachments and sync it to the disk."""
     file = ChunkedFile(file_names.partial(path))
     for topic, message in topics.FIXED.items():
         file.register(topic, message)

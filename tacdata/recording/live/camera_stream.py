@@ -1,4 +1,4 @@
-"""One camera's images on their way into a recording: compressed, and searched for tags as time allows."""
+"""Writes one camera's images to a recording, compressed, and searches them for tags as time allows."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ JPEG_QUALITY = 90
 
 
 class CameraStream:
-    """Writes every image, and searches the next one for tags whenever the search before has ended.
+    """Writes every image; searches the newest for tags when the previous search has ended.
 
-    Images are in the file, so the search can be redone on those that were passed over.
+    All images are in the file, so the search can be repeated on those that were skipped.
     """
 
     def __init__(
@@ -28,9 +28,9 @@ class CameraStream:
 
         Args:
             name: The camera's name.
-            entry: Its entry in the rig file; its ``cube`` is what is looked for.
+            entry: Its entry in the rig file; its ``cube`` is searched.
             detect: The detector, if tags are to be searched.
-            fingers: What a camera without ``cube`` looks for (`schemas/fingers.schema.json`).
+            fingers: Fingers that a camera without ``cube`` searches (`schemas/fingers.schema.json`).
         """
         self.name, self._intrinsics = name, entry.get("intrinsics")
         self._cube = entry.get("cube")
@@ -43,12 +43,12 @@ class CameraStream:
         """Whether the detector has answered once (or there is none)."""
 
     def take(self, frame: ImageFrame, sample_ns: int, sink: EpisodeWriter | None) -> None:
-        """Write one image with its sample time as estimated so far [ns].
+        """Write one image with its estimated sample time [ns].
 
         Without a recording, a first one is searched, as a detector's first call takes long.
 
         Raises:
-            DeviceError: If the image is none.
+            DeviceError: If the image is not a valid picture.
         """
         if sink:
             jpeg = frame.jpeg or self._jpeg(frame)
@@ -61,7 +61,7 @@ class CameraStream:
     def collect(self, patience: float) -> None:
         """Write the pose of the search under way if it ends within ``patience`` [s of real time].
 
-        A detector that fails is not asked again; the recording goes on without poses and says so.
+        A detector that fails is not called again. The recording continues without poses and logs that.
         """
         if self._search is None:
             return
@@ -74,7 +74,7 @@ class CameraStream:
         try:
             found = search.result()
             self._last = found.cubes if self._fingers else found
-        except Exception as error:  # whatever breaks in a detector, the press goes on
+        except Exception as error:  # any error of a detector: the press goes on
             self._detect = None
             if sink:
                 sink.note(
@@ -112,7 +112,7 @@ class CameraStream:
 
 
 def _record(pose: Any) -> CubePoseRecord | None:
-    """Return a cube's or a fingertip's pose as it is stored; what a detector does not say stays empty."""
+    """Return a cube's or fingertip's pose as it is stored; missing values stay empty."""
     if pose is None:
         return None
     x, y, z = (float(value) for value in pose.position)

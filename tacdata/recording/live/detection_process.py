@@ -1,7 +1,7 @@
-"""Searching images for tags in a process of its own, so that the streams' threads never wait for it.
+"""Searches images for tags in a process of its own.
 
-A search costs tens of milliseconds of computing; in the recorder's process it would hold up the reading of
-the serial lines, whose arrival times are what the clocks are fitted to.
+A search takes tens of milliseconds of computing. In the recorder's process it would delay the reading of the serial
+lines, and the clocks are fitted to those arrival times.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Detect = Callable[..., Future]
 """``detect(image, intrinsics, cube, hint)`` -> a future of the pose or None; with a fingers document instead of a cube,
 of a view with ``tips``, ``cubes`` (the next hint) and ``remarks`` (`tacdata.tags.look`)."""
 NICENESS = 10
-"""By how much the process gives way to others (Unix)."""
+"""Niceness of the process (Unix)."""
 
 
 @contextmanager
@@ -36,7 +36,7 @@ def in_background(detect: Callable[..., Any]) -> Iterator[Detect]:
 
 
 def _give_way() -> None:
-    # Ctrl-C reaches every process of the terminal; only the recorder is to answer it.
+    # Ctrl-C reaches every process of the terminal; only the recorder answers it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(NICENESS)

@@ -1,4 +1,4 @@
-"""Threads that drain boards and cameras into whichever recording is open; what silence means is for others to say."""
+"""Threads that read boards and cameras and write to the open recording."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from tacdata.recording.live.detection_process import Detect
 from tacdata.recording.live.live_feed import LiveFeed, Watch
 
 BOARD = "taxel board"
-"""What an only board is called where people read it."""
+"""Name of a single board in messages."""
 POLL = 0.05
-"""How long a read may wait [s of the host's clock]."""
+"""Timeout of one read [s of the host's clock]."""
 CATCH_UP = 5.0
-"""How long the end of a recording waits for images not yet written [s of real time]."""
+"""How long the end of a recording waits for images that are not written yet [s of real time]."""
 SEARCH = 2.0
-"""How long the end of a recording waits for a search for tags that is under way [s of real time]."""
+"""How long the end of a recording waits for a tag search under way [s of real time]."""
 
 
 class DeviceStreams(ABC):
-    """Runs as a context while the devices are open; between recordings, what arrives feeds the clock models only."""
+    """A context that runs while the devices are open; between recordings, arrivals feed only the clock models."""
 
     silence: float
-    """A stream that delivers nothing for so long has fallen silent [s of real time]."""
+    """Time without data after which a stream counts as silent [s of real time]."""
 
     def __init__(
         self, boards: dict[str, TaxelBoard], cameras: dict[str, Camera], entries: dict[str, dict[str, Any]],
@@ -42,12 +42,12 @@ class DeviceStreams(ABC):
         """Prepare the threads.
 
         Args:
-            boards: The opened boards; an only one may be called "".
+            boards: The opened boards; a single one may be called "".
             cameras: The opened cameras.
             entries: The rig file's camera entries.
             fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
             detect: Searches an image for cubes; without it images are only stored.
-            watch: Is shown some of what arrives.
+            watch: Called with a sample of the data.
         """
         self._boards = {f"taxels {name}".rstrip(): board for name, board in boards.items()}
         self._cameras = {f"camera {name}": camera for name, camera in cameras.items()}
@@ -68,15 +68,15 @@ class DeviceStreams(ABC):
 
     @abstractmethod
     def _silent(self, name: str) -> None:
-        """Take that a stream has delivered nothing for `silence`, again with each empty read; may raise."""
+        """Called when a stream has delivered nothing for `silence`, and with each empty read after that; may raise."""
 
     @abstractmethod
     def _broken(self, name: str, error: TacdataError) -> None:
-        """Take what ended a stream; its thread ends after that."""
+        """Called with the error that ended a stream's thread."""
 
     @abstractmethod
     def _spoke(self, name: str, count: int) -> None:
-        """Take that a stream has delivered so many frames, images or reports."""
+        """Called when a stream has delivered ``count`` frames, images or reports."""
 
     def __enter__(self) -> DeviceStreams:
         """Start the threads."""
@@ -95,7 +95,7 @@ class DeviceStreams(ABC):
 
     @property
     def searching(self) -> bool:
-        """Whether every camera's detector has loaded its libraries and answered once."""
+        """Whether every camera's detector has loaded and answered once."""
         return all(view.ready for view in self._views)
 
     @property
@@ -107,25 +107,25 @@ class DeviceStreams(ABC):
 
     @property
     def counts(self) -> dict[str, StreamCounts]:
-        """What each stream has delivered since `record_into` was called last."""
+        """What each stream has delivered since the last call of `record_into`."""
         return {name: _since(self._before.get(name, StreamCounts()), now) for name, now in self._totals().items()}
 
     def record_into(self, sink: EpisodeWriter | None) -> None:
-        """Send everything that arrives from now on into a recording, or nowhere."""
+        """Send all arrivals from now on to a recording, or to none."""
         with self._lock:
             self._sink = sink
             self._before = copy.deepcopy(self._totals())
             for name in self._cameras:
-                self._before[name].notes.clear()  # what a camera did not take at opening holds for all
+                self._before[name].notes.clear()  # settings that a camera refused at opening concern every recording
 
     def set_latencies(self, latencies: dict[str, StreamLatency]) -> None:
-        """Take these constant delays of streams, by name, into all sample times from now on, and no others."""
+        """Subtract these constant latencies, by stream name, from all sample times from now on, and no others."""
         with self._lock:
             for name, clock in self._clocks.items():
                 clock.set_latency(latencies.get(name))
 
     def catch_up(self, patience: float = CATCH_UP) -> None:
-        """Wait at most so long [s of real time] until every stream has handed on what has arrived by now."""
+        """Wait at most ``patience`` [s of real time] until every stream has handed on what has arrived."""
         end, self._ending = time.monotonic() + patience, True
         begun = dict(self._passes)
         for thread in self._threads:
@@ -151,7 +151,7 @@ class DeviceStreams(ABC):
                     self._silent(name)
             except TacdataError as error:
                 return self._broken(name, error)
-            except Exception as error:  # a driver's bug must not go unnoticed, nor cost the other streams
+            except Exception as error:  # a bug in a driver must be noticed, but must not cost the other streams
                 what = f"{name}: {type(error).__name__}: {error}"
                 return self._broken(name, DeviceError(what, "a driver that works", "report it with this line"))
 
@@ -194,7 +194,7 @@ class DeviceStreams(ABC):
         return read
 
     def _camera_clock(self, name: str, frame: ImageFrame) -> StreamClock:
-        """Return a camera's clock; its first image says whether the camera has a time of its own."""
+        """Return a camera's clock; its first image shows whether the camera gives a time of its own."""
         clock = self._clocks[name]
         if clock.axis == "order" and clock.frames == 0 and frame.device_ns >= 0:
             latency, clock = clock.latency, StreamClock("device_ns", clock.rate)
@@ -204,7 +204,7 @@ class DeviceStreams(ABC):
 
 
 def stream_clock(board: TaxelBoard) -> StreamClock:
-    """Return a clock that says when a board's frames were sampled."""
+    """Return a clock for a board's frames."""
     described = board.describe()
     axis = "device_ns" if described.get("clock") == "device_ns" else "counter"
     return StreamClock(axis, board.clock.rate, nominal_period_ns(described))

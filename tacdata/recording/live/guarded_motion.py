@@ -1,4 +1,4 @@
-"""Motion that stops the moment something is wrong, whoever notices."""
+"""Motion that stops as soon as any stream reports a fault."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from tacdata.recording.motion.move_times import Command
 from tacdata.recording.motion.press_steps import Position, Step
 
 WATCH = 0.02
-"""How often the motion is watched for faults and Ctrl-C [s of real time]."""
+"""Interval at which the motion is watched for faults and Ctrl-C [s of real time]."""
 MARGIN = 15.0
-"""What coming to rest may take at the end of a path before it counts as hung [s of the host's clock]."""
+"""Time allowed for coming to rest at the end of a path before it counts as hung [s of the host's clock]."""
 LETTING_GO = 10.0
-"""How long a stopped motion's thread may take to end [s of real time]."""
+"""Time allowed for a stopped motion's thread to end [s of real time]."""
 
 
 class GuardedMotion:
-    """Carries out steps in a thread of its own, so that the calling one can stop them at any moment."""
+    """Carries out steps in a thread of its own, so that the calling thread can stop them at any moment."""
 
     def __init__(self, cnc: MotionController, clock: Clock, interruption: Interruption | None = None) -> None:
-        """Drive ``cnc``; nothing moves before `drive`, which looks for what the interruption keeps."""
+        """Drive ``cnc``; nothing moves before `drive`, which looks for signals that the interruption holds back."""
         self._cnc, self._clock, self._interruption = cnc, clock, interruption or Interruption()
         self._halted = threading.Event()
-        self._rest: Position | None = None  # where it stands after a stop; None: it runs, or it does not obey
+        self._rest: Position | None = None  # where it stands after a stop; None: it runs, or does not obey
         self._why = "nothing was stopped"
 
     def stop(self) -> None:
-        """Feed hold, now; and no further step is sent. Safe from any thread."""
+        """Send a feed hold now, and no further step. Thread-safe."""
         self._halted.set()
         self._cnc.feed_hold()
 
@@ -47,11 +47,11 @@ class GuardedMotion:
         Args:
             path: The steps; each move starts from rest.
             start: Where the guide stands [mm].
-            streams: Watched meanwhile for faults.
-            writer: Where every acknowledged step is noted.
+            streams: Watched for faults.
+            writer: Receives every acknowledged step.
 
         Raises:
-            DeviceError: On a fault, after feed hold and abandoning what was queued.
+            DeviceError: On a fault, after a feed hold and dropping the queue.
             KeyboardInterrupt: On Ctrl-C, after the same.
         """
         failure: list[BaseException] = []
@@ -64,7 +64,7 @@ class GuardedMotion:
                 if streams.fault:
                     break
             if failure and streams.fault is None:
-                time.sleep(WATCH)  # a stream that stopped the motion is about to say why
+                time.sleep(WATCH)  # a stream that stopped the motion is about to give the reason
             if streams.fault or failure:
                 raise streams.fault or failure[0]
         except BaseException:
@@ -74,7 +74,7 @@ class GuardedMotion:
         return next((step.target for step in reversed(path) if step.target), start)
 
     def _let_go(self, work: threading.Thread) -> None:
-        """After a stop: see the motion's thread end, so that it sends nothing more, then empty the controller."""
+        """After a stop: wait until the motion's thread sends nothing more, then empty the controller's queue."""
         self._rest = None
         work.join(LETTING_GO)
         if work.is_alive():
@@ -113,7 +113,7 @@ class GuardedMotion:
             failure.append(error)
 
     def lift(self, height: float, speed: float) -> str:
-        """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; say what came of it."""
+        """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; return the result as a sentence."""
         if self._rest is None:
             return f"the indenter was not lifted ({self._why}); free it by hand"
         x, y, z = self._rest

@@ -1,7 +1,7 @@
-"""Ctrl-C while something moves: it waits until whoever watches the motion asks for it.
+"""Holds Ctrl-C back while something moves, until the motion's watcher asks for it.
 
-Python raises it wherever the main thread happens to be. Amid the taking of a lock that becomes a RuntimeError, in a
-finalizer it is lost, and the machine would go on.
+Python raises KeyboardInterrupt wherever the main thread happens to be. While a lock is taken that becomes a
+RuntimeError; in a finalizer it is lost, and the machine would go on.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ class Interruption:
     """
 
     def __init__(self) -> None:
-        """Take nothing yet."""
+        """Create it; no signal is taken yet."""
         self._asked = self._answered = self._keeping = False
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Interruption:
-        """Take the signals, also where a shell started this in the background and has it ignore Ctrl-C."""
+        """Take the signals, also where a shell started this in the background and ignores Ctrl-C."""
         hang_up = getattr(signal, "SIGHUP", None)  # Windows has none
         numbers = [signal.SIGINT, signal.SIGTERM]
         if hang_up is not None and signal.getsignal(hang_up) == signal.SIG_DFL:
@@ -35,7 +35,7 @@ class Interruption:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Let the signals go where they went before."""
+        """Restore the previous signal handlers."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
@@ -43,7 +43,7 @@ class Interruption:
         """Answer what was asked for meanwhile.
 
         Raises:
-            KeyboardInterrupt: If there was a signal that nobody has been told of.
+            KeyboardInterrupt: If a signal came that was not raised yet.
         """
         if self._asked and not self._answered:
             self._answered = True
@@ -51,14 +51,14 @@ class Interruption:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Let the first signal wait for `check`, or for the end; the next one is raised where it finds the thread."""
+        """Hold the first signal until `check` or the end; a second one is raised at once."""
         with self._set(True):
             yield
         self.check()
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
-        """Within `kept`: raise signals where they find the thread; a question to a person would not end otherwise."""
+        """Within `kept`: raise signals at once; a question to a person would not end otherwise."""
         with self._set(False):
             self.check()
             yield

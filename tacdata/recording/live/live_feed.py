@@ -1,4 +1,4 @@
-"""Some of what arrives, for somebody who watches: never more than a viewer can take, and never waited for."""
+"""A sample of the data for a viewer, at a rate that it can take; the recorder never waits for it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Watch = Callable[[str, int, Any], None]
 
 ``taxels``: readings, shape (channels,); ``cnc``: machine position [mm]; ``camera NAME``: image."""
 RATE = {"taxels": 30.0, "cnc": 10.0, "camera": 5.0}
-"""Most values shown a second of real time, by kind of stream [Hz]."""
+"""Values shown per second of real time, by kind of stream [Hz]."""
 
 
 class LiveFeed:
-    """Thins streams out before they reach a viewer."""
+    """Reduces streams to the rate of a viewer."""
 
     def __init__(self, watch: Watch) -> None:
-        """Show to ``watch``; it is not asked again once it has failed."""
+        """Show to ``watch``; after its first error it is not called again."""
         self._watch: Watch | None = watch
         self._shown: dict[str, float] = {}
 
@@ -43,5 +43,5 @@ class LiveFeed:
         self._shown[stream] = now
         try:
             self._watch(stream, arrival_ns, value)
-        except Exception:  # whatever breaks in a viewer, the recording goes on
+        except Exception:  # any error of a viewer: the recording goes on
             self._watch = None

@@ -1,4 +1,4 @@
-"""The devices of a rig, opened together and closed together."""
+"""The devices of a rig, opened and closed together."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.rig import Rig
 
 @dataclass(frozen=True)
 class RigDevices:
-    """What a recorder drives and listens to."""
+    """Boards, cameras and controller of a rig."""
 
     cnc: MotionController
     board: TaxelBoard
@@ -26,7 +26,7 @@ class RigDevices:
 
     @contextmanager
     def opened(self) -> Iterator[RigDevices]:
-        """Open all, the controller last, and close all whatever happens."""
+        """A context that opens all devices, the controller last, and closes all in any case."""
         with ExitStack() as stack:
             stack.enter_context(self.board)
             for camera in self.cameras.values():

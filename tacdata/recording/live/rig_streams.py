@@ -1,4 +1,4 @@
-"""Threads that drain a rig's devices into whichever recording is open; a fault in any of them stops the motion."""
+"""Threads that read a rig's devices and write to the open recording; a fault in any stops the motion."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tacdata.recording.live.live_feed import Watch
 from tacdata.recording.live.rig_devices import RigDevices
 
 TRIPS = 4096
-"""Round trips of the controller's reports that are remembered for its clock [count]."""
+"""Round trips of status reports that are kept for the controller's clock [count]."""
 
 
 class RigStreams(DeviceStreams):
-    """Runs while the session runs; what arrives between recordings feeds the clock models only."""
+    """Runs during a session; between recordings, arrivals feed only the clock models."""
 
     silence = 3.0
 
@@ -40,9 +40,9 @@ class RigStreams(DeviceStreams):
         Args:
             devices: The opened devices.
             cameras: The rig file's camera entries.
-            on_fault: Called at once, in the faulty stream's thread, before anything else: stops the motion.
+            on_fault: Called first, in the faulty stream's thread: stops the motion.
             detect: Searches an image for the cube; without it images are only stored.
-            watch: Is shown some of what arrives.
+            watch: Called with a sample of the data.
             fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
         """
         super().__init__({"": devices.board}, devices.cameras, cameras, fingers, detect, watch)
@@ -62,7 +62,7 @@ class RigStreams(DeviceStreams):
 
     @property
     def fault(self) -> TacdataError | None:
-        """The first thing that went wrong in a stream or in writing, or None."""
+        """The first error of a stream or of writing, or None."""
         failure = self._sink.failure if self._sink else None
         if self._fault is None and failure is not None:
             self._fail(DeviceError(f"writing failed: {failure}", "a disk with room", "make room, then --resume"))
@@ -70,7 +70,7 @@ class RigStreams(DeviceStreams):
 
     @property
     def clock_models(self) -> dict[str, ClockModel | PolledClock]:
-        """Clock of each stream, by its name: "taxels", "camera NAME", "cnc"."""
+        """Clock of each stream, by name: "taxels", "camera NAME", "cnc"."""
         models = super().clock_models
         with self._lock:
             polled = polled_clock(*np.array(self._trips, np.int64).reshape(-1, 2).T)

@@ -1,13 +1,20 @@
-"""When each commanded move really ran: its start time, bracketed by acknowledgements and status reports.
+"""Estimates when each commanded move ran: its start, bracketed by acknowledgements and status reports.
 
-Position cannot be sampled at the sensor's rate (GRBL answers `?` at 5 to 10 Hz), but each move's shape in
-time is known, so one number is missing: its start t0. Every fact bounds it. The controller starts after the
-command was sent and, standing still, not later than its `ok` plus a planner's turn. A report of progress s
-whose query left at q and whose answer came at r gives ``q - tau(s + e) <= t0 <= r - tau(s - e)``, where tau
-is the profile's inverse and e what a report and the steps behind it may be off the profile. A pause behind the
-move is acknowledged after the move's end. Grbl writes `ok` when a move is planned and starts it in the next turn of its
-main loop (`protocol.c`), so the start is, of what all bounds leave, what lies nearest to the middle between sending and
-that turn after the quickest `ok`; its uncertainty is the distance to the farther bound.
+The position cannot be sampled at the sensor's rate (GRBL answers `?` at 5 to 10 Hz). But each move's profile is known,
+so only its start t0 is missing. These bounds hold:
+
+1. The move starts after the command was sent.
+
+2. A controller at rest starts at the latest one planner's turn after its `ok`.
+
+3. A report of progress s, queried at q and answered at r, gives ``q - tau(s + e) <= t0 <= r - tau(s - e)``. Here tau is
+the inverse of the profile and e the largest deviation of a report from it.
+
+4. A pause behind the move is acknowledged after the move's end.
+
+Grbl writes `ok` when a move is planned and starts it in the next turn of its main loop (`protocol.c`). So of the times
+within all bounds, the start is the one nearest to the middle between sending and that turn after the quickest `ok`. Its
+uncertainty is the distance to the farther bound.
 """
 
 from __future__ import annotations
@@ -22,12 +29,13 @@ from tacdata.recording.motion.trapezoid import AxisLimits, Trapezoid
 LAST_DIGIT = 0.0005
 """Half of a report's last digit [mm]: three decimals."""
 UNKNOWN_STEP = 0.0025
-"""A motor's step where the controller does not say it [mm]: 400 steps/mm."""
+"""Size of a motor's step where the controller does not give it [mm]: 400 steps/mm."""
 SEGMENT = 0.01
-"""Time over which Grbl steps at one speed [s]: 1/ACCELERATION_TICKS_PER_SECOND of its `config.h`; `stepper.c` puts each
-segment's steps evenly into it, so that within a ramp the axis leaves the profile by up to a t^2 / 8."""
+"""Time over which Grbl steps at constant speed [s]: 1/ACCELERATION_TICKS_PER_SECOND of its `config.h`. `stepper.c`
+distributes each segment's steps evenly, so a ramp deviates from the profile by up to a t^2 / 8.
+"""
 PLANNER_TURN_NS = 5_000_000
-"""Longest time from a command's `ok` at the host to its first step [ns]; Grbl 1.1h on a host took 3 ms."""
+"""Longest time from a command's `ok` at the host to its first step [ns]; measured with Grbl 1.1h on a host: 3 ms."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,7 @@ class Command:
 
 @dataclass(frozen=True)
 class AnchoredMove:
-    """A move and when it ran."""
+    """A move with its estimated start."""
 
     command: Command
     profile: Trapezoid
@@ -68,7 +76,7 @@ class AnchoredMove:
     uncertainty_ns: int
     """Distance from the start to the farther of its bounds [ns]."""
     contradiction_ns: int
-    """By how much the bounds exclude each other [ns]; 0 if they agree."""
+    """By how much the bounds contradict each other [ns]; 0 if they agree."""
 
     @property
     def end_ns(self) -> int:
@@ -86,10 +94,10 @@ class StatusTimes:
 
 
 def report_resolution(settings: dict[str, str]) -> np.ndarray:
-    """Return what a report of an axis at rest may be off its command [mm], shape (3,).
+    """Return the largest difference between reported and commanded position at rest [mm], shape (3,).
 
-    Half of its last digit and one step, by GRBL's ``$100`` to ``$102`` [steps/mm] (doc/markdown/settings.md); in inches
-    (``$13``) a digit is 25.4 times a tenth as long.
+    It is half of the report's last digit and one motor step, by GRBL's ``$100`` to ``$102`` [steps/mm]
+    (doc/markdown/settings.md). In inches (``$13``) a digit is 25.4 times a tenth as long.
     """
     steps = np.array([_number(settings.get(f"$10{axis}", "")) for axis in range(3)])
     digit = LAST_DIGIT * (2.54 if _number(settings.get("$13", "")) else 1.0)
@@ -106,7 +114,7 @@ def _number(text: str) -> float:
 def anchor(
     commands: list[Command], statuses: StatusTimes, limits: AxisLimits, resolution: np.ndarray | None = None
 ) -> list[AnchoredMove]:
-    """Return every move of the list with its estimated start.
+    """Return every move with its estimated start.
 
     Args:
         commands: Moves and pauses in the order of sending; each move starts from rest.
@@ -116,8 +124,8 @@ def anchor(
     """
     anchored = []
     resolution = report_resolution({}) if resolution is None else resolution
-    # A controller takes a line, plans, answers and starts. It does so alike every time; what an `ok` takes longer
-    # than the quickest is the host's and the link's doing.
+    # A controller takes a line, plans, answers and starts, alike every time. If an `ok` takes longer than the
+    # quickest one, host and link caused that.
     quickest = min((c.acknowledged_ns - c.sent_ns for c in commands if c.is_move), default=0)
     for index, command in enumerate(commands):
         if command.is_move:
@@ -170,7 +178,7 @@ def _nanoseconds(seconds: np.ndarray) -> np.ndarray:
 def machine_path(moves: list[AnchoredMove], statuses: CncStream, complete: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return the path as knots: increasing times [ns], shape (k,), and positions [mm], shape (k, 3).
 
-    A recording that broke off is not trusted beyond its last move's sending: from there on the reports speak.
+    In an interrupted recording the profile ends where its last move was sent; from there on the reports are used.
     """
     times: list[np.ndarray] = [np.empty(0, np.int64)]
     positions: list[np.ndarray] = [np.empty((0, 3))]
@@ -190,7 +198,7 @@ def machine_path(moves: list[AnchoredMove], statuses: CncStream, complete: bool)
 
 
 def phases(commands: list[Command], moves: list[AnchoredMove]) -> tuple[Phase, ...]:
-    """Return the phases: a move's anchored times; a pause lasts from the move before to its own `ok`."""
+    """Return the phases: a move's estimated times; a pause lasts from the move before to its own `ok`."""
     begins: dict[str, int] = {}
     ends: dict[str, int] = {}
     by_command = {id(move.command): move for move in moves}
@@ -206,5 +214,5 @@ def phases(commands: list[Command], moves: list[AnchoredMove]) -> tuple[Phase, .
             ends[command.phase] = end
     found = sorted((begins[name], name) for name in begins if name in PHASES)
     bounds = [*(start for start, _ in found), np.iinfo(np.int64).max][1:]
-    # A phase never reaches into the next one, whatever the estimates of two neighbours are off.
+    # A phase never overlaps the next one, whatever the errors of two neighbouring estimates.
     return tuple(Phase(name, start, min(ends[name], bound)) for (start, name), bound in zip(found, bounds, strict=True))

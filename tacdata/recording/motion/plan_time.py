@@ -1,4 +1,4 @@
-"""How long a plan takes, before there is a rig."""
+"""Estimates how long a plan takes, before there is a rig."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.rig import Registration
 
 USUAL_LIMITS = AxisLimits(np.array([200.0, 200.0, 100.0]), np.array([50.0, 50.0, 15.0]))
-"""Acceleration [mm/s^2] and speed [mm/s] of a small desktop guide, where the rig's own are not known."""
+"""Acceleration [mm/s^2] and speed [mm/s] of a small desktop guide, used where the rig's own are unknown."""
 SECONDS_PER_MOUNTING = 60.0
-"""What a person takes to mount an indenter and zero its tip [s]."""
+"""Time that a person takes to mount an indenter and zero its tip [s]."""
 
 
 @dataclass(frozen=True)
 class PlanTime:
-    """What to expect of a plan."""
+    """Expected duration of a plan."""
 
     press_seconds: tuple[float, ...]
     """Expected duration of each press [s]."""
     mountings: int
-    """How often a person mounts an indenter, or turns one."""
+    """How often a person mounts or turns an indenter."""
 
     @property
     def seconds(self) -> float:

@@ -1,4 +1,4 @@
-"""What is going to happen, checked and said before the first move."""
+"""Checks all motion before the first move, and sums it up for a person to confirm."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tacdata.rig import Envelope, Rig
 from tacdata.sensor import Sensor
 
 SECONDS_PER_PRESS = 0.5
-"""What acknowledgements and closing the file add to each press [s]; measured on the virtual rig."""
+"""Time that acknowledgements and closing the file add to each press [s]; measured on the virtual rig."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Preflight:
     total: int
     """Presses of the plan."""
     indenters: tuple[str, ...]
-    """Names of the indenters in the order in which they are wanted, repeated when they come back."""
+    """Names of the indenters in the order of use; one that is used again is repeated."""
     deepest: float
     """Largest depth [mm]."""
     lower: Position
@@ -39,15 +39,15 @@ class Preflight:
     seconds: tuple[float, ...]
     """Expected duration of each press [s]."""
     cautions: tuple[str, ...] = ()
-    """What a person should know of the controller's settings before the first move."""
+    """What a person should know about the controller's settings before the first move."""
     tap: str = ""
-    """What the sync tap before them does, in words; empty without one."""
+    """What the sync tap does, in words; empty without one."""
     tools: str = ""
     """Tool offsets that are used, in words; empty without any."""
 
     @property
     def text(self) -> str:
-        """The summary in words."""
+        """The summary as text."""
         bounds = ", ".join(
             f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in zip("xyz", self.lower, self.upper, strict=True)
         )
@@ -77,12 +77,12 @@ def preflight(
     Args:
         plan: The plan.
         sensor: The skin that is pressed.
-        rig: Where it lies and where the guide may go.
+        rig: The rig: registration and envelope.
         limits: The controller's axis limits.
         wanted: Numbers of the presses still to do.
-        travel: Machine box of the controller's soft limits [mm], shapes (3,) and (3,); None: they are off.
+        travel: Machine box of the controller's soft limits [mm], shapes (3,) and (3,); None if they are off.
         cautions: What a person should know before the first move.
-        tap: What a sync tap touches before the first press (`sync_tap_motion`), if there is one.
+        tap: The touch of a sync tap before the first press (`sync_tap.touch`), if there is one.
 
     Raises:
         FormatError: Naming the first press that would leave the envelope or the soft limits, miss the skin or
@@ -137,7 +137,7 @@ def _tools(rig: Rig, indenters: list[str]) -> list[str]:
 
 
 def _unknown_tools(rig: Rig, indenters: list[str]) -> list[str]:
-    """Say which indenters have no tool offset where others have one."""
+    """Name the indenters without a tool offset, if others have one."""
     names = [name for name in dict.fromkeys(indenters) if name not in _tools(rig, indenters)]
     if not names or "tools" not in rig.document:
         return []

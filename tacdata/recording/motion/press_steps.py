@@ -1,4 +1,4 @@
-"""One press as the moves and pauses that the controller is given, each move from rest to rest."""
+"""One press as the moves and pauses for the controller, each move from rest to rest."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class Step:
 def steps(press: Press, motion: MotionSettings, registration: Registration) -> tuple[Step, ...]:
     """Return the steps of one press: travel, rest, approach, press, hold, release, retract, recovery.
 
-    A pause stands behind every move: the next one then starts from rest, as the profile of `motion_profile`
-    takes it, and the pause's acknowledgement bounds the move's end. A press with negative depth stops above
-    the skin. One with ``approach_from`` rests ``run_up`` beside its site and comes over it from there.
+    A pause stands behind every move. So the next move starts from rest, as `trapezoid` assumes, and the pause's
+    acknowledgement bounds the move's end. A press with negative depth stops above the skin. One with ``approach_from``
+    rests ``run_up`` beside its site and comes over it from there.
     """
     # Above the standoff the way down is halved, so that approach and press are both moves.
     high = -press.depth >= motion.standoff
@@ -69,7 +69,7 @@ def steps(press: Press, motion: MotionSettings, registration: Registration) -> t
 
 
 def duration(path: tuple[Step, ...], start: Position, limits: AxisLimits) -> tuple[float, Position]:
-    """Return how long the steps take from ``start`` [s], without the link's delays, and their end [mm]."""
+    """Return how long the steps take from ``start`` [s], without latencies of the link, and where they end [mm]."""
     seconds, position = 0.0, start
     for step in path:
         seconds += step.seconds

@@ -1,4 +1,4 @@
-"""The motion of a sync tap: slow and quick touches on one taxel, no deeper than the plan presses anyway."""
+"""The motion of a sync tap: slow and quick touches of one taxel, no deeper than the plan presses."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from tacdata.rig import Registration
 from tacdata.sensor import Sensor
 
 DEPTH = 0.4
-"""Depth of a touch [mm], if the plan presses as deep."""
+"""Depth of a touch [mm], if the plan presses that deep."""
 LEAST = 0.1
-"""Least depth that can be told from the uncertainty of a registration [mm]."""
+"""Smallest useful depth [mm]: the uncertainty of a registration must be small against it."""
 SLOW, QUICK = 1.0, 10.0
 """Speeds of the touches [mm/s]."""
 TOUCHES = (SLOW, QUICK, QUICK, QUICK, QUICK, SLOW, QUICK, QUICK, QUICK, QUICK, SLOW)
-"""Order of the touches: a drift while they last shifts slow and quick ones alike."""
+"""Order of the touches; alternating, so that drift affects slow and quick ones alike."""
 HELD = 0.15
 """Time at depth [s]."""
 APART = (0.55, 0.083)
-"""Rest before a touch, and what each further one adds in turn, so that samples fall differently [s]."""
+"""Rest before a touch, and what each further one adds, so that sample times differ in phase [s]."""
 
 
 def touch(plan: Plan, sensor: Sensor) -> Press:
-    """Return what the touches are, as a press: the first press's indenter on the taxel nearest to its site.
+    """Return the touch as a press: the first press's indenter on the taxel nearest to its site.
 
     Raises:
         UsageError: If the plan never presses deep enough to touch.

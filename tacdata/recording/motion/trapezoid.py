@@ -1,8 +1,8 @@
-"""The path that a motion controller commands: one acceleration-limited straight move from rest to rest.
+"""The commanded path of a motion controller: one acceleration-limited straight move from rest to rest.
 
-GRBL (doc/markdown/settings.md, $110-$112 and $120-$122) limits speed and acceleration per axis; along a
-straight move the limits are those of the axis that reaches its own first. Speed rises linearly, stays, falls
-linearly; a move too short for the commanded speed is a triangle.
+GRBL (doc/markdown/settings.md, $110-$112 and $120-$122) limits speed and acceleration per axis. Along a straight move
+the axis that reaches its own limit first decides. Speed rises linearly, stays, falls linearly. A move too short for the
+commanded speed is a triangle.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 KNOTS_PER_RAMP = 24
-"""Knots of a ramp when it is handed on as a polyline: its error is a t^2 / 8 per knot interval t."""
+"""Knots of a ramp when it is returned as a polyline; the error is a t^2 / 8 per knot interval t."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Trapezoid:
 
 @dataclass(frozen=True)
 class AxisLimits:
-    """What the controller allows each axis."""
+    """Acceleration and speed limits of the controller's axes."""
 
     acceleration: np.ndarray
     """Acceleration limit of each axis [mm/s^2], shape (3,)."""
@@ -92,7 +92,7 @@ class AxisLimits:
     """Speed limit of each axis [mm/s], shape (3,)."""
 
     def straight_move(self, start: np.ndarray, target: np.ndarray, speed: float) -> Trapezoid:
-        """Return the move that the controller makes of ``start`` to ``target`` [mm] at ``speed`` [mm/s]."""
+        """Return the controller's move from ``start`` to ``target`` [mm] at ``speed`` [mm/s]."""
         start, target = np.asarray(start, dtype=float), np.asarray(target, dtype=float)
         length = np.linalg.norm(target - start)
         if not length:

@@ -1,1 +1,1 @@
-"""The constant delay of each stream, measured by a sync tap."""
+"""The constant latency of each stream, measured by a sync tap."""

@@ -1,12 +1,13 @@
-"""The constant delay of each stream, from a few quick touches: where motion and readings must agree.
+"""Measures the constant latency of each stream, from a few quick touches.
 
-Arrivals alone do not show a link's smallest delay (`clock_model`). A touch does: slow touches say what the
-taxels read at which depth, since a delay moves little there, and in quick ones the same curve appears shifted
-by the delay times the speed. Only loading is used, as a relaxing skin unloads along another curve. A camera
-sees the carriage itself: its tag follows the height of the guide, later by the camera's delay.
+Arrivals alone do not show a link's minimum latency (`clock_model`). A touch does. Slow touches show which reading
+belongs to which depth, since a latency shifts little there. In quick ones the same curve appears shifted by the latency
+times the speed. Only loading is used, since a relaxing skin unloads along another curve.
 
-What is found is the delay against the commanded path as the reader will anchor it, which is what labels rest
-on. Its uncertainty is a jackknife over the touches.
+A camera sees the carriage: its tag follows the height of the guide, later by the camera's latency.
+
+The result is the latency against the commanded path as the reader dates it, on which labels rest. Its uncertainty is a
+jackknife over the touches.
 """
 
 from __future__ import annotations
@@ -24,41 +25,41 @@ from tacdata.recording.files.reader import Recording
 from tacdata.recording.motion.move_times import AnchoredMove
 
 RANGE = (-0.05, 0.30)
-"""Delays that are looked for [s]."""
+"""Range of latencies that are searched [s]."""
 ABOVE = 0.1
-"""How far above the skin the curve of a touch begins [mm]: more than a registration is off."""
+"""Height above the skin where the curve of a touch begins [mm]; more than the error of a registration."""
 KNOT = 0.06
-"""Distance of the curve's knots [mm]."""
+"""Spacing of the curve's knots [mm]."""
 SMOOTH = 0.3
-"""Weight of the curve's third differences against a sample [1]."""
+"""Weight of the curve's third differences relative to a sample [1]."""
 HELD = 0.03
-"""Time at depth that still counts as loading [s]: little of the skin has relaxed by then."""
+"""Time at depth that still counts as loading [s]; little of the skin has relaxed by then."""
 BASELINE = 0.3
 """Time before a touch over which its baseline is taken [s]."""
 LEAST_ANSWER = 20.0
-"""Answer to the touches that a delay can be read from [times the noise]."""
+"""Minimum answer to the touches for an estimate [times the noise]."""
 LEAST_TOUCHES = 3
-"""Quick touches with which a delay can be said [count]."""
+"""Minimum number of quick touches for an estimate [count]."""
 LEAST_VIEWS = 30
-"""Poses with which a camera's delay can be said [count]."""
+"""Minimum number of poses for an estimate of a camera's latency [count]."""
 LEAST_SURE = 0.02
-"""Largest uncertainty with which a camera's delay is worth taking [s]."""
+"""Largest uncertainty of a camera's latency that is accepted [s]."""
 LEAST_WAY = 1.0
-"""Way of the tag with which a camera's delay can be said [mm]."""
+"""Minimum travel of the tag for an estimate of a camera's latency [mm]."""
 
 
 @dataclass(frozen=True)
 class SyncTap:
-    """What the touches said."""
+    """Result of a sync tap."""
 
     latencies: dict[str, StreamLatency]
-    """Delay of each stream that could be measured: "taxels", "camera NAME"."""
+    """Latency of each stream that could be measured: "taxels", "camera NAME"."""
     remarks: tuple[str, ...]
-    """Why others could not be, in words."""
+    """Why others could not be measured, as sentences."""
 
     @property
     def words(self) -> tuple[str, ...]:
-        """A line for each stream, for people."""
+        """One line per stream, for a person."""
         found = (
             f"sync tap: {name} {latency.latency_ns / 1e6:.1f} ms late, known to {latency.uncertainty_ns / 1e6:.1f} ms"
             for name, latency in self.latencies.items()
@@ -67,7 +68,7 @@ class SyncTap:
 
 
 def measure(recording: Recording) -> SyncTap:
-    """Measure the delays of all streams in the recording of a sync tap (`sync_tap_motion`)."""
+    """Measure the latencies of all streams in the recording of a sync tap (`motion.sync_tap`)."""
     latencies: dict[str, StreamLatency] = {}
     remarks: list[str] = []
     found = taxel_latency(recording)
@@ -90,7 +91,7 @@ class _Touch:
 
     move: AnchoredMove
     time: np.ndarray
-    """Sample times without the unknown delay, since the move's start [s]."""
+    """Sample times without the unknown latency, since the move's start [s]."""
     signal: np.ndarray
     """Answer of all channels, weighted [times the noise]."""
 
@@ -107,7 +108,7 @@ class _Touch:
 
 
 def taxel_latency(recording: Recording) -> StreamLatency | str:
-    """Return the taxel stream's delay, or in words why it cannot be said."""
+    """Return the taxel stream's latency, or why it cannot be measured."""
     episode = recording.episode
     moves = [m for m in recording.moves if m.command.phase == "press" and m.profile.length]
     if len(moves) < LEAST_TOUCHES + 1:
@@ -159,7 +160,7 @@ def _cut(move: AnchoredMove, sample_ns: np.ndarray, signal: np.ndarray) -> _Touc
 
 
 def _coarse(quick: list[_Touch], origin: float) -> float:
-    """Return the delay at which depth and signal are most alike [s]."""
+    """Return the latency at which depth and signal are most alike [s]."""
     delays = np.arange(RANGE[0], RANGE[1], 0.004)
     signal = np.concatenate([t.signal for t in quick])
     likeness = [
@@ -174,7 +175,7 @@ def _loading(touch: _Touch, delay: float) -> np.ndarray:
 
 
 def _match(slow: list[_Touch], quick: list[_Touch], origin: float, delay: float) -> float:
-    """Return the delay [s] at which quick touches follow the slow ones' curve."""
+    """Return the latency [s] at which quick touches follow the slow ones' curve."""
     for _ in range(6):
         curve = _curve(slow, origin, delay)
         inside = [_loading(touch, delay) for touch in quick]
@@ -217,7 +218,7 @@ def _curve(slow: list[_Touch], origin: float, delay: float) -> Callable[[np.ndar
 
 
 def camera_latency(recording: Recording, tags: TagStream) -> StreamLatency | str:
-    """Return a camera's delay from its tag's motion, or in words why it cannot be said."""
+    """Return a camera's latency from its tag's motion, or why it cannot be measured."""
     seen = tags.faces > 0
     if seen.sum() < LEAST_VIEWS:
         return f"the tag was seen {seen.sum()} times, {LEAST_VIEWS} or more are needed"

@@ -1,4 +1,4 @@
-"""The sync taps of a session: the constant delays that hold for what is recorded after them."""
+"""The sync taps of a session: constant latencies that hold for the recordings after them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tacdata.recording.session import FILE, Session
 from tacdata.recording.sync_tap.delays import SyncTap
 
 CHANGE = 3.0
-"""Change of a delay that is worth a word [times its uncertainty]."""
+"""Minimum change of a latency that is reported [times its uncertainty]."""
 LEAST_CHANGE_NS = 2_000_000
-"""... and at least so much [ns]."""
+"""... and at least this much [ns]."""
 
 
 def latencies(session: Session) -> dict[str, StreamLatency]:
-    """Return the latest delay of each stream; {} without a sync tap."""
+    """Return the latest latency of each stream; {} without a sync tap."""
     found: dict[str, StreamLatency] = {}
     for entry in session.document.get("sync", []):
         found |= {name: StreamLatency.from_document(values) for name, values in entry["latencies"].items()}
@@ -26,7 +26,7 @@ def latencies(session: Session) -> dict[str, StreamLatency]:
 
 
 def changes(session: Session, now: dict[str, StreamLatency]) -> tuple[str, ...]:
-    """Return in words which delays are not what an earlier sync tap of the session found."""
+    """Describe the latencies that differ from an earlier sync tap of the session."""
     words = []
     for name, before in latencies(session).items():
         after = now.get(name, before)
