@@ -16,9 +16,9 @@ from tacdata.wire.frames.frame_format import from_document
 from tacdata.wire.serial_port import open_port, read_available
 
 FINE_TICK = 0.0002
-"""Coarsest tick of a board's own time that is preferred to its frame counter [s]."""
+"""Coarsest tick of a board's own time stamp that is preferred to its frame counter [s]."""
 FIRST_FRAME = 2.0
-"""Longest wait for the first good frame [s, real time]."""
+"""Timeout for the first good frame [s, real time]."""
 
 
 class CapacitiveBoard(TaxelBoard):
@@ -60,7 +60,8 @@ class CapacitiveBoard(TaxelBoard):
         }  # fmt: skip
 
     def _clock_axis(self) -> str:
-        # A counter is exact where sampling is; the board's own time is better if its ticks are fine enough.
+        # A counter is exact where sampling is regular; the board's own time stamp is better if its ticks are fine
+        # enough.
         fine = self.format.timestamp is not None and self.format.tick <= FINE_TICK
         return "device_ns" if fine or (self.format.timestamp and not self.format.counter) else "counter"
 
@@ -132,8 +133,9 @@ class CapacitiveBoard(TaxelBoard):
                 self._changed.notify_all()
 
     def _forget_partial_frame(self) -> None:
-        # The port is opened in the middle of some frame: what came before the first good one is no fault of
-        # the stream, and worth a note only if it was more than such a rest.
+        # The port is opened in the middle of a frame. What came before the first good one is no fault of the stream,
+        # and
+        # is reported only if it was longer than a frame.
         counts, rest = self.counts, 4 * self.format.size if self.format.encoding == "binary" else 4096
         if counts.corrupt > 1 or counts.garbage_bytes > rest:
             counts.notes.append(f"{counts.garbage_bytes} B, {counts.corrupt} frames were damaged at first")

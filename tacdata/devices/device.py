@@ -1,9 +1,10 @@
-"""What a driver's file holds.
+"""Base classes of all drivers.
 
 ``tacdata/devices/my_device.py`` defines one class derived from `MotionController`, `TaxelBoard` or `Camera`. A rig file
-names it by its file's name (``driver: my_device``) and hands its other settings to the constructor. A driver answers
-`describe` before it is opened, is a context manager, never blocks longer than the timeout it is given, stamps what
-arrives with the host's clock as early as it can, and counts what is lost or damaged instead of hiding it.
+names it by its file's name (``driver: my_device``) and hands its other settings to the constructor.
+
+A driver answers `describe` before it is opened, and is a context manager. It never blocks longer than its timeout. It
+stamps arrivals with the host's clock as early as it can. It counts lost and damaged data instead of hiding them.
 """
 
 from __future__ import annotations
@@ -51,13 +52,13 @@ class ImageFrame:
     image: np.ndarray
     """Grey or BGR image, shape (height, width) or (height, width, 3), uint8."""
     jpeg: bytes = b""
-    """The same image as the camera sent it, if that was a JPEG file: what is stored, without loss; else empty."""
+    """The image as the camera sent it, if that was a JPEG file; it is stored without loss. Otherwise empty."""
     device_ns: int = -1
-    """The camera's or driver's own time of the image [ns of its clock]; -1 if it gives none."""
+    """The camera's or driver's own time stamp of the image [ns of its clock]; -1 without one."""
 
 
 class Device(ABC):
-    """A device that is described before it is opened, and closed whatever happens."""
+    """Base class: a device that is described before it is opened, and closed in any case."""
 
     def __init__(self, clock: Clock, **settings: Any) -> None:
         """Keep the settings of the rig file; do not open anything yet."""
@@ -72,7 +73,7 @@ class Device(ABC):
         """Open the device.
 
         Raises:
-            DeviceError: If the port is missing, busy, silent or speaks another language.
+            DeviceError: If the port is missing, busy or silent, or what answers is another device.
         """
 
     @abstractmethod
@@ -90,7 +91,7 @@ class Device(ABC):
 
 
 class TaxelBoard(Device):
-    """A board that streams frames of all channels."""
+    """Base class of taxel boards, which stream frames of all channels."""
 
     counts: StreamCounts
 
@@ -100,13 +101,13 @@ class TaxelBoard(Device):
 
 
 class MotionController(Device):
-    """A motion controller with three axes."""
+    """Base class of motion controllers with three axes."""
 
     @abstractmethod
     def settings(self) -> dict[str, str]:
-        """Return what the controller says of itself (banner, `$$`, `$I`, ...), as text, read at opening.
+        """Return the controller's settings (banner, `$$`, `$I`, ...) as text, read at opening.
 
-        Its keys include ``banner``; GRBL-like numeric settings appear as ``$110`` etc.
+        The keys include ``banner``; GRBL-like numeric settings appear as ``$110`` etc.
         """
 
     @property
@@ -121,12 +122,12 @@ class MotionController(Device):
 
     @property
     def travel(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Lower and upper corner of what the controller itself allows [mm], shapes (3,) and (3,); None: everything."""
+        """Lower and upper corner of the controller's own limits [mm], shapes (3,) and (3,); None if it has none."""
         return None
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What a person should know of its settings before the first move."""
+        """What a person should know about its settings before the first move."""
         return ()
 
     @abstractmethod
@@ -151,9 +152,9 @@ class MotionController(Device):
 
     @abstractmethod
     def feed_hold(self) -> None:
-        """Stop the motion now, keeping the position (real-time command); safe from any thread and signal handler.
+        """Stop the motion now, keeping the position (real-time command); safe in any thread and signal handler.
 
-        Until `resume` or `abandon` no line goes out, and a `move`, `dwell` or `wait_idle` under way raises.
+        Until `resume` or `abandon` no line goes out, and a running `move`, `dwell` or `wait_idle` raises.
         """
 
     @abstractmethod
@@ -162,7 +163,7 @@ class MotionController(Device):
 
     @abstractmethod
     def abandon(self) -> tuple[float, float, float]:
-        """After a feed hold: throw the queued motion away, so that a retract can be sent.
+        """After a feed hold: drop the queued motion, so that a retract can be sent.
 
         Returns:
             Machine position at rest [mm], read after the machine had stopped.
@@ -173,11 +174,11 @@ class MotionController(Device):
 
 
 class Camera(Device):
-    """A camera."""
+    """Base class of cameras."""
 
     @property
     def counts(self) -> StreamCounts:
-        """What came so far: ``lost`` are images that nobody fetched in time, ``corrupt`` those that were damaged."""
+        """Images so far: ``lost`` were not fetched in time, ``corrupt`` were damaged."""
         return StreamCounts()
 
     @abstractmethod

@@ -107,7 +107,7 @@ class Grbl(MotionController):
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What a person should know before the first move."""
+        """What a person should know about the settings before the first move."""
         found = self._answers.cautions
         if self._found.get("reset_at_opening") == "yes" and not self._answers.homing:
             lost = "the controller was reset and its position counts from where it stands now: touch off before moving"
@@ -130,7 +130,7 @@ class Grbl(MotionController):
         return self._answers.limits("$11", 60.0, self.port)
 
     def move(self, position: tuple[float, float, float], speed: float) -> Motion:
-        """Queue a straight move; every modal word stands in the line, so that no earlier state bends it."""
+        """Queue a straight move; the line states every modal word, so that no earlier state changes it."""
         if not (np.all(np.isfinite(position)) and np.isfinite(speed) and speed > 0):
             raise UsageError(
                 f"a move to {position} mm at {speed} mm/s",
@@ -152,11 +152,11 @@ class Grbl(MotionController):
             link.wait(lambda: link.last is not None and link.last.state == "Idle", timeout, "the machine to be idle")
 
     def statuses(self) -> list[CncStatus]:
-        """Return the reports received since the last call; what came before a fault is still handed out."""
+        """Return the reports received since the last call; those before a fault too."""
         return self._opened().take_statuses()
 
     def check(self) -> None:
-        """Raise what has gone wrong since the last call, if anything.
+        """Raise the error that occurred since the last call, if any.
 
         Raises:
             DeviceError: On alarm, reset, a broken line or silence, a hold or an open door.
@@ -165,7 +165,7 @@ class Grbl(MotionController):
 
     def feed_hold(self) -> None:
         """Send ``!``; no line goes out until `resume` or `abandon`. Does nothing on a closed controller."""
-        # The broken line is a fault that every other call raises; a signal handler must not.
+        # A broken line is a fault that every other call raises; a signal handler must not raise.
         with suppress(DeviceError):
             if self._link is not None:
                 self._link.hold()
@@ -191,7 +191,7 @@ class Grbl(MotionController):
             raise DeviceError("the safety door is open", "a closed door", "close it; --resume lifts the tip first")
         link.soft_reset(ANSWER)
         link.rearm()
-        link.command("", ANSWER)  # grblHAL refuses every line after a refused one until an empty one
+        link.command("", ANSWER)  # after refusing a line, grblHAL refuses every line until an empty one
         x, y, z = link.fresh_status(ANSWER).position.tolist()
         return x, y, z
 
@@ -206,7 +206,7 @@ class Grbl(MotionController):
         try:
             link.command("$H", timeout)
         finally:
-            link.homing = link.waiting  # one that was given up still moves
+            link.homing = link.waiting  # a timed-out homing still moves
 
     @property
     def _version(self) -> str:
@@ -230,13 +230,13 @@ class Grbl(MotionController):
         except DeviceError:
             if link.resets == resets:
                 raise
-            # Grbl with a fresh memory answers ? before its welcome, and what it was sent meanwhile is lost.
+            # Grbl with a fresh memory answers ? before its welcome and loses what is sent meanwhile.
             state = clear(link)
             self._read(link)
         return state
 
     def _read(self, link: GrblLink) -> None:
-        """Ask what the controller says of itself, and set the link up for it."""
+        """Read the controller's settings and adapt the link to them."""
         self._answers = answers = GrblSettings.read(link, ANSWER)
         link.statuses.unit, link.statuses.automatic = answers.unit, answers.reports_by_itself
         link.rx_bytes = answers.rx_bytes or link.rx_bytes
@@ -247,7 +247,7 @@ class Grbl(MotionController):
         answers.limits("$11", 60.0, self.port)
 
     def _rest(self, link: GrblLink) -> CncStatus:
-        """Return a report of the machine at rest, holding it if it moves.
+        """Return a report of the machine at rest; a moving machine gets a feed hold.
 
         Raises:
             DeviceError: On a fault, or if it goes on moving.

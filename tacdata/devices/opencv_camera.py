@@ -1,4 +1,4 @@
-"""Cameras and what stands in for one, through OpenCV: device index, URL, video file or image folder."""
+"""Cameras and their substitutes, through OpenCV: device index, URL, video file or image folder."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tacdata.devices.device import Camera, ImageFrame, StreamCounts
 from tacdata.errors import DeviceError, UsageError
 
 FIRST_IMAGE = 5.0
-"""Longest wait for the first image [s, real time]."""
+"""Timeout for the first image [s, real time]."""
 STALL = 3.0
-"""A live camera without an image for so long has stalled [s of the clock, at least 2 s real time]."""
+"""Time without an image after which a live camera counts as stalled [s of the clock, at least 2 s real time]."""
 WAITING = 120
-"""Images kept until they are read; beyond that the oldest are dropped and counted."""
+"""Images kept until they are read; if there are more, the oldest are dropped and counted."""
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 BACKENDS = {
     "any": "CAP_ANY", "v4l2": "CAP_V4L2", "dshow": "CAP_DSHOW", "msmf": "CAP_MSMF",
@@ -30,21 +30,21 @@ BACKENDS = {
 }  # fmt: skip
 """Name in a rig file -> OpenCV's name of the back-end."""
 MANUAL_AUTOMATIC = {"V4L2": (1, 3)}
-"""What a back-end calls manual and automatic exposure; the others say 0.25 and 0.75."""
+"""A back-end's values of manual and automatic exposure; the others use 0.25 and 0.75."""
 BAD_IN_A_ROW = 10
-"""Damaged images in a row that are too many."""
+"""Damaged images in a row that count as a broken source."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Grabbed:
-    """What a source gives."""
+    """One item from a source."""
 
     image: np.ndarray | None
     """Grey or BGR, uint8; None if it is damaged."""
     jpeg: bytes = b""
     """The image as the source sent it, if that is a whole JPEG file."""
     device_ns: int = -1
-    """The source's own time [ns]; -1 if it has none."""
+    """The source's own time stamp [ns]; -1 without one."""
 
 
 Grab = Callable[[], "_Grabbed | None"]
@@ -68,7 +68,7 @@ class OpencvCamera(Camera):
         """Keep the settings; see the class.
 
         Raises:
-            UsageError: If a setting means nothing.
+            UsageError: If a setting is invalid.
         """
         super().__init__(clock)
         self.source = int(source) if isinstance(source, str) and source.isdigit() else source
@@ -105,7 +105,7 @@ class OpencvCamera(Camera):
 
     @property
     def counts(self) -> StreamCounts:
-        """Images received, not fetched in time (lost) and damaged (corrupt); what it did not do as asked, in words."""
+        """Images received, lost (not fetched in time) and corrupt; settings that were not accepted, as sentences."""
         with self._changed:
             return StreamCounts(self._sequence, self.dropped, 0, self.damaged, 0, list(self.notes))
 
@@ -141,7 +141,7 @@ class OpencvCamera(Camera):
             raise fault
 
     def close(self) -> None:
-        """Stop; never raises. A grab that hangs is left to end by itself."""
+        """Stop; never raises. A grab that hangs ends by itself later."""
         self._stopped.set()
         if self._thread is not None:
             self._thread.join(timeout=2.0)
@@ -174,7 +174,7 @@ class OpencvCamera(Camera):
                 grabbed = grab()
             except DeviceError as error:
                 grabbed, fault = None, error
-            except Exception as error:  # a thread that dies silently would look like a camera that stalls
+            except Exception as error:  # a thread that died silently would look like a stalled camera
                 grabbed, fault = None, self._error(f"failed ({error})", "report it with this line")
             arrival_ns = self.clock.now_ns()
             bad = bad + 1 if grabbed is not None and grabbed.image is None else 0
@@ -241,7 +241,7 @@ class OpencvCamera(Camera):
         elif not self._live and self.rate is None:
             self.rate = capture.get(cv2.CAP_PROP_FPS) or 30.0
         raw = self._ask_for_jpeg(capture)
-        # A stream over HTTP has no clock: its back-end makes times up at 25 Hz. One in a loop begins again and again.
+        # A stream over HTTP has no clock: its back-end invents times at 25 Hz. A looped file begins again and again.
         timed = not str(self.source).startswith("http") and not self.loop
 
         def grab() -> _Grabbed | None:
@@ -267,7 +267,7 @@ class OpencvCamera(Camera):
         return cv2.VideoCapture(self.source, backend)
 
     def _set_up(self, capture: Any) -> None:
-        """Set a camera's format, and note what it does not take."""
+        """Set a camera's format, and note the settings that it does not accept."""
         import cv2
 
         width, height = self.intrinsics["width"], self.intrinsics["height"]
@@ -294,11 +294,11 @@ class OpencvCamera(Camera):
             taken = capture.set(key, value)
             if not taken or abs(capture.get(key) - value) > 0.05 * abs(value) + 1e-6:
                 self.notes.append(f"camera {self.source}: {what} {value:g} asked, {capture.get(key):g} given")
-        # One image under way: with more, each is older when it arrives.
+        # A buffer of one image: with more, each is older when it arrives.
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
 
     def _ask_for_jpeg(self, capture: Any) -> bool:
-        """Ask for JPEG files as they come, so that they are stored without loss; say whether they will come so."""
+        """Ask for JPEG files as they come, to store them without loss; return whether they will come so."""
         import cv2
 
         if int(capture.get(cv2.CAP_PROP_FOURCC)) != cv2.VideoWriter.fourcc(*"MJPG"):
@@ -344,7 +344,7 @@ class OpencvCamera(Camera):
 
 
 def _decoded(data: bytes, device_ns: int = -1) -> _Grabbed:
-    """Decode an image file; a JPEG that lacks its end is damaged, one without Huffman tables is not kept as it is."""
+    """Decode an image file. A JPEG without its end is damaged; one without Huffman tables is not stored as it came."""
     import cv2
 
     if data.startswith(b"\xff\xd8"):
@@ -358,6 +358,6 @@ def _decoded(data: bytes, device_ns: int = -1) -> _Grabbed:
 
 
 def _by_number(path: Path) -> list[tuple[int, str]]:
-    """Sort image-2 before image-10."""
+    """Sort key that puts image-2 before image-10."""
     parts = re.split(r"(\d+)", path.name)
     return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]

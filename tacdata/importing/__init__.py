@@ -1,1 +1,1 @@
-"""Foreign data become recordings, by a mapping file; what is missing stays missing."""
+"""Imports foreign data as recordings, by a mapping file; what is missing stays missing."""

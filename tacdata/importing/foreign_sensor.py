@@ -1,4 +1,4 @@
-"""A foreign sensor as a `Sensor`: what is known of it, and stand-ins, marked as such, for what is not."""
+"""Describes a foreign sensor as a `Sensor`; unknown values are stand-ins and marked as such."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ UNKNOWN = "not said by the source; a stand-in"
 
 
 def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rate: float) -> tuple[Sensor, list[str]]:
-    """Return the sensor of an import and what in it stands in for unknown values.
+    """Return the sensor of an import, and which of its values are stand-ins.
 
     Args:
         entry: ``sensor`` of the mapping: a sensor file's path beside it, or what is known.

@@ -1,4 +1,4 @@
-"""Foreign files into a session folder, by a mapping."""
+"""Imports foreign files into a session folder, by a mapping."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from tacdata.recording.session import FILE
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import made."""
+    """Result of an import."""
 
     folder: Path
     """The session."""
     recordings: int
     notes: tuple[str, ...]
-    """What a person should know, in words; each once."""
+    """Remarks for a person, as sentences, each once."""
     refused: tuple[str, ...]
     """Trials that could not be imported, and why."""
 
@@ -46,11 +46,11 @@ def import_session(
         source: A folder or a file.
         mapping: The mapping's file (`schemas/import_mapping.schema.json`).
         out: Session folder to create.
-        progress: Is told of every recording.
+        progress: Called with a line for every recording.
 
     Raises:
         UsageError: If ``out`` exists, or a file is missing.
-        FormatError: If nothing could be imported; the first reason.
+        FormatError: If nothing could be imported, with the first reason.
     """
     document = documents.read(mapping, "import_mapping")
     if out.exists():
@@ -74,7 +74,7 @@ def import_session(
 
 
 class _Import:
-    """One import under way."""
+    """An import in progress."""
 
     def __init__(
         self, mapping: dict[str, Any], beside: Path, source: Path, work: Path, progress: Callable[[str], None]
@@ -145,7 +145,7 @@ class _Import:
 
 
 def plan_of(name: str, presses: list[Any]) -> dict[str, Any]:
-    """Return a plan's document that says what was pressed; it was never driven by us."""
+    """Return a document of a plan that describes the imported presses; tacdata never executed it."""
     slowest = min(press.speed for press in presses)
     motion = {"clearance": 1.0, "travel_speed": slowest, "approach_speed": slowest, "press_speed": slowest,
               "hold": 0.0, "rest": 0.0}  # fmt: skip

@@ -1,4 +1,4 @@
-"""What the path of an indenter says of a press: its depth, speed and phases."""
+"""Derives a press from the path of an indenter: depth, speed and phases."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ import numpy as np
 from tacdata.recording.episode import Phase
 
 STILL = 0.005
-"""Share of the stroke within which the indenter counts as standing at full depth [1]."""
+"""Share of the stroke within which the indenter counts as being at full depth [1]."""
 ROUNDED = 1.6
-"""How much longer it may be within four times that share for a hold [1]; a turning point is there twice as long."""
+"""Largest ratio of the time within four times that share to the time within it, for a hold [1]. At a mere turning point
+the ratio is two.
+"""
 LOW = 0.02
-"""Share of the stroke above the surface, or above the lowest point, where loading begins [1]."""
+"""Share of the stroke, from its highest point, at which loading begins [1]."""
 SHORTEST_HOLD = 0.2
-"""A rest at full depth shorter than this is no hold [s]."""
+"""A rest at full depth shorter than this is not a hold [s]."""
 
 
 @dataclass(frozen=True)
 class PressPath:
-    """A press told from its path."""
+    """A press as derived from its path."""
 
     depth: float
     """Largest depth [mm]."""
@@ -37,7 +39,7 @@ class PressPath:
 
 
 def press_path(time_ns: np.ndarray, tip: np.ndarray) -> PressPath:
-    """Tell a press from its path.
+    """Derive a press from its path.
 
     Args:
         time_ns: Times [ns], shape (n,), increasing.
@@ -69,14 +71,14 @@ def press_path(time_ns: np.ndarray, tip: np.ndarray) -> PressPath:
 
 
 def _run(mask: np.ndarray, at: int) -> tuple[int, int]:
-    """Return the first and last index of the run of True around an index, bridging nothing."""
+    """Return the first and last index of the run of True around an index."""
     outside = np.flatnonzero(~mask)
     before, behind = outside[outside < at], outside[outside > at]
     return (int(before[-1]) + 1 if len(before) else 0), (int(behind[0]) - 1 if len(behind) else len(mask) - 1)
 
 
 def _strokes(depth: np.ndarray, low: float) -> int:
-    """Return how often the path leaves the bottom tenth and comes into the top half of its stroke."""
+    """Count the strokes: how often the path goes from the bottom tenth into the top half of its range."""
     high = low + 0.5 * (float(depth.max()) - low)
     state, count = False, 0
     for above, below in zip(depth > high, depth <= low, strict=True):

@@ -1,4 +1,4 @@
-"""The presses in the rows of one trial: streams cut into recordings, each with its path and what is known of it."""
+"""Cuts the rows of one trial into recordings of single presses."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from tacdata.plans import Press
 from tacdata.rig import Registration
 
 DEEPEST = 100.0
-"""Depth beyond which a unit must be wrong [mm]; a plan allows no more."""
+"""Largest plausible depth [mm]; beyond it a unit must be wrong. A plan allows no more."""
 NO_INDENTER = {"shape": "sphere", "radius": 2.0}
-"""What stands in for an indenter that is not known."""
+"""Stand-in for an unknown indenter."""
 SLOWEST = 1e-4
-"""Least speed that a press is given [mm/s]."""
+"""Smallest speed that a press is given [mm/s]."""
 UNITS = {
     "x": "mm",
     "y": "mm",
@@ -157,7 +157,7 @@ def _indenter(mapping: dict[str, Any]) -> tuple[Indenter, str]:
 
 
 def _registration(mapping: dict[str, Any], streams: ImportedStreams) -> tuple[Registration, list[str]]:
-    """Return where the skin lies in the machine's frame, and what of it nobody said."""
+    """Return the skin's pose in the machine's frame, and which of its values are stand-ins."""
     contact, position = mapping.get("contact", {}), streams.position
     if position is None or streams.depth_given:
         return Registration((0.0, 0.0, 0.0), contact.get("yaw", 0.0)), []
@@ -208,7 +208,7 @@ def _shifted(streams: ImportedStreams, shift_ns: int) -> ImportedStreams:
 
 
 def _known(mapping: dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str]) -> dict[str, float]:
-    """Return what the mapping knows of a trial's press beyond its path."""
+    """Return what the mapping states about a trial's press beyond its path."""
     found = {}
     for name, entry in mapping.get("press", {}).items():
         where = f"press: {name}"

@@ -1,4 +1,4 @@
-"""What is in foreign files, and a mapping to start from: guesses by the columns' names, for a person to correct."""
+"""Lists what is in foreign files and proposes a mapping, by the columns' names, for a person to correct."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ GUESSES = {
     "trial": r"(trial|run|cycle|episode|press|repeat|rep|test|versuch|element)(_?(id|no|nr|number))?",
     "counter": r"(counter|frame|seq(uence)?|sample|index|n)",
 }
-"""What a column's name, without its unit, says of it."""
+"""Meaning of a column by its name without the unit."""
 GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
-"""Words in the names of lengths that were measured beside the commanded ones."""
+"""Words that mark a length as measured beside the commanded one."""
 SHOWN = 30
-"""Columns that are listed of each file."""
+"""Columns that are listed per file."""
 
 
 def described(source: Path) -> tuple[dict[str, SourceTable], str]:
-    """Return one table of each kind of file in a source, and what is in them in words.
+    """Return one table of each kind of file in a source, and a description of them.
 
     Raises:
         UsageError: If nothing there can be read.
@@ -50,7 +50,7 @@ def described(source: Path) -> tuple[dict[str, SourceTable], str]:
             continue
         try:
             tables[kind] = read_table(path, {})
-        except Exception as error:  # a README beside the data is no fault
+        except Exception as error:  # a README beside the data is no error
             refused.append(f"{kind}: {type(error).__name__}")
     if not tables:
         raise UsageError(
@@ -87,7 +87,7 @@ def _line(table: SourceTable, name: str) -> str:
 
 
 def proposed_mapping(source: Path, tables: dict[str, SourceTable]) -> dict[str, Any]:
-    """Return a mapping's document that fits the tables as far as their names tell."""
+    """Return a mapping's document for the tables, as far as their names allow."""
     aliases: dict[str, str] = {}
     for kind in tables:
         alias = re.sub(r"\W+", "_", Path(kind).stem.lower()).strip("_") or "data"
@@ -117,7 +117,7 @@ def proposed_mapping(source: Path, tables: dict[str, SourceTable]) -> dict[str, 
             }
         lengths = found.get("depth", [])
         if len(lengths) > 1 and "displacement" not in document.get("measured", {}):
-            # A second length is a gauge beside the drive: it tells what bends from what the skin does.
+            # A second length is a gauge beside the drive; it separates compliance from the skin's deformation.
             told = {"file": alias, "columns": lengths[1:2], "unit": _unit(tables[aliases[alias]], lengths[1])}
             document.setdefault("measured", {})["displacement"] = told
         for key in ("force", "temperature"):
@@ -150,7 +150,7 @@ def _roles(table: SourceTable) -> dict[str, list[str]]:
     if not roles["depth"]:
         del roles["depth"]
     if "time" not in roles and table.columns and not any(re.search(r"[A-Za-z]", name) for name in table.columns):
-        # Without a header the first column that only grows is most likely the time.
+        # Without a header, the first increasing column is most likely the time.
         for name in list(roles["channels"]):
             if (np.diff(table.columns[name]) >= 0).all():
                 roles["time"] = [name]

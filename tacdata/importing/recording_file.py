@@ -25,7 +25,7 @@ STATE = "Imported"
 
 @dataclass(frozen=True)
 class ImportedPress:
-    """All that goes into one file."""
+    """Everything that one imported recording holds."""
 
     press: Press
     sensor: Sensor
@@ -43,7 +43,7 @@ class ImportedPress:
 
     @property
     def rig(self) -> dict[str, Any]:
-        """What stands in for a rig file."""
+        """The stand-in for a rig file."""
         imported = {key: self.record[key] for key in ("name", "source", "trial", "mapping_hash", "stand_ins")}
         return {"name": self.record["name"], "registration": self.registration, "imported": imported}
 
@@ -68,7 +68,7 @@ class ImportedPress:
 
 
 def write(path: Path, imported: ImportedPress) -> None:
-    """Write one file; it has its final name only when it is whole.
+    """Write one file; it gets its final name only when it is complete.
 
     Raises:
         UsageError: If it exists.

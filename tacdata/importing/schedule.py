@@ -1,4 +1,4 @@
-"""A press schedule in place of a position: the path as it was commanded, from times, depths and speeds."""
+"""A press schedule in place of a measured position: the commanded path from times, depths and speeds."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ class ScheduledPress:
 def read_schedule(mapping: dict[str, Any], tables: dict[str, SourceTable], taxels: Stream) -> list[ScheduledPress]:
     """Return the presses of a mapping's schedule in the order of time; [] if it has none.
 
-    A list of presses counts its times from the zero of the channels' clock; from their first row if that clock
-    is Unix time and the list's is not.
+    Times in a list of presses count from the zero of the channels' clock. If that clock is Unix time and the list's is
+    not, they count from the channels' first row.
 
     Raises:
         FormatError: If a column is missing, presses overlap or lie outside the recorded time.

@@ -1,4 +1,4 @@
-"""Which files belong together: paths with {parts} that differ from trial to trial."""
+"""Finds the files of each trial: paths with {parts} that differ from trial to trial."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.errors import FormatError, UsageError
 
 @dataclass(frozen=True)
 class FileSet:
-    """Files of one trial, or of several that lie in them."""
+    """The files of one trial, or of several trials that share files."""
 
     parts: dict[str, str]
     """Value of each {part} of the paths."""
@@ -21,7 +21,7 @@ class FileSet:
 
     @property
     def label(self) -> str:
-        """The parts' values, in words."""
+        """The values of the parts, as text."""
         return " ".join(self.parts.values())
 
 
@@ -53,7 +53,7 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
                 f"correct files/{name}/path in the mapping; there is {_listing(source)}",
             )  # fmt: skip
     keys = {name: tuple(re.findall(r"\{(\w+)\}", entry["path"])) for name, entry in files.items()}
-    # The kind of file with the most parts tells the trials; others are shared by those whose parts agree.
+    # The kind of file with the most parts defines the trials; others are shared by those whose parts agree.
     leading = max(keys, key=lambda name: len(keys[name]))
     sets = []
     for parts, _ in matches[leading]:

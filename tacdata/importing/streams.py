@@ -27,7 +27,7 @@ class Stream:
     """Name of each column of `values`."""
     unit: str
     zero: str
-    """What the clock counts from; streams with the same zero share it, "aligned" fits all."""
+    """Zero of the clock. Streams with the same zero share a clock; "aligned" fits all."""
     notes: tuple[str, ...] = ()
 
     def within(self, begin_ns: int, end_ns: int) -> Stream:
@@ -38,7 +38,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class ImportedStreams:
-    """What a set of files holds."""
+    """The streams of one set of files."""
 
     taxels: Stream
     """The channels; its last column is the counter if `counted`."""
@@ -47,7 +47,7 @@ class ImportedStreams:
     measured: tuple[Stream, ...] = ()
     counted: bool = False
     depth_given: bool = False
-    """Whether the position is a depth, so that its zero is the skin."""
+    """Whether the position is a depth, so that its zero is the skin's surface."""
     notes: tuple[str, ...] = field(default=())
 
     @property
@@ -67,7 +67,7 @@ def read_streams(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> Imp
 
     Args:
         mapping: The mapping's document.
-        tables: Name under ``files`` -> what was read of it.
+        tables: Name under ``files`` -> its table.
 
     Raises:
         FormatError: If a column, unit or clock is wrong, or clocks have no zero in common.
@@ -140,7 +140,7 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[St
 
 
 def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any]) -> tuple[SourceTable, list[str]]:
-    """Return a table with a column a channel of one with a row a channel; what was not read stays NaN."""
+    """Turn a table with one row per channel into one with one column per channel; missing values are NaN."""
     clock = _clock(mapping, entry)
     time = single(table, clock["column"], "taxels: time") if "column" in clock else None
     if time is None:

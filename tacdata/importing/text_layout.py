@@ -1,4 +1,4 @@
-"""How a text file of numbers is laid out: delimiter, decimal sign, header and units, told from its first lines."""
+"""Recognizes how a text file of numbers is laid out: delimiter, decimal sign, header and units."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MISSING = (
 """Texts that stand for a missing value in any file."""
 DELIMITERS = ("\t", ";", ",", "|", " ")
 SAMPLE = 400
-"""Lines that are looked at."""
+"""Lines that are examined."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class TextLayout:
     names: tuple[str, ...]
     """Column names, one a column; "0", "1", ... in a file without a header."""
     units: dict[str, str]
-    """Unit of each column that the header gives one."""
+    """Unit of each column, where the header gives one."""
     kinds: tuple[str, ...]
     """``float``, ``int`` (too long for a float) or ``text`` of each column."""
 
 
 def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
-    """Tell the layout from a file's beginning; ``options`` (of the mapping) overrule what is found.
+    """Recognize the layout from a file's beginning; ``options`` of the mapping take precedence.
 
     Raises:
         FormatError: If there are no rows of one and the same number of columns.
@@ -86,7 +86,7 @@ def split(line: str, delimiter: str) -> list[str]:
 
 
 def is_number(field: str, decimal: str) -> bool:
-    """Say whether a field is a number or stands for a missing one."""
+    """Whether a field is a number or a text for a missing one."""
     if field in MISSING:
         return True
     try:

@@ -14,11 +14,11 @@ from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.units import FACTORS, plain, split_unit
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0
-"""Unix times between which a clock that does not say its zero is taken for Unix time [s]."""
+"""Unix times between which a clock without a stated zero is taken for Unix time [s]."""
 
 
 def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.ndarray, str]:
-    """Return each row's time and what its zero is.
+    """Return each row's time and the zero of the clock.
 
     Args:
         table: The file.
@@ -67,7 +67,7 @@ def _shifted(seconds: np.ndarray, clock: dict[str, Any]) -> np.ndarray:
     known = np.isfinite(seconds)
     whole = np.floor(np.where(known, seconds, 0.0))
     part = np.where(known, seconds, 0.0) - whole
-    # Whole seconds and the rest apart: a float holds Unix nanoseconds to 240 ns only.
+    # Whole seconds and the rest apart: a float64 resolves Unix nanoseconds to 240 ns only.
     result = whole.astype(np.int64) * 1_000_000_000 + np.rint(part * 1e9).astype(np.int64)
     result[~known] = NEVER
     return _shifted_ns(result, clock)
@@ -85,13 +85,13 @@ def _shifted_ns(time_ns: np.ndarray, clock: dict[str, Any]) -> np.ndarray:
 
 
 def _guessed(values: np.ndarray) -> str:
-    """Return the unit that makes a Unix time of this century, or s."""
+    """Return the unit that makes the values Unix times of this century, or s."""
     middle = float(np.nanmedian(values.astype(float))) if len(values) else 0.0
     return next((u for u in ("ns", "us", "ms") if YEAR_2000 < middle * FACTORS["s"][u] < YEAR_2100), "s")
 
 
 def _times_of_day(values: np.ndarray) -> np.ndarray | None:
-    """Return seconds since the first midnight [s], shape (n,), of texts like 12:34:56.789; None if they are others."""
+    """Return seconds since the first midnight [s], shape (n,), of texts like 12:34:56.789; None for other texts."""
     known = [text for text in values.tolist() if text is not None]
     if not known or not all(re.fullmatch(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?", str(text).strip()) for text in known):
         return None

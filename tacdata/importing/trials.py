@@ -1,4 +1,4 @@
-"""What makes several recordings of one set of files: a column, a pause, or each press."""
+"""Splits one set of files into recordings: by a column, by a pause, or by press."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tacdata.importing.formats.source_format import SourceTable
 def split_tables(
     tables: dict[str, SourceTable], trials: dict[str, Any]
 ) -> Iterator[tuple[str, dict[str, SourceTable]]]:
-    """Yield the label and the rows of each trial that a column tells; all rows under "" without such a column.
+    """Yield the label and the rows of each trial by a column; all rows under "" without such a column.
 
     Raises:
         FormatError: If no file has the column.
@@ -59,7 +59,7 @@ def _labels(table: SourceTable, column: str | int) -> np.ndarray:
 def windows(
     trials: dict[str, Any], taxels_ns: np.ndarray, path: tuple[np.ndarray, np.ndarray] | None
 ) -> list[tuple[int, int]]:
-    """Return the stretches of time that are trials.
+    """Return the time intervals of the trials.
 
     Args:
         trials: ``trials`` of the mapping.

@@ -1,4 +1,4 @@
-"""Units of foreign files and what they are in ours: mm, N, s. Taxel readings keep their unit."""
+"""Units of foreign files and their conversion to mm, N, s. Taxel readings keep their unit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FACTORS: dict[str, dict[str, float]] = {
 """Our unit -> the units that can be converted to it, and the factor."""
 OTHERS = {"pf", "ff", "nf", "v", "mv", "uv", "count", "counts", "lsb", "adc", "ut", "mt", "gauss", "kpa", "pa", "mpa",
           "degc", "c", "k", "ohm", "kohm", "a", "ma", "hz", "1", "raw", "%"}  # fmt: skip
-"""Units that are recognized behind a column's name though nothing is converted to them."""
+"""Units that are recognized behind a column's name but not converted."""
 
 
 def plain(unit: str) -> str:
@@ -33,7 +33,7 @@ def plain(unit: str) -> str:
 
 
 def factor(unit: str, wanted: str, origin: str) -> float:
-    """Return by what a value in ``unit`` is multiplied to be in ``wanted``.
+    """Return the factor from ``unit`` to ``wanted``.
 
     Raises:
         FormatError: If the unit is none of those that can be converted to it.

@@ -1,4 +1,4 @@
-"""Which registration a session uses, and what a person must know of it."""
+"""Chooses the registration of a session and warns about it."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from tacdata.rig import Rig
 from tacdata.sensor import Sensor
 
 FILE = "registration.yaml"
-"""Name under which `tacdata register` writes beside a rig file, and under which a session keeps its copy."""
+"""File name of a registration beside a rig file, and of its copy in a session."""
 OLD_DAYS = 30
-"""Age from which a registration is worth a word [days]."""
+"""Age from which a warning is given [days]."""
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """A rig with the registration that is going to be used."""
+    """A rig with the registration that will be used."""
 
     rig: Rig
     path: Path | None
     """The registration's file; None if the rig file's own is used."""
     warnings: tuple[str, ...]
-    """What a person must know, in words."""
+    """Warnings for a person, as sentences."""
 
     def keep(self, session: Path) -> None:
-        """Put a copy of the registration's file into a session's folder, if there is not one yet."""
+        """Copy the registration's file into a session's folder, unless a copy is there."""
         if self.path is not None and session.is_dir() and not (session / FILE).exists():
             documents.write_text(session / FILE, self.path.read_text())
 
@@ -37,10 +37,10 @@ def chosen_registration(rig: Rig, rig_path: Path, path: Path | None, sensor: Sen
     """Return the rig with a measured registration: the file that is named, or the one beside the rig file.
 
     Args:
-        rig: The rig as its file says.
+        rig: The rig, with the registration of its own file.
         rig_path: That file.
         path: A registration file; None: `FILE` beside the rig file, if there is one.
-        sensor: The sensor that is going to be pressed.
+        sensor: The sensor that will be pressed.
 
     Raises:
         UsageError: If the file does not exist, or belongs to another rig or sensor.

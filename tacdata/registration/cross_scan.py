@@ -1,4 +1,4 @@
-"""A cross of small presses over one taxel: where in the guide's frame its answer has its centre."""
+"""A cross of small presses over one taxel; returns the centre of its answer in the guide's frame."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ REACH = 1.4
 CLEARANCE = 0.5
 """Height above the skin between the presses [mm]."""
 FRAMES = 6
-"""Readings of each press, and of the rest before it."""
+"""Readings averaged at each press, and at the rest before it [count]."""
 RECOVERY = 0.5
 """Time above the skin before each press [s]."""
 
 
 @dataclass(frozen=True)
 class Cross:
-    """Where one taxel was found."""
+    """Position of one taxel, as found by a cross of presses."""
 
     taxel: int
     x: float
@@ -47,12 +47,12 @@ def cross_scan(
 
     Args:
         probe: The indenter, above the skin.
-        taxel: Which one, counted as in the sensor file.
-        guess: Where it should be [mm, machine].
+        taxel: Its number in the sensor file.
+        guess: Expected position [mm, machine].
         axes: The sensor's x and y as unit vectors in the machine's frame [1], shape (2, 2), one a row.
         pitch: Distance of the taxels along the sensor's x and y [mm].
         surface: Height of the skin [mm, machine] at a place [mm, machine].
-        depth: How deep [mm].
+        depth: Depth of the presses [mm].
         noise: Standard deviation of a reading [counts], shape (channels,).
 
     Raises:
@@ -61,7 +61,7 @@ def cross_scan(
     center = np.array(guess, dtype=float)
     lines, spread = [], []
     for axis, step in zip(axes, pitch, strict=True):
-        # Presses jump across the line, so that drift and the skin's memory do not lean to one side.
+        # The presses alternate between the line's halves, so that drift and the skin's memory do not favour one side.
         offsets = np.linspace(-REACH * step, REACH * step, PRESSES)
         order = np.random.default_rng(taxel).permutation(PRESSES)
         answer = np.zeros(PRESSES)

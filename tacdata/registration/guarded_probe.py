@@ -22,15 +22,15 @@ from tacdata.registration.probe import Position, Probe, StillReading
 from tacdata.rig import Rig
 
 PATIENCE = 5.0
-"""How long the first frames and a reading may take [s of real time, and of the rig's clock]."""
+"""Timeout of the first frames and of a reading [s of real time, and of the rig's clock]."""
 SIDEWAYS = 0.01
-"""A move of less in x and y is straight up or down [mm]."""
+"""A move of less than this in x and y counts as vertical [mm]."""
 LOOK = 0.002
-"""How often arriving frames are looked for [s of real time]."""
+"""Interval at which new frames are looked for [s of real time]."""
 
 
 class _Sink:
-    """Takes what the streams deliver; stands where a recording's writer would."""
+    """Receives what the streams deliver, in place of a recording's writer."""
 
     failure: Exception | None = None
 
@@ -43,7 +43,7 @@ class _Sink:
         self.frames.append((sample_ns, frame.counts))
 
     def status(self, status: CncStatus) -> None:
-        """Reports are of no interest here."""
+        """Ignore a status report."""
 
 
 class GuardedProbe(Probe):
@@ -53,7 +53,7 @@ class GuardedProbe(Probe):
         self, rig: Rig, devices: RigDevices, streams: RigStreams, motion: GuardedMotion, height: float,
         interruption: Interruption,
     ) -> None:  # fmt: skip
-        """Take over devices that are open and streams that run; ``height`` [mm, machine] is safe to rise to."""
+        """Use open devices and running streams; ``height`` [mm, machine] is a safe height."""
         self._rig, self._devices, self._streams, self._motion = rig, devices, streams, motion
         self._height, self._sink, self._interruption = height, _Sink(), interruption
         streams.record_into(cast(Any, self._sink))
@@ -103,7 +103,7 @@ class GuardedProbe(Probe):
         self.lowest = min(self.lowest, position[2])
 
     def _way(self, position: Position, speed: float) -> tuple[Step, ...]:
-        """Return the steps there: sideways only at the higher of the two heights, so that nothing is hit on the way."""
+        """Return the steps there: sideways only at the higher of the two heights, so that nothing is hit."""
         x, y, z = self._position
         if np.hypot(position[0] - x, position[1] - y) < SIDEWAYS or abs(position[2] - z) < SIDEWAYS:
             return (Step("", position, speed),)
@@ -149,10 +149,10 @@ class GuardedProbe(Probe):
 def guarded_probe(
     rig: Rig, devices: RigDevices, height: float, speed: float, interruption: Interruption | None = None
 ) -> Iterator[GuardedProbe]:
-    """Open streams on devices that are open and yield a probe, risen to ``height`` [mm, machine] at ``speed`` [mm/s].
+    """Yield a probe on open devices, lifted to ``height`` [mm, machine] at ``speed`` [mm/s].
 
-    Whatever goes wrong, the motion stops first; then the indenter is lifted straight up. A Ctrl-C that ``interruption``
-    has kept is noticed within 20 ms.
+    On any fault the motion stops first; then the indenter is lifted straight up. A Ctrl-C held back by ``interruption``
+    is noticed within 20 ms.
     """
     interruption = interruption or Interruption()
     motion = GuardedMotion(devices.cnc, rig.clock, interruption)
@@ -171,12 +171,12 @@ def guarded_probe(
 
 
 def _free(probe: GuardedProbe, motion: GuardedMotion, streams: RigStreams, height: float, speed: float) -> None:
-    """Lift the indenter after whatever went wrong; never raises."""
+    """Lift the indenter after a fault; never raises."""
     if streams.fault is None and not probe.stopped:
         with suppress(TacdataError):
             probe.rise(speed)
         return
-    if not probe.stopped:  # a fault while the guide stood still: what the hold left has to be let go first
+    if not probe.stopped:  # a fault while the guide stood still: the hold must be released first
         with suppress(TacdataError):
             motion.drive((), probe.position, streams, None)
     print(motion.lift(height, speed), file=sys.stderr)

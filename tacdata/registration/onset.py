@@ -1,10 +1,12 @@
-"""The height of first contact, from a slow approach: a hinge b + A (z0 - z)^p for z < z0 fitted to the answer.
+"""Estimates the height of first contact from a slow approach, by a hinge b + A (z0 - z)^p for z < z0.
 
-A threshold on the answer finds contact too late by what the noise demands, on soft skins by far more than the
-guide's resolution. Fitting the curve's foot has no such bias, if the power p is free: 1 for a spring that is met
-squarely, 3/2 for a sphere on a half space (K. L. Johnson, Contact Mechanics, eq. 4.23), up to 2 for a sphere on a
-bed of springs. For each z0 and p the rest is linear and solved with Huber's weights, so that single bad readings
-do not pull; z0's uncertainty is where the misfit grows by one unit of the noise, p being free (profile likelihood).
+A threshold on the answer finds contact too late, by an amount that depends on the noise. On soft skins that is far more
+than the guide's resolution. Fitting the foot of the curve has no such bias if the power p is free. It is 1 for a flat
+spring, 3/2 for a sphere on a half space (K. L. Johnson, Contact Mechanics, eq. 4.23) and up to 2 for a sphere on a bed
+of springs.
+
+For each z0 and p the rest is linear and solved with Huber's weights against outliers. The uncertainty of z0 is its
+profile likelihood: where the misfit, with p free, grows by one unit of the noise.
 """
 
 from __future__ import annotations
@@ -14,17 +16,17 @@ from dataclasses import dataclass
 import numpy as np
 
 POWERS = np.linspace(1.0, 2.4, 29)
-"""Powers that are tried [1]."""
+"""Powers in the search grid [1]."""
 GRID = 161
-"""Heights that are tried."""
+"""Number of heights in the search grid."""
 HUBER = 1.5
 """Residual beyond which a reading counts less [standard deviations]."""
 FLOOR = 0.003
-"""Least uncertainty that is claimed [mm]: three decimals of a report and a micro-step of the guide."""
+"""Smallest uncertainty that is stated [mm]: three decimals of a report and a micro-step of the guide."""
 FOOT = 0.08
-"""Depth to which the answer's shape is trusted to be a power [mm]."""
+"""Depth down to which the answer is assumed to be a power [mm]."""
 CLEAR = 8.0
-"""Answer at the lowest point that a fit needs [standard deviations of a reading]."""
+"""Minimum answer at the lowest point for a fit [standard deviations of a reading]."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +42,13 @@ class Onset:
     strength: float
     """Answer at the lowest point [standard deviations of a reading]."""
     model: float
-    """What the answer's unknown shape and the approach's steps may do to the height [mm]; the same everywhere."""
+    """Systematic uncertainty by the unknown power and the steps of the approach [mm]; common to all places."""
 
 
 def combined(readings: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Return the channels' answers as one, with unit noise.
+    """Combine the channels' answers into one with unit noise (matched filter).
 
-    The weights are the answer at the deepest readings over the noise squared (matched filter).
+    Each weight is the answer at the deepest readings over the noise squared.
 
     Args:
         readings: Mean readings [counts], shape (n, channels), from the highest to the lowest.
@@ -61,9 +63,8 @@ def combined(readings: np.ndarray, noise: np.ndarray) -> np.ndarray:
 def onset(height: np.ndarray, answer: np.ndarray, power: float | None = None) -> Onset | None:
     """Fit the height of first contact.
 
-    The curve is fitted twice: whole, and down to `FOOT` below the first fit's contact only. Where the two contradict
-    each other the answer's shape further down (a gap that closes, a layer that ends) is none of the hinge's, and the
-    foot alone is believed.
+    The curve is fitted twice: whole, and down to `FOOT` below the first fit's contact. Where the two contradict each
+    other, the deeper answer is no power (a gap that closes, a layer that ends), and the foot alone is used.
 
     Args:
         height: Machine heights [mm], shape (n,), falling.
@@ -93,8 +94,8 @@ def onset(height: np.ndarray, answer: np.ndarray, power: float | None = None) ->
 def shared_power(curves: list[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
     """Return the power that fits all approaches best, and its standard uncertainty [1].
 
-    Indenter and skin are the same everywhere, so the power is; where it is fitted to each approach alone, its error
-    moves the heights by different amounts and tilts the plane.
+    Indenter and skin are the same everywhere, so the power is too. Fitted to each approach alone, its error would move
+    the heights by different amounts and tilt the plane.
 
     Args:
         curves: Heights [mm] and answers [standard deviations] of each approach.
@@ -121,7 +122,7 @@ def _fit(height: np.ndarray, answer: np.ndarray, powers: np.ndarray) -> tuple[fl
     best = int(np.argmin(profile))
     if best >= GRID - 2:
         return None
-    # Noise as the fit itself shows it, never less than what the idle readings show.
+    # Noise as the residuals show it, never less than what the idle readings show.
     scale = max(profile[best] / max(len(height) - 4, 1), 1.0)
     within = trial[profile <= profile[best] + scale]
     width = max(float(within.max() - within.min()) / 2, float(trial[1] - trial[0]) / 2)
@@ -130,7 +131,7 @@ def _fit(height: np.ndarray, answer: np.ndarray, powers: np.ndarray) -> tuple[fl
 
 
 def _misfits(height: np.ndarray, answer: np.ndarray, trial: np.ndarray, powers: np.ndarray) -> np.ndarray:
-    """Return the robust misfit of every height and power, shape (heights, powers), b and A being solved for."""
+    """Return the robust misfit of every height and power, shape (heights, powers); b and A are solved for."""
     hinge = np.maximum(trial[:, None, None] - height, 0.0) ** powers[None, :, None]
     weight = np.ones_like(hinge)
     residual = np.broadcast_to(answer, hinge.shape)
@@ -143,5 +144,5 @@ def _misfits(height: np.ndarray, answer: np.ndarray, trial: np.ndarray, powers: 
         spread = np.maximum(1.0, 1.4826 * np.median(np.abs(residual), axis=-1))[..., None]
         weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(residual), 1e-12))
     size = np.abs(residual)
-    # A wild reading counts as one of three deviations and hardly more, however wild it is.
+    # An outlier counts as a residual of three standard deviations and hardly more.
     return np.where(size <= 3.0, size**2, 9.0 + np.log1p(np.maximum(size - 3.0, 0.0))).sum(axis=-1)

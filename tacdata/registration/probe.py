@@ -1,4 +1,4 @@
-"""What the procedure needs of a rig: to go somewhere, and to read the channels while standing there."""
+"""What the procedure needs of a rig: go to a position, and read the channels there."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ Position = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class StillReading:
-    """Channels while the indenter stands still."""
+    """Channels averaged while the indenter stands still."""
 
     mean: np.ndarray
     """Mean reading [counts], shape (channels,)."""
     spread: np.ndarray
     """Standard deviation of a single reading [counts], shape (channels,)."""
     frames: int
-    """Readings behind the mean."""
+    """Frames averaged [count]."""
 
 
 class Probe(ABC):
-    """An indenter on a guide over a sensor."""
+    """Base class: an indenter on a guide over a sensor."""
 
     @abstractmethod
     def go(self, position: Position, speed: float) -> None:
@@ -36,8 +36,8 @@ class Probe(ABC):
 
     @abstractmethod
     def read(self, frames: int) -> StillReading:
-        """Return the mean of so many frames, all sampled after the guide came to rest."""
+        """Return the mean of ``frames`` frames, all sampled after the guide came to rest."""
 
     @abstractmethod
     def wait(self, seconds: float) -> None:
-        """Let so much time pass [s of the rig's clock]."""
+        """Wait [s of the rig's clock]."""

@@ -1,4 +1,4 @@
-"""The procedure: noise, four touches, a plane; crosses over three taxels, a rigid motion."""
+"""The procedure: noise, four touches and a plane; crosses over three taxels and a rigid motion."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from tacdata.rig import Registration
 from tacdata.sensor import Sensor
 
 IDLE_FRAMES = 40
-"""Readings from which the noise is taken."""
+"""Readings from which the noise is estimated [count]."""
 QUIET_RISE = 0.4
-"""How far above the first touch the search at the other places begins [mm], tilt not counted."""
+"""Height above the first touch from which the other places are searched [mm], tilt not counted."""
 
 
 def reference_taxels(sensor: Sensor) -> tuple[int, ...]:
@@ -41,7 +41,7 @@ def touch_sites(sensor: Sensor) -> dict[str, tuple[float, float]]:
 
 
 def described(sensor: Sensor, guess: Registration, settings: RegistrationSettings) -> str:
-    """Return in words what the procedure is going to do."""
+    """Describe what the procedure is going to do."""
     half = np.abs(sensor.taxels.centers).max(axis=0)
     x, y, z = guess.origin
     taxels = settings.taxels or reference_taxels(sensor)
@@ -68,9 +68,9 @@ def register(
     Args:
         probe: A spherical indenter, somewhere above the sensor.
         sensor: The sensor.
-        guess: Where it is believed to lie, within about a pitch, a few degrees and ``settings.limit``.
+        guess: Where it is expected, within about a pitch, a few degrees and ``settings.limit``.
         settings: How far and how carefully.
-        say: Is told what goes on.
+        say: Called with a line of progress.
 
     Raises:
         DeviceError: If the sensor does not answer, is too noisy, not flat, too tilted, or not what its file says.
@@ -103,7 +103,7 @@ def _noise(probe: Probe, guess: Registration, settings: RegistrationSettings) ->
             "no channel changes at all while nothing is touched", "live channels with some noise",
             "check that the board sends fresh readings",
         )  # fmt: skip
-    # A quiet channel may stand still between two counts; rounding alone is worth 0.3 counts.
+    # A quiet channel may stay between two counts; the standard deviation of rounding alone is 0.3 counts.
     return np.maximum(reading.spread, 0.3)
 
 
@@ -129,7 +129,7 @@ def _touches(
 
 
 def _with_one_power(touches: list[Touch]) -> list[Touch]:
-    """Fit the onsets again with one power for all; what the power may be off moves all heights alike (`model`)."""
+    """Fit the onsets again with one common power; its error moves all heights alike (`model`)."""
     power, doubt = shared_power([(t.height, t.answer) for t in touches])
     powers = np.clip([power, power - doubt, power + doubt], POWERS[0], POWERS[-1]).tolist()
     fits = [[onset(t.height, t.answer, p) for p in powers] for t in touches]
@@ -176,7 +176,7 @@ def _crosses(
     crosses: list[Cross] = []
     for taxel in taxels:
         x, y, _ = guess.to_machine(*centers[taxel], 0.0)
-        # What the first taxel was off, the others will be off by about as much.
+        # The other taxels are expected to be off by about as much as the first.
         if crosses:
             known = guess.to_machine(*centers[crosses[0].taxel], 0.0)
             x, y = x + crosses[0].x - known[0], y + crosses[0].y - known[1]

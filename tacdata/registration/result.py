@@ -1,4 +1,4 @@
-"""What the procedure found, as a file."""
+"""The result of a registration, and its file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tacdata.sensor import Sensor
 
 @dataclass(frozen=True)
 class Found:
-    """A registration with everything behind it."""
+    """A registration with all data behind it."""
 
     plane: Plane
     motion: RigidMotion
@@ -48,7 +48,7 @@ class Found:
         """Standard uncertainties: origin [mm], yaw [deg], tilt [mm/mm]."""
         x, y = self.motion.shift
         slope = float(np.sqrt(np.diag(self.plane.covariance)[1:]).max())
-        # A tilt that is wrong by s makes one side of a line deeper: d^p exp(-x^2 / 2 w^2) leans by w^2 p s / d, where
+        # A tilt error s makes one side of a line deeper: d^p exp(-x^2 / 2 w^2) leans by w^2 p s / d, where
         # the answer's width w is at most about the length of the lines.
         width = max(float(np.ptp(place)) / 4 for cross in self.crosses for place, _ in cross.lines)
         lean = width**2 * float(np.mean([t.onset.power for t in self.touches])) * slope / self.settings.depth
@@ -60,7 +60,7 @@ class Found:
 
     @property
     def text(self) -> str:
-        """The result in words."""
+        """The result as text."""
         place, sigma = self.registration, self.uncertainty
         x, y, z = (f"{value:.3f} +- {u:.3f}" for value, u in zip(place.origin, sigma["origin"], strict=True))
         return (

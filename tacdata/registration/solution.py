@@ -1,4 +1,4 @@
-"""Touches and centres to a registration: a plane through the heights, a rigid motion through the taxels."""
+"""Turns touches and centres into a registration: a plane through the heights, a rigid motion through the taxels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Plane:
     """Height of first contact over the guide's x and y: z = c + a (x - x0) + b (y - y0)."""
 
     center: tuple[float, float]
-    """Where the height is counted from, x0 and y0 [mm, machine]."""
+    """Reference point x0 and y0 [mm, machine]."""
     height: float
     """c [mm]."""
     slope: tuple[float, float]
@@ -35,7 +35,7 @@ class Plane:
 def fit_plane(place: np.ndarray, height: np.ndarray, uncertainty: np.ndarray) -> Plane:
     """Fit a plane by weighted least squares.
 
-    Its covariance is widened where the heights scatter more than their uncertainties say.
+    Its covariance is inflated where the heights scatter more than their uncertainties.
 
     Args:
         place: x and y [mm, machine], shape (n, 2); three or more, not on a line.
@@ -56,7 +56,7 @@ def fit_plane(place: np.ndarray, height: np.ndarray, uncertainty: np.ndarray) ->
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """machine = shift + R_z(yaw) sensor, in the plane."""
+    """A rigid motion in the plane: machine = shift + R_z(yaw) sensor."""
 
     shift: tuple[float, float]
     """Machine position of the sensor's origin [mm]."""

@@ -1,7 +1,7 @@
-"""The centre of a taxel's answer along a line of presses: a bell B + A (1 + ((s - c) / w)^2)^-q fitted to it.
+"""Finds the centre of a taxel's answer along a line, by a symmetric bell B + A (1 + ((s - c) / w)^2)^-q.
 
-The bell is symmetric, and its foot q is free from Gaussian-like to Boussinesq's spreading of stress under a slab
-(K. L. Johnson, Contact Mechanics, eq. 2.22: q = 5/2); only its centre is used.
+The exponent q is free, from Gaussian-like to Boussinesq's spreading of stress under a slab (K. L. Johnson, Contact
+Mechanics, eq. 2.22: q = 5/2). Only the centre is used.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 FLOOR = 0.005
-"""Least uncertainty that is claimed [mm]."""
+"""Smallest uncertainty that is stated [mm]."""
 CLEAR = 6.0
-"""Answer that a taxel must give [standard deviations]."""
+"""Minimum answer of a taxel [standard deviations]."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Center:
     """Centre of symmetry along a line."""
 
     place: float
-    """Where on the line [mm]."""
+    """Position on the line [mm]."""
     uncertainty: float
     """Standard uncertainty [mm]."""
     strength: float

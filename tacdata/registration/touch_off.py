@@ -15,15 +15,15 @@ COARSE = 0.1
 FINE = 0.02
 """Step of the slow approach [mm]."""
 ABOVE, BELOW = (0.28, 0.6), 0.12
-"""From where, at first and at the second try, to where around the search's contact the slow approach goes [mm]."""
+"""Begin (first and second try) and end of the slow approach, relative to the search's contact [mm]."""
 HIGHER = 0.4
 """How far the indenter is lifted between the approaches [mm]."""
 RECOVERY = 2.0
-"""Time that the skin is left alone before each approach [s]."""
+"""Recovery time of the skin before each approach [s]."""
 FRAMES = 6
-"""Readings at each step."""
+"""Readings averaged at each step [count]."""
 ANSWER = 7.0
-"""What counts as an answer of a channel [standard deviations of a step's mean], seen twice in a row."""
+"""Minimum answer of a channel [standard deviations of a step's mean], needed twice in a row."""
 SPEED, LIFT_SPEED = 1.0, 5.0
 """Speeds downwards and upwards [mm/s]."""
 
@@ -33,7 +33,7 @@ class Touch:
     """First contact at one place."""
 
     site: str
-    """What the place is called."""
+    """Name of the place."""
     x: float
     """Place [mm, machine]."""
     y: float
@@ -52,12 +52,12 @@ def touch_off(
 
     Args:
         probe: The indenter.
-        site: What the place is called, in errors.
+        site: Name of the place, for errors.
         place: x and y [mm, machine].
         top: Height from which the search begins [mm, machine], above the skin.
         lowest: Height below which the search never goes [mm, machine].
         noise: Standard deviation of a reading [counts], shape (channels,).
-        repeats: Slow approaches.
+        repeats: Number of slow approaches.
 
     Raises:
         DeviceError: If nothing answers down to the limit, or something does already at the top, or the
@@ -72,7 +72,9 @@ def touch_off(
 def _approach(
     probe: Probe, site: str, place: tuple[float, float], found: float, lowest: float, noise: np.ndarray
 ) -> Touch:
-    """Approach slowly around the height at which the search was answered; once more from higher if that was late."""
+    """Approach slowly around the height at which the search was answered; if that began in contact, once more from
+    higher.
+    """
     for above in ABOVE:
         probe.go((*place, found + max(above, HIGHER)), LIFT_SPEED)
         probe.wait(RECOVERY)
@@ -94,7 +96,7 @@ def _approach(
 
 
 def search(probe: Probe, site: str, place: tuple[float, float], top: float, lowest: float, noise: np.ndarray) -> float:
-    """Go down in steps until a channel answers twice in a row; return the height of the first of the two [mm]."""
+    """Go down in steps until a channel answers twice in a row; return the height of the first answer [mm]."""
     probe.go((*place, top), LIFT_SPEED)
     probe.wait(RECOVERY / 2)
     rest = probe.read(2 * FRAMES).mean

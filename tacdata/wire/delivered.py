@@ -1,4 +1,4 @@
-"""What streams of bytes deliver: readings, status reports, and counts of both."""
+"""What the serial lines deliver: readings, status reports, and their counts."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 
 @dataclass(frozen=True)
 class TaxelFrame:
-    """One reading of all channels, un-tared."""
+    """One reading of all channels, not tared."""
 
     arrival_ns: int
-    """Host time at which the last byte of the frame was received [ns]."""
+    """Host time of the frame's last byte [ns]."""
     counter: int
     """The device's frame counter, unwrapped from the wire's width [frames]; -1 if the format has none."""
     counts: np.ndarray
     """Raw readings [counts], shape (channels,), float64."""
     device_ns: int = -1
-    """The device's own time, unwrapped [ns of the device's clock]; -1 if the format has none."""
+    """The device's own time stamp, unwrapped [ns of the device's clock]; -1 if the format has none."""
 
 
 @dataclass(frozen=True)
@@ -52,4 +52,4 @@ class StreamCounts:
     garbage_bytes: int = 0
     """Bytes skipped while resynchronizing."""
     notes: list[str] = field(default_factory=list)
-    """What else a person should know, in words."""
+    """Further remarks for a person, as sentences."""

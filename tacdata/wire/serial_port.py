@@ -1,4 +1,4 @@
-"""Opening a serial port so that what is wrong is said and a board is not reset without need."""
+"""Opens a serial port: errors in words, and no needless reset of the board."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ except ImportError:  # Windows has no hang-up flag to clear.
 
 
 def ports() -> str:
-    """Return the serial ports that this machine has, in words."""
+    """Return the serial ports of this machine, as text."""
     found = [f"{p.device} ({p.description})" if p.description != "n/a" else p.device for p in list_ports.comports()]
     return ", ".join(found) or "this machine shows none"
 
 
 def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | None = None) -> serial.SerialBase:
-    """Open a port for one process alone.
+    """Open a port exclusively.
 
-    Linux raises DTR whenever a port is opened, before any program can say otherwise (`tty_port_open`), and an Arduino
-    board resets if DTR was low until then: after plugging in, or after a program that lowered it at closing. That first
-    reset cannot be prevented from here; the welcome shows it, and the driver says it. Clearing HUPCL keeps DTR up at
-    closing, so that later openings do not reset a board in motion. A pseudo-terminal has no DTR. To protect a
-    board at the first opening too: a capacitor at its reset pin, or ``stty -F PORT -hupcl`` once while it stands.
+    Linux raises DTR whenever a port is opened (`tty_port_open` of the kernel), and an Arduino resets if DTR was low
+    until then: after plugging in, or after a program that lowered it at closing. No program can prevent that first
+    reset. The welcome shows it, and the driver reports it.
+
+    Clearing HUPCL keeps DTR up at closing, so that later openings do not reset a board in motion. A pseudo-terminal has
+    no DTR. To protect a board at the first opening too, use a capacitor at its reset pin, or ``stty -F PORT -hupcl``
+    once while nothing moves.
 
     Args:
         port: Path, ``COM`` name or pyserial URL.
@@ -54,7 +56,7 @@ def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | Non
 
 
 def read_available(line: serial.SerialBase) -> bytes:
-    """Return what has arrived, waiting for the first byte at most as long as the port's timeout.
+    """Return what has arrived; wait for the first byte at most as long as the port's timeout.
 
     Raises:
         serial.SerialException: If the line broke (OSError or TypeError on some systems).

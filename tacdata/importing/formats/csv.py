@@ -14,7 +14,7 @@ from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 from tacdata.importing.text_layout import COMMENTS, MISSING, TextLayout, is_number, text_layout
 
 SNIFFED = 256 * 1024
-"""Bytes from which the layout is told."""
+"""Bytes from which the layout is recognized."""
 
 
 class Csv(SourceFormat):
@@ -23,7 +23,7 @@ class Csv(SourceFormat):
     endings = (".csv", ".tsv", ".txt", ".dat", ".asc", ".csv.gz", ".txt.gz", ".tsv.gz")
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
-        """Read the file by Arrow's reader, whose layout `text_layout` tells; see the base."""
+        """Read the file by Arrow's reader, with the layout of `text_layout`; see the base class."""
         data, notes = _decoded(path, options)
         layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
         body = _body(data, layout)
@@ -74,7 +74,7 @@ def _body(data: bytes, layout: TextLayout) -> bytes:
 
 
 def _parsed(body: bytes, layout: TextLayout, missing: list[str], path: Path) -> tuple[dict[str, np.ndarray], int]:
-    """Parse with the kinds that the layout tells; if a text stands among numbers, say where."""
+    """Parse with the column types of the layout; if a text stands among numbers, report where."""
     import pyarrow as pa
 
     kinds = {"float": pa.float64(), "int": pa.int64(), "text": pa.string()}

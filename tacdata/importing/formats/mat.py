@@ -22,7 +22,7 @@ class Mat(SourceFormat):
     endings = (".mat",)
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
-        """Read the variables; ``table`` in the options names a variable to take alone. See the base."""
+        """Read the variables; ``table`` in the options selects one. See the base class."""
         from scipy.io import loadmat
         from scipy.io.matlab import MatReadError
 

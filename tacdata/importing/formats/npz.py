@@ -18,7 +18,7 @@ class Npz(SourceFormat):
     endings = (".npz", ".npy")
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
-        """Read the arrays; nothing pickled is ever loaded. See the base."""
+        """Read the arrays; pickled objects are never loaded. See the base class."""
         try:
             with np.load(path, allow_pickle=False) as loaded:
                 arrays = {name: loaded[name] for name in loaded.files}

@@ -17,7 +17,7 @@ class Parquet(SourceFormat):
     endings = (".parquet", ".feather")
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
-        """Read all columns; nulls become NaN. See the base."""
+        """Read all columns; nulls become NaN. See the base class."""
         import pyarrow as pa
         from pyarrow import feather, parquet
 

@@ -1,7 +1,7 @@
-"""What a source format's file holds.
+"""Base class of a source format, and the table that it returns.
 
-``tacdata/importing/formats/my_format.py`` defines one class derived from `SourceFormat`. It says which endings are its
-own and reads a file into a `SourceTable`: named columns as they stand in the file, nothing converted or filled in.
+``tacdata/importing/formats/my_format.py`` defines one class derived from `SourceFormat`. It names its file endings and
+reads a file into a `SourceTable`: named columns as they stand in the file, nothing converted or filled in.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ class SourceTable:
     columns: dict[str, np.ndarray]
     """Name -> values as in the file [any], shape (rows,) or (rows, k): float64, int64, or text."""
     units: dict[str, str] = field(default_factory=dict)
-    """Name -> unit as the file says it, where it does."""
+    """Name -> unit, where the file gives one."""
     notes: tuple[str, ...] = ()
-    """What a person should know of the reading, in words."""
+    """Remarks on the reading, as sentences."""
 
     @property
     def rows(self) -> int:
@@ -49,8 +49,8 @@ class SourceFormat(ABC):
 
         Args:
             path: The file.
-            options: What the mapping says of it: ``header``, ``delimiter``, ``decimal``, ``skip``, ``encoding``,
-                ``missing`` (texts), ``table`` (name inside the file); a format takes what it knows.
+            options: The mapping's options: ``header``, ``delimiter``, ``decimal``, ``skip``, ``encoding``,
+                ``missing`` (texts), ``table`` (name inside the file); a format uses those that concern it.
 
         Raises:
             FormatError: If the file is not of this kind, or damaged.
@@ -58,7 +58,7 @@ class SourceFormat(ABC):
 
 
 def read_table(path: Path, options: dict[str, Any]) -> SourceTable:
-    """Read a file by the format that its mapping names, or that its ending says.
+    """Read a file by the format that its mapping names, or by its ending.
 
     Raises:
         UsageError: If it does not exist or its kind is not known.

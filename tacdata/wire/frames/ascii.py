@@ -1,4 +1,4 @@
-"""Cutting a byte stream into lines of numbers."""
+"""Cuts a byte stream into lines of numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tacdata.wire.frames.frame_format import BITS, FrameFormat
 
 
 def limits(kind: str) -> tuple[float, float]:
-    """Return the least and greatest number of a wire type."""
+    """Return the smallest and largest number of a wire type."""
     if kind.startswith("float"):
         return -float(np.finfo(kind).max), float(np.finfo(kind).max)
     bits = BITS[kind]
@@ -19,7 +19,7 @@ def limits(kind: str) -> tuple[float, float]:
 
 
 class AsciiLines:
-    """Takes a line for a frame if its sync text, checksum, number of fields and their ranges are right."""
+    """Accepts a line as a frame if its sync text, checksum, number of fields and their ranges are right."""
 
     def __init__(self, layout: FrameFormat, counts: StreamCounts) -> None:
         """Cut by ``layout`` and count damage into ``counts``."""
@@ -27,7 +27,7 @@ class AsciiLines:
         self.buffer = bytearray()
         self.offset = 0  # of the buffer's first byte in the stream [bytes]
         self.longest = 64 + 16 * (layout.channels + 2)
-        # Without sync text and checksum a line cut at its beginning looks whole: the first proves nothing.
+        # Without sync text and checksum, a line cut at its beginning looks whole. So the first one is dropped.
         self.unproven = not layout.sync and layout.checksum == "none"
 
     def push(self, data: bytes) -> list[tuple[Fields, int]]:
@@ -83,7 +83,7 @@ class AsciiLines:
             low, high = limits(kind)
             radix = 0 if kind.startswith("float") else layout.radix
             values = [_number(part, radix) for part in parts[at : at + count]]
-            # A board may say itself that it has no number (nan); that is kept, and `tacdata check` names it.
+            # A board may send nan for a missing number; that is kept, and `tacdata check` reports it.
             if any(v is None or not (low <= v <= high or v != v) for v in values):
                 return None
             fields[name] = np.array(values, dtype=np.float64)

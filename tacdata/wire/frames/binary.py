@@ -1,4 +1,4 @@
-"""Cutting a byte stream into binary frames."""
+"""Cuts a byte stream into binary frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Fields = dict[str, np.ndarray]
 
 
 def widen(values: np.ndarray, kind: str, endianness: str) -> np.ndarray:
-    """Turn numbers as they lie on the wire into float64; 24-bit ones come as bytes, shape (count, 3)."""
+    """Convert numbers from their wire type to float64; 24-bit ones come as bytes, shape (count, 3)."""
     if BITS[kind] != 24:
         return values.astype(np.float64)
     parts = values.astype(np.int64)
@@ -25,7 +25,7 @@ def widen(values: np.ndarray, kind: str, endianness: str) -> np.ndarray:
 
 
 def intact(layout: FrameFormat, frame: bytes) -> bool:
-    """Say whether checksum and trailer of a frame of the right length and sync are right."""
+    """Whether checksum and trailer are right, for a frame of the right length and sync."""
     body_end = len(layout.sync) + layout.dtype.itemsize
     width = WIDTHS[layout.checksum]
     if frame[body_end + width :] != layout.trailer:
@@ -42,9 +42,9 @@ def fields(layout: FrameFormat, frame: bytes) -> Fields:
 
 
 class BinaryFrames:
-    """Finds frames by sync and checksum, and after damage looks for the next sync one byte further on.
+    """Finds frames by sync and checksum; after damage it searches the next sync, byte by byte.
 
-    A format without checksum proves a frame only by the sync of the one after it: frames come one later.
+    Without checksum only the sync of the next frame proves a frame, so frames come one later.
     """
 
     def __init__(self, layout: FrameFormat, counts: StreamCounts) -> None:
@@ -79,7 +79,7 @@ class BinaryFrames:
         return found
 
     def _reject(self) -> None:
-        # A sync inside garbage is no frame: only one that stands where a frame is due counts as corrupt.
+        # A sync inside garbage is no frame: only one where a frame is due counts as corrupt.
         if self.offset == self.expected:
             self.counts.corrupt += 1
             self.expected += self.layout.size

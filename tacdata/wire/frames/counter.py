@@ -1,4 +1,4 @@
-"""Following a counter that wraps: what is lost, what came twice, what began anew."""
+"""Follows a frame counter that wraps: losses, repeats, restarts."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ REPEAT_WINDOW = 8
 class CounterTrack:
     """Unwraps a frame counter.
 
-    A restarted board cannot be told from a loss by the counter alone, so a jump ahead by more than 10 s that
-    is longer than the time since the first frame could hold is taken as a restart and said in the notes.
+    The counter alone cannot distinguish a restarted board from a loss. A jump ahead by more than 10 s, longer than the
+    time since the first frame allows, counts as a restart and is noted.
     """
 
     def __init__(self, modulus: int, rate: float, counts: StreamCounts) -> None:

@@ -1,4 +1,4 @@
-"""From received bytes to frames of readings."""
+"""Decodes received bytes into frames of readings."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tacdata.wire.frames.packets import PacketFrames
 
 
 class Decoder:
-    """Decodes one board's stream; keeps what is unfinished between calls and never makes up a reading.
+    """Decodes one board's stream; keeps incomplete frames between calls and never invents a reading.
 
-    ``counts`` says what was received, lost (by the counter), repeated (and dropped), corrupt, and skipped.
+    ``counts`` holds frames received, lost (by the counter), repeated (and dropped) and corrupt, and bytes skipped.
     """
 
     def __init__(self, layout: FrameFormat) -> None:
-        """Decode frames that lie as ``layout`` says."""
+        """Decode frames of a format."""
         self.layout = layout
         self.counts = StreamCounts()
         cutter = AsciiLines if layout.encoding == "ascii" else BinaryFrames
@@ -48,7 +48,7 @@ class Decoder:
             device_ns = -1 if ticks is None else round(ticks * self.layout.tick * 1e9)
             frames.append(TaxelFrame(arrival, counter, fields["channels"], device_ns))
         while self._arrivals and self._arrivals[0][0] <= self._frames.offset:
-            self._arrivals.popleft()  # of bytes that are cut up already, were they frames or garbage
+            self._arrivals.popleft()  # of bytes that are cut already, into frames or garbage
         return frames
 
     def _arrival_of(self, end: int) -> int:

@@ -1,4 +1,4 @@
-"""From readings to bytes: the board's side of the wire, for emulators and tests."""
+"""Encodes readings as bytes: the board's side of the line, for emulators and tests."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from tacdata.wire.frames.packets import packed
 
 
 class Encoder:
-    """Writes frames of one format."""
+    """Encodes frames of one format."""
 
     def __init__(self, layout: FrameFormat) -> None:
-        """Write frames as ``layout`` says."""
+        """Encode frames of a format."""
         self.layout = layout
 
     def encode(self, counts: np.ndarray, counter: int = 0, ticks: int = 0) -> bytes:

@@ -22,7 +22,7 @@ BITS |= {"uint64": 64, "float32": 32, "float64": 64}
 
 @dataclass(frozen=True)
 class FrameFormat:
-    """How one frame lies on the wire."""
+    """Layout of one frame on the wire."""
 
     name: str
     encoding: str
@@ -30,13 +30,13 @@ class FrameFormat:
     endianness: Literal["little", "big"]
     """``little`` or ``big``: numbers of a binary frame."""
     sync: bytes
-    """What every frame begins with; may be empty in ascii."""
+    """Bytes at the beginning of every frame; may be empty in ascii."""
     order: tuple[str, ...]
     """Order of ``counter``, ``timestamp``, ``channels`` after the sync."""
     counter: str | None
     """Integer type of the frame counter; None if the board sends none."""
     timestamp: str | None
-    """Integer type of the board's time; None if the board sends none."""
+    """Integer type of the board's time stamp; None if the board sends none."""
     tick: float
     """Seconds per tick of the timestamp [s]."""
     channels: int
@@ -48,15 +48,15 @@ class FrameFormat:
     checksum_endianness: Literal["little", "big"]
     """Byte order of a binary frame's checksum."""
     covers: str
-    """``fields`` or ``frame``: whether the sync is part of what the checksum covers."""
+    """``fields`` or ``frame``: whether the checksum covers the sync too."""
     framing: str
-    """``none``, ``slip`` or ``cobs``: how binary frames are told apart besides by their sync."""
+    """``none``, ``slip`` or ``cobs``: how binary frames are separated, besides by their sync."""
     mark: bytes
     """Text before the checksum of an ascii line."""
     trailer: bytes
     """Constant bytes after the checksum of a binary frame."""
     separator: bytes
-    """Between the numbers of an ascii line."""
+    """Separator between the numbers of an ascii line."""
     radix: int
     """Base of the numbers of an ascii line."""
     rate: float

@@ -1,4 +1,4 @@
-"""Frames in packets whose end no reading can imitate: SLIP (RFC 1055) and COBS (Cheshire and Baker 1999)."""
+"""Frames in packets whose end cannot occur in data: SLIP (RFC 1055) and COBS (Cheshire and Baker 1999)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from tacdata.wire.frames.frame_format import FrameFormat
 END, ESCAPE, ESCAPED_END, ESCAPED_ESCAPE = 0xC0, 0xDB, 0xDC, 0xDD
 """SLIP's special bytes."""
 ENDS = {"slip": bytes([END]), "cobs": b"\0"}
-"""What stands behind each packet."""
+"""End marker of each kind of packet."""
 
 
 def packed(framing: str, frame: bytes) -> bytes:
-    """Return a frame as it goes over the line; without framing as it is."""
+    """Return a frame as it goes over the line; unchanged without framing."""
     if framing == "slip":
         escaped = frame.replace(b"\xdb", b"\xdb\xdd").replace(b"\xc0", b"\xdb\xdc")
         return b"\xc0" + escaped + b"\xc0"
@@ -35,7 +35,7 @@ def _cobs(frame: bytes) -> bytes:
 
 
 def unpacked(framing: str, packet: bytes) -> bytes | None:
-    """Return the frame in a packet without its end; None if it breaks the rules."""
+    """Return the frame in a packet without its end marker; None if it breaks the rules."""
     return _from_slip(packet) if framing == "slip" else _from_cobs(packet)
 
 
@@ -64,7 +64,7 @@ def _from_cobs(packet: bytes) -> bytes | None:
 
 
 class PacketFrames:
-    """Takes a packet for a frame if its length, sync, checksum and trailer are right."""
+    """Accepts a packet as a frame if its length, sync, checksum and trailer are right."""
 
     def __init__(self, layout: FrameFormat, counts: StreamCounts) -> None:
         """Cut by ``layout`` and count damage into ``counts``."""
@@ -72,7 +72,7 @@ class PacketFrames:
         self.buffer = bytearray()
         self.offset = 0  # of the buffer's first byte in the stream [bytes]
         self.longest = 2 * layout.size + 64
-        self.begun = False  # the first packet is heard from its middle on
+        self.begun = False  # the first packet is received from its middle on
 
     def push(self, data: bytes) -> list[tuple[Fields, int]]:
         """Take bytes; return each complete frame's fields and the offset of its end in the stream [bytes]."""

@@ -1,1 +1,1 @@
-"""The language of GRBL controllers."""
+"""Speaks GRBL: lines and answers, real-time bytes, status reports."""

@@ -1,4 +1,4 @@
-"""What a line from a GRBL controller is, by its form alone (Grbl v1.1 interface documentation; grblHAL `report.c`)."""
+"""Recognizes a line from a GRBL controller by its form (Grbl v1.1 interface documentation; grblHAL `report.c`)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STARTUP = re.compile(r"^\$N\d+=(.*)$")
 MESSAGE = re.compile(r"^\[([A-Z][A-Z0-9. ]*):(.*)\]$")
 
 OPENED_AGAIN = ("Hold:0", "Door:0")
-"""States of a machine at rest that only waits for a cycle start."""
+"""States of a machine at rest that waits for a cycle start."""
 MOVING = ("Run", "Jog", "Home")
 """States, without their substate, in which something moves."""
 
@@ -43,9 +43,9 @@ class StatusReport:
 
 
 def parse_status(line: str) -> StatusReport | None:
-    """Return what ``<State|MPos:x,y,z|...>`` says, or None if the line is damaged.
+    """Parse ``<State|MPos:x,y,z|...>``; None if the line is damaged.
 
-    After the first two fields any other may follow in any order or be absent; unknown ones are passed over.
+    After the first two fields others may follow in any order or be absent; unknown ones are ignored.
     """
     if not (line.startswith("<") and line.endswith(">")):
         return None

@@ -20,16 +20,17 @@ from tacdata.wire.grbl.watch import WELCOME_IN_MID_STREAM, what_is_wrong
 from tacdata.wire.serial_port import read_available
 
 REAL_FLOOR = 1.0
-"""No wait for the controller gives up sooner than this [s, real time], however fast the clock runs."""
+"""Shortest timeout of any wait for the controller [s, real time], however fast the clock runs."""
 SILENCE = 3.0
-"""A controller that is asked and says nothing for so long is gone [s of the clock, and of real time: a fast clock is
-an emulator's, which stalls with its host]."""
+"""Time without an answer after which the controller counts as gone [s of the clock, and of real time, since an emulator
+on a fast clock stalls with its host].
+"""
 LINE_BYTES = 79
 """Longest line that Grbl 1.1 takes [bytes without its end] (``LINE_BUFFER_SIZE`` 80; grblHAL takes 256)."""
 RX_BYTES = 128
-"""Receive buffer until the controller has said its own [bytes]; Grbl 1.1's."""
+"""Size of the receive buffer until the controller states its own [bytes]; Grbl 1.1's."""
 READ_FAILED = "error:7"
-"""Said by ``$#`` and ``$N`` for each entry that cannot be read, before their own answer."""
+"""Sent by ``$#`` and ``$N`` for each entry that cannot be read, before their own answer."""
 
 
 def deadline(clock: Clock, seconds: float) -> float:
@@ -39,7 +40,7 @@ def deadline(clock: Clock, seconds: float) -> float:
 
 @dataclass
 class _Line:
-    """A line on its way."""
+    """A line that waits for its answer."""
 
     text: str
     answer: str | None = None
@@ -49,10 +50,11 @@ class _Line:
 class GrblLink:
     """One open line to a controller, with a reading and a polling thread.
 
-    Each line is answered once, in order, and only a line that is exactly ``ok`` or ``error:N`` is an answer. A line
-    goes out only when it fits into what unanswered ones leave of the receive buffer. What stops the machine for good
-    (alarm, unexpected welcome, broken line, silence) is kept as `fault` and raised by every later call; what only
-    interrupts it (a hold, the door) is kept as `interruption` until `rearm`.
+    Each line is answered once, in order, and only ``ok`` or ``error:N`` alone on a line is an answer. A line goes out
+    only when it fits into the free part of the receive buffer.
+
+    What stops the machine for good (alarm, unexpected welcome, broken line, silence) is kept as `fault` and raised by
+    every later call. What only interrupts it (a hold, the door) is kept as `interruption` until `rearm`.
     """
 
     def __init__(self, port: serial.SerialBase, clock: Clock, poll_rate: float) -> None:
@@ -86,7 +88,7 @@ class GrblLink:
 
     @property
     def waiting(self) -> bool:
-        """Whether a line is not answered yet."""
+        """Whether a line still waits for its answer."""
         return bool(self._unanswered)
 
     @property
@@ -96,11 +98,11 @@ class GrblLink:
         return last is not None and last.state == "Idle" and last.sent_ns > self._commanded_ns
 
     def start(self) -> None:
-        """Start to listen."""
+        """Start to read."""
         self._begin(self._listen, "grbl-listen")
 
     def poll(self) -> None:
-        """Start to ask for the status and to mind silence; from now on a welcome means a lost position."""
+        """Start to poll the status and to watch for silence; from now on a welcome means a lost position."""
         self._welcome_expected, self.polled = False, True
         self._received_at = time.monotonic()
         self._begin(self._ask_regularly, "grbl-poll")
@@ -117,11 +119,11 @@ class GrblLink:
             pass
 
     def realtime(self, byte: bytes) -> None:
-        """Send a real-time byte at once, past every waiting line; safe from any thread and signal handler."""
+        """Send a real-time byte at once, before all waiting lines; safe in any thread and signal handler."""
         self._write(byte)
 
     def hold(self) -> None:
-        """Send ``!``; until `rearm` no line goes out, and whoever waits for an answer is told so."""
+        """Send ``!``; until `rearm` no line goes out, and everyone who waits for an answer gets an error."""
         try:
             self._write(b"!")
         finally:
@@ -130,12 +132,12 @@ class GrblLink:
                 self._changed.notify_all()
 
     def rearm(self) -> None:
-        """Take lines again after a hold or an interruption."""
+        """Accept lines again after a hold or an interruption."""
         with self._changed:
             self._held, self.interruption = False, None
 
     def ask(self) -> None:
-        """Ask for the status, unless an answer is still due."""
+        """Query the status, unless an answer is pending."""
         with self._changed:
             wanted = self.statuses.ask()
         if wanted:
@@ -146,14 +148,14 @@ class GrblLink:
 
         Args:
             line: One line without its end.
-            timeout: Longest wait [s of the clock]; None waits as long as the controller lives, as a full
-                planner or a dwell hold the answer back.
+            timeout: Longest wait [s of the clock]; None waits as long as the controller lives, since a full planner or
+                a dwell delays the answer.
 
         Returns:
-            What was pushed meanwhile, and the times of sending and of the answer [ns].
+            The lines pushed meanwhile, and the times of sending and of the answer [ns].
 
         Raises:
-            DeviceError: If the line is too long, refused, thrown away or not answered, on a hold or a fault.
+            DeviceError: If the line is too long, refused, dropped or not answered, on a hold or a fault.
         """
         data = line.encode("ascii") + b"\n"
         if len(data) > min(LINE_BYTES + 1, self.rx_bytes):
@@ -175,7 +177,7 @@ class GrblLink:
         return entry.pushed, sent_ns, answered_ns
 
     def wait(self, reached: Callable[[], bool], timeout: float | None, what: str, through_hold: bool = False) -> None:
-        """Wait until ``reached()``, ``timeout`` [s of the clock] at most; None: while nothing is wrong.
+        """Wait until ``reached()``, ``timeout`` [s of the clock] at most; None: without limit.
 
         With ``through_hold`` only a fault ends the wait, no hold and no interruption.
 
@@ -215,7 +217,7 @@ class GrblLink:
                     self._changed.wait(0.05)
 
     def soft_reset(self, timeout: float) -> None:
-        """Send 0x18 and wait for the welcome that answers it; the caller makes sure that nothing moves."""
+        """Send 0x18 and wait for the welcome; the caller ensures that nothing moves."""
         with self._changed:
             self._welcome_expected, self._reset_asked, self.welcome = True, True, ""
         self._write(b"\x18")
@@ -225,7 +227,7 @@ class GrblLink:
             self._welcome_expected, self._reset_asked = not self.polled, False
 
     def hear(self, seconds: float) -> bool:
-        """Wait at most ``seconds`` [s, real time] for a welcome or a status report; say whether one came."""
+        """Wait at most ``seconds`` [s, real time] for a welcome or a status report; return whether one came."""
         with self._changed:
             return self._changed.wait_for(lambda: bool(self.welcome or self.last or self.fault), seconds)
 
@@ -291,7 +293,7 @@ class GrblLink:
     def _ask_regularly(self) -> None:
         while not self._stopped.wait(1.0 / (self.poll_rate * self.clock.rate)):
             waited = time.monotonic() - self._received_at
-            # A homing controller (Grbl 1.1) answers nothing; its own time-out minds it.
+            # A homing controller (Grbl 1.1) answers nothing; homing has its own timeout.
             if not self.homing and waited > max(SILENCE / self.clock.rate, SILENCE):
                 self._fail(
                     f"the controller on {self.port.port} is silent for {waited * self.clock.rate:.1f} s",

@@ -1,4 +1,4 @@
-"""From an open port to a controller that is known to stand still and to obey, without moving it."""
+"""Opens the conversation: makes sure that the controller stands still and obeys, without moving it."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from tacdata.wire.grbl.link import GrblLink
 from tacdata.wire.grbl.settings import GrblSettings
 
 GREETING = 15.0
-"""Longest wait for the first sign of life [s, real time]: a boot loader takes 1-2 s, a simulated board more."""
+"""Timeout for the first answer [s, real time]: a boot loader takes 1-2 s, a simulated board more."""
 GARBAGE = 4.0
-"""The same if what is heard are no characters: another baud rate [s, real time]."""
+"""The same if the bytes received are no text, as with another baud rate [s, real time]."""
 FIRST_QUERY = 0.25
-"""Time between queries while nothing is heard [s, real time]."""
+"""Interval between queries while nothing is received [s, real time]."""
 ANSWER = 10.0
-"""Longest wait for the answer to a ``$`` command or a reset [s of the clock]; an alarm alone takes Grbl 0.5 s."""
+"""Timeout for the answer to a ``$`` command or a reset [s of the clock]; an alarm alone takes Grbl 0.5 s."""
 TALKS = ("Idle", "Alarm")
 """States in which ``$`` commands are answered."""
 FULL_SPEED = (b"\x90", b"\x95")
-"""Feed and rapid override back to 100 %; moves nothing."""
+"""Set feed and rapid override back to 100 %; moves nothing."""
 REMEDIES = {
     "Run": "let it finish or stop it, then try again",
     "Jog": "let it finish or stop it, then try again",
@@ -34,7 +34,7 @@ REMEDIES = {
 def greet(link: GrblLink, baud: int) -> None:
     """Wait for a welcome (the board was reset) or an answer to ``?`` (it was not).
 
-    Nothing but queries is sent: whatever speaks here may be moving.
+    Nothing but queries is sent, since the machine may be moving.
 
     Raises:
         DeviceError: If nothing speaks GRBL 1.1.
@@ -51,7 +51,7 @@ def greet(link: GrblLink, baud: int) -> None:
 
 
 def clear(link: GrblLink) -> str:
-    """End a hold that stands still (nothing moves) and return the state that was found.
+    """End a hold at rest (nothing moves) and return the state that was found.
 
     Raises:
         DeviceError: If the machine is moving, or in another state that only a person should end.

@@ -1,4 +1,4 @@
-"""What a GRBL controller says of itself when asked, and what follows from it for a recording."""
+"""A GRBL controller's settings, and what follows from them for a recording."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.wire.grbl.lines import MESSAGE, MM_PER_INCH, SETTING, STARTUP
 from tacdata.wire.grbl.link import GrblLink
 
 QUESTIONS = ("$I", "$$", "$#", "$G", "$N")
-"""Asked at opening; Grbl answers all of them when idle or locked, and none of them moves anything."""
+"""Queries sent at opening; Grbl answers them when idle or locked, and none moves anything."""
 ALWAYS_ON = 255
 """``$1`` that keeps the motors powered."""
 AXIS_WORD = re.compile(r"[XYZ]")
@@ -20,14 +20,14 @@ AXIS_WORD = re.compile(r"[XYZ]")
 
 @dataclass(frozen=True)
 class GrblSettings:
-    """The answers."""
+    """The controller's answers at opening."""
 
     said: dict[str, str]
-    """Settings and start-up lines by their name (``$110``, ``$N0``), other answers by their tag (``VER``, ``G54``)."""
+    """Settings and start-up lines by name (``$110``, ``$N0``), other answers by tag (``VER``, ``G54``)."""
 
     @classmethod
     def read(cls, link: GrblLink, timeout: float) -> GrblSettings:
-        """Ask everything, each answer awaited for ``timeout`` [s of the clock].
+        """Send all queries; each answer may take ``timeout`` [s of the clock].
 
         Raises:
             DeviceError: If a question is refused or not answered.
@@ -56,7 +56,7 @@ class GrblSettings:
 
     @property
     def rx_bytes(self) -> int | None:
-        """Receive buffer by ``[OPT:codes,blocks,bytes...]`` [bytes], if it says so."""
+        """Size of the receive buffer by ``[OPT:codes,blocks,bytes...]`` [bytes]; None if it is not stated."""
         parts = self.said.get("OPT", "").split(",")
         return int(parts[2]) if len(parts) > 2 and parts[2].isdigit() else None
 
@@ -109,7 +109,7 @@ class GrblSettings:
         return tuple(found)
 
     def refuse_moves_at_start(self, port: str) -> None:
-        """Refuse start-up lines that move: they run at every reset, and a fault is answered by one.
+        """Refuse start-up lines that move: they would run at every reset, and a fault is answered by a reset.
 
         Raises:
             DeviceError: Naming the line.

@@ -1,4 +1,4 @@
-"""From status reports as written to machine positions in mm with the times that bracket them."""
+"""Converts status reports to machine positions in mm, with the times that bracket them."""
 
 from __future__ import annotations
 
@@ -12,22 +12,24 @@ from tacdata.wire.delivered import CncStatus
 from tacdata.wire.grbl.lines import StatusReport
 
 REPORT_LAG_NS = 50_000_000
-"""A report is made at most so long before it arrives [ns]: Grbl looks for queries every 50 ms of a pause."""
+"""Longest time from making a report to its arrival [ns]: Grbl looks for queries every 50 ms of a pause."""
 REPEAT = 0.5
-"""A query without an answer is repeated after so long [s, real time]. Several before one answer may collapse to one:
-when no second answer has come for so long, none will."""
+"""An unanswered query is repeated after this time [s, real time].
+
+Several queries may get one common answer. When no second answer has come after this time, none will.
+"""
 
 
 class Statuses:
-    """The reports of one connection; its user guards it with a lock.
+    """The reports of one connection; the caller guards it with a lock.
 
-    The position was read between ``sent_ns`` (the query left the host) and ``arrival_ns``. So that this is certain,
-    no query goes out while one may be unanswered; a report after a repeated query is taken as the first one's answer. A
-    report that nobody asked for (auto-reporting) was made after the one before it.
+    The position was read between ``sent_ns`` (the query left the host) and ``arrival_ns``. To be certain of that, no
+    query goes out while another may be unanswered, and a report after a repeated query counts as the first one's
+    answer. An unsolicited report (auto-reporting) was made after the one before it.
     """
 
     def __init__(self, clock: Clock) -> None:
-        """Start without a report."""
+        """Create it without a report."""
         self._clock = clock
         self.unit = 1.0
         """Report units to mm."""
@@ -36,18 +38,18 @@ class Statuses:
         self.automatic = False
         """Whether the controller reports by itself; it then leaves ``?`` unanswered (grblHAL, ``$481``)."""
         self.last: CncStatus | None = None
-        self._queries: deque[int] = deque()  # when those went out that may not be answered yet [ns]
+        self._queries: deque[int] = deque()  # when the queries went out that may still be unanswered [ns]
         self._asked_at = self._answered_at = 0.0
         self._answered = False  # whether a report has come since the latest query
         self._waiting: list[CncStatus] = []
 
     @property
     def asked_ns(self) -> int | None:
-        """When the query went out that is not answered yet [ns]; the first, if it was repeated."""
+        """When the unanswered query went out [ns]; the first, if it was repeated."""
         return self._queries[0] if self._queries else None
 
     def ask(self) -> bool:
-        """Return whether a query should go out now, and take it that it does."""
+        """Return whether to send a query now, and count it as sent."""
         now = time.monotonic()
         if self._queries and now - max(self._asked_at, self._answered_at) <= REPEAT:
             return False
@@ -58,7 +60,7 @@ class Statuses:
         return True
 
     def forget(self) -> None:
-        """A reset has thrown all queries away."""
+        """Forget all queries, after a reset."""
         self._queries.clear()
 
     def take(self, report: StatusReport, arrival_ns: int) -> CncStatus | None:
@@ -68,7 +70,7 @@ class Statuses:
         if report.offset is not None:
             self.offset = report.offset
         if report.is_work and self.offset is None:
-            return None  # a work position without its offset is no machine position
+            return None  # a work position without its offset gives no machine position
         if sent_ns is None or self.automatic:
             sent_ns = (self.last.arrival_ns if self.last else arrival_ns) - REPORT_LAG_NS
         position = report.position + self.offset if report.is_work and self.offset is not None else report.position

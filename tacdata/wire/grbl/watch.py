@@ -1,4 +1,4 @@
-"""What a status report says that nobody asked for, in words."""
+"""Reports unexpected states of the controller: holds, doors, alarms, overrides."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from tacdata.wire.grbl import codes
 from tacdata.wire.grbl.lines import StatusReport
 
 Words = tuple[str, str, str]
-"""Given, allowed, remedy, as `tacdata.errors` wants them."""
+"""Given, allowed, remedy, as in `tacdata.errors`."""
 
 WELCOME_IN_MID_STREAM: Words = (
     "the controller was reset in mid-stream (it said {!r}); its position is lost",
@@ -23,9 +23,9 @@ UNASKED = {
     "Sleep": ("the controller fell asleep and its motors are off", "a machine that is awake", "reset and home it"),
     "Tool": ("the controller waits for a tool change", "no tool change", RESUME),
 }
-"""State -> words; none of these ever follows from what a recording sends."""
+"""State -> text; none of these follows from what a recording sends."""
 LOST = ("Sleep",)
-"""States after which the position is not known."""
+"""States after which the position is unknown."""
 
 
 def what_is_wrong(report: StatusReport, held: bool, homing: bool) -> tuple[Words | None, bool]:
@@ -33,8 +33,8 @@ def what_is_wrong(report: StatusReport, held: bool, homing: bool) -> tuple[Words
 
     Args:
         report: A report of a machine that was opened and made ready.
-        held: Whether the hold is our own.
-        homing: Whether the homing is our own.
+        held: Whether we sent the hold.
+        homing: Whether we started the homing.
     """
     state, _, substate = report.state.partition(":")
     if state == "Alarm":
@@ -45,7 +45,7 @@ def what_is_wrong(report: StatusReport, held: bool, homing: bool) -> tuple[Words
             "free it by hand if need be, then home or unlock it and record again",
         )
         return words, True
-    # A machine that still brakes (Hold:1) may be about to say why by an alarm.
+    # A machine that still brakes (Hold:1) may be about to send an alarm with the reason.
     ours = (state == "Hold" and (held or substate != "0")) or (state == "Home" and homing)
     if state in UNASKED and not ours:
         return UNASKED[state], state in LOST
