@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -24,19 +25,70 @@ def read(path: Path, schema: str) -> dict[str, Any]:
     if not path.is_file():
         raise UsageError(f"no file {path}", f"a {schema} file (YAML or JSON)", "check the path")
     try:
-        document = _parsed(path.read_text())
+        document = parsed(path.read_text(encoding="utf-8"), str(path))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise FormatError(f"{path} is not readable as YAML: {error}", f"a {schema} file", "fix the syntax") from None
     check(document, schema, str(path))
     return document
 
 
-def _parsed(text: str) -> Any:
-    """Return JSON as JSON: YAML 1.1 takes its ``1e-07`` for a text."""
+def parsed(text: str, origin: str) -> Any:
+    """Return what a YAML or JSON text holds; ``origin`` names it in errors.
+
+    Raises:
+        FormatError: If a key is given twice, with both lines.
+        yaml.YAMLError: If it is neither.
+    """
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=_unique)
     except ValueError:
-        return yaml.safe_load(text)
+        loader = _Loader(text)
+        loader.origin = origin
+        try:
+            return loader.get_single_data()
+        finally:
+            loader.dispose()
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of a JSON text; one with a key twice is left to `_Loader`, which knows the lines."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise ValueError("a key twice")
+    return found
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML as its version 1.2 reads numbers (``1e-7``, ``1.0e12``), without keys that are given twice."""
+
+    origin = ""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return the mapping.
+
+        Raises:
+            FormatError: If two of its keys are equal.
+        """
+        lines: dict[Any, int] = {}
+        for key, _ in node.value:
+            if key.tag == "tag:yaml.org,2002:merge":
+                continue  # what is merged in may be overruled: that is its purpose
+            name, line = self.construct_object(key, deep=True), key.start_mark.line + 1
+            if name in lines:
+                raise FormatError(
+                    f"{self.origin}: {name!r} is given twice, in line {lines[name]} and in line {line}",
+                    "each key once",
+                    "delete or rename one of the two",
+                )
+            lines[name] = line
+        return super().construct_mapping(node, deep)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"),
+    list("-+0123456789."),
+)
 
 
 def check(document: Any, schema: str, origin: str) -> None:

@@ -67,7 +67,7 @@ def _by_board(board: Path, images: Path, calibration: Path, camera: str, frame: 
     from tacdata import documents
     from tacdata.demonstrations.camera_pose.board_pose import board_poses
     from tacdata.demonstrations.camera_pose.hand_eye import board_world
-    from tacdata.tags.calibration.board import read_board
+    from tacdata.tags.board import read_board
     from tacdata.tags.calibration.view_picker import images_of
 
     intrinsics = documents.read(calibration, "camera_calibration")["intrinsics"]

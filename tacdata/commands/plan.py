@@ -91,7 +91,7 @@ def _read(path: Path) -> dict[str, Any]:
     from tacdata.plans.recipe import read_recipe
 
     try:
-        has_blocks = "blocks" in (yaml.safe_load(path.read_text()) or {}) if path.is_file() else False
+        has_blocks = "blocks" in (documents.parsed(path.read_text(), str(path)) or {}) if path.is_file() else False
     except (yaml.YAMLError, UnicodeDecodeError, TypeError):
         has_blocks = False  # the reader below says it in words
     return read_recipe(path) if has_blocks else documents.read(path, "plan")

@@ -352,7 +352,8 @@ def _decoded(data: bytes, device_ns: int = -1) -> _Grabbed:
         if end < 0:
             return _Grabbed(None, device_ns=device_ns)
         data = data[: end + 2]  # cameras pad their buffers
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYCOLOR) if data else None
+    flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), flags) if data else None
     is_whole = data.startswith(b"\xff\xd8") and b"\xff\xc4" in data
     return _Grabbed(image, data if is_whole and image is not None else b"", device_ns)
 

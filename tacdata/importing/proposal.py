@@ -11,8 +11,10 @@ import numpy as np
 import schemas
 from tacdata.errors import UsageError
 from tacdata.importing.formats.source_format import SourceTable, read_table
-from tacdata.importing.units import FACTORS, plain, quantity_of, split_unit
+from tacdata.importing.units import plain, quantity_of, split_unit
 
+SHORT = ("s", "ms", "us", "ns", "min", "h", "d")
+"""Units of time that a mapping may name; others stand in the header and are read from there."""
 GUESSES = {
     "time": r"(time|t|timestamp|stamp|zeit|clock|datetime|date)",
     "depth": r"(depth|indentation|displacement|disp|travel|stroke|weg|eindringtiefe|d)",
@@ -166,7 +168,7 @@ def _file(kind: str, table: SourceTable, roles: dict[str, list[str]]) -> dict[st
     if "time" not in roles:
         return {"path": path, "time": {"rate": 100.0}}
     unit = plain(table.units.get(roles["time"][0], ""))
-    return {"path": path, "time": {"column": roles["time"][0], **({"unit": unit} if unit in FACTORS["s"] else {})}}
+    return {"path": path, "time": {"column": roles["time"][0], **({"unit": unit} if unit in SHORT else {})}}
 
 
 def _axis(table: SourceTable, name: str) -> dict[str, Any]:

@@ -12,8 +12,13 @@ from tacdata.errors import FormatError
 from tacdata.importing.units import split_unit
 
 COMMENTS = ("#", "%", "//")
+SHEET_ERRORS = (
+    "#N/A", "#DIV/0!", "#NAME?", "#NULL!", "#NUM!", "#REF!", "#VALUE!", "#SPILL!", "#CALC!", "#FIELD!", "#BLOCKED!",
+    "#CONNECT!", "#BUSY!", "#UNKNOWN!", "#GETTING_DATA", "#WERT!", "#ZAHL!", "#BEZUG!", "#NV",
+)  # fmt: skip
+"""What a spreadsheet writes for a cell without a value; it begins like a comment and is none."""
 MISSING = (
-    "", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---", "?",
+    "", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "None", "-", "--", "---", "?", *SHEET_ERRORS,
 )  # fmt: skip
 """Texts that stand for a missing value in any file."""
 DELIMITERS = ("\t", ";", ",", "|", " ")
@@ -39,6 +44,12 @@ class TextLayout:
     """``float``, ``int`` (too long for a float) or ``text`` of each column."""
 
 
+def is_comment(line: str, missing: tuple[str, ...] = ()) -> bool:
+    """Return whether a line is a comment: it begins like one, and not with a text that stands for a missing value."""
+    bare = line.lstrip().lstrip('"\'')
+    return bare.startswith(COMMENTS) and not bare.startswith((*SHEET_ERRORS, *(text for text in missing if text)))
+
+
 def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     """Recognize the layout from a file's beginning; ``options`` of the mapping take precedence.
 
@@ -47,7 +58,8 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     """
     lines = text.splitlines()[:SAMPLE]
     skip = int(options.get("skip", 0))
-    lines_of_data = [line for line in lines[skip:] if line.strip() and not line.lstrip().startswith(COMMENTS)]
+    missing = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
+    lines_of_data = [line for line in lines[skip:] if line.strip() and not is_comment(line, missing)]
     delimiter = {"tab": "\t", "space": " "}.get(options.get("delimiter", ""), options.get("delimiter"))
     delimiter = delimiter or _delimiter(lines_of_data)
     rows = [split(line, delimiter) for line in lines_of_data]

@@ -11,10 +11,18 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.columns import single
 from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.units import FACTORS, plain, split_unit
+from tacdata.importing.units import FACTORS, factor, plain, split_unit
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0
-"""Unix times between which a clock without a stated zero is taken for Unix time [s]."""
+"""Unix times between which a clock that does not say its zero is taken for Unix time [s]."""
+DAY_ZERO = {"datenum": 719_529.0, "excel": 25_569.0}
+"""Clocks that count days: the day on which 1970 begins, in MATLAB's datenum and in Excel's serial time [d]."""
+DAY = 86_400.0
+"""Length of a day [s]."""
+FASTEST = 100_000.0
+"""Rows a second above which times are no times of a tactile sensor [Hz]: the unit is another one."""
+NO_UNIT = {"", "unix", "epoch", "posix", "utc", "gmt", "local", "time", "timestamp", "a.u.", "-"}
+"""What stands in brackets behind a clock's name and is no unit (compared in lower case)."""
 
 
 def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.ndarray, str]:
@@ -42,10 +50,15 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
         return _shifted(clocked, clock), clock.get("zero", "shared")
     if values.dtype == object or unit == "datetime":
         return _shifted_ns(_datetimes(values, f"{where}: {name}"), clock), "unix"
-    if unit not in FACTORS["s"]:
+    if unit in DAY_ZERO:
+        return _of_days(values, unit, clock), clock.get("zero", "unix")
+    if unit.lower() in NO_UNIT:
         unit = _guessed(values)
+        _refuse_days(values, unit, f"{where}: {name}")
     zero = clock.get("zero")
-    scale = FACTORS["s"][unit]
+    scale = factor(unit, "s", f"{where}: {name}")
+    if scale == DAY and (dated := _dated(values)):
+        return _of_days(values, dated, clock), clock.get("zero", "unix")
     middle = float(np.nanmedian(values.astype(float))) * scale if len(values) else 0.0
     looks_unix = YEAR_2000 < middle < YEAR_2100
     if zero == "unix" and not looks_unix:
@@ -88,6 +101,39 @@ def _guessed(values: np.ndarray) -> str:
     """Return the unit that makes the values Unix times of this century, or s."""
     middle = float(np.nanmedian(values.astype(float))) if len(values) else 0.0
     return next((u for u in ("ns", "us", "ms") if YEAR_2000 < middle * FACTORS["s"][u] < YEAR_2100), "s")
+
+
+def _of_days(values: np.ndarray, unit: str, clock: dict[str, Any]) -> np.ndarray:
+    """Return Unix times [ns] of days counted from one of `DAY_ZERO`."""
+    return _shifted((values.astype(float) - DAY_ZERO[unit]) * DAY, clock)
+
+
+def _dated(values: np.ndarray) -> str | None:
+    """Return which clock of `DAY_ZERO` makes these days dates of this century; None if neither does."""
+    middle = float(np.nanmedian(values.astype(float))) if len(values) else 0.0
+    return next((n for n, zero in DAY_ZERO.items() if YEAR_2000 < (middle - zero) * DAY < YEAR_2100), None)
+
+
+def _refuse_days(values: np.ndarray, unit: str, where: str) -> None:
+    """Refuse times without a unit that are days by all appearance: as seconds they would come too fast.
+
+    Raises:
+        FormatError: Saying which unit the mapping may give.
+    """
+    steps = np.diff(values.astype(float))
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    if not len(steps) or 1 / (np.median(steps) * FACTORS["s"][unit]) <= FASTEST:
+        return
+    rate = 1 / (np.median(steps) * FACTORS["s"][unit])
+    dated = _dated(values)
+    next_ = f"unit: {dated}" if dated else "unit: d, or whichever it is"
+    like = {"datenum": "MATLAB's datenum", "excel": "Excel's serial time"}.get(dated or "", "days, for example")
+    raise FormatError(
+        f"{where}: no unit is given, and read in {unit} the rows come at {rate:.3g} Hz",
+        f"times at no more than {FASTEST:.0f} Hz, or their unit ({like} counts days)" if dated
+        else f"times at no more than {FASTEST:.0f} Hz, or their unit",
+        f"give {next_} under time in the mapping",
+    )  # fmt: skip
 
 
 def _times_of_day(values: np.ndarray) -> np.ndarray | None:

@@ -17,7 +17,14 @@ FACTORS: dict[str, dict[str, float]] = {
         "N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "g": GRAVITY * 1e-3, "gf": GRAVITY * 1e-3, "kg": GRAVITY,
         "kgf": GRAVITY, "lbf": 4.4482216152605, "lb": 4.4482216152605, "cN": 1e-2,
     },
-    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "s": {
+        "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0,
+        "sec": 1.0, "secs": 1.0, "second": 1.0, "msec": 1e-3, "msecs": 1e-3, "millis": 1e-3, "millisecond": 1e-3,
+        "milliseconds": 1e-3, "usec": 1e-6, "usecs": 1e-6, "micros": 1e-6, "microsecond": 1e-6, "microseconds": 1e-6,
+        "nsec": 1e-9, "nsecs": 1e-9, "nanos": 1e-9, "nanosecond": 1e-9, "nanoseconds": 1e-9,
+        "mins": 60.0, "minute": 60.0, "minutes": 60.0, "hr": 3600.0, "hrs": 3600.0, "hour": 3600.0, "hours": 3600.0,
+        "day": 86_400.0, "days": 86_400.0,
+    },
     "mm/s": {"mm/s": 1.0, "mm/min": 1 / 60, "um/s": 1e-3, "m/s": 1e3, "cm/s": 10.0},
     "deg": {"deg": 1.0, "rad": 57.29577951308232},
 }  # fmt: skip
@@ -29,7 +36,8 @@ OTHERS = {"pf", "ff", "nf", "v", "mv", "uv", "count", "counts", "lsb", "adc", "u
 
 def plain(unit: str) -> str:
     """Return a unit's name in ASCII, as the tables have it."""
-    return unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg").replace("seconds", "s")
+    name = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg")
+    return "s" if name == "seconds" else name
 
 
 def factor(unit: str, wanted: str, origin: str) -> float:
@@ -45,6 +53,9 @@ def factor(unit: str, wanted: str, origin: str) -> float:
     lowered = {key.lower(): value for key, value in table.items() if key != "mN"}
     if name.lower() in lowered and wanted != "N":
         return lowered[name.lower()]
+    # A counter's step: "10 ms", "0.1 um".
+    if match := re.fullmatch(r"(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[*x]?\s*([^\d\s].*)", name):
+        return float(match[1]) * factor(match[2], wanted, origin)
     raise FormatError(f"{origin}: unit {unit!r}", ", ".join(table), "correct the unit in the mapping")
 
 
@@ -58,6 +69,8 @@ def split_unit(name: str) -> tuple[str, str]:
     if match := re.fullmatch(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*", name):
         return match[1].strip(), (match[2] or match[3] or "").strip()
     match = re.fullmatch(r"(.+?)\s*[/_ ]\s*([A-Za-z\u00b5\u03bc%]+)", name)
-    if match and (quantity_of(match[2]) or plain(match[2]).lower() in OTHERS - {"c", "k", "a", "v", "1"}):
-        return match[1].strip(), match[2]
-    return name, ""
+    # Without brackets a lone "d" is a name (depth, distance), no unit of days.
+    if not match or match[2] == "d":
+        return name, ""
+    known = quantity_of(match[2]) or plain(match[2]).lower() in OTHERS - {"c", "k", "a", "v", "1"}
+    return (match[1].strip(), match[2]) if known else (name, "")

@@ -24,6 +24,8 @@ SHAPES = Path(__file__).parent / "shapes"
 
 _SMALLEST, _LARGEST = 0.2, 200.0
 """Extents between which a solid presses a skin [mm]; others are files in another unit."""
+_OFF_AXIS = 0.02
+"""How far inside its bounding box the press axis must pass, of the box [1]: at the very border it passes beside."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,7 @@ class Mesh(Indenter):
             )
         found = cls(Path(file).name, digest or "0" * 64, values.get("scale", 1.0))
         _check_size(solid(path, float(found.scale)), found, origin)
+        _check_axis(solid(path, float(found.scale)), found, origin)
         store.keep(path)
         return {**values, "file": found.file, "sha256": digest}
 
@@ -218,4 +221,21 @@ def _check_size(body: Solid, indenter: Mesh, origin: str) -> None:
         raise FormatError(
             f"{origin}: {indenter.file} is {size} mm with scale {indenter.scale:g}",
             f"an indenter of {_SMALLEST:g} to {_LARGEST:g} mm", f"is it in another unit? try scale: {guess:g}",
+        )
+
+
+def _check_axis(body: Solid, indenter: Mesh, origin: str) -> None:
+    """Refuse a solid that stands beside the axis it is pressed along, as a file of a build plate leaves it.
+
+    The axis may pass between two tips of one holder, so that it need not meet the solid, only its bounding box.
+    """
+    low, high = np.asarray(body.mesh.bounds)[:, :2]
+    inset = _OFF_AXIS * (high - low)
+    if np.any(low + inset > 0) or np.any(high - inset < 0):
+        middle = (low + high) / 2
+        raise FormatError(
+            f"{origin}: {indenter.file} spans x {low[0]:.4g} to {high[0]:.4g} mm and y {low[1]:.4g} to {high[1]:.4g} "
+            f"mm: the press axis, x = y = 0, passes beside it",
+            "a solid around the z axis, along which it is pressed",
+            f"move it by ({-middle[0]:.4g}, {-middle[1]:.4g}) mm in the CAD file, or wherever its tip's axis is",
         )

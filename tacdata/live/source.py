@@ -7,6 +7,7 @@ from pathlib import Path
 
 import yaml
 
+from tacdata import documents
 from tacdata.clock import Clock
 from tacdata.demonstrations.recording.rig import read_demo_rig
 from tacdata.devices.device import TaxelBoard, create
@@ -44,7 +45,7 @@ def touched_board(path: Path, finger: str | None, assumed: Sensor) -> Source:
     if not path.is_file():
         raise UsageError(f"no file {path}", "a rig or demo rig file", "check the path")
     try:
-        parsed = yaml.safe_load(path.read_text())
+        parsed = documents.parsed(path.read_text(), str(path))
     except (yaml.YAMLError, UnicodeDecodeError):
         parsed = None  # the rig reader says what is wrong
     if isinstance(parsed, dict) and "boards" in parsed:

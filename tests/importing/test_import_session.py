@@ -9,6 +9,7 @@ from foreign import T0, mapping, press_data, wide_csv
 
 from tacdata import cli, provenance
 from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.importing.formats.source_format import read_table
 from tacdata.importing.imported_session import import_session
 from tacdata.importing.proposal import described, proposed_mapping
 from tacdata.recording import read_session
@@ -17,8 +18,8 @@ from tacdata.recording.files.mcap_records import read_records
 from tacdata.recording.files.reader import read_episode
 
 
-def imported(tmp_path, mapping_path, source=None):
-    made = import_session(source or tmp_path, mapping_path, tmp_path / "session")
+def imported(tmp_path, mapping_path, name="session"):
+    made = import_session(tmp_path, mapping_path, tmp_path / name)
     return made, [read_episode(path) for path in read_session(made.folder).episodes]
 
 
@@ -344,3 +345,109 @@ def test_clocks_of_every_kind_give_the_same_times(write, zero, tmp_path):
     assert episode.taxels.sample_ns[0] / 1e9 == pytest.approx(zero, abs=1e-3)
     step = 1e-3 if zero == T0 else 1e-4
     np.testing.assert_allclose((episode.taxels.sample_ns - episode.taxels.sample_ns[0]) / 1e9, time, atol=step)
+
+
+def days(path, begin, header="t,disp [mm],cap0 (pF)"):
+    """Write a press at 20 Hz whose times are days from ``begin``."""
+    rows = [f"{begin + 0.05 * k / 86_400:.11f},{0.01 * k:.3f},{20 + 0.02 * k:.4f}" for k in range(120)]
+    path.write_text("\n".join([header, *rows]) + "\n")
+
+
+@pytest.mark.parametrize(("begin", "unit"), [(740_311.375, "datenum"), (46_351.375, "excel")])
+def test_times_in_days_are_refused_without_a_unit_and_dates_with_one(tmp_path, begin, unit):
+    days(tmp_path / "wide.csv", begin)
+    changes = {"taxels": {"file": "data", "columns": ["cap0"], "unit": "pF"}, "measured": None}
+    assert f"unit: {unit}" in refused(tmp_path, **changes)
+    for named in (unit, "d"):
+        clock = {"column": "t", "unit": named}
+        path = mapping(tmp_path, files={"data": {"path": "wide.csv", "time": clock}}, **changes)
+        _, (episode,) = imported(tmp_path, path, f"session {named}")
+        seconds = (episode.taxels.sample_ns - episode.taxels.sample_ns[0]) * 1e-9
+        np.testing.assert_allclose(np.diff(seconds), 0.05, atol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("header", "step"),
+    [("d", 0.05 / 86_400), ("days", 0.05 / 86_400), ("hours", 0.05 / 3600), ("msec", 50), ("10 ms", 5), ("s", 0.05)],
+)
+def test_a_unit_in_a_header_is_understood(tmp_path, header, step):
+    rows = [f"{step * k:.12f},{0.01 * k:.3f},{20 + 0.02 * k:.4f}" for k in range(120)]
+    (tmp_path / "wide.csv").write_text("\n".join([f"t [{header}],disp [mm],cap0 (pF)", *rows]) + "\n")
+    path = mapping(tmp_path, taxels={"file": "data", "columns": ["cap0"], "unit": "pF"}, measured=None)
+    _, (episode,) = imported(tmp_path, path)
+    np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 50_000_000, atol=10_000)
+
+
+def test_a_unit_of_time_that_is_not_known_is_refused_with_those_that_are(tmp_path):
+    rows = [f"{k},{0.01 * k:.3f},{20 + 0.02 * k:.4f}" for k in range(120)]
+    (tmp_path / "wide.csv").write_text("\n".join(["t [jiffies],disp [mm],cap0 (pF)", *rows]) + "\n")
+    taxels = {"file": "data", "columns": ["cap0"], "unit": "pF"}
+    assert "'jiffies'" in refused(tmp_path, taxels=taxels, measured=None)
+
+
+@pytest.mark.parametrize("text", ["#DIV/0!", "#N/A", "#NV", "#NUM!"])
+def test_a_spreadsheets_errors_are_missing_values_in_the_first_column_too(tmp_path, text):
+    rows = [[20 + 0.02 * k, 0.01 * k, 0.05 * k] for k in range(120)]
+    lines = [f"{text if k % 5 == 3 else a},{d:.3f},{t:.3f}" for k, (a, d, t) in enumerate(rows)]
+    lines.insert(60, "# the operator coughed")
+    (tmp_path / "wide.csv").write_text("\n".join(["cap0 (pF),disp [mm],t [s]", *lines]) + "\n")
+    path = mapping(tmp_path, taxels={"file": "data", "columns": ["cap0"], "unit": "pF"}, measured=None)
+    made, (episode,) = imported(tmp_path, path)
+    assert len(episode.taxels.counts) == 120
+    assert np.isnan(episode.taxels.counts).sum() == 24
+    assert any("1 comment lines" in note for note in made.notes)
+
+
+@pytest.mark.parametrize("kind", ["mat", "npz", "csv.gz", "parquet"])
+def test_damaged_files_end_in_words_whatever_the_library_raises(tmp_path, kind):
+    """One byte flipped, or the end cut off, at many places: read, or refused as a format error."""
+    import gzip
+
+    import pyarrow as pa
+    from pyarrow import parquet
+    from scipy.io import savemat
+
+    rng = np.random.default_rng(0)
+    columns = {"t": np.arange(400) * 0.02, "cap0": rng.normal(20, 1, 400)}
+    whole = tmp_path / f"whole.{kind}"
+    if kind == "mat":
+        savemat(whole, columns, do_compression=True)
+    elif kind == "npz":
+        np.savez_compressed(whole, **columns)
+    elif kind == "parquet":
+        parquet.write_table(pa.table(columns), whole)
+    else:
+        lines = [",".join(columns), *(f"{a:.3f},{b:.6f}" for a, b in zip(*columns.values(), strict=True))]
+        whole.write_bytes(gzip.compress("\n".join(lines).encode(), mtime=0))
+    data, damaged = whole.read_bytes(), tmp_path / f"damaged.{kind}"
+    outcomes = []
+    for _ in range(120):
+        broken = bytearray(data)
+        at = int(rng.integers(len(data)))
+        if rng.random() < 0.5:
+            broken[at] ^= int(rng.integers(1, 256))
+        else:
+            broken = broken[:at]
+        damaged.write_bytes(broken)
+        try:
+            outcomes.append(read_table(damaged, {}).rows)
+        except FormatError as error:
+            assert "damaged" in str(error)
+            outcomes.append("refused")
+    assert outcomes.count("refused") > 30
+
+
+def test_one_damaged_file_of_a_series_leaves_the_good_ones_in(tmp_path):
+    for number in range(3):
+        time, depth, _, signals = press_data(number)
+        np.savez_compressed(tmp_path / f"run{number}.npz", t=time, disp=depth, cap=signals)
+    data = bytearray((tmp_path / "run1.npz").read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 16] = b"\xff" * 16
+    (tmp_path / "run1.npz").write_bytes(data)
+    path = mapping(
+        tmp_path, files={"data": {"path": "run{n}.npz", "time": {"column": "t", "unit": "s"}}},
+        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}}, measured=None,
+    )  # fmt: skip
+    made, episodes = imported(tmp_path, path)
+    assert len(episodes) == 2
+    assert "run1.npz" in " ".join(made.refused)

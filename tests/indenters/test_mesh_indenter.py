@@ -177,3 +177,20 @@ def test_the_distance_is_the_same_on_cuda():
     places = wp.array(points, dtype=wp.vec3d, device="cuda:0")
     wp.launch(compiled("mesh"), len(points), inputs=[places, q, found], device="cuda:0")
     assert found.numpy() == pytest.approx(distance(indenter, points), abs=1e-12)
+
+
+@pytest.mark.parametrize("place", [(105.0, 62.5), (2.0, 2.0), (0.0, -2.0)])
+def test_a_solid_beside_its_axis_is_refused_with_the_move_that_mends_it(place, tmp_path):
+    """A build plate's corner is no press axis: such a solid would press beside the skin."""
+    mesh = tessellated_ball(3)
+    mesh.apply_translation([*place, 0.0])
+    with pytest.raises(FormatError, match="passes beside it") as caught:
+        indenter_of(mesh, tmp_path)
+    assert f"move it by ({-place[0]:.4g}, {-place[1]:.4g}) mm" in str(caught.value)
+
+
+def test_two_tips_on_one_holder_may_leave_the_axis_free(tmp_path):
+    tips = [tessellated_ball(3).apply_translation([side * 4.0, 0.0, 0.0]) for side in (-1, 1)]
+    holder = trimesh.creation.box(extents=[14.0, 4.0, 4.0]).apply_translation([0.0, 0.0, 10.0])
+    solid = trimesh.boolean.union([*tips, holder], engine="manifold")
+    assert indenter_of(solid, tmp_path).extent > 5.0

@@ -1,5 +1,7 @@
 """`tacdata calibrate-camera` as a person uses it."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -9,9 +11,10 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from tacdata import cli, documents
-from tacdata.errors import TacdataError
-from tacdata.tags.calibration.board import read_board
+from tacdata.errors import FormatError, TacdataError
+from tacdata.tags.board import read_board
 from tacdata.tags.calibration.board_view import find_board
+from tacdata.tags.calibration.view_picker import ViewPicker, images_of
 from tacdata.tags.camera import PinholeCamera
 
 
@@ -104,3 +107,45 @@ def test_what_cannot_be_used_is_refused_in_words(folder, tmp_path, monkeypatch, 
     assert isinstance(shown.exception, TacdataError), shown.output
     assert words in str(shown.exception)
     assert not (tmp_path / "c.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "is_mirrored", "words"),
+    [
+        ({"legacy": True}, False, "legacy: false"),
+        ({"columns": 6, "rows": 9}, False, "columns: 9 and rows: 6"),
+        ({"dictionary": "5X5_100"}, False, "dictionary: 4X4_50"),
+        ({}, True, "mirroring off"),
+        ({"columns": 6, "rows": 9}, True, "mirroring off, and write columns: 9"),
+    ],
+)
+def test_why_no_board_is_found_is_looked_for_and_named(changes, is_mirrored, words):
+    pattern = replace(BOARD, **changes)
+    picker = ViewPicker(pattern, still=False)
+    for k, image in enumerate(images(4)):
+        assert not picker.take(np.ascontiguousarray(image[:, ::-1]) if is_mirrored else image, f"image {k}")
+    with pytest.raises(FormatError, match="in the others") as caught:
+        picker.check_board()
+    assert words in str(caught.value)
+
+
+def test_images_of_no_board_are_not_explained():
+    picker = ViewPicker(BOARD, still=False)
+    noise = np.random.default_rng(0).integers(0, 255, (480, 640), dtype=np.uint8)
+    assert not picker.take(noise, "noise")
+    picker.check_board()
+
+
+def test_pixels_are_read_as_the_sensor_wrote_them(tmp_path):
+    """Whatever turn a viewer is told by EXIF: the optical centre belongs to the sensor."""
+    from PIL import Image
+
+    plain = np.random.default_rng(0).integers(0, 255, (48, 64), dtype=np.uint8)
+    for orientation in (1, 3, 6, 8):
+        tag = Image.Exif()
+        tag[0x0112] = orientation
+        Image.fromarray(plain).save(tmp_path / f"view_{orientation}.jpg", quality=95, exif=tag)
+    found = [image for _, image in images_of(tmp_path)]
+    assert len(found) == 4
+    for image in found:
+        np.testing.assert_array_equal(image, found[0])

@@ -41,7 +41,7 @@ def _cube(pair: dict[str, Any], document: dict[str, Any], folder: Path, origin: 
 
     if "intrinsics" not in document or "tag_cube" not in document:
         raise FormatError(f"{origin} names an image", "intrinsics and tag_cube beside pairs", "add them to the file")
-    image = cv2.imread(str(folder / pair["image"]), cv2.IMREAD_GRAYSCALE)
+    image = cv2.imread(str(folder / pair["image"]), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
         raise UsageError(f"{origin}: no image {folder / pair['image']}", "an image file", "correct its name")
     pose = detect_cube(image, document["intrinsics"], document["tag_cube"])

@@ -64,7 +64,7 @@ def _image(message: bytes) -> np.ndarray | None:
     import cv2
 
     data = np.frombuffer(CompressedImage.FromString(message).data, np.uint8)
-    return cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
+    return cv2.imdecode(data, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION) if len(data) else None
 
 
 def _stream(camera: str, finger: str, times_ns: np.ndarray, found: list[dict[str, TipPose]]) -> TagStream:

@@ -11,7 +11,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
-from tacdata.importing.text_layout import COMMENTS, MISSING, TextLayout, is_number, text_layout
+from tacdata.importing.text_layout import COMMENTS, MISSING, TextLayout, is_comment, is_number, text_layout
 
 SNIFFED = 256 * 1024
 """Bytes from which the layout is recognized."""
@@ -26,11 +26,13 @@ class Csv(SourceFormat):
         """Read the file by Arrow's reader, with the layout of `text_layout`; see the base class."""
         data, notes = _decoded(path, options)
         layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
-        body = _body(data, layout)
+        own = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
+        body, comments = _body(data, layout, own)
+        if comments:
+            notes.append(f"{path.name}: {comments} comment lines among the rows are left out")
         if not body.strip():
             raise FormatError(f"{path} has a header and no row", "one row of data or more", "leave it out")
-        missing = [*MISSING, *(str(text) for text in options.get("missing", ()) if isinstance(text, str))]
-        columns, skipped = _parsed(body, layout, missing, path)
+        columns, skipped = _parsed(body, layout, [*MISSING, *own], path)
         if skipped:
             notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
         return SourceTable(path, columns, dict(layout.units), tuple(notes))
@@ -60,17 +62,20 @@ def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
     return raw.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n"), notes
 
 
-def _body(data: bytes, layout: TextLayout) -> bytes:
-    start = 0
+def _body(data: bytes, layout: TextLayout, missing: tuple[str, ...]) -> tuple[bytes, int]:
+    """Return the rows without comments, and how many comments stood among them."""
+    start, comments = 0, 0
     for _ in range(layout.skip):
         start = data.index(b"\n", start) + 1
     body = data[start:]
     marks = tuple(mark.encode() for mark in COMMENTS)
     if any(mark in body for mark in marks):
-        body = b"\n".join(line for line in body.split(b"\n") if not line.lstrip().startswith(marks))
+        lines = body.split(b"\n")
+        kept = [line for line in lines if not is_comment(line.decode("utf-8", "ignore"), missing)]
+        body, comments = b"\n".join(kept), len(lines) - len(kept)
     if layout.delimiter == " ":
         body = b"\n".join(b" ".join(line.split()) for line in body.split(b"\n"))
-    return body
+    return body, comments
 
 
 def _parsed(body: bytes, layout: TextLayout, missing: list[str], path: Path) -> tuple[dict[str, np.ndarray], int]:

@@ -24,7 +24,6 @@ class Mat(SourceFormat):
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the variables; ``table`` in the options selects one. See the base class."""
         from scipy.io import loadmat
-        from scipy.io.matlab import MatReadError
 
         try:
             loaded = loadmat(path, simplify_cells=True)
@@ -34,8 +33,6 @@ class Mat(SourceFormat):
                 "a MATLAB file of version 7 or older",
                 "in MATLAB: save('new.mat', ..., '-v7')",
             ) from None
-        except (MatReadError, ValueError, TypeError, OSError) as error:
-            raise FormatError(f"{path} cannot be read as MATLAB: {error}", "a .mat file", "save it again") from None
         variables = {name: value for name, value in loaded.items() if not name.startswith("__")}
         if wanted := options.get("table"):
             if wanted not in variables:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
 
@@ -17,18 +16,10 @@ class Parquet(SourceFormat):
     endings = (".parquet", ".feather")
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
-        """Read all columns; nulls become NaN. See the base class."""
-        import pyarrow as pa
+        """Read all columns; nulls become NaN. See the base."""
         from pyarrow import feather, parquet
 
-        try:
-            table = feather.read_table(path) if path.suffix == ".feather" else parquet.read_table(path)
-        except (pa.ArrowException, OSError) as error:
-            raise FormatError(
-                f"{path} cannot be read: {error}",
-                "a whole Parquet or Feather file",
-                "write it again",
-            ) from None
+        table = feather.read_table(path) if path.suffix == ".feather" else parquet.read_table(path)
         columns = {str(name): _column(table.column(k)) for k, name in enumerate(table.column_names)}
         units = {
             field.name: field.metadata[b"unit"].decode()

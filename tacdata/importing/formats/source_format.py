@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from tacdata import registry
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import FormatError, TacdataError, UsageError
 
 ROOM, BASE = "tacdata.importing.formats", "source_format"
 
@@ -68,7 +68,17 @@ def read_table(path: Path, options: dict[str, Any]) -> SourceTable:
         raise UsageError(f"no file {path}", "a file of measured data", "check the path and the mapping's files")
     name = options.get("format") or _by_ending(path)
     kind: type[Any] = registry.load(ROOM, BASE, name, SourceFormat)
-    table: SourceTable = kind().read(path, options)
+    try:
+        table: SourceTable = kind().read(path, options)
+    except TacdataError:
+        raise
+    except Exception as error:
+        # A damaged file can raise anything in the library that reads it: zlib.error, EOFError, struct.error, ...
+        raise FormatError(
+            f"{path} cannot be read as {name}: {str(error) or type(error).__name__}",
+            f"a whole file of the format {name}",
+            "copy or save it again; if it is of another kind, name its format in the mapping",
+        ) from error
     if not table.rows:
         raise FormatError(f"{path} holds no rows of data", "one row or more", "leave it out, or correct the mapping")
     return table

@@ -8,20 +8,23 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.tags.calibration.board import CharucoBoard
+from tacdata.tags.board import Board
+from tacdata.tags.calibration.board_mismatch import mismatch
 from tacdata.tags.calibration.board_view import BoardView, find_board
 
 STILL = 1.0
 """Movement between two images that follow each other [px per 1000 px of width] above which they are blurred."""
 NEW = 40.0
 """Movement since every view kept [px per 1000 px of width] from which an image shows something new."""
+LOOKED_AT_AGAIN = 5
+"""Images without the board that are kept to find out why [1]."""
 ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 
 class ViewPicker:
     """Takes images one after the other; `views` holds those worth keeping."""
 
-    def __init__(self, board: CharucoBoard, still: bool = True) -> None:
+    def __init__(self, board: Board, still: bool = True) -> None:
         """Keep the board; ``still``: the images follow each other as those of a film do."""
         self.board, self.still = board, still
         self.views: list[BoardView] = []
@@ -32,6 +35,7 @@ class ViewPicker:
         self.with_board = 0
         """Images that show the board."""
         self._last: BoardView | None = None
+        self._without_board: list[np.ndarray] = []
 
     def take(self, image: np.ndarray, name: str) -> bool:
         """Look at an image, grey or BGR uint8; say whether it was kept.
@@ -50,6 +54,8 @@ class ViewPicker:
         view = find_board(image, self.board, name)
         before, self._last = self._last, view
         if view is None:
+            if len(self._without_board) < LOOKED_AT_AGAIN:
+                self._without_board.append(image.copy())
             return False
         self.with_board += 1
         if self.still:
@@ -60,6 +66,21 @@ class ViewPicker:
                 return False
         self.views.append(view)
         return True
+
+    def check_board(self) -> None:
+        """Look for the reason where most images show no board.
+
+        Raises:
+            FormatError: If they show one that the board file does not describe.
+        """
+        if 2 * self.with_board >= self.seen or not self._without_board:
+            return
+        if (other := mismatch(self._without_board, self.board)) is not None:
+            raise FormatError(
+                f"the board in {self.with_board} of {self.seen} images; in the others {other.found}",
+                "the board that the board file describes",
+                other.remedy,
+            )
 
 
 def images_of(source: Path) -> Iterator[tuple[str, np.ndarray]]:
@@ -76,7 +97,8 @@ def images_of(source: Path) -> Iterator[tuple[str, np.ndarray]]:
         if not paths:
             raise UsageError(f"{source} holds no image", f"files ending in {', '.join(ENDINGS)}", "check the path")
         for path in paths:
-            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+            # As the sensor's pixels lie: a camera turned over keeps its optical centre.
+            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
             if image is None:
                 raise FormatError(f"{path} cannot be read as an image", "whole image files", "replace or remove it")
             yield path.name, image
@@ -85,6 +107,7 @@ def images_of(source: Path) -> Iterator[tuple[str, np.ndarray]]:
         raise UsageError(f"no file or folder {source}", "a folder of images or a video", "check the path")
     quiet = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     film = cv2.VideoCapture(str(source))
+    film.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
     cv2.utils.logging.setLogLevel(quiet)
     number, good = 0, film.isOpened()
     while good:
