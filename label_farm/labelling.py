@@ -263,7 +263,7 @@ class Labelling:
         """Hash of all that decides a label beside its recording."""
         key = version + (skin.transduction.content_hash if skin.transduction else "")
         if key not in self._made_by:
-            parts = [skin.document, version, asdict(self.settings.ladder), make_label.source_hash()]
+            parts = [skin.document, version, asdict(self.settings.ladder), make_label.code_hash()]
             self._made_by[key] = provenance.content_hash(parts)
         return self._made_by[key]
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -26,6 +24,14 @@ ALWAYS = ("signed", "error_map", "force", "force_error", "interpolation_error")
 """What it says of map and force."""
 UNCERTAIN = ("uncertainty", "force_uncertainty", "taxel_force_uncertainty", "taxel_closure_uncertainty")
 """Standard deviations that a label takes over from its path, where the path has them."""
+
+_DECIDING = (
+    "label_farm.presses.interpolate",
+    "label_farm.labels.make_label",
+    "label_farm.labels.request",
+    "tacdata.transduction",
+)
+"""What decides which label comes of a solution; who computes it where does not."""
 
 
 def make_label(request: LabelRequest, solution: PathSolution | None) -> Label:
@@ -108,15 +114,9 @@ def _readings(sensor: Sensor, values: dict[str, np.ndarray]) -> tuple[dict[str, 
     return {"taxel_capacitance": readings.capacitance, "taxel_counts": readings.counts}, readings.remarks
 
 
-_SOURCES = ("presses/interpolate.py", "labels/make_label.py", "labels/request.py")
-"""Files of the farm that decide what a label makes of a solution; who computes it where does not."""
-
-
-@cache
-def source_hash() -> str:
-    """Return the hash of the code that turns recordings and solutions into labels (hex, 64 characters)."""
-    here = Path(__file__).parents[1]
-    return provenance.content_hash([provenance.file_hash(here / name) for name in _SOURCES])
+def code_hash() -> str:
+    """Return the version of the code that turns recordings and solutions into labels (hex, 64 characters)."""
+    return provenance.code_hash(*_DECIDING)
 
 
 def parents(request: LabelRequest | Planned) -> dict[str, str]:
@@ -125,7 +125,7 @@ def parents(request: LabelRequest | Planned) -> dict[str, str]:
         "recording": request.recording,
         "sensor": request.sensor.content_hash,
         "model": request.model,
-        "label_farm": source_hash(),
+        "label_farm": code_hash(),
     }
     if request.sensor.transduction is not None:
         made_from["transduction"] = request.sensor.transduction.content_hash

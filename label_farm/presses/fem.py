@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from label_farm import environment
@@ -32,8 +31,11 @@ neighbours would say without it, several times what they leave out with it."""
 _AT_A_TIME = {"cpu": 4, "cuda": 256}
 """How many presses a device solves at a time [1] (benchmarks/skin_throughput.py): a CPU reads its factor once for 4."""
 
-_SOURCES = ("fem.py", "interpolate.py", "tolerance.py")
+_DECIDING = tuple(f"label_farm.presses.{name}" for name in ("fem", "interpolate", "tolerance"))
 """Files of the farm that decide which states a path gets."""
+
+_SPREADS = "tacdata.skin.derivatives"
+"""Decides a path's standard deviations, where the sensor file states spreads."""
 
 
 class FemModel:
@@ -63,9 +65,9 @@ class FemModel:
     @property
     def content_hash(self) -> str:
         """Hash of everything in the model that decides a result, the spreads that its uncertainty comes from too."""
-        here = Path(__file__).parent
-        sources = [provenance.file_hash(here / name) for name in _SOURCES]
-        return provenance.content_hash([self._model.content_hash, self._model.sensor.uncertainty, sources])
+        spreads = self._model.sensor.uncertainty
+        code = provenance.code_hash(*_DECIDING, *([_SPREADS] if spreads else []))
+        return provenance.content_hash([self._model.content_hash, spreads, code])
 
     def solve(self, job: Job) -> PathSolution:
         """Solve one path, with states added where the job's tolerance asks for them.

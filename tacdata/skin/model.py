@@ -58,6 +58,11 @@ _LIFT = 0.5
 _JUMP = (200, 40)
 """Newton iterations per state, and without progress, that a jump into contact or off it may take."""
 
+_UNDECIDING = (
+    "tacdata.skin.derivatives", "tacdata.skin.mesh.generation", "tacdata.skin.mesh.build", "tacdata.skin.mesh.pin",
+)  # fmt: skip
+"""Code of the skin that the model's version leaves out: a press needs no derivatives, and a mesh has its own hash."""
+
 
 @dataclass(frozen=True)
 class ModelSettings:
@@ -157,8 +162,8 @@ class SkinModel:
             "mesh": self.mesh.content_hash,
             **coarse,
             "settings": provenance.content_hash(asdict(self.settings)),
-            "code": provenance.source_hash("tacdata.skin"),
-            "indenters": provenance.source_hash("tacdata.indenters"),
+            "code": provenance.code_hash("tacdata.skin", without=_UNDECIDING),
+            "indenters": provenance.code_hash("tacdata.indenters"),
         }
 
     @property
