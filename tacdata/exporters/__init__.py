@@ -1,1 +1,1 @@
-"""Formats that robots read: one file each; the file's name is the format's name."""
+"""Formats that robots read, one per file; the file's name is the format's name."""

@@ -1,4 +1,4 @@
-"""Plain CSV, a file a demonstration, with what it means in a JSON file beside it."""
+"""Plain CSV, one file per demonstration, with a JSON file beside it that explains the columns."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Csv(Exporter):
     """``NAME.csv`` with units in the columns' names, and ``NAME.json`` (`schemas/fingertip_targets.schema.json`)."""
 
     def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
-        """Write a new folder; numbers are written so that they are read back bit for bit."""
+        """Write a new folder; numbers are exact to the last bit."""
         new_folder(out)
         for targets in episodes:
             columns, stem = to_columns(targets), Path(targets.recording).stem

@@ -1,8 +1,8 @@
-"""What an exporter's file holds.
+"""Base class of an export format.
 
 ``tacdata/exporters/my_robot.py`` defines one class derived from `Exporter`; ``tacdata export --format my_robot`` finds
-it by its file's name. `write` makes a new folder from targets, `read` gives the same targets back: what a robot will
-do can be looked at, and the tests hold one against the other for every file here.
+it by its file's name. `write` makes a new folder from targets and `read` returns the same targets. So a person can look
+at what a robot will do, and the tests compare both for every format.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROOM, BASE = "tacdata.exporters", "exporter"
 
 
 class Exporter(ABC):
-    """A format that a robot reads."""
+    """Base class: a format that a robot reads."""
 
     needs_robot = False
     """Whether `write` needs a robot file (`schemas/robot.schema.json`)."""
@@ -34,11 +34,11 @@ class Exporter(ABC):
         """Write a new folder.
 
         Args:
-            episodes: Targets, one entry a demonstration.
+            episodes: Targets, one per demonstration.
             out: The folder; it does not exist.
 
         Returns:
-            What a person must know of what was written, in words: above all what a robot cannot do.
+            Remarks for a person, above all what a robot cannot do.
 
         Raises:
             UsageError: If something that the format needs is missing.

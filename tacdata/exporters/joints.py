@@ -1,4 +1,4 @@
-"""Joint values for a robot's URDF, by inverse kinematics; what it cannot reach is NaN and named, never clipped."""
+"""Joint values for a robot's URDF, by inverse kinematics; unreachable targets are NaN and named, never clipped."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tacdata.replay.targets import FingertipTargets
 
 HEADER = b"tacdata.joint_trajectory"
 JOINT = "joint."
-"""What the name of a column of joint values begins with."""
+"""Prefix of the columns of joint values."""
 
 
 class Joints(Exporter):
@@ -33,7 +33,7 @@ class Joints(Exporter):
     needs_robot = True
 
     def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
-        """Solve and write a new folder; returns what cannot be reached, in words."""
+        """Solve and write a new folder; return what cannot be reached, as sentences."""
         if self.robot is None:
             raise UsageError("no robot", "a robot file", "name it with --robot")
         robot, said = read_robot(self.robot), []
@@ -71,7 +71,7 @@ def read_joints(out: Path) -> list[tuple[FingertipTargets, dict[str, np.ndarray]
 
 
 def in_words(path: JointPath, targets: FingertipTargets, turned: bool = True) -> list[str]:
-    """Return what the robot cannot do, in words with times; with its turns, where those are asked for."""
+    """Describe what the robot cannot do, with times; orientations too, where they are prescribed."""
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     said = []
     for name, rows in path.unreached.items():

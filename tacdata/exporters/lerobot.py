@@ -1,4 +1,4 @@
-"""LeRobot v3.0: actions are the targets, observations are what was seen, felt and predicted."""
+"""LeRobot v3.0: targets as actions; what was seen, felt and predicted as observations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tacdata.replay.columns import AXES, TURNS
 from tacdata.replay.targets import FingertipTargets
 
 META = Path("meta/tacdata_targets.json")
-"""What the targets are, an entry an episode (`schemas/fingertip_targets.schema.json`)."""
+"""Meaning of the targets, one entry per episode (`schemas/fingertip_targets.schema.json`)."""
 ACTION, STATE = "action", "observation.state"
 DEPTH, FELT, GAP = "tacdata.predicted_contact_depth", "tacdata.felt", "tacdata.gap"
 TIME = "tacdata.time_ns"
@@ -99,11 +99,11 @@ def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
     columns = {
         ACTION: np.concatenate([targets.position, targets.quaternion], -1).reshape(count, -1).astype(np.float32),
         STATE: np.concatenate([targets.seen, targets.quaternion], -1).reshape(count, -1).astype(np.float32),
-        # LeRobot's statistics bear no NaN: 0 where nothing was felt, which FELT says.
+        # LeRobot's statistics allow no NaN: 0 where nothing was felt; the column FELT marks it.
         DEPTH: np.nan_to_num(targets.depth).astype(np.float32),
         FELT: np.isfinite(targets.depth), GAP: targets.gap, TIME: targets.time_ns,
     }  # fmt: skip
-    if len(targets.fingers) == 1:  # LeRobot stores a vector of one as a number
+    if len(targets.fingers) == 1:  # LeRobot stores a vector of length one as a number
         columns = {key: values[:, 0] if values.shape[1:] == (1,) else values for key, values in columns.items()}
     for name, track in () if made is None else ((name, made.tracks[name]) for name in targets.fingers):
         if track.signals is not None:

@@ -1,4 +1,4 @@
-"""Parquet, a file a demonstration, with what it means in its header."""
+"""Parquet, one file per demonstration, with the meaning of its columns in the header."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Depth maps while the sensor is touched: windows over a stream, messages for controllers, latencies."""
+"""Live estimates: depth maps while the sensor is touched, messages for controllers, latencies."""

@@ -1,4 +1,4 @@
-"""From a stream of frames to depth maps at the sensor's rate, by a network over a sliding window."""
+"""Estimates depth maps at the sensor's rate, by a network over a sliding window of frames."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from tacdata.sensor import DepthMap
 REGION = 0.4
 """Depth above which a pixel belongs to the contact region [mm] (paper, Exp. 3)."""
 STILL = 6.0
-"""While taring, readings may spread by so many times their frame-to-frame noise [1]."""
+"""Largest spread of readings while taring, over their frame-to-frame noise [1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What one frame's skin is estimated to be pressed; a network's prediction."""
+    """A network's estimate of the depth map of one frame."""
 
     sequence: int
     """Number of the estimate."""
     sample_ns: int
-    """When the frame that it is of was sampled, as estimated [ns]."""
+    """Estimated sample time of its frame [ns]."""
     arrival_ns: int
     """When the newest frame used arrived [ns]."""
     depth: np.ndarray
@@ -37,16 +37,17 @@ class Estimate:
     centre: tuple[float, float] | None
     """Centroid of the pixels deeper than `REGION` in the sensor's frame [mm]; None without contact."""
     novelty: float | None = None
-    """How far the reading is from all that the network learnt from, over what is far [1]; None if that is not known."""
+    """Novelty: distance of the reading from all training readings, over the limit [1]; None if it is not known."""
 
 
 class DepthStream:
-    """Takes frames one by one, gives an estimate for each once its window is full.
+    """Takes frames one by one; returns an estimate for each once its window is full.
 
-    The first frames are for taring: nothing may touch the skin. A centred window gives the estimate of the frame
-    ``lookahead`` frames before the newest one. With ``causal`` the estimate is of the newest frame; the network's
-    frames to come are then all taken to be like it, which is what training did at the end of an episode: right while
-    the contact holds still, late while it changes.
+    The first frames are for taring: nothing may touch the skin. A centred window estimates the frame ``lookahead``
+    frames before the newest one.
+
+    With ``causal`` the newest frame is estimated, and it is repeated in place of the network's later frames, as
+    training did at the end of an episode. That is right while the contact holds still, and late while it changes.
     """
 
     def __init__(
@@ -61,9 +62,9 @@ class DepthStream:
             offsets: Frames of the window relative to its target, ascending.
             grid: The sensor's pixels.
             clock: The board's clock, which says when frames were sampled.
-            tare_frames: Frames at the beginning over which the untouched reading is averaged.
+            tare_frames: Frames at the beginning over which the reading without contact is averaged.
             causal: Whether to estimate the newest frame.
-            novelty: Tared readings (m, taxels) -> how far they are from all that was learnt from [1], shape (m,).
+            novelty: Tared readings (m, taxels) -> novelty [1], shape (m,).
 
         Raises:
             UsageError: If there is no frame for taring.
@@ -124,7 +125,7 @@ def contact_centre(depth: np.ndarray, grid: DepthMap, threshold: float = REGION)
 
 
 def _untouched(counts: np.ndarray) -> np.ndarray:
-    """Return the mean of readings, shape (n, taxels), if they stand still."""
+    """Return the mean of readings, shape (n, taxels), if they are at rest."""
     if len(counts) < 2:
         return counts[0]
     noise = np.median(np.abs(np.diff(counts, axis=0)), axis=0) + 1.0

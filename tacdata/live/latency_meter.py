@@ -1,4 +1,4 @@
-"""How old estimates are when they go out."""
+"""Measures the age of estimates when they are sent."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 KEPT = 2000
-"""Estimates that the figures are of [count]."""
+"""Estimates in the statistics [count]."""
 
 
 @dataclass(frozen=True)
 class LatencyFigures:
-    """Figures over the latest estimates."""
+    """Statistics of the latest estimates."""
 
     count: int
     """Estimates since the beginning."""
@@ -26,7 +26,7 @@ class LatencyFigures:
 
     @property
     def text(self) -> str:
-        """The figures in a line."""
+        """The statistics in one line."""
         age, computing = self.age, self.computing
         return (
             f"{self.count} estimates at {self.rate:.1f} Hz; age from sampling to sending {age[0]:.1f} ms median, "
@@ -36,20 +36,20 @@ class LatencyFigures:
 
 
 class LatencyMeter:
-    """Takes three times an estimate."""
+    """Takes three time stamps per estimate."""
 
     def __init__(self) -> None:
         self._times: deque[tuple[int, int, int]] = deque(maxlen=KEPT)
         self._count = 0
 
     def take(self, sample_ns: int, arrival_ns: int, sent_ns: int) -> None:
-        """Take when a frame was sampled, when the newest one arrived, and when the estimate went out [ns]."""
+        """Take the frame's sample time, the newest frame's arrival, and the time of sending [ns]."""
         self._times.append((sample_ns, arrival_ns, sent_ns))
         self._count += 1
 
     @property
     def figures(self) -> LatencyFigures | None:
-        """The figures; None before two estimates."""
+        """The statistics; None before two estimates."""
         if len(self._times) < 2:
             return None
         sample, arrival, sent = np.array(self._times, np.int64).T

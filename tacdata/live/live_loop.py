@@ -1,4 +1,4 @@
-"""Reads a board, estimates, and hands out: to a socket, to a viewer, to a person in words."""
+"""Reads a board, estimates, and passes the estimates on: to a socket, a viewer, a person."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from tacdata.live.message_server import MessageServer, message
 from tacdata.live.source import Source
 
 PATIENCE = 0.05
-"""How long a read may wait [s of the host's clock]."""
+"""Timeout of a read [s of the host's clock]."""
 LATE = 2.0
-"""A frame that has waited for longer [frame periods] gets an estimate only if no newer one is there."""
+"""A frame that waited longer [frame periods] is estimated only if no newer one is there."""
 SAID_EVERY = 1.0
-"""How often a person is told [s of real time]."""
+"""Interval between status lines for a person [s of real time]."""
 
 
 class LiveLoop:
@@ -34,7 +34,7 @@ class LiveLoop:
             stream: Makes estimates of its frames.
             network: Identity of the network, for messages.
             server: Takes messages.
-            watch: Is shown every estimate (`viewers.live.window`); must return at once.
+            watch: Called with every estimate (`viewers.live.window`); must return at once.
             maps: Whether messages hold whole maps.
         """
         self._source, self._stream, self._server, self._watch, self._maps = source, stream, server, watch, maps
@@ -47,7 +47,7 @@ class LiveLoop:
         self._stopped = False
 
     def stop(self) -> None:
-        """End `run` soon; safe from any thread and signal handler."""
+        """End `run` soon; safe in any thread and signal handler."""
         self._stopped = True
 
     def run(self, seconds: float | None, say: Callable[[str], None]) -> None:
@@ -60,7 +60,7 @@ class LiveLoop:
         while not self._stopped and (seconds is None or time.monotonic() - begun < seconds):
             frames = self._source.board.read(PATIENCE)
             for frame in frames:
-                # Behind time, only the newest estimate helps a controller; the others would make it later still.
+                # When late, only the newest estimate helps a controller; the others would make it later still.
                 late = self._source.clock.now_ns() - frame.arrival_ns > LATE * 1e9 / self._source.rate
                 wanted = not late or frame is frames[-1]
                 self.skipped += not wanted and self._stream.baseline is not None

@@ -1,4 +1,4 @@
-"""Messages to whoever listens on a socket (`schemas/live_message.schema.json`): a line of JSON each, never waiting."""
+"""Sends one line of JSON per estimate to every reader of a socket (`schemas/live_message.schema.json`); never waits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tacdata.live.depth_stream import Estimate
 
 LOOPBACK = "127.0.0.1"
 WAITING = 4
-"""Messages that wait for a slow reader; beyond, the oldest are left out [count]."""
+"""Messages that wait for a slow reader; beyond that the oldest are dropped [count]."""
 
 
 def message(made: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = True) -> dict[str, Any]:
@@ -22,9 +22,9 @@ def message(made: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = T
 
     Args:
         made: The estimate.
-        source: Whose it is: ``finger``, ``network`` (hash), ``causal``, ``lookahead``.
+        source: Its source: ``finger``, ``network`` (hash), ``causal``, ``lookahead``.
         sent_ns: Now [ns].
-        maps: Whether the whole map is in it.
+        maps: Whether to include the whole map.
     """
     values: dict[str, Any] = {
         "version": schemas.version("live_message"), "sequence": made.sequence, **source,
@@ -41,7 +41,7 @@ def message(made: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = T
 
 
 class MessageServer:
-    """Listens on the loopback; every reader gets every message that it can take."""
+    """A server on the loopback interface; every reader gets the messages that it can take."""
 
     def __init__(self, port: int) -> None:
         """Open the socket; port 0 takes a free one.
@@ -65,11 +65,11 @@ class MessageServer:
 
     @property
     def readers(self) -> int:
-        """How many listen."""
+        """Number of connected readers."""
         return sum(reader.alive for reader in self._readers)
 
     def send(self, values: dict[str, Any]) -> None:
-        """Hand a message to all readers; returns at once."""
+        """Pass a message to all readers; returns at once."""
         self._readers = [reader for reader in self._readers if reader.alive]
         if self._readers:
             line = json.dumps(values, separators=(",", ":")).encode() + b"\n"
@@ -96,13 +96,13 @@ class MessageServer:
 
 
 class _Reader:
-    """One connection with a thread of its own: a controller that stalls must not hold up the others."""
+    """One connection with a thread of its own: a controller that stalls must not delay the others."""
 
     def __init__(self, connection: socket.socket) -> None:
         self.alive = True
         self._connection, self._lines = connection, []
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        # A large buffer would hand out old messages to a slow reader.
+        # A large buffer would give old messages to a slow reader.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 32768)
         self._changed = threading.Condition()
         threading.Thread(target=self._write, name="live-reader", daemon=True).start()

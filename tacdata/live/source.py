@@ -1,4 +1,4 @@
-"""Which board is touched: the only one of a rig, or one finger's of a demo rig."""
+"""Finds the board to read: the only one of a rig, or that of one finger of a demo rig."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from tacdata.sensor import Sensor
 
 @dataclass(frozen=True)
 class Source:
-    """A board with what is known of it."""
+    """A board with its sensor and rate."""
 
     name: str
     """The finger, or the sensor's name."""
     board: TaxelBoard
-    """Not yet opened."""
+    """The board, not opened yet."""
     clock: Clock
     sensor: Sensor
     rate: float
@@ -47,7 +47,7 @@ def touched_board(path: Path, finger: str | None, assumed: Sensor) -> Source:
     try:
         parsed = documents.parsed(path.read_text(), str(path))
     except (yaml.YAMLError, UnicodeDecodeError):
-        parsed = None  # the rig reader says what is wrong
+        parsed = None  # the rig reader describes what is wrong
     if isinstance(parsed, dict) and "boards" in parsed:
         demo = read_demo_rig(path)
         name = finger or next(iter(demo.boards), "")

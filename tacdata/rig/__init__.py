@@ -1,4 +1,4 @@
-"""The rig: which devices, how the sensor lies in the guide's frame, where the guide may go."""
+"""The rig file: devices, pose of the sensor in the guide's frame, envelope of the guide."""
 
 from tacdata.rig.rig import Envelope, Registration, Rig, read_rig, registration_for
 

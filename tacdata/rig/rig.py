@@ -15,10 +15,10 @@ from tacdata.errors import FormatError, UsageError
 
 @dataclass(frozen=True)
 class Registration:
-    """How the sensor lies in the guide's frame: machine = origin + R_z(yaw) (x, y, tilt . (x, y) - depth).
+    """Pose of the sensor in the guide's frame: machine = origin + R_z(yaw) (x, y, tilt . (x, y) - depth).
 
-    Depth is counted along the guide's z from the tilted outer face; of tilts up to a few degrees the second order
-    (0.15 % of a length at 3 deg) is left out.
+    Depth is counted along the guide's z from the tilted outer face. Terms of second order in the tilt are neglected
+    (0.15 % of a length at 3 deg).
     """
 
     origin: tuple[float, float, float]
@@ -35,7 +35,9 @@ class Registration:
         return cls(tuple(document["origin"]), document["yaw"], tuple(tilt))
 
     def with_tool(self, offset: tuple[float, float, float]) -> Registration:
-        """Return it for an indenter whose lowest point lies ``offset`` off the registered one's [mm, machine axes]."""
+        """Return the registration for an indenter whose lowest point is at ``offset`` from the registered one's [mm,
+        machine axes].
+        """
         x, y, z = (own - moved for own, moved in zip(self.origin, offset, strict=True))
         return replace(self, origin=(x, y, z))
 
@@ -67,13 +69,13 @@ class Envelope:
     """Upper corner [mm]."""
 
     def contains(self, position: tuple[float, float, float]) -> bool:
-        """Say whether a machine position [mm] lies inside."""
+        """Whether a machine position [mm] lies inside."""
         return all(a <= p <= b for a, p, b in zip(self.min, position, self.max, strict=True))
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig as its file describes it."""
+    """A rig: devices, registration, envelope and clock."""
 
     name: str
     cnc: dict[str, Any]
@@ -88,10 +90,10 @@ class Rig:
     document: dict[str, Any]
     """The file's document, as attached to every recording."""
     fingers: dict[str, Any] | None = None
-    """The cubes that fingers carry and the tips on them (`schemas/fingers.schema.json`), if there are any."""
+    """Cubes and fingertips of fingers (`schemas/fingers.schema.json`), if any."""
 
     def registration_for(self, indenter: str) -> Registration:
-        """Return how the sensor lies in the guide's frame for an indenter, named as in a plan."""
+        """Return the registration for an indenter, named as in a plan."""
         return registration_for(self.document, indenter)
 
     def registered(self, document: dict[str, Any], sensor_hash: str, origin: str) -> Rig:
@@ -99,7 +101,7 @@ class Rig:
 
         Args:
             document: The registration's document.
-            sensor_hash: Content hash of the sensor that is going to be pressed.
+            sensor_hash: Content hash of the sensor that will be pressed.
             origin: Names the document in errors.
 
         Raises:
@@ -132,7 +134,9 @@ def registration_for(document: dict[str, Any], indenter: str) -> Registration:
 
 
 def from_document(document: dict[str, Any], origin: str) -> Rig:
-    """Build a rig from a parsed file; ``origin`` names it in errors, and says where files it names are looked for.
+    """Build a rig from a parsed file.
+
+    ``origin`` names it in errors and is where the files that it names are searched.
 
     Raises:
         FormatError: If the document breaks the schema or the envelope is empty.

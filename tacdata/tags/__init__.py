@@ -1,4 +1,4 @@
-"""AprilTag cubes to poses."""
+"""Poses of AprilTag cubes, and of the fingertips that carry them."""
 
 from tacdata.tags.cube.cube import Cube
 from tacdata.tags.cube.pose import CubePose, detect_cube

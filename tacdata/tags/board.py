@@ -1,4 +1,4 @@
-"""A ChArUco board: the chessboard with markers that a camera is calibrated on."""
+"""A ChArUco board: a chessboard with markers, for camera calibration."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from tacdata.errors import FormatError, UsageError
 PAPER = {"a4": (297.0, 210.0), "a3": (420.0, 297.0), "letter": (279.4, 215.9)}
 """Width and height of a sheet that lies on its side [mm]."""
 DPI = 600
-"""Dots an inch of a drawn board; the edges of its squares are off by at most half a dot, 0.02 mm."""
+"""Dots per inch of a drawn board; the edges of its squares are off by at most half a dot, 0.02 mm."""
 
 
 @dataclass(frozen=True)
 class Board:
-    """Squares and markers as they were printed. Its corners lie between the squares, row by row."""
+    """Squares and markers as printed. Its corners lie between the squares, row by row."""
 
     columns: int
     """Squares across [count]."""
@@ -32,7 +32,7 @@ class Board:
     dictionary: str
     """OpenCV's name of the markers' dictionary without "DICT_"."""
     legacy: bool = False
-    """Whether the pattern begins as OpenCV drew it before 4.6."""
+    """Whether the pattern begins as OpenCV before 4.6 drew it."""
 
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str = "board") -> Board:
@@ -57,7 +57,7 @@ class Board:
 
     @property
     def document(self) -> dict[str, Any]:
-        """The board as its file holds it."""
+        """The board as in its file."""
         plain = {key: getattr(self, key) for key in ("columns", "rows", "square", "marker", "dictionary")}
         return {"version": "1.0", **plain, **({"legacy": True} if self.legacy else {})}
 
@@ -68,7 +68,7 @@ class Board:
 
     @property
     def opencv(self) -> Any:
-        """The same as OpenCV's `CharucoBoard`."""
+        """The board as OpenCV's `CharucoBoard`."""
         import cv2
 
         markers = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{self.dictionary}"))
@@ -88,14 +88,14 @@ def read_board(path: Path) -> Board:
 
 
 def draw_squares(board: Board, side: int) -> np.ndarray:
-    """Return the board alone with ``side`` dots a square, uint8 0 or 255, shape (rows side, columns side)."""
+    """Return the board alone with ``side`` dots per square, uint8 0 or 255, shape (rows side, columns side)."""
     import cv2
 
     marker = round(board.marker / board.square * side)
     image = np.zeros((board.rows * side, board.columns * side), np.uint8)
     opencv = board.opencv
     for number, corners in zip(opencv.getIds().ravel().tolist(), opencv.getObjPoints(), strict=True):
-        # Whole dots: rounding may not differ from square to square.
+        # Whole dots: rounding must not differ between squares.
         column, row = np.floor(np.array(corners)[:, :2].mean(axis=0) / board.square).astype(int).tolist()
         square = image[row * side : (row + 1) * side, column * side : (column + 1) * side]
         square[:] = 255
@@ -107,7 +107,7 @@ def draw_squares(board: Board, side: int) -> np.ndarray:
 
 
 def printable(board: Board, dpi: int = DPI) -> Board:
-    """Return the board nearest to one whose squares are whole dots: what `draw_board` draws."""
+    """Return the nearest board whose squares are whole dots, as `draw_board` draws it."""
     dot = 25.4 / dpi
     side = round(board.square / dot)
     marker = round(board.marker / board.square * side)

@@ -1,4 +1,4 @@
-"""A camera's intrinsics, ready for OpenCV."""
+"""A camera's intrinsics, with OpenCV's projections."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tacdata.errors import FormatError, UsageError
 
 @dataclass(frozen=True, eq=False)
 class PinholeCamera:
-    """Pinhole with OpenCV's distortion. Frame: x right, y down, z forward; whole pixels at pixel centres."""
+    """A pinhole camera with OpenCV's distortion. Frame: x right, y down, z forward; whole pixels at pixel centres."""
 
     width: int
     """Image width [px]."""
@@ -29,7 +29,7 @@ class PinholeCamera:
         """Build a camera from a rig file's ``intrinsics`` entry.
 
         Raises:
-            FormatError: If a number is missing or no camera has it.
+            FormatError: If a number is missing or impossible.
         """
         wanted = ("width", "height", "fx", "fy", "cx", "cy")
         missing = [name for name in wanted if name not in document]
@@ -64,7 +64,7 @@ class PinholeCamera:
             )
 
     def straighten(self, pixels: np.ndarray) -> np.ndarray:
-        """Return where pixels, shape (n, 2), would lie without distortion, shape (n, 2)."""
+        """Return pixels, shape (n, 2), with the distortion removed, shape (n, 2)."""
         import cv2
 
         if not self.distortion.any():
@@ -73,7 +73,7 @@ class PinholeCamera:
         return cv2.undistortPoints(pixels.reshape(-1, 1, 2), square, self.distortion, P=square)[:, 0]
 
     def bend(self, pixels: np.ndarray) -> np.ndarray:
-        """Return where straightened pixels, shape (n, 2), lie in the image as taken, shape (n, 2)."""
+        """Return undistorted pixels, shape (n, 2), at their place in the image as taken, shape (n, 2)."""
         import cv2
 
         if not self.distortion.any():
@@ -82,12 +82,12 @@ class PinholeCamera:
         return cv2.projectPoints(rays, np.zeros(3), np.zeros(3), self.matrix, self.distortion)[0][:, 0]
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Return pixels without distortion, shape (n, 2), of points in the camera frame [m], shape (n, 3)."""
+        """Return undistorted pixels, shape (n, 2), of points in the camera frame [m], shape (n, 3)."""
         pixels = points @ self.matrix.T
         return pixels[:, :2] / pixels[:, 2:]
 
     def window(self, grey: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return a part of an image without distortion, and the camera matrix that belongs to it.
+        """Return a part of an image without distortion, and its camera matrix.
 
         Args:
             grey: The image as taken, shape (height, width).
@@ -111,7 +111,7 @@ class PinholeCamera:
 def _straight_maps(
     width: int, height: int, matrix: tuple[float, ...], distortion: tuple[float, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return, for every pixel of the straightened image, where it lies in the image as taken."""
+    """Return, for every pixel of the undistorted image, its place in the image as taken."""
     import cv2
 
     square = np.array(matrix).reshape(3, 3)

@@ -1,4 +1,4 @@
-"""Which cube each finger carries, and where its fingertip is on it (`schemas/fingers.schema.json`)."""
+"""The cube of each finger, and the fingertip's place on it (`schemas/fingers.schema.json`)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Finger:
     tip: np.ndarray
     """The fingertip's frame in the cube's, homogeneous, shape (4, 4) [m]."""
     tip_spread: float = 0.0
-    """Standard deviation of the fingertip's place on the cube [m]."""
+    """Standard deviation of the fingertip's position on the cube [m]."""
     hand: str = ""
     """"left", "right" or unknown."""
     kind: str = ""

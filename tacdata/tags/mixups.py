@@ -1,8 +1,8 @@
-"""Notice tags and cubes that were mixed up: a finger that wears another's cube, a hand the other's.
+"""Notices tags and cubes that were mixed up: a finger with another's cube, one hand with the other's.
 
-A number alone never tells: the poses do. Two cubes cannot be in one place; a cube's tags are where the cube
-is; a finger does not change places with another between two images; and index and middle finger of a right
-hand stand in the other order than those of a left one.
+A tag's number alone never shows that; the poses do. Two cubes cannot be in one place. A cube's tags are where the cube
+is. A finger does not change places with another between two images. Index and middle finger of a right hand stand in
+the other order than those of a left one.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     from tacdata.tags.cube.pose import CubePose
 
 NEARER = 0.5
-"""Share [1] of the way between two cubes that a jump may leave, at most, to count as a change of places."""
+"""Largest share [1] of the distance between two cubes that may remain after a jump for it to count as an exchange."""
 SIDEWAYS = 0.5
-"""Sine of the least angle between the line from index to middle finger and the fingers [1] that tells hands."""
+"""Smallest sine of the angle between the line from index to middle finger and the fingers [1] for telling hands apart.
+"""
 
 
 def mixups(fingers: dict[str, Finger], cubes: dict[str, CubePose]) -> tuple[str, ...]:
-    """Return what looks swapped in one image, in words.
+    """Describe what looks swapped in one image.
 
     Args:
         fingers: The fingers.
@@ -51,7 +52,7 @@ def mixups(fingers: dict[str, Finger], cubes: dict[str, CubePose]) -> tuple[str,
 
 
 def handedness(fingers: dict[str, Finger], cubes: dict[str, CubePose]) -> str:
-    """Return "left" or "right" by how index and middle finger stand, "" if one is not seen or it is unclear.
+    """Return "left" or "right" by the order of index and middle finger, "" if one is not seen or it is unclear.
 
     Looking along the fingers with the pads down, a right hand has its middle finger right of its index.
     """
@@ -70,7 +71,7 @@ def handedness(fingers: dict[str, Finger], cubes: dict[str, CubePose]) -> str:
 
 
 def exchanged(before: dict[str, CubePose], now: dict[str, CubePose]) -> tuple[str, ...]:
-    """Return which fingers seem to have changed places between two images, in words.
+    """Describe the fingers that seem to have changed places between two images.
 
     Args:
         before: Poses of the cubes in an image, by finger.

@@ -1,4 +1,4 @@
-"""Fingertips in an image: each finger's cube, and its tip from there."""
+"""Fingertips in an image, from the poses of the fingers' cubes."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from tacdata.tags.mixups import mixups
 
 @dataclass(frozen=True, eq=False)
 class TipPose:
-    """Where a fingertip is in the camera frame (x right, y down, z forward)."""
+    """Pose of a fingertip in the camera frame (x right, y down, z forward)."""
 
     position: np.ndarray
     """Origin of the fingertip's frame [m], shape (3,)."""
     quaternion: np.ndarray
     """Rotation from the fingertip's frame to the camera frame, xyzw [1], shape (4,)."""
     covariance: np.ndarray
-    """Of a small turn in the camera frame [rad] and the position [m], in this order, shape (6, 6)."""
+    """Covariance of a small rotation in the camera frame [rad] and the position [m], in this order, shape (6, 6)."""
     cube: CubePose
-    """The cube's pose that it rests on, with faces seen, reprojection and ambiguity."""
+    """The cube's pose that it is computed from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class View:
     tags: tuple[Tag, ...] = ()
     """All tags read, of whatever number."""
     remarks: tuple[str, ...] = field(default=())
-    """What looks wrong, in words: tags or cubes that seem to be swapped."""
+    """Warnings about tags or cubes that seem to be swapped."""
 
     @property
     def cubes(self) -> dict[str, CubePose]:
@@ -52,7 +52,7 @@ def detect_fingers(
     image: np.ndarray, intrinsics: dict[str, Any], fingers: dict[str, Finger],
     hints: dict[str, CubePose] | None = None,
 ) -> View:  # fmt: skip
-    """Return the fingertips that an image shows; a finger needs one tag that can be read.
+    """Return the fingertips in an image; a finger needs one readable tag.
 
     Args:
         image: Grey (height, width) or BGR (height, width, 3), uint8.
@@ -76,13 +76,13 @@ def look(image: np.ndarray, intrinsics: dict[str, Any], what: dict[str, Any], hi
         image: Grey (height, width) or BGR (height, width, 3), uint8.
         intrinsics: A rig file's ``intrinsics`` [px].
         what: A cube's or a fingers' document.
-        hint: What was seen just before: a cube's pose, or the cubes' poses by finger.
+        hint: Previous pose of the cube, or of the cubes by finger.
 
     Returns:
         `CubePose` or None of a cube, `View` of fingers.
 
     Raises:
-        UsageError: If the image is no image or of another size than the intrinsics.
+        UsageError: If the image is invalid or of another size than the intrinsics.
         FormatError: If a document contradicts itself.
     """
     if "fingers" in what:
@@ -98,7 +98,7 @@ def _known(document: str) -> dict[str, Finger]:
 def view_of(
     grey: np.ndarray, tags: list[Tag], camera: PinholeCamera, fingers: dict[str, Finger], hints: dict[str, CubePose]
 ) -> View:
-    """Return the fingertips from tags that were read in an image, uint8, shape (height, width)."""
+    """Return the fingertips by tags that were read in an image, uint8, shape (height, width)."""
     cubes = {}
     for name, finger in fingers.items():
         pose = solve_cube(grey, tags, finger.cube, camera, hints.get(name))
@@ -109,13 +109,13 @@ def view_of(
 
 
 def tip_of(pose: CubePose, finger: Finger) -> TipPose:
-    """Return a fingertip's pose from its cube's, with the covariance that the lever between them gives."""
+    """Return a fingertip's pose from its cube's; the covariance includes the lever arm."""
     from scipy.spatial.transform import Rotation
 
     matrix = pose.matrix @ finger.tip
     x, y, z = matrix[:3, 3] - pose.position
     lever = np.eye(6)
-    # A small turn w moves the tip by w x arm.
+    # A small rotation w moves the tip by w x arm.
     lever[3:, :3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
     covariance = lever @ pose.covariance @ lever.T if np.isfinite(pose.covariance).all() else pose.covariance
     covariance = covariance + np.diag([0.0] * 3 + [finger.tip_spread**2] * 3)

@@ -1,4 +1,4 @@
-"""Fingertips in one camera's images, one after the other: looks first where the cubes were just before."""
+"""Tracks fingertips through one camera's images; searches first around their previous positions."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from tacdata.tags.mixups import exchanged
 from tacdata.tags.tips import View, view_of
 
 SEARCH_EVERY = 6
-"""Images between two searches of the whole image, while a finger is missing or none is."""
+"""Images between two searches of the whole image, while a finger, or every finger, is missing."""
 REMEMBERED = 30
-"""Images for which a finger that is not seen keeps its last pose as a hint."""
+"""Images for which an unseen finger keeps its last pose as a hint."""
 
 
 class FingerTracker:
@@ -49,7 +49,7 @@ class FingerTracker:
         """Return what an image, grey or BGR uint8, shows.
 
         Raises:
-            UsageError: If the image is no image or of another size than the intrinsics.
+            UsageError: If the image is invalid or of another size than the intrinsics.
         """
         grey = to_grey(image)
         self.camera.check(grey)
@@ -66,7 +66,7 @@ class FingerTracker:
         return view
 
     def _near(self, grey: np.ndarray, names: set[str]) -> list[Tag]:
-        """Return the tags around the cubes' last places; overlapping boxes are searched as one."""
+        """Return the tags around the cubes' previous positions; overlapping boxes are merged."""
         boxes: list[tuple[int, int, int, int]] = []
         for name in names:
             box = surroundings(self._hints[name], self.fingers[name].cube, self.camera)

@@ -1,4 +1,4 @@
-"""Emulated devices behind real operating-system wires, with a world of their own; see README.md."""
+"""Emulated devices on real operating-system wires, with a simulated world behind them; see README.md."""
 
 from tacdata.virtual_rig.world.mounting import mount
 

@@ -1,4 +1,4 @@
-"""An emulated capacitive board on a virtual port: its own crystal, and a USB bridge's delays."""
+"""An emulated capacitive board on a virtual port: its own crystal, and the latencies of a USB bridge."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Timing:
     drift: float
     """Error of the crystal [ppm]; positive is slow."""
     wander: float
-    """Amplitude of the samples' slow wander around the straight line [s]."""
+    """Amplitude of the slow deviation of sample times from the straight line [s]."""
     wander_period: float
-    """Period of that wander [s]."""
+    """Period of that deviation [s]."""
     conversion: float
     """From sampling to the first bit on the line [s]."""
     timer: float
@@ -101,7 +101,7 @@ class VirtualBoard:
         self._counter += 1
 
     def _bridge(self, before_ns: int) -> None:
-        """Pack what leaves the board before a time: at a tick of the timer, or when a packet is full."""
+        """Return the packets that leave the board before a time: at a tick of the timer, or when a packet is full."""
         timer = max(int(self.timing.timer * NS), 1_000_000)
         while self._line:
             first = self._line[0][0] - self.timing.start_ns

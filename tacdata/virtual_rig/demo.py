@@ -1,4 +1,4 @@
-"""A virtual demonstration: boards on three fingers and cameras on their cubes, with a demo rig file like any other."""
+"""A virtual demonstration: boards on three fingers, cameras on their cubes, and a demo rig file."""
 
 from __future__ import annotations
 
@@ -27,16 +27,18 @@ INTRINSICS = {"width": 800, "height": 600, "fx": 880.0, "fy": 880.0, "cx": 399.5
 FACES = ("+x", "-x", "+y", "-y", "+z")
 TIP = {"position": [10.0, 0.0, -18.0], "quaternion": [1.0, 0.0, 0.0, 0.0], "method": "drawing", "residual": 0.1}
 EYES = {"left": (0.10, -0.36, 0.36), "right": (-0.08, 0.37, 0.35)}
-"""Where the cameras stand [m]; both look at the ball."""
+"""Positions of the cameras [m]; both look at the ball."""
 RATE = 20.0
 """Images a second of the rig's clock [Hz]."""
 DELAY = 0.05
-"""From exposure to arrival of an image, at least [s]; the rig file says so, as if a sync tap had measured it."""
+"""Minimum latency from exposure to arrival of an image [s]; the rig file states it, as if a sync tap had measured it.
+"""
 FAULTS = ("no-tag", "turned-tag", "swapped-fingers", "silent-finger")
-"""What can go wrong on demand: the index finger's tags covered for a second; its upper tag turned half way round;
-the cubes of index and middle finger exchanged; the middle finger's board silent after three seconds."""
+"""Faults on demand: the index finger's tags covered for a second; its upper tag turned by 180 deg; the cubes of index
+and middle finger exchanged; the middle finger's board silent after three seconds.
+"""
 NUBS = 1.0, 200.0
-"""Radii of what may press a skin, from and to [mm]."""
+"""Smallest and largest radius of what presses a skin [mm]."""
 FACE_UP = "-x"
 
 
@@ -52,7 +54,7 @@ FINGERS: dict[str, Any] = {
 
 
 class VirtualDemo:
-    """Emulated boards and cameras; only the demo rig file and the wires reach the outside."""
+    """Emulated boards and cameras; the pipeline sees only the demo rig file and the wires."""
 
     def __init__(
         self, directory: Path, speed: float = 1.0, seed: int = 0, cameras: int = 2, fault: str | None = None,
@@ -132,7 +134,7 @@ class VirtualDemo:
 
     @property
     def emulates(self) -> list[str]:
-        """What it emulates, a line each, for people."""
+        """What is emulated, one line each."""
         boards = [f"{name:<7} {board.port.path}  {self.layout.rate:g} Hz" for name, board in self.boards.items()]
         return [
             *boards, *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
@@ -163,7 +165,7 @@ class VirtualDemo:
         documents.write(self.path, self.document, "demo_rig")
 
     def stop(self) -> None:
-        """Switch everything off and take the rig file away, whose ports are gone."""
+        """Switch everything off and delete the rig file, whose ports are gone."""
         self.path.unlink(missing_ok=True)
         for device in (*self.cameras.values(), *self.boards.values()):
             device.stop()
@@ -215,7 +217,7 @@ def _tip_on_cube() -> np.ndarray:
 
 
 def _look_at(place: tuple[float, float, float]) -> np.ndarray:
-    """Return a camera's frame in the world, shape (4, 4) [m], that looks at where the ball is lifted."""
+    """Return the frame of a camera that looks at the place where the ball is lifted, shape (4, 4) [m]."""
     forward = np.array([0.0, 0.0, 0.085]) - place
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, (0.0, 0.0, 1.0))
@@ -227,7 +229,7 @@ def _look_at(place: tuple[float, float, float]) -> np.ndarray:
 
 
 def _world(camera: str, pose: np.ndarray, rng: np.random.Generator) -> dict[str, Any]:
-    """Return a camera's place as a careful lab would have found it: off by 0.2 mm and 0.03 degrees."""
+    """Return a camera's pose with the errors of a careful calibration: 0.2 mm and 0.03 degrees."""
     from scipy.spatial.transform import Rotation
 
     spread = 0.0002, float(np.radians(0.03))

@@ -13,18 +13,17 @@ import tty
 import numpy as np
 
 BACKLOG = 1 << 18
-"""Bytes kept for a host that is too busy to read [bytes]."""
+"""Bytes kept for a host that does not read [bytes]."""
 
 
 class VirtualPort:
-    """A pseudo-terminal: the host opens `path` with pyserial, the emulated device reads and writes here.
+    """A pseudo-terminal: the host opens `path` with pyserial; the emulated device reads and writes here.
 
-    As on a real line, what is sent while nobody has the port open is gone, and a host that listens at another
-    baud rate hears garbage.
+    As on a real line, data sent while nobody has the port open is lost, and a wrong baud rate gives garbage.
     """
 
     def __init__(self, baud: int, seed: int = 0) -> None:
-        """Make a line on which the device speaks at ``baud`` [bit/s]."""
+        """Create a line on which the device sends at ``baud`` [bit/s]."""
         self.baud = baud
         self._speed = getattr(termios, f"B{baud}")
         self._noise = np.random.default_rng(seed)
@@ -56,7 +55,7 @@ class VirtualPort:
             return b""
 
     def write(self, data: bytes) -> None:
-        """Send to the host, and what its buffer did not take before; beyond `BACKLOG` the newest is lost."""
+        """Send to the host, after what its buffer did not take before; beyond `BACKLOG` the newest bytes are lost."""
         with self._writing:
             if not self.connected:
                 self._unsent.clear()
@@ -67,14 +66,14 @@ class VirtualPort:
                 while self._unsent:
                     del self._unsent[: os.write(self._master, self._unsent)]
             except termios.error:
-                return  # unplugged in this moment
+                return  # unplugged at this moment
             except OSError as error:
                 if error.errno not in (errno.EAGAIN, errno.EIO, errno.EBADF):
                     raise
 
     @property
     def waiting(self) -> bool:
-        """Whether something waits for room at the host; any `write`, even of nothing, tries again."""
+        """Whether bytes wait for the host; any `write`, also an empty one, tries again."""
         return bool(self._unsent)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The whole virtual rig: controller, board and camera on one clock, with a rig file like any other."""
+"""The whole virtual rig: controller, board and camera on one clock, and a rig file."""
 
 from __future__ import annotations
 
@@ -30,26 +30,26 @@ from tacdata.wire.frames.frame_format import FrameFormat, from_document
 
 NAME = "virtual rig"
 NOMINAL = Registration((-96.0, -61.5, -38.0), 1.2)
-"""Where the lab believes the sensor to lie: what its touch-off measured."""
+"""Position of the sensor as the lab's touch-off measured it."""
 PARKED = 25.0
 """Height above the skin at which the machine waits [mm]."""
 IMAGES = 30.0
-"""Most images drawn per real second."""
+"""Largest number of images rendered per real second."""
 BAUDS = (115200, 230400, 460800, 921600, 2000000, 4000000)
 
 
 def board_format(sensor: Sensor) -> FrameFormat:
-    """Return the default frame format with as many channels and frames a second as a sensor has."""
+    """Return the default frame format with a sensor's channels and frame rate."""
     base = default_format().document
     channels = {**base["channels"], "count": sensor.taxels.count}
     return from_document({**base, "channels": channels, "rate": sensor.taxels.rate}, "virtual board")
 
 
 class VirtualRig:
-    """Emulated devices and their world; only the rig file and the wires reach the outside.
+    """Emulated devices and their world; the pipeline sees only the rig file and the wires.
 
-    Files in its directory: ``rig.yaml`` while it runs, ``mounted.json`` (written by whoever mounts an
-    indenter), ``truth.yaml`` (what it really is; for tests only).
+    Files in its directory: ``rig.yaml`` while it runs, ``mounted.json`` (written by whoever mounts an indenter),
+    ``truth.yaml`` (the true parameters; for tests only).
     """
 
     def __init__(
@@ -58,8 +58,8 @@ class VirtualRig:
     ) -> None:  # fmt: skip
         """Set up a rig whose clock runs ``speed`` times as fast as real time; ``seed`` decides its world.
 
-        With ``rough`` the sensor was put down by eye, up to a millimetre and some degrees off; the rig file does not
-        say that it was registered. ``hidden``: kind -> size of what no file but truth.yaml tells of (`hidden.KINDS`).
+        With ``rough`` the sensor was put down by eye, up to a millimetre and some degrees off, and the rig file is not
+        marked as registered. ``hidden``: kind -> size of effects that stand in no file but truth.yaml (`hidden.KINDS`).
 
         Raises:
             UsageError: If ``speed`` is not positive or too fast.
@@ -129,7 +129,7 @@ class VirtualRig:
 
     @property
     def emulates(self) -> list[str]:
-        """What it emulates, a line each, for people."""
+        """What is emulated, one line each."""
         layout = self.layout
         lines = [
             f"motion controller  {self.controller.port.path}  GRBL 1.1",
@@ -140,7 +140,7 @@ class VirtualRig:
         return [*lines, f"clock              {self.clock.rate:g} times real time"]
 
     def start(self) -> None:
-        """Switch everything on; the rig file comes last, so that whoever finds it finds the devices too.
+        """Switch everything on. The rig file is written last, so that its readers find the devices too.
 
         Raises:
             UsageError: If another rig runs in the directory or another rig's file lies there.
@@ -161,7 +161,7 @@ class VirtualRig:
         documents.write(self.path, self.document, "rig")
 
     def stop(self) -> None:
-        """Switch everything off and take the rig file away, whose ports are gone."""
+        """Switch everything off and delete the rig file, whose ports are gone."""
         if self._lock:
             self.path.unlink(missing_ok=True)
         for device in (self.camera, self.board, self.controller):

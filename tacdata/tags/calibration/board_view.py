@@ -10,22 +10,22 @@ from tacdata.tags.board import Board
 from tacdata.tags.detection.detector import to_grey
 
 LEAST_CORNERS = 8
-"""Corners below which an image shows no board."""
+"""Minimum number of corners in an image."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoardView:
-    """What one image shows of a board."""
+    """Corners of a board in one image."""
 
     name: str
-    """Which image."""
+    """Name of the image."""
     ids: np.ndarray
     """Numbers of the corners seen [1], shape (n,)."""
     corners: np.ndarray
-    """Where they are [px], shape (n, 2); whole numbers are pixel centres."""
+    """Positions of the corners [px], shape (n, 2); whole numbers are pixel centres."""
 
     def moved(self, other: BoardView) -> float:
-        """Return how far the corners that both see lie apart [px], median; infinite if they share none."""
+        """Return the distance between the corners that both views show [px], median; infinite if they share none."""
         _, here, there = np.intersect1d(self.ids, other.ids, return_indices=True)
         if not len(here):
             return np.inf
@@ -33,7 +33,7 @@ class BoardView:
 
 
 def find_board(image: np.ndarray, board: Board, name: str = "") -> BoardView | None:
-    """Return a board's corners, found to a fraction of a pixel, or None if fewer than `LEAST_CORNERS` are seen.
+    """Return a board's corners to a fraction of a pixel, or None if fewer than `LEAST_CORNERS` are seen.
 
     Args:
         image: Grey (height, width) or BGR (height, width, 3), uint8.

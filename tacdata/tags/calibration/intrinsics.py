@@ -1,7 +1,7 @@
-"""A camera's intrinsics from views of a ChArUco board (Zhang, IEEE PAMI 22, 2000, as OpenCV implements it).
+"""Estimates a camera's intrinsics from views of a ChArUco board (Zhang, IEEE PAMI 22, 2000, by OpenCV).
 
-Views that fit badly are dropped in words. What the views cannot tell is refused: too few of them, a board that
-was never tilted (focal length and distance cannot be told apart), an image that is mostly empty of corners.
+Outlier views are dropped and named. Views that do not determine the camera are refused: too few, a board that was never
+tilted (focal length and distance are then not identifiable), or corners in a small part of the image.
 """
 
 from __future__ import annotations
@@ -16,35 +16,37 @@ from tacdata.tags.board import Board
 from tacdata.tags.calibration.board_view import BoardView
 
 LEAST_VIEWS = 8
-"""Views below which nothing is estimated [count]; 15 to 30 are usual."""
+"""Minimum number of views [count]; 15 to 30 are usual."""
 LEAST_TILT, LEAST_COVERAGE = 20.0, 0.4
-"""Least angle between two views' boards [deg] and share of the image's cells with a corner [1]."""
+"""Minimum angle between two views' boards [deg], and minimum share of the image's cells with a corner [1]."""
 GOOD_COVERAGE = 0.7
-"""Share [1] below which a person is told."""
+"""Coverage [1] below which a remark is made."""
 UNSURE, REFUSED = 0.003, 0.02
-"""Standard deviation of the focal length over it [1] from which a person is told, and from which it is refused."""
+"""Relative standard deviation of the focal length [1] from which a remark is made, and from which it is refused."""
 OUTLIER, LEAST_OUTLIER = 2.5, 0.3
-"""Reprojection of a view over the median of all [1], and at least [px], from which it is dropped."""
+"""A view is an outlier at this ratio of its reprojection error to the median [1], and at least at this error [px]."""
 MOST_DROPPED = 1 / 3
-"""Share of the views [1] beyond which dropping is not the answer."""
+"""Largest share of views [1] that may be dropped as outliers."""
 STRAY, LEAST_STRAY, MOST_STRAYS = 8.0, 0.5, 0.15
-"""A corner is left out so many medians [1], and at least so far [px], away, up to such a share of a view's [1]."""
+"""A corner is an outlier at this many medians [1] and at least this distance [px]; at most this share of a view's
+corners [1].
+"""
 BAD = 1.5
-"""Reprojection [px] from which the board file does not describe the board."""
+"""Reprojection error [px] from which the board file does not describe the board."""
 BETTER = 0.97
-"""Ratio of held-out reprojections [1] up to which a model with more coefficients is worth having."""
+"""Ratio of held-out reprojection errors [1] below which a model with more coefficients is preferred."""
 CELLS, IN_CELL = (8, 6), 3
-"""Cells of the image across and down, for the coverage, and how many corners make one covered."""
+"""Cells of the image across and down, for the coverage, and corners that make a cell covered."""
 MODELS = ("k1k2p1p2", "k1k2p1p2k3", "rational")
 
 
 @dataclass(frozen=True, eq=False)
 class UsedView:
-    """A view and what became of it."""
+    """A view and its residuals."""
 
     view: BoardView
     rms: float = np.nan
-    """Reprojection [px], root mean square."""
+    """Reprojection error [px], root mean square."""
     residuals: np.ndarray | None = None
     """Corner minus projection [px], shape (n, 2)."""
     reason: str = ""
@@ -53,7 +55,7 @@ class UsedView:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """Intrinsics and how well they are known."""
+    """Estimated intrinsics and their uncertainty."""
 
     size: tuple[int, int]
     """Width and height [px]."""
@@ -66,20 +68,20 @@ class Calibration:
     spread: np.ndarray
     """Standard deviations of fx, fy, cx, cy [px], shape (4,)."""
     rms: float
-    """Reprojection [px], root mean square."""
+    """Reprojection error [px], root mean square."""
     held_out_rms: float
-    """The same on views that an estimate from the other half did not see [px]."""
+    """The same on views that were held out of an estimate from the other half [px]."""
     coverage: float
     """Share of the image's cells with corners [1]."""
     tilt: float
     """Largest angle between the board's normals in two views [deg]."""
     views: tuple[UsedView, ...]
     remarks: tuple[str, ...] = ()
-    """What a person should know, in words."""
+    """Remarks for a person, as sentences."""
 
     @property
     def intrinsics(self) -> dict[str, Any]:
-        """As a rig file takes them."""
+        """The intrinsics as in a rig file."""
         (fx, _, cx), (_, fy, cy), _ = self.matrix.tolist()
         width, height = self.size
         plain = {"fx": fx, "fy": fy, "cx": cx, "cy": cy}
@@ -107,7 +109,7 @@ def calibrate(views: list[BoardView], board: Board, size: tuple[int, int], model
         views: Views of the board.
         board: The board.
         size: Width and height of all images [px].
-        model: One of `MODELS`, or "auto": the smallest that predicts views it has not seen about as well as any.
+        model: One of `MODELS`, or "auto": the smallest that predicts held-out views about as well as any.
 
     Raises:
         FormatError: If the views do not determine the camera, saying what is missing.
@@ -131,7 +133,7 @@ def calibrate(views: list[BoardView], board: Board, size: tuple[int, int], model
 
 
 def _without_strays(views: list[BoardView], fit: _Fit) -> tuple[list[BoardView], list[str]]:
-    """Return the views without single corners that were found in a wrong place, and how many those were, in words."""
+    """Return the views without outlier corners, and a remark on how many those were."""
     off = [np.linalg.norm(each, axis=1) for each in fit.residuals]
     limit = max(STRAY * float(np.median(np.concatenate(off))), LEAST_STRAY)
     kept, count = [], 0
@@ -147,7 +149,7 @@ def _without_strays(views: list[BoardView], fit: _Fit) -> tuple[list[BoardView],
 def _fitting(
     views: list[BoardView], board: Board, size: tuple[int, int], model: str, count: int
 ) -> tuple[list[BoardView], list[UsedView]]:
-    """Return the views that fit one camera, and those dropped, worst first, of ``count`` at most `MOST_DROPPED`."""
+    """Return the views that fit one camera, and those dropped, worst first: at most `MOST_DROPPED` of ``count``."""
     kept, dropped = list(views), []
     while True:
         rms = _fit(kept, board, size, model).rms
@@ -238,7 +240,7 @@ def _choose_model(views: list[BoardView], board: Board, size: tuple[int, int]) -
 
 
 def _held_out(views: list[BoardView], board: Board, size: tuple[int, int], model: str) -> float:
-    """Return the reprojection [px] of each half of the views with the intrinsics of the other half."""
+    """Return the reprojection error [px] of each half of the views with the intrinsics of the other half."""
     import cv2
 
     squares: list[np.ndarray] = []

@@ -1,4 +1,4 @@
-"""A calibration in one picture: where corners were seen, by how much they are off, and each view's share."""
+"""A calibration in one picture: corners, residuals, and each view's error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ WIDTH = 900
 BAR = 14
 """Height of a view's bar [px of the picture]."""
 ARROW = 40.0
-"""Length of a residual's stroke over its length in the image [1]."""
+"""Magnification of a residual's stroke [1]."""
 INK, FAINT, USED, DROPPED = (40, 40, 40), (215, 215, 215), (160, 90, 20), (60, 60, 210)
 
 

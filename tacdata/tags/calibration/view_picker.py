@@ -1,4 +1,4 @@
-"""Which of many images of a board are worth keeping: still ones, each different from those kept."""
+"""Picks images of a board for calibration: still ones, each different from those kept."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from tacdata.tags.calibration.board_mismatch import mismatch
 from tacdata.tags.calibration.board_view import BoardView, find_board
 
 STILL = 1.0
-"""Movement between two images that follow each other [px per 1000 px of width] above which they are blurred."""
+"""Movement between two consecutive images [px per 1000 px of width] above which they are blurred."""
 NEW = 40.0
-"""Movement since every view kept [px per 1000 px of width] from which an image shows something new."""
+"""Movement against every view kept [px per 1000 px of width] from which an image is new."""
 LOOKED_AT_AGAIN = 5
 """Images without the board that are kept to find out why [1]."""
 ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 
 class ViewPicker:
-    """Takes images one after the other; `views` holds those worth keeping."""
+    """Takes images one after the other; `views` holds those that were kept."""
 
     def __init__(self, board: Board, still: bool = True) -> None:
-        """Keep the board; ``still``: the images follow each other as those of a film do."""
+        """Keep the board; ``still``: consecutive images belong to one film."""
         self.board, self.still = board, still
         self.views: list[BoardView] = []
         self.size: tuple[int, int] | None = None
@@ -38,7 +38,7 @@ class ViewPicker:
         self._without_board: list[np.ndarray] = []
 
     def take(self, image: np.ndarray, name: str) -> bool:
-        """Look at an image, grey or BGR uint8; say whether it was kept.
+        """Examine an image, grey or BGR uint8; return whether it was kept.
 
         Raises:
             FormatError: If it has another size than those before.

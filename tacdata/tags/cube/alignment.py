@@ -1,9 +1,9 @@
-"""Refine a cube's pose on the grey values of its faces (analysis by synthesis).
+"""Refines a cube's pose on the grey values of its faces (analysis by synthesis).
 
-The tags' patterns are drawn as the camera would see them from the pose at hand, blurred, and compared with
-the image pixel by pixel; a few Gauss-Newton steps on the pose, on black and white of every face and on the
-blur make them agree (Lucas & Kanade 1981; Baker & Matthews, IJCV 56, 2004, forward-additive form). All edges
-of a pattern count, not only four corners, so that the scale's bias of detected corners falls out.
+The tags' patterns are rendered from the current pose, blurred, and compared with the image pixel by pixel. Gauss-Newton
+steps adjust the pose, black and white of every face, and the blur (Lucas & Kanade 1981; Baker & Matthews, IJCV 56,
+2004, forward-additive form). All edges of a pattern count, not only four corners, so the bias of detected corners in
+scale vanishes.
 """
 
 from __future__ import annotations
@@ -18,21 +18,22 @@ from tacdata.tags.cube.face_patch import FacePatch, draw_face, slopes_of
 STEPS = 4
 """Most Gauss-Newton steps."""
 SETTLED = 0.4
-"""Move in the image [px] below which a step is the last."""
+"""Movement in the image [px] below which the iteration ends."""
 COVERED = (0.05, 0.15)
-"""Difference, over the contrast [1], from which a pixel counts as covered by something: three times what is left on
-the detected faces, within these."""
+"""Difference over the contrast [1] from which a pixel counts as covered. It is three times the residual on the detected
+faces, within these bounds.
+"""
 ENTIRE = 0.85
-"""Correlation [1] with its pattern from which a face that was not detected is uncovered enough to take part."""
+"""Correlation [1] with its pattern from which an undetected face takes part."""
 GRAIN = 0.015
-"""Standard deviation of a tag's corner [px] that remains however good the image is: print, lens, drawing."""
+"""Standard deviation of a tag's corner [px] that remains in any image: print, lens, drawing."""
 ALIKE = 0.6
-"""Correlation [1] with its pattern from which a face is there."""
+"""Correlation [1] with its pattern from which a face is present."""
 
 
 @dataclass(eq=False)
 class Alignment:
-    """A pose and how well the image agrees with it."""
+    """An aligned pose and how well the image agrees with it."""
 
     rotation: np.ndarray
     """From the cube frame to the camera frame [1], shape (3, 3)."""
@@ -41,24 +42,25 @@ class Alignment:
     blur: float = 0.8
     """Standard deviation of the blur [px]."""
     likeness: dict[str, float] = field(default_factory=dict)
-    """Face that should be seen -> correlation of the image with its pattern [1]."""
+    """Face that should be visible -> correlation of the image with its pattern [1]."""
     residual: float = np.inf
-    """Difference of image and drawing on the faces detected, over the contrast of black and white [1]: root mean
-    square, but for what is covered."""
+    """Difference of image and rendering on the detected faces over the contrast [1]: root mean square, without covered
+    pixels.
+    """
     covariance: np.ndarray = field(default_factory=lambda: np.full((6, 6), np.inf))
-    """Of a small turn in the camera frame [rad] and the translation [m], in this order, shape (6, 6)."""
+    """Covariance of a small rotation in the camera frame [rad] and the translation [m], in this order, shape (6, 6)."""
 
 
 @dataclass(eq=False)
 class _Step:
-    """Where a Gauss-Newton step leads."""
+    """One Gauss-Newton step."""
 
     move: np.ndarray
     """Rotation [rad], translation [m], the blur's variance [px^2], shape (7,)."""
     covariance: np.ndarray
     """Of rotation [rad] and translation [m], shape (6, 6)."""
     pixels: float
-    """By how far the rotation and translation move the cube in the image, about [px]."""
+    """About how far rotation and translation move the cube in the image [px]."""
 
 
 def align(
@@ -68,11 +70,11 @@ def align(
 
     Args:
         start: First pose, within about half a cell of the truth.
-        seen: Faces whose tags were detected; others take part if they look as they should.
+        seen: Faces whose tags were detected; others take part if they correlate with their pattern.
         cube: The cube.
         matrix: Camera matrix [px], shape (3, 3).
         grey: Image without distortion, uint8, shape (height, width).
-        steps: Most Gauss-Newton steps; one that is too small to see is the last.
+        steps: Most Gauss-Newton steps; an invisibly small one is the last.
     """
     pose = start
     for step in range(max(steps, 1)):
@@ -97,7 +99,7 @@ def align(
 
 
 def _grain(pose: Alignment, seen: set[str], cube: Cube, matrix: np.ndarray) -> np.ndarray:
-    """Return the covariance of rotation [rad] and translation [m] that `GRAIN` gives, shape (6, 6)."""
+    """Return the covariance of rotation [rad] and translation [m] by `GRAIN`, shape (6, 6)."""
     arms = np.concatenate([cube.corners(face) for face in seen]) @ pose.rotation.T
     slopes = np.empty((2, 6, len(arms)))
     for row, (x, y) in zip(slopes, ((-1.0, 0.0), (0.0, -1.0)), strict=True):
@@ -108,7 +110,7 @@ def _grain(pose: Alignment, seen: set[str], cube: Cube, matrix: np.ndarray) -> n
 
 
 def _residual(patches: list[FacePatch], move: np.ndarray) -> float:
-    """Return what is left after a step, to first order, over each face's contrast; what is covered counts little."""
+    """Return the residual after a step, to first order, over each face's contrast; covered pixels get little weight."""
     if not patches:
         return np.inf
     left = [p.rest / max(p.contrast, 1.0) - move @ p.columns[:7] for p in patches]
@@ -122,11 +124,11 @@ def _step(
 
     Args:
         patches: The faces.
-        pose: Where they are drawn.
+        pose: The pose of the rendering.
         matrix: Camera matrix [px].
         cube: The cube.
-        left: What the step before has left of the difference, over the contrast [1]; None at the first step, when
-            large differences mean that the pose is off.
+        left: Residual of the step before, over the contrast [1]. None at the first step, where large differences come
+            from the pose.
     """
     normal, right = np.zeros((7, 7)), np.zeros(7)
     squares = count = 0.0
@@ -135,7 +137,7 @@ def _step(
             continue
         weighted, rest = patch.columns, patch.rest
         if left is not None:
-            # Cauchy weights: what covers a part of the face counts little.
+            # Cauchy weights: pixels that cover a part of the face count little.
             weight = 1 / (1 + np.square(rest / (patch.contrast * np.clip(3 * left, *COVERED))))
             weighted, rest = weighted * weight, weight * rest
             count += float(weight.sum())
@@ -143,7 +145,7 @@ def _step(
             count += len(rest)
         squares += float(rest @ patch.rest)
         product, towards = weighted @ patch.columns.T, patch.columns @ rest
-        # Black and white of a face are its own: they are solved for and drop out.
+        # Black and white of a face are parameters of their own: they are solved for and eliminated.
         inner = product[:7, 7:] @ np.linalg.inv(product[7:, 7:])
         normal += patch.contrast**2 * (product[:7, :7] - inner @ product[7:, :7])
         right += patch.contrast * (towards[:7] - inner @ towards[7:])

@@ -1,9 +1,9 @@
 """Poses of a cube that explain the corners of its tags.
 
-Every tag alone gives two poses: a square seen in weak perspective looks the same tilted either way (Collins
-& Bartoli, "Infinitesimal plane-based pose estimation", IJCV 109, 2014). All corners together give one. A
-pose is refined by Gauss-Newton steps (OpenCV's VVS) on the tags that fit it, first loosely, then tightly; the
-others are outliers.
+Every tag alone gives two poses: in weak perspective a square looks the same tilted either way (Collins & Bartoli,
+"Infinitesimal plane-based pose estimation", IJCV 109, 2014). All corners together give one. A pose is refined by
+Gauss-Newton steps (OpenCV's VVS) on its inlier tags, first with a loose limit, then with a tight one; the others are
+outliers.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from tacdata.tags.cube.cube import AXES, Cube
 from tacdata.tags.detection.tag import Tag
 
 LOOSE, TIGHT = 0.35, 0.06
-"""Reprojection of a tag's corners over its size [1] up to which it joins a first and a refined pose."""
+"""Inlier limits: reprojection error of a tag's corners over its size [1], for a first and for a refined pose."""
 LEAST = 1.2
-"""Reprojection that is always allowed [px]: four times a corner's noise."""
+"""Reprojection error that is always allowed [px]: four times a corner's noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,18 +32,18 @@ class PoseCandidate:
     translation: np.ndarray
     """Cube centre in the camera frame [m], shape (3,)."""
     tags: tuple[Tag, ...]
-    """Tags explained, one a face."""
+    """Tags explained, one per face."""
     reprojection: float
-    """Root mean square distance of their corners from where the pose puts them [px]."""
+    """Root mean square reprojection error of their corners [px]."""
 
     def moved(self, rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: PinholeCamera) -> float:
-        """Return the reprojection [px] of the same tags at another pose."""
+        """Return the reprojection error [px] of the same tags at another pose."""
         errors = [_error(rotation, translation, tag, cube, camera) for tag in self.tags]
         return float(np.sqrt(np.mean(np.square(errors))))
 
 
 def candidates(tags: list[Tag], cube: Cube, camera: PinholeCamera) -> list[PoseCandidate]:
-    """Return the different poses that explain the most tags, best first; none if there are no tags.
+    """Return the different poses that explain the most tags, best first; none without tags.
 
     Args:
         tags: Tags of the cube with straightened corners.
@@ -68,7 +68,9 @@ def candidates(tags: list[Tag], cube: Cube, camera: PinholeCamera) -> list[PoseC
 def contradicting(
     tags: list[Tag], rotation: np.ndarray, translation: np.ndarray, cube: Cube, camera: PinholeCamera
 ) -> list[Tag]:
-    """Return the tags that lie elsewhere than a pose has them; what is merely read badly, as at a slant, is not meant.
+    """Return the tags that lie elsewhere than a pose predicts.
+
+    A tag that is merely read badly, for example at a slant, is not included.
 
     Args:
         tags: Tags of the cube with straightened corners, not among those that gave the pose.
@@ -89,14 +91,14 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _solved(start: Tag, tags: list[Tag], cube: Cube, camera: PinholeCamera) -> Iterator[PoseCandidate]:
-    """Yield the two poses that one tag gives, each refined on all tags that fit it."""
+    """Yield the two poses of one tag, each refined on all its inliers."""
     import cv2
 
     points, pixels = _pairs([start], cube)
     method = cv2.SOLVEPNP_IPPE
     try:
         _, rotations, translations, _ = cv2.solvePnPGeneric(points, pixels, camera.matrix, None, flags=method)
-    except cv2.error:  # corners on a line, from a false detection
+    except cv2.error:  # collinear corners, from a false detection
         return
     for rotation, translation in zip(rotations, translations, strict=True):
         candidate = _settle(rotation, translation, tags, cube, camera)
@@ -107,7 +109,7 @@ def _solved(start: Tag, tags: list[Tag], cube: Cube, camera: PinholeCamera) -> I
 def _settle(
     rotation: np.ndarray, translation: np.ndarray, tags: list[Tag], cube: Cube, camera: PinholeCamera
 ) -> PoseCandidate | None:
-    """Refine a pose (rotation vector [rad] and translation [m]) on the tags that fit it; None if none do."""
+    """Refine a pose (rotation vector [rad] and translation [m]) on its inlier tags; None if there are none."""
     import cv2
 
     for limit in (LOOSE, TIGHT):
@@ -131,7 +133,7 @@ def _settle(
 def _fitting(
     rotation: np.ndarray, translation: np.ndarray, tags: list[Tag], cube: Cube, camera: PinholeCamera, limit: float
 ) -> list[Tag]:
-    """Return the tags, one an id, that a pose explains and whose faces it turns to the camera."""
+    """Return the inlier tags, one per id, whose faces a pose turns to the camera."""
     import cv2
 
     if not (np.isfinite(rotation).all() and np.isfinite(translation).all()):
@@ -149,7 +151,7 @@ def _fitting(
 
 
 def _error(rotation: np.ndarray, translation: np.ndarray, tag: Tag, cube: Cube, camera: PinholeCamera) -> float:
-    """Return the root mean square distance [px] of a tag's corners from where a pose puts them."""
+    """Return the root mean square reprojection error [px] of a tag's corners."""
     points = cube.corners(cube.faces[tag.id]) @ rotation.T + translation
     return float(np.sqrt(((camera.project(points) - tag.corners) ** 2).sum(axis=1).mean()))
 

@@ -1,13 +1,11 @@
 """A cube with AprilTags on its faces.
 
-Cube frame: origin at the cube's centre, axes along its edges, right-handed. A face's tag is centred on the
-face and stands upright as OpenCV draws it (`cv2.aruco.generateImageMarker`): on the side faces its upper
-edge looks to the cube's +z, on the +z face to the cube's +y. The images published by AprilRobotics are the
-same tags turned by 180 degrees.
+Cube frame: origin at the cube's centre, axes along its edges, right-handed. A tag is centred on its face and stands
+upright as OpenCV draws it (`cv2.aruco.generateImageMarker`). On the side faces its upper edge points to the cube's +z,
+on the +z face to +y. The images published by AprilRobotics are turned by 180 degrees.
 
-Corner order is the AprilTag library's: in that upright view from outside, right-top, left-top, left-bottom,
-right-bottom (counter-clockwise). OpenCV's ArUco detector gives left-top, right-top, right-bottom,
-left-bottom.
+Corner order is the AprilTag library's. In that upright view from outside: right-top, left-top, left-bottom,
+right-bottom (counter-clockwise). OpenCV's ArUco detector gives left-top, right-top, right-bottom, left-bottom.
 """
 
 from __future__ import annotations

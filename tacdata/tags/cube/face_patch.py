@@ -1,4 +1,4 @@
-"""One face of a cube as a pose would show it, beside the image: its pixels, and what they depend on."""
+"""One face of a cube, rendered from a pose and compared with the image, with its derivatives."""
 
 from __future__ import annotations
 
@@ -10,26 +10,27 @@ import numpy as np
 from tacdata.tags.cube.cube import AXES, Cube
 
 FINE = 72
-"""About how many fine pixels are drawn along a tag's side; a pixel holds one to four of them a side."""
+"""Fine pixels rendered along a tag's side, approximately; one to four per pixel and axis."""
 CELL = 12
-"""Texels a cell of the pattern."""
+"""Texels per cell of the pattern."""
 CLEAR = 2.25
-"""Distance from the paper's edge, in blurs [1], up to which something else may shine in."""
+"""Distance from the paper's edge, in blurs [1], within which the background may shine in."""
 FILLED = 0.5
-"""By how far [px] the pixels of a filled outline reach over it."""
+"""Distance [px] by which the pixels of a filled outline exceed it."""
 GRAZING = 0.12
-"""Cosine between face normal and view below which a face is not looked at."""
+"""Cosine between face normal and view below which a face is ignored."""
 
 
 @dataclass(eq=False)
 class FacePatch:
-    """One face's pixels that show nothing but the face."""
+    """Pixels that show one face only."""
 
     image: np.ndarray
     """Grey values [1 of 255], shape (n,)."""
     columns: np.ndarray
-    """What the grey values depend on [1], shape (9, n): change of the pattern (0 black to 1 white) with rotation
-    [rad], translation [m] and the blur's variance [px^2]; one; the pattern."""
+    """Derivatives of the grey values [1], shape (9, n): by rotation [rad], translation [m] and the blur's variance
+    [px^2] for a pattern from 0 (black) to 1 (white); one; the pattern.
+    """
 
     def __post_init__(self) -> None:
         base = self.columns[7:]
@@ -56,7 +57,7 @@ def draw_face(
     matrix: np.ndarray,
     grey: np.ndarray,
 ) -> FacePatch | None:
-    """Return a face's pixels, or None if the pose turns it away, or shows too little of it in the image.
+    """Return a face's pixels, or None if the pose turns it away or too little of it is in the image.
 
     Args:
         face: Which face.
@@ -78,7 +79,7 @@ def draw_face(
         return None
     pixels = outline @ matrix.T
     pixels = pixels[:, :2] / pixels[:, 2:]
-    # Two pixels around the face feed the slopes; what lies outside the image is neither drawn nor compared.
+    # Two pixels around the face feed the derivatives; what lies outside the image is neither rendered nor compared.
     left, top = np.maximum(np.floor(pixels.min(axis=0)), 0).astype(int) - 2
     right, bottom = np.minimum(np.ceil(pixels.max(axis=0)) + 1, grey.shape[::-1]).astype(int) + 2
     if right - left < 6 or bottom - top < 6:
@@ -92,7 +93,7 @@ def draw_face(
     u, v = np.arange(2.0, right - left - 2), np.arange(2.0, bottom - top - 2)[:, None]
     across, down, depth = (a * u + (b * v + c) for a, b, c in to_plane.tolist())
     across, down = across / depth, down / depth
-    # Near the paper's edge shines in what lies beside it.
+    # Near the paper's edge the background shines in.
     clear = _inset((pixels - (left + 2, top + 2)).tolist(), CLEAR * blur + FILLED)
     if clear is None:
         return None
@@ -142,9 +143,9 @@ def slopes_of(
     slope_x: np.ndarray, slope_y: np.ndarray, arm: np.ndarray, translation: np.ndarray, matrix: np.ndarray,
     columns: np.ndarray,
 ) -> None:  # fmt: skip
-    """Write the change of the drawing with rotation about the cube's centre and translation to six columns.
+    """Write the derivatives of the rendering by rotation about the cube's centre and translation to six columns.
 
-    A point that moves by dx in the image takes its value along: the drawing changes by -slope . dx.
+    A point that moves by dx in the image takes its value along: the rendering changes by -slope . dx.
     """
     (a, b, c), (x, y, z) = arm, arm + translation[:, None]
     u, v = slope_x * (-matrix[0, 0] / z), slope_y * (-matrix[1, 1] / z)

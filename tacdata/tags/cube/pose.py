@@ -1,4 +1,4 @@
-"""A cube's pose in an image: tags, then corners, then grey values."""
+"""Estimates a cube's pose in an image: from tags, then corners, then grey values."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from tacdata.tags.detection.detector import detect_tags, to_grey
 from tacdata.tags.detection.tag import Tag
 
 AROUND = 2.0
-"""How far around the pose just before a cube is looked for first, in sides of the cube [1]."""
+"""Size of the search region around the previous pose, in sides of the cube [1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class CubePose:
-    """Where a cube is in the camera frame (x right, y down, z forward)."""
+    """Pose of a cube in the camera frame (x right, y down, z forward)."""
 
     position: np.ndarray
     """The cube's centre [m], shape (3,)."""
     quaternion: np.ndarray
     """Rotation from the cube frame to the camera frame, xyzw [1], shape (4,)."""
     reprojection: float
-    """Root mean square distance of the detected corners from where the pose puts them [px]."""
+    """Root mean square reprojection error of the detected corners [px]."""
     faces: int
     """Faces detected [count]."""
     ids: tuple[int, ...]
@@ -35,14 +35,16 @@ class CubePose:
     ambiguous: bool = False
     """Whether a second pose fits the image about as well."""
     covariance: np.ndarray = field(default_factory=lambda: np.full((6, 6), np.inf))
-    """Of a small turn in the camera frame [rad] and the position [m], in this order, shape (6, 6). It knows the
-    image's noise, not errors of the calibration, the print's scale or a choice that was ambiguous."""
+    """Covariance of a small rotation in the camera frame [rad] and the position [m], in this order, shape (6, 6). It
+    covers image noise. It does not cover calibration errors, the print's scale or a wrong choice between ambiguous
+    poses.
+    """
     residual: float = 0.0
-    """Difference of the image and the drawn tags over the contrast of black and white [1]; about 0.02 when sharp."""
+    """Difference of image and rendered tags over the contrast of black and white [1]; about 0.02 in a sharp image."""
     rival: CubePose | None = None
     """The other pose, where `ambiguous`."""
     strays: tuple[int, ...] = ()
-    """Numbers of this cube that were read where the pose has no such tag: swapped tags, or another cube's."""
+    """Outlier tags of this cube: read where the pose has no such tag (swapped tags, or another cube's)."""
 
     @property
     def matrix(self) -> np.ndarray:
@@ -64,10 +66,10 @@ def detect_cube(
         image: Grey (height, width) or BGR (height, width, 3), uint8.
         intrinsics: A rig file's ``intrinsics`` [px].
         cube: A rig file's ``cube`` [mm].
-        hint: The pose just before, if known: where to look first, and what decides where the image does not.
+        hint: The previous pose, if known. It is searched first, and decides between ambiguous poses.
 
     Raises:
-        UsageError: If the image is no image or of another size than the intrinsics.
+        UsageError: If the image is invalid or of another size than the intrinsics.
         FormatError: If intrinsics or cube contradict themselves.
     """
     grey, camera, known = to_grey(image), PinholeCamera.from_document(intrinsics), Cube.from_document(cube)
@@ -90,7 +92,7 @@ def solve_cube(
         tags: Tags as read [px of the image as taken].
         cube: The cube.
         camera: The camera.
-        hint: The pose just before, if known; decides only where the image does not.
+        hint: The previous pose, if known; decides only between ambiguous poses.
     """
     own = [Tag(tag.id, camera.straighten(tag.corners), tag.margin, tag.hamming) for tag in tags if tag.id in cube.faces]
     before = None
@@ -108,7 +110,7 @@ def solve_cube(
 
 
 def surroundings(pose: CubePose, cube: Cube, camera: PinholeCamera) -> tuple[int, int, int, int] | None:
-    """Return left, top, right, bottom [px] of where a cube is to be expected soon; None if out of the image."""
+    """Return left, top, right, bottom [px] of where the cube will soon be; None if out of the image."""
     if pose.position[2] <= cube.side / 1000:
         return None
     centre = camera.bend(camera.project(pose.position[None]))[0]

@@ -1,8 +1,8 @@
-"""Which of several poses that explain the same corners an image shows.
+"""Chooses between poses that explain the same corners.
 
-Where one face is all that was detected, two poses fit its corners. Both are aligned with the image; what
-their other faces should look like decides (a grazing face that no detector reads still correlates with its
-pattern), then how well the grey values agree, and only then, if the caller knows it, the pose just before.
+Where only one face was detected, two poses fit its corners. Both are aligned with the image. Their other faces decide
+first: a grazing face that no detector reads still correlates with its pattern. Then the grey values decide, and only
+then the previous pose, if the caller knows it.
 """
 
 from __future__ import annotations
@@ -18,18 +18,20 @@ from tacdata.tags.cube.cube import AXES, Cube
 from tacdata.tags.detection.tag import Tag
 
 UNLIKE = 0.45
-"""Correlation [1] below which a face that a pose turns to the camera is not there (or is covered)."""
+"""Correlation [1] below which a face that a pose turns to the camera is missing or covered."""
 CLEARLY = 1.15
-"""Ratio of residuals [1] from which the better one is believed."""
+"""Ratio of residuals [1] from which the better pose is chosen."""
 LARGE = 48
-"""Side of a tag [px] that is as good as a larger one: from twice that the image is halved, and so on."""
+"""Side of a tag [px] above which more pixels do not help: from twice that the image is halved, and so on."""
 LEAST_TILT = np.radians(6.0)
-"""By how much [rad] a mirrored pose is turned at least."""
+"""Minimum tilt [rad] for starting the mirrored pose."""
 STRIDE, AWAY = np.radians(8.0), 3.0
-"""How far a cube turns between two images at most [rad] for its last pose to choose between two that are at least
-twice that, and so many times [1] as far as the nearer one, from it; the image must agree as well as before."""
+"""Limits for choosing by the previous pose: largest rotation between two images [rad], and ratio of the farther pose's
+distance to the nearer one's [1]. Two poses must be at least twice the first limit apart, and the image must agree as
+well as before.
+"""
 APART = np.radians(2.0)
-"""Angle [rad] from which two poses are different ones."""
+"""Angle [rad] from which two poses count as different."""
 
 
 class PoseHypothesis:
@@ -51,23 +53,23 @@ class PoseHypothesis:
 
     @property
     def support(self) -> int:
-        """Faces that were not detected and yet look as they should."""
+        """Undetected faces that correlate with their pattern."""
         return sum(value > ALIKE for face, value in self.alignment.likeness.items() if face not in self.seen)
 
     @property
     def missing(self) -> int:
-        """Faces that should be seen and do not look so: not there, or covered."""
+        """Faces that should be visible and are not: missing, or covered."""
         return sum(value < UNLIKE for face, value in self.alignment.likeness.items() if face not in self.seen)
 
 
 @dataclass(frozen=True, eq=False)
 class Before:
-    """How a cube stood in the image before."""
+    """The cube's pose in the previous image."""
 
     rotation: np.ndarray
     """From the cube frame to the camera frame [1], shape (3, 3)."""
     residual: float
-    """What was left of the difference between image and drawing [1]; 0 if two poses were about as good."""
+    """Residual of image and rendering [1]; 0 if two poses were about as good."""
 
 
 def best_rival(
@@ -104,7 +106,7 @@ def best_rival(
 
 
 def _continuing(starts: list[PoseCandidate], before: Before) -> PoseCandidate | None:
-    """Return the pose that goes on from the one before, if the other is far from it; None if that is not sure."""
+    """Return the pose that continues the previous one, if the other is far from it; None if that is uncertain."""
     angles = sorted((angle_between(start.rotation, before.rotation), k) for k, start in enumerate(starts))
     if len(angles) < 2 or angles[0][0] > STRIDE or angles[1][0] < AWAY * angles[0][0] + 2 * STRIDE:
         return None
@@ -112,10 +114,9 @@ def _continuing(starts: list[PoseCandidate], before: Before) -> PoseCandidate | 
 
 
 def _mirrored(rival: PoseHypothesis, cube: Cube) -> PoseCandidate:
-    """Return the pose whose one face is tilted the other way about the line of sight, at the same place.
+    """Return the pose whose only face is tilted the other way about the line of sight, at the same place.
 
-    Noise lets both poses of a face that is looked at squarely end up in one minimum of its four corners,
-    though the image has two.
+    For a face seen head-on, noise lets both poses end in one minimum of its four corners, though the image has two.
     """
     rotation, (face,) = rival.alignment.rotation, rival.seen
     normal = rotation @ AXES[face][:, 2]
@@ -123,7 +124,7 @@ def _mirrored(rival: PoseHypothesis, cube: Cube) -> PoseCandidate:
     sight = centre / np.linalg.norm(centre)
     towards = 2 * (normal @ sight) * sight - normal
     axis = np.cross(normal, towards)
-    # At least some tilt, so that the other minimum is in reach.
+    # A minimum tilt, so that the other minimum is in reach.
     angle = np.arctan2(np.linalg.norm(axis), normal @ towards)
     turned = _turn(axis, max(angle, LEAST_TILT)) @ rotation
     place = centre - turned @ AXES[face][:, 2] * cube.side / 2000
@@ -150,7 +151,7 @@ def _choose(rivals: list[PoseHypothesis], before: Before | None) -> tuple[PoseHy
     ]
     if not close:
         return best, None
-    # A face that is missing speaks against a pose, but may be covered: it decides nothing for sure.
+    # A missing face speaks against a pose, but may be covered: it decides nothing with certainty.
     equals = sorted([best, *close], key=lambda r: (r.missing, r.alignment.residual))
     if before is not None:
         equals.sort(key=lambda r: angle_between(r.alignment.rotation, before.rotation))
@@ -160,7 +161,7 @@ def _choose(rivals: list[PoseHypothesis], before: Before | None) -> tuple[PoseHy
 def _aligned(
     start: Alignment, seen: set[str], grey: np.ndarray, cube: Cube, camera: PinholeCamera, steps: int = STEPS
 ) -> Alignment:
-    """Align with a window of the image that holds the whole cube, in half size or less where it is large."""
+    """Align with a window of the image that holds the whole cube, at half size or less where it is large."""
     half = cube.side / 2000
     box = half * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     points = box @ start.rotation.T + start.translation
@@ -173,7 +174,7 @@ def _aligned(
 
 
 def _shrunk(image: np.ndarray, matrix: np.ndarray, factor: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return an image and its camera matrix with so many pixels a side made one; odd rows at the end are lost."""
+    """Return a reduced image and its camera matrix, ``factor`` pixels per side merged; odd rows at the end are lost."""
     import cv2
 
     height, width = image.shape

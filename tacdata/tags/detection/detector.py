@@ -1,7 +1,7 @@
-"""Find AprilTags: a cheap search says where one may lie, the AprilTag library says what and exactly where.
+"""Detects AprilTags: a cheap search finds candidates, the AprilTag library reads them.
 
-The AprilTag library places corners to a quarter of a pixel but takes a hundred milliseconds for a noisy
-image of 1280 x 720; shown only the small boxes that `search` leaves, it takes one.
+The library locates corners to a quarter of a pixel but takes a hundred milliseconds for a noisy image of 1280 x 720.
+With only the small boxes that `search` leaves, it takes one.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from tacdata.tags.detection.search import Suspect, suspects
 from tacdata.tags.detection.tag import Tag
 
 HALF_PIXEL = 0.5
-"""The AprilTag library puts pixel centres at halves (AprilRobotics/apriltag issue 121), OpenCV does not."""
+"""The AprilTag library puts pixel centres at halves (AprilRobotics/apriltag issue 121); OpenCV does not."""
 HAMMING, MARGIN = 2, 15.0
-"""Bits that may be corrected, and the least decision margin, of a tag that is believed."""
+"""Largest number of corrected bits, and smallest decision margin, of an accepted tag."""
 TINY, SMALL, LARGE = 28, 40, 160
-"""Size of a suspect [px] below which it is read in double size first, below which in double size if it cannot be read
-as it is, and from which in half size or less."""
+"""Sizes of a candidate [px]: below the first it is read in double size at once, below the second in double size if it
+cannot be read as it is, from the third in half size or less.
+"""
 ROOM = 0.25
-"""What is shown of a suspect's surroundings, over its size [1]: the white margin that a tag needs."""
+"""Margin around a candidate, over its size [1]: a tag needs some white around it."""
 NEAR = 1.2
-"""How far from a tag, over its size [1], the other tags of its cube lie."""
+"""Distance from a tag, over its size [1], within which the other tags of its cube lie."""
 LAST = 24
-"""How many boxes that do not look like a tag are read where nothing else was found."""
+"""Boxes that do not look like a tag and are read if nothing else was found."""
 _LOCK = Lock()
 
 
@@ -37,11 +38,11 @@ def detect_tags(image: np.ndarray, *, whole: bool = True, within: tuple[int, int
 
     Args:
         image: Grey (height, width) or BGR (height, width, 3), uint8.
-        whole: Show the AprilTag library everything. Otherwise only what the search suspects.
+        whole: Pass the whole image to the AprilTag library, not only the candidates.
         within: Left, top, right, bottom [px] of the part to look at.
 
     Raises:
-        UsageError: If this is no such image.
+        UsageError: If the image has another shape or type.
     """
     grey = to_grey(image)
     height, width = grey.shape
@@ -83,14 +84,14 @@ def _refused(image: Any) -> UsageError:
 
 @cache
 def _april() -> Any:
-    """Return the process's one AprilTag detector: making and dropping several has crashed the library."""
+    """Return the process's only AprilTag detector: creating and deleting several has crashed the library."""
     import pyapriltags
 
     return pyapriltags.Detector(families="tag36h11", nthreads=1, quad_decimate=1.0, refine_edges=0)
 
 
 def _read_suspects(grey: np.ndarray) -> list[Tag]:
-    """Read what looks like a tag, then what lies beside a tag that was read, or without one the smallest rest."""
+    """Read the candidates, then what lies beside a tag that was read; without one, the smallest remaining boxes."""
     tags: list[Tag] = []
     rest = []
     for suspect in suspects(grey):
@@ -106,7 +107,7 @@ def _read_suspects(grey: np.ndarray) -> list[Tag]:
 
 
 def _read_one(grey: np.ndarray, suspect: Suspect, tags: list[Tag]) -> None:
-    """Add a suspect's tags; two boxes may show the same tag, which counts once."""
+    """Add a candidate's tags; two boxes may show the same tag, which counts once."""
     height, width = grey.shape
     scale = 1.0
     while suspect.size * scale >= LARGE:
@@ -121,7 +122,7 @@ def _read_one(grey: np.ndarray, suspect: Suspect, tags: list[Tag]) -> None:
 
 
 def _read(grey: np.ndarray, box: tuple[int, int, int, int], scale: float) -> list[Tag]:
-    """Run the AprilTag library on a box (left, top, right, bottom) [px] drawn ``scale`` times as large."""
+    """Run the AprilTag library on a box (left, top, right, bottom) [px], scaled by ``scale``."""
     import cv2
 
     left, top, right, bottom = box

@@ -1,8 +1,8 @@
-"""Where in an image a tag may lie: dark blobs with four corners, found in half size.
+"""Finds candidates for tags: dark blobs with four corners, at half size.
 
-A tag's black border is one connected blob, darker than its surroundings, whose convex hull has four corners.
-Finding those in an image of a quarter of the pixels costs about two milliseconds for 1280 x 720 and leaves a
-handful of small boxes for the AprilTag library, whose cost goes with the area that it is shown.
+A tag's black border is one connected blob, darker than its surroundings, whose convex hull has four corners. At half
+size the search takes about two milliseconds for 1280 x 720. It leaves a few small boxes for the AprilTag library, whose
+cost grows with the area.
 """
 
 from __future__ import annotations
@@ -14,31 +14,31 @@ import numpy as np
 WINDOW = 21
 """Side [px of the half-size image] of the neighbourhood that a blob must be darker than."""
 DARKER = (3.0, 10.0)
-"""Least and most difference [1 of 255] that is asked for; between them four times the noise."""
+"""Smallest and largest threshold of the difference [1 of 255]; between them it is four times the noise."""
 LEAST_SIDE = 4
 """Shorter side [px of the half-size image] of the smallest blob: a tag of 8 px has no readable bits."""
 SLENDER = 6.0
 """Ratio of a box's sides [1] from which a blob is a line."""
 MOST = 400
-"""Blobs that are looked at, the largest first: an image of noise or grass has thousands."""
+"""Blobs that are examined, the largest first: an image of noise or grass has thousands."""
 FULL = 0.7
-"""Least share [1] of its convex hull's area that the hull's quadrilateral covers, and the reverse."""
+"""Minimum share [1] of its convex hull's area that the hull's quadrilateral covers, and the reverse."""
 PATTERN = (0.02, 0.95)
-"""How bright the inside of a tag may be between its frame, 0, and the paper around it, 1."""
+"""Brightness of a tag's inside between its frame (0) and the paper around it (1)."""
 DARK = 0.3
-"""Least share [1] of the hull that the blob fills: a tag's border alone fills 0.44."""
+"""Minimum share [1] of the hull that the blob fills: a tag's border alone fills 0.44."""
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """A place that may hold a tag."""
+    """A candidate: a box that may hold a tag."""
 
     low: tuple[int, int]
     """First column and row of the blob's box [px]."""
     high: tuple[int, int]
     """Last column and row, exclusive [px]."""
     framed: bool = True
-    """Whether it looks like a dark frame around a pattern; a neighbour of a tag may be one without it."""
+    """Whether it looks like a dark frame around a pattern; a tag's neighbour may be one without looking so."""
 
     @property
     def size(self) -> int:
@@ -46,12 +46,12 @@ class Suspect:
         return max(self.high[0] - self.low[0], self.high[1] - self.low[1])
 
     def is_near(self, corners: np.ndarray, reach: float) -> bool:
-        """Say whether the box comes within ``reach`` [px] of the box of some corners [px], shape (n, 2)."""
+        """Whether the box comes within ``reach`` [px] of the box of some corners [px], shape (n, 2)."""
         low, high = corners.min(axis=0) - reach, corners.max(axis=0) + reach
         return bool((np.array(self.high) > low).all() and (np.array(self.low) < high).all())
 
     def box(self, room: float, width: int, height: int) -> tuple[int, int, int, int]:
-        """Return left, top, right, bottom [px] with ``room`` [px] around it, in the image."""
+        """Return left, top, right, bottom [px] with a margin of ``room`` [px], clipped to the image."""
         extra = int(np.ceil(room))
         return (
             max(self.low[0] - extra, 0), max(self.low[1] - extra, 0),
@@ -60,7 +60,7 @@ class Suspect:
 
 
 def suspects(grey: np.ndarray) -> list[Suspect]:
-    """Return the places of an image, uint8, shape (height, width), that may hold a tag."""
+    """Return the candidates in an image, uint8, shape (height, width)."""
     import cv2
 
     half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
@@ -96,8 +96,8 @@ def suspects(grey: np.ndarray) -> list[Suspect]:
 def noise(grey: np.ndarray) -> float:
     """Return the standard deviation of an image's noise [1 of 255] from a twentieth of its rows.
 
-    Immerkaer, "Fast noise variance estimation", CVIU 64, 1996, along rows: second differences of white noise
-    spread by sqrt(6); their median is hardly moved by edges.
+    Immerkaer, "Fast noise variance estimation", CVIU 64, 1996, along rows: second differences of white noise have
+    sqrt(6) times its standard deviation. Their median is robust against edges.
     """
     rows = grey[::20].astype(np.int16)
     return float(np.median(np.abs(rows[:, 2:] - 2 * rows[:, 1:-1] + rows[:, :-2]))) / 0.6745 / np.sqrt(6)
@@ -126,7 +126,7 @@ def _grown(quad: np.ndarray) -> np.ndarray:
 
 
 def _framed(grey: np.ndarray, quads: np.ndarray) -> np.ndarray:
-    """Say of each quadrilateral [px], shape (n, 4, 2), whether it is a dark frame on paper around a pattern."""
+    """Return for each quadrilateral [px], shape (n, 4, 2), whether it is a dark frame on paper around a pattern."""
     import cv2
 
     places = np.einsum("pk,nkd->npd", _WEIGHTS, quads).astype(np.float32)

@@ -10,14 +10,14 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Tag:
-    """A tag of the family 36h11."""
+    """A detected tag of the family 36h11."""
 
     id: int
     """Number in the family."""
     corners: np.ndarray
     """Corners of the black square [px], shape (4, 2), in AprilTag's order; integers at pixel centres."""
     margin: float
-    """Contrast between the bits and their thresholds [1 of 255]; below about 20 a tag is doubtful."""
+    """Contrast between the bits and their thresholds [1 of 255]; below about 20 a tag is unreliable."""
     hamming: int
     """Bits corrected."""
 

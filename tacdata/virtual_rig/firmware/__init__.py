@@ -1,1 +1,1 @@
-"""An emulated motion controller."""
+"""An emulated GRBL controller."""

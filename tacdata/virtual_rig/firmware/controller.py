@@ -25,8 +25,7 @@ NS = 1_000_000_000
 class Controller:
     """The firmware's main loop in a thread, on the time of ``clock``.
 
-    `position_at` is where the machine really is; what it reports can differ from that after a loss of
-    position.
+    `position_at` is the true position of the machine. The reported one can differ after a loss of position.
     """
 
     def __init__(
@@ -34,9 +33,9 @@ class Controller:
         homed: bool = True, settings: dict[str, str] | None = None,
         offset: tuple[float, float, float] = (0.0, 0.0, 0.0), firmware: str = "Grbl", fresh: bool = False,
     ) -> None:  # fmt: skip
-        """Switch on a machine that stands at ``position`` [mm, machine]; ``offset`` is its G54 [mm].
+        """Switch on a machine at ``position`` [mm, machine]; ``offset`` is its G54 [mm].
 
-        ``firmware`` is Grbl or grblHAL; a ``fresh`` one finds its memory empty.
+        ``firmware`` is Grbl or grblHAL; a ``fresh`` one has empty memory.
         """
         self.clock = clock
         self.port = VirtualPort(115200, seed)
@@ -59,7 +58,7 @@ class Controller:
 
     @property
     def planner(self) -> Planner:
-        """The motion."""
+        """The motion planner."""
         return self.machine.planner
 
     def start(self) -> None:
@@ -79,11 +78,11 @@ class Controller:
         return self.planner.position(time_ns)
 
     def inject_alarm(self, code: int = 1) -> None:
-        """Fault: a limit switch closes (1) or another alarm that stops the machine dead."""
+        """Fault: a limit switch closes (1), or another alarm stops the machine at once."""
         self._faults.put(lambda now: self._wiped(lambda: self.machine.stop_dead(now, code)))
 
     def inject_brown_out(self) -> None:
-        """Fault: the supply sags; the firmware starts anew and believes to stand at zero."""
+        """Fault: the supply voltage drops; the firmware restarts and assumes position zero."""
         self._faults.put(lambda now: self._wiped(lambda: self.machine.brown_out(now)))
 
     def inject_silence(self) -> None:
@@ -95,7 +94,7 @@ class Controller:
         self._faults.put(lambda now: self.port.write(data))
 
     def inject_door(self, is_open: bool) -> None:
-        """Fault: the safety door is opened or closed."""
+        """Fault: the safety door opens or closes."""
 
         def turn(now: int) -> None:
             self.machine.door_open = is_open
@@ -105,11 +104,11 @@ class Controller:
         self._faults.put(turn)
 
     def inject_byte(self, byte: int) -> None:
-        """Fault: somebody else sends a real-time byte, or presses the button for it."""
+        """Fault: another program sends a real-time byte, or a button does."""
         self._faults.put(lambda now: self.machine.realtime(byte, now))
 
     def inject_unreadable_memory(self) -> None:
-        """Fault: stored parameters cannot be read; ``$#`` says error:7 and then its own ok."""
+        """Fault: stored parameters cannot be read; ``$#`` answers error:7 and then ok."""
         self._faults.put(lambda now: setattr(self.machine, "unreadable", True))
 
     def unplug(self) -> None:
@@ -129,7 +128,7 @@ class Controller:
             self._serve_output(self.clock.now_ns())
 
     def _pause(self) -> float:
-        """Return how long nothing will happen unless a byte comes [s, real time]."""
+        """Return how long nothing will happen unless a byte arrives [s, real time]."""
         due = [t for t in (self._report_ns, self.machine.next_event()) if t is not None]
         if self._out:
             due.append(self._out[0][0])
@@ -163,7 +162,7 @@ class Controller:
         return len(self._received) + sum(len(line) + 1 for _, line in self._lines)
 
     def _wiped(self, restart: Callable[[], None]) -> None:
-        """Forget what was received and not yet said, then start anew."""
+        """Discard what was received and not answered, then restart."""
         self._lines.clear()
         self._received.clear()
         self._out.clear()
@@ -192,7 +191,7 @@ class Controller:
                 self.port.write(text.encode("ascii") + b"\r\n")
 
     def _say(self, now: int, text: str, lag: float | None = None) -> None:
-        # The bridge to USB hands its bytes on once a millisecond.
+        # The USB bridge passes its bytes on once a millisecond.
         lag = self._rng.uniform(0.0005, 0.0015) if lag is None else lag
         due = now + int((lag + len(text) * BYTE_SECONDS) * NS)
         self._out.append((max(due, self._out[-1][0]) if self._out else due, text))

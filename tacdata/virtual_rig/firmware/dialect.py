@@ -1,4 +1,4 @@
-"""What tells one emulated firmware from another: its texts, buffers and habits."""
+"""Differences between emulated firmwares: texts, buffers and behaviour."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Firmware:
-    """A firmware's character."""
+    """Texts, buffer sizes and behaviour of one firmware."""
 
     welcome: str
     """First line after power-on and every reset."""
     information: tuple[str, ...]
     """Answer to ``$I``."""
     planner_blocks: int
-    """Moves that it queues."""
+    """Number of moves in its queue."""
     rx_bytes: int
     """Receive buffer [bytes]."""
     line_bytes: int
     """Longest line without blanks [bytes]; beyond it ``error:11``."""
     dwell_step: float
-    """Pauses are rounded up to multiples of this, and ``?`` is only looked for between them [s]."""
+    """Pauses are rounded up to multiples of this, and ``?`` is only answered between them [s]."""
     alarm_pause: float
-    """How long it says and hears nothing after an ALARM line [s]."""
+    """Time without any input or output after an ALARM line [s]."""
     answers_in_critical_alarm: bool
     """Whether ``?`` is answered after a limit alarm, before the reset."""
     refuses_after_error: bool
-    """Whether a refused G-code line makes it refuse all further ones until an empty or ``$`` line."""
+    """Whether a refused G-code line makes it refuse all others until an empty or ``$`` line."""
     alarm_substate: bool
     """Whether the state reads ``Alarm:N``."""
     changed: dict[str, str] = field(default_factory=dict)

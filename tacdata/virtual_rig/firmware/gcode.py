@@ -1,4 +1,4 @@
-"""Reading one line of the G-code that GRBL 1.1 takes, with GRBL's error numbers."""
+"""Parses one line of the G-code of GRBL 1.1, with GRBL's error numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GROUPS = {
     "cutter": ("G40",), "length": ("G49",), "path": ("G61",), "once": ("G4", "G53"),
     "stop": ("M0", "M2", "M30"), "spindle": ("M3", "M4", "M5"), "coolant": ("M7", "M8", "M9"),
 }  # fmt: skip
-"""Modal group -> the words that the emulator takes; ``once`` stands for GRBL's non-modal group."""
+"""Modal group -> the words that the emulator accepts; ``once`` stands for GRBL's non-modal group."""
 GROUP_OF = {word: group for group, words in GROUPS.items() for word in words}
 POWER_ON = {
     "motion": "G0", "offset": "G54", "plane": "G17", "units": "G21", "distance": "G90", "feed": "G94",
@@ -36,7 +36,7 @@ class Refused(Exception):
 
 @dataclass
 class Modal:
-    """What lasts from line to line."""
+    """Modal state: what lasts from line to line."""
 
     words: dict[str, str] = field(default_factory=lambda: dict(POWER_ON))
     """Group -> active word."""
@@ -51,7 +51,7 @@ class Modal:
 
 @dataclass(frozen=True)
 class Action:
-    """What a line asks for beside modal changes."""
+    """What a line asks for, besides modal changes."""
 
     dwell: float | None = None
     """Pause [s]."""
@@ -81,7 +81,7 @@ def split(line: str) -> list[tuple[str, float]]:
 
 
 def interpret(line: str, modal: Modal, position: np.ndarray, offset: np.ndarray, jog: bool = False) -> Action:
-    """Carry out a line's modal words and return the action that it asks for.
+    """Apply a line's modal words and return the action that it asks for.
 
     Args:
         line: The line.

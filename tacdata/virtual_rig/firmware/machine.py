@@ -1,4 +1,4 @@
-"""The emulated firmware's state machine: what a line and a real-time byte do, and when it is done."""
+"""The state machine of the emulated firmware: effects of lines and real-time bytes, and when they end."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tacdata.virtual_rig.firmware.texts import LOCKED, axis_setting
 NS = 1_000_000_000
 ALWAYS_ON = 255
 OVERRIDES = {0x90: None, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}
-"""Real-time byte -> change of the feed override [%]; None sets it back to 100."""
+"""Real-time byte -> change of the feed override [%]; None resets it to 100."""
 CRITICAL = (1, 2)
-"""Alarms after which only a reset is heard."""
+"""Alarms after which only a reset is accepted."""
 LOST = 0.02
 """Steps lost when motors are cut off in motion, standard deviation [mm]."""
 
@@ -84,12 +84,12 @@ class Machine:
         return self.planner.blocks[0].kind if self.planner.blocks else "Run"
 
     def silent(self, now: int) -> bool:
-        """Whether ``?`` stays without an answer."""
+        """Whether ``?`` gets no answer."""
         deaf = self.critical and not self.firmware.answers_in_critical_alarm
         return self.homing or deaf or now < self.busy_until
 
     def next_event(self) -> int | None:
-        """Return when something ends by itself [ns], as far as it is known."""
+        """Return when the next thing ends by itself [ns], as far as it is known."""
         due = [t for t in (self.dwell_ns, self._boot_due) if t is not None]
         if self.busy_until:
             due.append(self.busy_until)
@@ -98,7 +98,7 @@ class Machine:
         return min(due, default=None)
 
     def serve(self, now: int) -> None:
-        """Carry out what has become due."""
+        """Carry out everything that is due."""
         if self._boot_due is not None and now >= self._boot_due:
             self._boot(now)
         if now < self.busy_until:
@@ -119,7 +119,7 @@ class Machine:
             self._say(now, "ok")
 
     def realtime(self, byte: int, now: int) -> None:
-        """Heed a real-time byte other than ``?`` and 0x18."""
+        """Process a real-time byte other than ``?`` and 0x18."""
         state = self.state(now).split(":")[0]
         if byte == ord("!") and state in ("Idle", "Run", "Jog"):
             self._hold(now)
@@ -139,7 +139,7 @@ class Machine:
                 self.override, self.counters.overrides = new, 0
 
     def open_door(self, now: int) -> None:
-        """The door's switch opens, or ``0x84`` says so."""
+        """Open the door, by its switch or by ``0x84``."""
         if self.homing:
             self.stop_dead(now, 7)
         elif self.alarm is None:
@@ -153,14 +153,14 @@ class Machine:
         return not blocked and now >= self.busy_until and self._boot_due is None and not self._suspended(now)
 
     def admits(self, line: str, now: int) -> bool:
-        """Whether the planner is ready for a line: empty for a dwell, with a free block for a move."""
+        """Whether the planner can take a line: it is empty for a dwell, or has a free block for a move."""
         left = self.planner.retire(now)
         if "G4P" in line.upper().replace(" ", ""):
             return not left and not self.moving(now) and not self.planner.held
         return line.startswith("$") or left < self.firmware.planner_blocks
 
     def execute(self, line: str, now: int) -> None:
-        """Carry out a line and say its answer."""
+        """Carry out a line and send its answer."""
         try:
             if len(line) > self.firmware.line_bytes:
                 raise gcode.Refused(11)
@@ -185,7 +185,7 @@ class Machine:
         )  # fmt: skip
 
     def reset(self, now: int) -> None:
-        """Heed 0x18: in motion the motors are cut off and steps are lost."""
+        """Process 0x18: in motion the motors are cut off and steps are lost."""
         moving, homing = self.moving(now), self.homing
         self.planner.stop(now)
         self._clear()
@@ -198,7 +198,7 @@ class Machine:
             self._boot(now)
 
     def brown_out(self, now: int) -> None:
-        """Start anew, believing to stand at zero."""
+        """Restart, assuming position zero."""
         self.planner.stop(now)
         self._clear()
         self.error = self.planner.position(now)
@@ -217,7 +217,7 @@ class Machine:
             self._say(now, "[MSG:Reset to continue]")
 
     def power_on(self, now: int, fresh: bool) -> None:
-        """Say what a board says when it is switched on; ``fresh``: with an empty memory."""
+        """Send what a board sends when it is switched on; ``fresh``: with empty memory."""
         if fresh:
             self._say(now, "error:7")
             for line in texts.information("$$", self.firmware, self.settings, self.offset, []) or []:

@@ -1,4 +1,4 @@
-"""Acceleration-limited motion along straight blocks, in closed form, as GRBL's planner shapes it."""
+"""Acceleration-limited motion along straight blocks, in closed form, as GRBL's planner computes it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Block:
     speed: float
     """Programmed speed [mm/s]."""
     acceleration: float
-    """Limit along the move [mm/s^2]."""
+    """Acceleration limit along the move [mm/s^2]."""
     kind: str = "Run"
     """State shown while it runs: Run, Jog or Home."""
 
@@ -42,7 +42,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A piece of motion with constant acceleration."""
+    """A segment of motion with constant acceleration."""
 
     start_ns: int
     """When it begins [ns]."""
@@ -58,22 +58,21 @@ class Stretch:
     """Signed acceleration [mm/s^2]."""
 
     def at(self, time_ns: int) -> tuple[float, float]:
-        """Return the way along the block [mm] and the speed [mm/s] at a time [ns], clipped to the stretch."""
+        """Return distance along the block [mm] and speed [mm/s] at a time [ns], clipped to the segment."""
         t = min(max((time_ns - self.start_ns) * 1e-9, 0.0), self.seconds)
         return self.way + self.speed * t + 0.5 * self.acceleration * t * t, self.speed + self.acceleration * t
 
 
 def axis_limit(direction: np.ndarray, limits: np.ndarray) -> float:
-    """Return the limit along a unit direction that no axis of ``limits`` is asked to exceed."""
+    """Return the largest value along a unit direction at which no axis exceeds its limit in ``limits``."""
     share = np.abs(direction)
     return float(np.min(limits[share > 1e-9] / share[share > 1e-9]))
 
 
 class Planner:
-    """Queue of blocks, with the position at every moment of the recent past and of the planned future.
+    """Queue of blocks; knows the position at any time of the recent past and of the planned motion.
 
-    Neighbouring blocks in line keep the lower of their speeds; at every other corner the machine comes to
-    rest.
+    Neighbouring blocks in line keep the lower of their speeds. At every other corner the machine comes to rest.
     """
 
     def __init__(self, position: np.ndarray) -> None:
@@ -103,7 +102,7 @@ class Planner:
                 self._plan(now_ns, way, speed)
 
     def hold(self, now_ns: int) -> None:
-        """Brake to rest from now on [ns], keeping what is queued."""
+        """Brake to rest from now on [ns], keeping the queue."""
         with self._lock:
             if self.held:
                 return
@@ -123,7 +122,7 @@ class Planner:
                 way, speed = 0.0, out
 
     def resume(self, now_ns: int) -> None:
-        """Go on from rest."""
+        """Continue from rest."""
         with self._lock:
             if self.held:
                 way, speed = self._cut(now_ns)
@@ -131,7 +130,7 @@ class Planner:
                 self._plan(now_ns, way, speed)
 
     def stop(self, now_ns: int) -> bool:
-        """Stop dead and forget the queue; return True if something was moving."""
+        """Stop at once and clear the queue; return True if something was moving."""
         with self._lock:
             moving = self.moving(now_ns)
             self._cut(now_ns)
@@ -153,7 +152,7 @@ class Planner:
             return stretch is not None and time_ns < stretch.start_ns + round(stretch.seconds * 1e9)
 
     def next_end(self) -> int | None:
-        """Return when the running block will be finished [ns], or when a hold comes to rest."""
+        """Return when the running block will end [ns], or when a hold comes to rest."""
         with self._lock:
             if self._ends:
                 return self._ends[0]
@@ -204,7 +203,8 @@ class Planner:
         return last.block.start + last.at(self._end_of(last))[0] * last.block.unit
 
     def _cut(self, now_ns: int) -> tuple[float, float]:
-        """Forget the future; return the way along the first unfinished block [mm] and the speed [mm/s]."""
+        """Discard the planned motion; return the distance along the first unfinished block [mm] and the speed [mm/s].
+        """
         self.retire(now_ns)
         stretch, moving = self._stretch(now_ns), self.moving(now_ns)
         while self._past and self._starts[-1] >= now_ns:

@@ -1,4 +1,4 @@
-"""What the emulated firmware keeps in its EEPROM and how it writes its answers."""
+"""EEPROM settings of the emulated firmware, and the wording of its answers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DEFAULTS = {
 """Settings of a small three-axis stage: mm, mm/min, mm/s^2, steps/mm."""
 LOCKED = "[MSG:'$H'|'$X' to unlock]"
 WCO_PERIOD, OV_PERIOD = {True: 30, False: 10}, {True: 20, False: 10}
-"""Reports from one with WCO (Ov) to the next, busy or not (Grbl's `config.h`)."""
+"""Number of reports between two with WCO (or Ov), busy or not (Grbl's `config.h`)."""
 
 
 def axis_setting(settings: Mapping[str, str], prefix: str) -> np.ndarray:
@@ -36,7 +36,7 @@ def triple(values: np.ndarray, digits: int = 3) -> str:
 def information(
     command: str, firmware: Firmware, settings: Mapping[str, str], offset: np.ndarray, startup: list[str]
 ) -> list[str] | None:
-    """Return the answer to a ``$`` command that only tells, or None if it is none of them."""
+    """Return the answer to a ``$`` command that asks for information; None for other commands."""
     inches = settings["$13"] == "1"
     unit, digits = (25.4, 4) if inches else (1.0, 3)
     zero = triple(np.zeros(3), digits)
@@ -52,7 +52,7 @@ def information(
 
 @dataclass
 class Counters:
-    """When the fields that come only now and then are due again [reports]."""
+    """When the fields that are not in every report are due again [reports]."""
 
     wco: int = 0
     overrides: int = 0
@@ -65,13 +65,13 @@ def report(
     """Return a status report (Grbl's `report_realtime_status`).
 
     Args:
-        settings: ``$10`` and ``$13`` decide on what is said and in which unit.
+        settings: ``$10`` and ``$13`` select fields and unit.
         state: State with substate.
-        machine: Machine position as the controller believes it [mm], shape (3,).
+        machine: Machine position by the controller's count [mm], shape (3,).
         speed: Present speed [mm/s].
         offset: Work coordinate offset [mm], shape (3,).
         free: Free planner blocks and bytes of the receive buffer.
-        counters: Brought up to date.
+        counters: Updated.
         override: Feed override [%].
         pins: Letters of the active inputs.
     """

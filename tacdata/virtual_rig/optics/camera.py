@@ -1,4 +1,4 @@
-"""An emulated network camera: MJPEG over HTTP on the loopback interface, drawn when somebody watches."""
+"""An emulated network camera: MJPEG over HTTP on the loopback interface, rendered while somebody watches."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ QUALITY = 92
 
 
 class VirtualCamera:
-    """Exposes `rate` times a second of ``clock`` and sends every image some tens of milliseconds later."""
+    """Exposes `rate` times per second of ``clock`` and sends every image some tens of milliseconds later."""
 
     def __init__(
         self,
@@ -27,10 +27,10 @@ class VirtualCamera:
         seed: int = 0,
         ahead: bool = False,
     ) -> None:
-        """Serve ``draw(exposure [ns]) -> uint8 (height, width)`` at ``rate`` [Hz] after ``delay`` [s].
+        """Serve ``draw(exposure [ns]) -> uint8 (height, width)`` at ``rate`` [Hz] after a latency of ``delay`` [s].
 
-        With ``ahead`` images are drawn before they are due, so that drawing does not add to the delay; then what is
-        drawn must be known beforehand.
+        With ``ahead``, images are rendered before they are due, so that rendering adds no latency. The scene must then
+        be known beforehand.
         """
         self.clock, self.rate, self.delay = clock, rate, delay
         self._draw, self._ahead = draw, ahead
@@ -66,7 +66,7 @@ class VirtualCamera:
         self._server.server_close()
 
     def inject_stall(self) -> None:
-        """Fault: no image comes any more, the connection stays."""
+        """Fault: no further image comes; the connection stays open."""
         self._stalled = True
 
     def exposure_ns(self, number: int) -> int:
@@ -119,7 +119,7 @@ class VirtualCamera:
                         self.wfile.write(head.encode("ascii") + data + b"\r\n")
                         self.wfile.flush()
                 except OSError:
-                    pass  # the watcher went away
+                    pass  # the client disconnected
                 finally:
                     camera._watchers -= 1
 

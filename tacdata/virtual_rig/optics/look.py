@@ -1,4 +1,4 @@
-"""How an emulated camera looks at a scene: optics, light, what is in the way, and what the file format costs."""
+"""Image quality of an emulated camera: optics, light, occlusion and compression."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ Polygon = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """One exposure. The default is a sharp lens on a lit bench."""
+    """Conditions of one exposure. The default is a sharp lens on a lit bench."""
 
     blur: float = 0.7
     """Standard deviation of the optical blur [px]."""
     noise: float = 2.0
     """Standard deviation of the sensor's noise [1 of 255]."""
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """How far the cubes move during the exposure [m, camera frame]; the pose asked for is that of its middle."""
+    """Movement of the cubes during the exposure [m, camera frame]; the given pose is that of its middle."""
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """How far they turn about their centres during the exposure: rotation vector [rad, camera frame]."""
+    """Rotation of the cubes about their centres during the exposure: rotation vector [rad, camera frame]."""
     gain: float = 1.0
-    """Brightness of everything [1]; grey values end at 255."""
+    """Brightness factor [1]; grey values saturate at 255."""
     fall: float = 0.0
-    """Share [1] of the light that is missing at the image's right edge; it falls off evenly from the left."""
+    """Share [1] of the light that is missing at the image's right edge; it decreases evenly from the left."""
     shadow: Polygon = ()
     """Outline [px] of a sharp shadow in which 45 % of the light remains."""
     covers: tuple[Polygon, ...] = ()
-    """Outlines [px] of things before the cubes."""
+    """Outlines [px] of things in front of the cubes."""
     cover: float = 105.0
     """Their grey value [1 of 255]."""
     background: np.ndarray | None = None
-    """What lies behind the cubes, uint8 or float32, shape (height, width); None: an empty bench."""
+    """Image behind the cubes, uint8 or float32, shape (height, width); None for an empty bench."""
     jpeg: int | None = None
-    """Quality of a JPEG file that the image goes through [1 of 100]; None: none."""
+    """JPEG quality [1 of 100]; None for no compression."""

@@ -1,8 +1,8 @@
-"""What a camera sees of a cube with AprilTags: a grey image by ray casting, with shading, blur and noise.
+"""Renders a cube with AprilTags as a camera sees it: a grey image by ray casting, with shading, blur and noise.
 
-Written apart from the pose solver, so that each can be held against the other. Conventions are those of
-``tacdata/tags/README.md``: camera x right, y down, z forward; whole pixel coordinates at pixel centres; each
-tag upright as OpenCV draws it, with cube z up on the side faces and cube y up on the top face.
+It shares no code with the pose estimation, so that each can test the other. Conventions are those of
+``tacdata/tags/README.md``: camera x right, y down, z forward; whole pixel coordinates at pixel centres; each tag
+upright as OpenCV draws it, with cube z up on the side faces and cube y up on the top face.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ LIGHT = np.array([-0.4, -0.7, -0.6]) / np.linalg.norm([-0.4, -0.7, -0.6])
 WHITE, BLACK, BACKGROUND = 225.0, 28.0, 120.0
 """Grey values [1 of 255] of paper and ink under full light, and of the bench."""
 AMBIENT = np.float32(0.55)
-"""Share of the light that comes from all sides [1]."""
+"""Share of ambient light [1]."""
 MOMENTS = 9
-"""Poses drawn during the exposure of a cube that moves."""
+"""Poses rendered during the exposure of a moving cube [count]."""
 CELL = 24
-"""Texels a tag cell."""
+"""Texels per tag cell."""
 
 
 def render_cube(
@@ -82,7 +82,7 @@ def expose(
 
     Args:
         image: The scene's grey values, float32, shape (height, width).
-        boxes: Left, top, right, bottom [px] of where something lies on a smooth bench: only there the blur matters.
+        boxes: Left, top, right, bottom [px] of the objects; only there the blur is computed.
         look: Optics, light and obstacles.
         rng: Source of the noise.
     """
@@ -107,7 +107,7 @@ def expose(
 def _compose(
     image: np.ndarray, pose: np.ndarray, intrinsics: dict[str, Any], cube: dict[str, Any], look: Look
 ) -> tuple[int, int, int, int] | None:
-    """Draw one cube into a sharp image; return the box [px] that it can touch, or None if it is out of view."""
+    """Draw one cube into a sharp image; return the box [px] around it, or None if it is out of view."""
     import cv2
 
     poses = _through_exposure(pose, look)
@@ -134,7 +134,7 @@ def _compose(
 
 
 def _through_exposure(pose: np.ndarray, look: Look) -> list[np.ndarray]:
-    """Return the poses, shape (4, 4) [m], that a cube goes through while the shutter is open."""
+    """Return the poses, shape (4, 4) [m], of a cube during the exposure."""
     import cv2
 
     if not (np.any(look.shift) or np.any(look.turn)):
@@ -166,7 +166,7 @@ def _light(width: int, height: int, look: Look) -> np.ndarray:
 
 
 class Lens:
-    """Fine pixels of a box to rays (x, y, 1)."""
+    """Rays (x, y, 1) of the fine pixels of a box."""
 
     def __init__(self, box: tuple[int, int, int, int], fine: int, intrinsics: dict[str, Any]) -> None:
         import cv2
@@ -183,7 +183,7 @@ class Lens:
             rows, columns = (box[3] - box[1]) * fine, (box[2] - box[0]) * fine
             v, u = np.mgrid[:rows, :columns].astype(float)
             pixels = np.stack([u, v], axis=-1) / fine + to_pixel[:2, 2]
-            # OpenCV's five iterations leave up to a tenth of a pixel at the corners of a wide lens.
+            # OpenCV's five iterations leave errors up to a tenth of a pixel at the corners of a wide lens.
             until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-7)
             flat = pixels.reshape(-1, 1, 2)
             bent = cv2.undistortPointsIter(flat, matrix, distortion, np.eye(3), np.eye(3), until)
@@ -191,7 +191,7 @@ class Lens:
             self.rays = np.stack([bent[..., 0], bent[..., 1], np.ones((rows, columns))]).astype(np.float32)
 
     def paint(self, canvas: np.ndarray, texture: np.ndarray, to_texture: np.ndarray) -> None:
-        """Paint a plane's texture where it is hit; ``to_texture`` takes rays to texels, shape (3, 3)."""
+        """Paint a plane's texture where rays hit it; ``to_texture`` maps rays to texels, shape (3, 3)."""
         import cv2
 
         border = cv2.BORDER_TRANSPARENT
@@ -201,12 +201,12 @@ class Lens:
             cv2.warpPerspective(texture, to_texture @ self.to_ray, size, canvas, flags, borderMode=border)
         else:
             u, v, w = np.tensordot(to_texture.astype(np.float32), self.rays, 1)
-            w[w == 0] = np.float32(1e-30)  # a ray along the plane hits it nowhere
+            w[w == 0] = np.float32(1e-30)  # a ray along the plane never hits it
             cv2.remap(texture, u / w, v / w, cv2.INTER_LINEAR, canvas, borderMode=border)
 
 
 def _draw(canvas: np.ndarray, face: str, pose: np.ndarray, cube: dict[str, Any], lens: Lens) -> None:
-    """Paint one face onto the fine canvas, if it is turned to the camera."""
+    """Paint one face onto the fine canvas, if it faces the camera."""
     normal, right = (np.array(v, float) for v in FACES[face])
     rotation, side = pose[:3, :3], cube["side"] / 1000
     outward = rotation @ normal
@@ -256,7 +256,7 @@ def _bench(width: int, height: int) -> np.ndarray:
 
 
 def _box(pose: np.ndarray, intrinsics: dict[str, Any], side: float) -> tuple[int, int, int, int] | None:
-    """Return left, top, right, bottom [px] of what the cube can touch, or None if it is out of view."""
+    """Return left, top, right, bottom [px] of the box around a cube, or None if it is out of view."""
     corners = side / 2 * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     points = corners @ pose[:3, :3].T + pose[:3, 3]
     if points[:, 2].min() < 1e-3:

@@ -1,4 +1,4 @@
-"""Where the emulated camera stands and what it sees of the cube on the carriage."""
+"""Pose of the emulated camera, and of the cube on the carriage as it sees it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class CubeScene:
 
 
 def draw_scene(seed: int, over: tuple[float, float, float]) -> CubeScene:
-    """Set the camera up, by hand, to look at the cube when the carriage is at ``over`` [mm]."""
+    """Place the camera, as if by hand, to look at the cube when the carriage is at ``over`` [mm]."""
     from scipy.spatial.transform import Rotation
 
     rng = np.random.default_rng([seed, 6])

@@ -1,4 +1,4 @@
-"""What a camera sees of a flat printed sheet, for example a calibration board."""
+"""Renders a flat printed sheet, for example a calibration board, as a camera sees it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tacdata.virtual_rig.optics.look import Look
 from tacdata.virtual_rig.optics.render import BACKGROUND, Lens, expose
 
 FINE = 2
-"""Fine pixels a pixel, along each axis."""
+"""Fine pixels per pixel, along each axis."""
 
 
 def whole_lens(intrinsics: dict[str, Any]) -> Lens:
-    """Return the rays of a camera's every fine pixel."""
+    """Return the rays of all fine pixels of a camera."""
     return Lens((0, 0, intrinsics["width"], intrinsics["height"]), FINE, intrinsics)
 
 
@@ -31,8 +31,8 @@ def render_sheet(
             right, y down the sheet, z into it.
         intrinsics: The camera, as a rig file has it.
         rng: Source of the noise.
-        look: Optics, light and obstacles; movement is not drawn.
-        lens: The camera's `whole_lens`, where many images are drawn: a distorting one takes seconds to work out.
+        look: Optics, light and obstacles; movement is not rendered.
+        lens: The camera's `whole_lens`, for many images; with distortion it takes seconds to compute.
     """
     import cv2
 
@@ -42,7 +42,7 @@ def render_sheet(
     texel = width / print_of.shape[1]
     plane = pose[:3, [0, 1, 3]] * (texel, texel, 1.0)
     shift = np.array([[1, 0, -0.5], [0, 1, -0.5], [0, 0, 1.0]])
-    # A texel's middle is half a texel from its corner; whole texel coordinates are middles.
+    # A texel's centre is half a texel from its corner; whole texel coordinates are centres.
     (lens or whole_lens(intrinsics)).paint(canvas, print_of.astype(np.float32), shift @ np.linalg.inv(plane))
     image = cv2.resize(canvas, size, interpolation=cv2.INTER_AREA)
     return expose(image, [(0, 0, *size)], look, rng)

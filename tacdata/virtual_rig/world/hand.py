@@ -1,7 +1,7 @@
-"""An emulated hand that grasps a ball, or wipes with an eraser, over and over: its fingertips, and how deep they press.
+"""An emulated hand that grasps a ball, or wipes with an eraser, again and again.
 
-World: z up, the ball or eraser lies on the table about the origin. Fingertip frame: origin on the pad, x along the
-finger, z out of the pad. Either object presses the skins as the ball does, or by round nubs of a smaller radius.
+World: z up; ball or eraser lies on the table about the origin. Fingertip frame: origin on the pad, x along the finger,
+z out of the pad. The object presses the skins with the ball's radius, or by round nubs of a smaller one.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ HEIGHT = 36.0
 DIRECTIONS = {"thumb": (-1.0, 0.0, 0.05), "index": (0.93, 0.36, 0.05), "middle": (0.93, -0.36, 0.05)}
 """From the ball's centre to each finger of a right hand."""
 TIMES = (0.8, 2.0, 2.5, 3.7, 5.7, 6.9, 7.2, 8.2)
-"""Ends of: waiting, closing, pressing, lifting, holding, lowering, letting go, opening [s]; then it begins again."""
+"""End times of: waiting, closing, pressing, lifting, holding, lowering, letting go, opening [s]; then it repeats."""
 PERIOD = 8.5
 """From one grasp to the next [s]."""
 REACH = 45.0
-"""How far the fingertips are from the ball before and after [mm]."""
+"""Distance of the fingertips from the ball before and after [mm]."""
 LIFT = 90.0
-"""How high it is lifted [mm]."""
+"""Height of the lift [mm]."""
 TASKS = ("grasp", "wipe")
 ERASER = 25.0, 15.0
 """Half the eraser's width between the fingers, and the height of its middle [mm]."""
 ASIDE = {"thumb": 0.0, "index": 14.0, "middle": -14.0}
-"""Where along the eraser each finger presses [mm]."""
+"""Position along the eraser that each finger presses [mm]."""
 STROKE, STROKES = 40.0, 2
-"""How far to each side is wiped [mm], and how often back and forth."""
+"""Amplitude of wiping to each side [mm], and number of strokes."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +40,15 @@ class Hand:
 
     seed: int
     depth: dict[str, float]
-    """How deep each finger's skin is pressed while it holds [mm]."""
+    """Depth of each finger's contact while holding [mm]."""
     skew: dict[str, tuple[float, float]]
-    """Where on the pad each finger touches: x and y [mm]."""
+    """Position of each finger's contact on the pad: x and y [mm]."""
     tremor: float
-    """Amplitude of the hand's trembling at 8 Hz [mm]."""
+    """Amplitude of the hand's tremor at 8 Hz [mm]."""
     task: str = "grasp"
     """"grasp" or "wipe"."""
     nub: float = RADIUS
-    """Radius of what presses each skin [mm]: the ball's own, or that of nubs on the object where the fingers touch."""
+    """Radius of what presses each skin [mm]: the ball's own, or that of nubs on the object."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -58,7 +58,7 @@ class Hand:
         return values
 
     def press(self, finger: str, seconds: float) -> tuple[float, float, float]:
-        """Return where on the pad the ball presses, x and y, and how deep [mm], at a time [s]."""
+        """Return the contact's x and y on the pad and its depth [mm], at a time [s]."""
         t = seconds % PERIOD
         share = _blend(t, TIMES[1], TIMES[2]) - _blend(t, TIMES[5], TIMES[6])
         return (*self.skew[finger], self.depth[finger] * share)
@@ -71,7 +71,7 @@ class Hand:
         normal = -out
         along = np.array([0.0, 0.0, -1.0]) - (-normal[2]) * normal
         along /= np.linalg.norm(along)
-        # The whole hand sways a little, so that no pose ever rests.
+        # The whole hand sways a little, so that no pose is ever at rest.
         phase = 2 * np.pi * (seconds + 0.37 * self.seed)
         free = 1.0 if self.task == "grasp" else 0.1  # an eraser lies flat on its board, and the hand with it
         sway = 4.0 * free * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
@@ -81,7 +81,7 @@ class Hand:
         x, y, depth = self.press(finger, seconds)
         half = RADIUS if self.task == "grasp" else ERASER[0]
         touch = self._middle(finger, t) + out * (half + away - depth)
-        # The pad's origin is the array's centre; what touches lies off it by the skew.
+        # The pad's origin is the array's centre; the contact is offset from it by the skew.
         place = touch - matrix[:3, 0] * x - matrix[:3, 1] * y
         turn = _turn(0.06 * free * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)]))
         matrix[:3, :3] = turn @ matrix[:3, :3]
@@ -112,7 +112,7 @@ def draw_hand(seed: int, task: str = "grasp") -> Hand:
 
 
 def _blend(t: float, begin: float, end: float) -> float:
-    """Return 0 before, 1 behind, and between them the step of least jerk."""
+    """Return a minimum-jerk step: 0 before, 1 after."""
     s = float(np.clip((t - begin) / (end - begin), 0.0, 1.0))
     return s**3 * (10 - 15 * s + 6 * s**2)
 

@@ -1,4 +1,4 @@
-"""A world with something in it that no file of the rig tells of: to try `tacdata discrepancy` on."""
+"""A world with a hidden effect that no file of the rig names, for trying `tacdata discrepancy`."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ KINDS = {
     "late": "s that readings come late",
     "give": "mm that the frame gives way where the skin pushes back with 1 N",
 }
-"""What can be hidden, and what its size means."""
+"""Effects that can be hidden, and the meaning of their size."""
 TIP_PATH = "true_tip.csv"
-"""Where the indenter truly was, in the rig's folder: for `tacdata revise --truth`, never read by the pipeline."""
+"""True path of the indenter, in the rig's folder: for `tacdata revise --truth`, never read by the pipeline."""
 
 
 def hidden_from(words: list[str]) -> dict[str, float]:
@@ -44,10 +44,10 @@ def hidden_from(words: list[str]) -> dict[str, float]:
 
 
 class HiddenWorld(World):
-    """The world, with a loose or soft guide or a slow board; it writes down where the tip truly was."""
+    """The world with play, compliance or a late board; it writes the true path of the tip."""
 
     def __init__(self, truth: Truth, sensor: Sensor, hidden: dict[str, float], directory: Path) -> None:
-        """Lay the sensor; ``hidden`` as `hidden_from` returns it, ``directory`` gets `TIP_PATH`."""
+        """Create it; ``hidden`` comes from `hidden_from`, ``directory`` receives `TIP_PATH`."""
         super().__init__(truth, sensor)
         self._hidden, self._path = hidden, directory / TIP_PATH
         self._carriage: float | None = None
@@ -57,7 +57,7 @@ class HiddenWorld(World):
         self._path.write_text("time_ns,x,y,depth\n")
 
     def readings(self, tip: np.ndarray, indenter: IndenterProfile | None, yaw: float, time_ns: int) -> np.ndarray:
-        """Return a frame of where the tip truly is, or was."""
+        """Return a frame for the true tip position, now or, if late, earlier."""
         true = np.array([tip[0], tip[1], self._dragged(float(tip[2]))])
         true = self._pushed_back(true, indenter, yaw)
         x, y, depth = self.truth.registration.to_sensor(true[None])[0]
@@ -67,16 +67,16 @@ class HiddenWorld(World):
         return self._late(super().readings(true, indenter, yaw, time_ns), time_ns)
 
     def _dragged(self, z: float) -> float:
-        """Return the carriage's height [mm, machine]: dragged along between two stops.
+        """Return the carriage's height [mm, machine] with play: it is dragged between two stops.
 
-        The skin was touched off on a way down, so that the way down is right and the way up too deep.
+        The skin was touched off on a way down, so the way down is right and the way up too deep.
         """
         play = self._hidden.get("play", 0.0)
         self._carriage = z if self._carriage is None else min(max(self._carriage, z - play), z)
         return self._carriage
 
     def _pushed_back(self, tip: np.ndarray, indenter: IndenterProfile | None, yaw: float) -> np.ndarray:
-        """Return the tip where frame and skin balance: secant steps on the push-back."""
+        """Return the tip position at which the frame's compliance balances the skin's force, by secant steps."""
         give = self._hidden.get("give", 0.0)
         if give == 0.0:
             return tip
@@ -89,7 +89,7 @@ class HiddenWorld(World):
         return tip + 0.5 * (low + high) * lift
 
     def _late(self, frame: np.ndarray, time_ns: int) -> np.ndarray:
-        """Return the frame that was taken so long ago, mixed of the two around that time."""
+        """Return the frame of an earlier time, interpolated between two."""
         late = round(self._hidden.get("late", 0.0) * 1e9)
         if late == 0:
             return frame

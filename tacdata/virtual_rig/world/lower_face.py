@@ -1,4 +1,7 @@
-"""A solid's lower surface as a table: files answer too slowly for a stream, leaning shapes have no formula."""
+"""A solid's lower surface as a table, for shapes without a quick formula.
+
+Distances of surface files are too slow for a stream, and leaning shapes have no closed form.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from tacdata.indenters import Indenter
 
 SPACING = 0.05
-"""Between samples [mm]."""
+"""Spacing of the samples [mm]."""
 FAR = 100.0
-"""Height that stands for no solid [mm]."""
+"""Height that stands for "no solid here" [mm]."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class LowerFace:
 
     @classmethod
     def of(cls, indenter: Indenter, yaw: float, tilt_x: float, tilt_y: float) -> Self:
-        """Sample a turned indenter: its surface's triangles, the lowest one over each place.
+        """Sample a turned indenter, from its surface's triangles: the lowest one at each position.
 
         Args:
             indenter: The shape.
@@ -59,7 +62,7 @@ class LowerFace:
         return cls(extent, heights)
 
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height [mm] over (x, y) [mm], linear between the samples; `FAR` beside them."""
+        """Return the height [mm] at (x, y) [mm], interpolated linearly; `FAR` outside."""
         last = len(self.heights) - 1
         i, j = ((np.asarray(v) + self.extent) / SPACING for v in (x, y))
         beside = (i < 0) | (i > last) | (j < 0) | (j > last)
@@ -77,7 +80,7 @@ def _places(extent: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _over(a: np.ndarray, b: np.ndarray, c: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the height of a triangle over places, `FAR` beside it."""
+    """Return the height of a triangle at positions, `FAR` outside it."""
     twice = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
     if abs(twice) < 1e-12:
         return np.full(x.shape, FAR)

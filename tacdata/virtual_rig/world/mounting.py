@@ -1,4 +1,4 @@
-"""The operator's hand: which indenter is mounted, said through a small file beside the rig."""
+"""Mounts indenters on a virtual rig, through a small file beside the rig."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tacdata.indenters import Indenter, from_document
 from tacdata.virtual_rig.world.lower_face import LowerFace
 
 POLL = 0.01
-"""Time between two looks at a file [s]."""
+"""Interval between two looks at a file [s]."""
 LONGEST = 60.0
-"""Longest time that taking an indenter may last [s]: a new solid's distances are computed first."""
+"""Timeout for mounting an indenter [s]; the distances of a new solid are computed first."""
 
 
 def mount(
@@ -29,12 +29,12 @@ def mount(
         rig: A rig file's document with ``mounting: {file: PATH}``, or the directory of a virtual rig.
         indenter: ``{"shape": name, parameter: value, ...}``, as in a plan.
         yaw: Rotation about its own axis in the sensor's frame [deg].
-        tilt_x: How far that axis leans about x [deg], after the yaw and the tilt about y.
-        tilt_y: How far it leans about y [deg], after the yaw.
+        tilt_x: Tilt of that axis about x [deg], after the yaw and the tilt about y.
+        tilt_y: Tilt about y [deg], after the yaw.
 
     Raises:
-        UsageError: If the rig has no mounting file: there a person mounts.
-        FormatError: If the indenter is none.
+        UsageError: If the rig has no mounting file; then a person mounts.
+        FormatError: If the indenter is invalid.
         DeviceError: If a rig runs and does not take it.
     """
     if isinstance(rig, dict):
@@ -64,12 +64,12 @@ def mount(
 
 
 def taken(path: Path) -> Path:
-    """Return the file in which a running rig says which mounting file it has taken."""
+    """Return the file in which a running rig confirms the mounting file that it has read."""
     return path.with_suffix(".taken")
 
 
 class Mounted:
-    """What the mounting file says, read anew when it changes."""
+    """Content of the mounting file, read again when it changes."""
 
     def __init__(self, path: Path) -> None:
         """Watch a file that may not exist yet."""
@@ -81,20 +81,20 @@ class Mounted:
         self._thread = threading.Thread(target=self._watch, name="virtual-mounting", daemon=True)
 
     def start(self) -> None:
-        """Watch the file in a thread of its own and say what was taken: reading a solid from a file takes seconds."""
+        """Watch the file in a thread and confirm what was mounted; reading a solid takes seconds."""
         self.path.unlink(missing_ok=True)
         taken(self.path).write_text("nothing")
         self._thread.start()
 
     def stop(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         self._stopped.set()
         if self._thread.is_alive():
             self._thread.join(timeout=30.0)
             taken(self.path).unlink(missing_ok=True)
 
     def look(self) -> None:
-        """Take over what is mounted now: one `stat`, and a read if the file is another one."""
+        """Read what is mounted now: one `stat`, and a read if the file has changed."""
         try:
             status = self.path.stat()
             if (mark := (status.st_ino, status.st_mtime_ns)) == self._seen:
@@ -106,7 +106,7 @@ class Mounted:
         indenter = from_document(document["indenter"], str(self.path))
         tilts = [float(document.get(name, 0.0)) for name in ("tilt_x", "tilt_y")]
         if any(tilts):
-            # The leaning axis is fixed in the sensor's frame: the table holds the yaw as well.
+            # The tilted axis is fixed in the sensor's frame: the table includes the yaw.
             self.indenter, self.yaw = LowerFace.of(indenter, float(document["yaw"]), *tilts), 0.0
         else:
             self.indenter = LowerFace.upright(indenter) if indenter.shape == "mesh" else indenter
@@ -118,7 +118,7 @@ class Mounted:
             before = self._seen
             try:
                 self.look()
-            except TacdataError as error:  # whoever mounts is told that it was not taken
+            except TacdataError as error:  # whoever mounts is told that the file was refused
                 print(error, file=sys.stderr, flush=True)
             if self._seen != before:
                 taken(self.path).write_text(str(self._seen))

@@ -1,10 +1,10 @@
-"""The emulated world: a skin that answers to where the emulated indenter really is.
+"""The emulated world: a skin that responds to the true position of the emulated indenter.
 
-A model of its own, unlike the FEM that makes the labels: a stiffening bed of springs under the indenter,
-Boussinesq's spreading of stress with depth (K. L. Johnson, Contact Mechanics, eq. 2.22), Hertzian protrusions
-(ibid., eq. 4.23), parallel plates with a parasitic capacitance, a Prony series in time, gain spread, drift,
-noise and quantisation. Nothing of it reaches the pipeline but through the wires; `Truth` is written beside
-the rig for tests.
+Its model is not the FEM that makes the labels: a stiffening bed of springs under the indenter, Boussinesq's spreading
+of stress with depth (K. L. Johnson, Contact Mechanics, eq. 2.22), Hertzian protrusions (ibid., eq. 4.23), parallel
+plates with a parasitic capacitance, a Prony series in time, gain spread, drift, noise and quantisation.
+
+The pipeline sees it through the wires only; `Truth` is written beside the rig for tests.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ FULL_SCALE = 65535
 
 @dataclass(frozen=True)
 class Truth:
-    """What the world is, drawn from a seed."""
+    """True parameters of the world, drawn from a seed."""
 
     seed: int
     registration: Registration
-    """Where the sensor really lies in the guide's frame."""
+    """True pose of the sensor in the guide's frame."""
     mount_yaw: float
-    """Rotation of every mounted indenter beyond what was asked for [deg]."""
+    """Error of every mounted indenter's yaw [deg]."""
     stiffness: float
     """Pressure per depth of the skin at first touch [N/mm^3]."""
     thickness: float
@@ -50,7 +50,7 @@ class Truth:
     noise: float
     """Standard deviation of a reading [counts]."""
     drift: float
-    """Standard deviation of the slow wander of a reading, over a minute [counts]."""
+    """Standard deviation of the slow drift of a reading, over a minute [counts]."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -63,11 +63,11 @@ class Truth:
 
 
 ROUGH = (0.7, 0.7, 0.5), 3.0, 0.02
-"""How far a sensor that was only put down may be off: x, y, z [mm], yaw [deg], tilt [mm/mm]."""
+"""Largest errors of a sensor that was only put down: x, y, z [mm], yaw [deg], tilt [mm/mm]."""
 
 
 def put_down(seed: int, nominal: Registration) -> Registration:
-    """Return where a sensor lies that was put down by eye and never registered."""
+    """Return the pose of a sensor that was put down by eye and never registered."""
     rng = np.random.default_rng([seed, 8])
     shift, turn = rng.uniform(-1, 1, 3) * ROUGH[0], rng.uniform(-1, 1) * ROUGH[1]
     tilt = rng.uniform(-1, 1, 2) * ROUGH[2]
@@ -82,8 +82,8 @@ def draw(seed: int, sensor: Sensor, nominal: Registration, rough: bool = False) 
     Args:
         seed: Same seed, same world.
         sensor: The sensor in it.
-        nominal: Where the lab believes the sensor to lie.
-        rough: Whether the sensor was only put down (`put_down`), so that it has to be registered first.
+        nominal: The registration that the lab measured.
+        rough: Whether the sensor was only put down (`put_down`), so that it must be registered first.
     """
     rng = np.random.default_rng([seed, 1])
     modulus = sensor.material.youngs_modulus / (1 - sensor.material.poisson_ratio**2)
@@ -109,7 +109,7 @@ def draw(seed: int, sensor: Sensor, nominal: Registration, rough: bool = False) 
 
 
 class IndenterProfile(Protocol):
-    """What the skin feels of an indenter (`tacdata.indenters.Indenter` is one)."""
+    """What the skin needs to know of an indenter (`tacdata.indenters.Indenter` provides it)."""
 
     @property
     def extent(self) -> float:
@@ -122,10 +122,10 @@ class IndenterProfile(Protocol):
 
 
 class World:
-    """The skin in time. Ask for readings in the order of time."""
+    """The skin over time. Call `readings` in the order of time."""
 
     def __init__(self, truth: Truth, sensor: Sensor) -> None:
-        """Lay a sensor of this geometry with these true properties."""
+        """Create a sensor of this geometry with these true properties."""
         self.truth = truth
         self.x = np.arange(-sensor.skin.size_x / 2, sensor.skin.size_x / 2 + GRID / 2, GRID)
         self.y = np.arange(-sensor.skin.size_y / 2, sensor.skin.size_y / 2 + GRID / 2, GRID)
@@ -144,9 +144,9 @@ class World:
         """Return the instantaneous elastic force on each protrusion [N], shape (taxels,).
 
         Args:
-            tip: True carriage position [mm, machine], shape (3,): where the indenter's lowest point is.
-            indenter: What is mounted; None for nothing.
-            yaw: Rotation that the mounting was asked for [deg].
+            tip: True carriage position [mm, machine], shape (3,): the indenter's lowest point.
+            indenter: The mounted indenter, or None.
+            yaw: Nominal yaw of the mounting [deg].
         """
         x, y, depth = self.truth.registration.to_sensor(tip[None])[0]
         if indenter is None or depth <= 0:
@@ -174,7 +174,7 @@ class World:
         change, self._elastic, self._time_ns = elastic - self._elastic, elastic, time_ns
         for n, (share, tau) in enumerate(PRONY):
             decay = np.exp(-dt / tau)
-            mean = (1 - decay) * tau / dt if dt > 0 else 1.0  # of the decay over the step, for a ramp within it
+            mean = (1 - decay) * tau / dt if dt > 0 else 1.0  # mean of the decay over the step, for a ramp within it
             self._branches[n] = decay * self._branches[n] + mean * share * change
         keep = np.exp(-dt / 60.0)
         fresh = self._rng.normal(0, 1, len(elastic))
