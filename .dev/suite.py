@@ -1,0 +1,128 @@
+"""Run the checks and the tests.
+
+Without arguments: lint, import directions, types and the quick tests, side by side. `--long`: those that are long by
+nature (tests/running/long_part.py). `--ci`: the quick ones, then of the long ones what changed since they last passed.
+Other arguments go to one pytest.
+
+All checks run even if one fails; the exit status is that of the first that failed. The last line is pytest's summary.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BIN = Path(sys.executable).parent
+WAITING = 2
+"""Test processes that take what waits for a clock, beside one a core that computes."""
+MOST = 8
+"""Computing test processes at most: each takes 1 to 2 GB."""
+NO_TESTS = 5
+"""Pytest's exit status if none was to run."""
+STAND_BACK = 10
+"""How much pyright is put back beside the tests (nice)."""
+
+
+class Checks:
+    """Runs commands, prints each under its name, and keeps what failed."""
+
+    def __init__(self):
+        self.failed = {}
+        self.summaries = []
+        self.begin = time.monotonic()
+
+    def run(self, name, command, **options):
+        """Run a command whose words go to the terminal."""
+        self._head(name, command)
+        self._note(name, subprocess.run(command, cwd=ROOT, check=False, **options).returncode)
+
+    def tests(self, name, *arguments, perhaps_none=False):
+        """Run pytest and keep its last line; say whether there may be nothing to do."""
+        command = [sys.executable, "-m", "pytest", *arguments]
+        self._head(name, command)
+        last = ""
+        # One thread a process: more would only wait for those of the others.
+        environment = {**os.environ, "OMP_NUM_THREADS": str(max(1, _cores() // MOST)), "PYTHONUNBUFFERED": "1"}
+        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, bufsize=1, env=environment) as done:
+            for line in done.stdout:
+                sys.stdout.write(line)
+                sys.stdout.flush()
+                last = line.strip() or last
+        self._note(name, 0 if perhaps_none and done.returncode == NO_TESTS else done.returncode)
+        self.summaries.append(last)
+
+    def collect(self, name, command, process, said):
+        """Wait for a command that was started beside the tests, and print what it said."""
+        process.wait()
+        self._head(name, command)
+        said.seek(0)
+        print(said.read(), end="", flush=True)
+        self._note(name, process.returncode)
+
+    def end(self):
+        """Print what failed, and the summaries of all test runs as one; return the exit status."""
+        if self.failed:
+            print(f"\nfailed: {' '.join(self.failed)}", file=sys.stderr, flush=True)
+        if self.summaries:
+            print(_sum(self.summaries, time.monotonic() - self.begin), flush=True)
+        return next(iter(self.failed.values()), 0)
+
+    def _head(self, name, command):
+        print(f"\n== {name}: {' '.join(os.path.relpath(c, ROOT) if c.startswith(str(ROOT)) else c for c in command)}")
+        sys.stdout.flush()
+
+    def _note(self, name, code):
+        if code < 0:
+            print(f"{name}: killed by signal {-code}", flush=True)
+        if code:
+            self.failed[name] = abs(code)
+
+
+def _cores():
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _sum(lines, seconds):
+    """Return one line like pytest's of several: "3 passed, 1 skipped in 2.00s"."""
+    counts = {}
+    for line in lines:
+        for count, what in re.findall(r"(\d+) ([a-z]+)", line.split(" in ")[0]):
+            what = {"errors": "error", "warnings": "warning"}.get(what, what)
+            counts[what] = counts.get(what, 0) + int(count)
+    words = ", ".join(f"{count} {what}" for what, count in counts.items()) or "no tests ran"
+    return f" {words} in {seconds:.2f}s ({time.strftime('%H:%M:%S', time.gmtime(seconds))}) ".center(100, "=")
+
+
+def main(arguments):
+    """Return the exit status."""
+    checks = Checks()
+    ours = {"--long", "--ci"} & set(arguments)
+    checks.run("lint", [str(BIN / "ruff"), "check", "."])
+    checks.run("imports", [str(BIN / "lint-imports")])
+    types = [str(BIN / "pyright"), "--pythonpath", sys.executable]
+    with tempfile.TemporaryFile("w+") as said:
+        beside = subprocess.Popen(
+            types, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT, preexec_fn=lambda: os.nice(STAND_BACK)
+        )
+        try:
+            side_by_side = ["--numprocesses", str(min(_cores(), MOST) + WAITING), "--waiting", str(WAITING)]
+            if not arguments or "--ci" in ours:
+                checks.tests("tests", *side_by_side)
+            elif not ours:
+                checks.tests("tests", *arguments)
+            if ours:
+                rest = [argument for argument in arguments if argument not in ours]
+                which = "changed" if "--ci" in ours else "all"
+                checks.tests("long part", f"--long={which}", *side_by_side, *rest, perhaps_none=True)
+            checks.collect("types", types, beside, said)
+        finally:
+            beside.kill()
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,168 @@
+"""What is long by nature runs when asked for, or when something changed that decides it.
+
+A test says which rooms decide it and why it is long: `@pytest.mark.long("label_farm", reason="workers die at random")`.
+`pytest --long=all` runs these tests alone. `--long=changed` runs the files whose inputs differ from those at which they
+last passed. Inputs are the rooms named, what they import in turn, the test's own folder and the pinned versions; no
+docstrings or comments. A run in which all long tests of a file pass writes a hash of its inputs to `long_runs.json`.
+"""
+
+import ast
+import functools
+import hashlib
+import json
+import sys
+import time
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+RECORD = Path(__file__).with_name("long_runs.json")
+PACKAGES = ("tacdata", "label_farm", "training", "viewers", "schemas")
+
+
+def pytest_addoption(parser):
+    """Add the option that asks for the long part."""
+    parser.addoption("--long", choices=("all", "changed"), help="run what is long by nature, and only that")
+
+
+def pytest_configure(config):
+    """Declare the mark; write down what passed where the tests report to."""
+    config.addinivalue_line(
+        "markers", "long(*rooms, reason): `sh .dev/test --long` runs it, or CI when one of its rooms changed"
+    )
+    if config.option.long and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Passed(config))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Leave out the long tests, or all others."""
+    rooms = defaultdict(set)
+    for item in items:
+        for mark in item.iter_markers("long"):
+            rooms[item.nodeid.split("::")[0]] |= set(mark.args)
+            item.user_properties.append(("rooms", " ".join(mark.args)))
+    known = record()
+
+    def wanted(item):
+        if item.get_closest_marker("long") is None:
+            return not config.option.long
+        file = item.nodeid.split("::")[0]
+        stale = known.get(file, {}).get("inputs") != inputs(file, tuple(sorted(rooms[file])))
+        return config.option.long == "all" or (config.option.long == "changed" and stale)
+
+    left_out = [item for item in items if not wanted(item)]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in set(left_out)]
+
+
+def record():
+    """Return what passed when, by file."""
+    return json.loads(RECORD.read_text())
+
+
+class Passed:
+    """Collects what became of the long tests; writes down the files of which all passed."""
+
+    def __init__(self, config):
+        self.whole = not any("::" in argument for argument in config.args) and not config.option.keyword
+        self.files = defaultdict(lambda: {"rooms": set(), "outcomes": set(), "seconds": 0.0})
+
+    def pytest_runtest_logreport(self, report):
+        """Note a phase."""
+        file = self.files[report.nodeid.split("::")[0]]
+        file["rooms"] |= {room for name, rooms in report.user_properties if name == "rooms" for room in rooms.split()}
+        file["seconds"] += report.duration
+        if report.outcome != "rerun":
+            file["outcomes"].add(report.outcome)
+
+    def pytest_terminal_summary(self, terminalreporter):
+        """Say what ran and what was left as it passed before, and write down what passed."""
+        known = record()
+        terminalreporter.section("long part")
+        for name, file in sorted(known.items()):
+            if name not in self.files:
+                terminalreporter.write_line(f"not run: {name}: passed on {file['on']} with these inputs")
+        for name, file in sorted(self.files.items()):
+            passed = file["outcomes"] == {"passed"}
+            word = "passed" if passed else "not all passed"
+            terminalreporter.write_line(f"{word} in {file['seconds']:.0f} s: {name}")
+            if passed and self.whole:
+                rooms = tuple(sorted(file["rooms"]))
+                known[name] = {
+                    "inputs": inputs(name, rooms), "rooms": rooms, "on": time.strftime("%Y-%m-%d"),
+                    "seconds": round(file["seconds"]),
+                }  # fmt: skip
+        if self.whole:
+            RECORD.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
+
+
+@functools.cache
+def inputs(file, rooms):
+    """Return a hash of all that decides the long tests of a file."""
+    paths = {ROOT / ".dev" / "constraints.txt", *_texts((ROOT / file).parent)}
+    for room in sorted(closure(rooms)):
+        paths |= _texts(ROOT / room)
+    whole = hashlib.sha256()
+    for path in sorted(paths):
+        whole.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + _content(path) + b"\0")
+    return whole.hexdigest()
+
+
+def closure(rooms):
+    """Return the rooms and all rooms that they import in turn."""
+    found, todo = set(), set(rooms)
+    while todo:
+        found.add(room := todo.pop())
+        todo |= set().union(*(_imported(path) for path in _texts(ROOT / room) if path.suffix == ".py")) - found
+    return found
+
+
+def _texts(place):
+    if place.is_file():
+        return {place}
+    return {path for path in place.rglob("*") if path.is_file() and path.suffix not in (".md", ".pyc")}
+
+
+@functools.cache
+def _imported(path):
+    """Return the rooms, as folders or single files, that a file imports."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        found |= {room for name in names if (room := _room(name.split(".")))}
+    return found
+
+
+def _room(words):
+    if words[0] not in PACKAGES:
+        return None
+    if words[0] != "tacdata":
+        return words[0]
+    place = Path("tacdata", *words[1:2])
+    return place.as_posix() if (ROOT / place).is_dir() else place.with_suffix(".py").as_posix()
+
+
+@functools.cache
+def _content(path):
+    """Return what of a file can decide a test: of Python its syntax tree, without docstrings."""
+    if path.suffix != ".py":
+        return path.read_bytes()
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node) is not None:
+            node.body = body[1:]
+    return ast.dump(tree).encode()
+
+
+if __name__ == "__main__":
+    sys.exit(print(*sorted(closure(sys.argv[1:])), sep="\n"))

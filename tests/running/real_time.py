@@ -1,0 +1,67 @@
+"""What drives devices in real time is tried again if it failed while the machine stood still, and only then."""
+
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).parents[1]
+ROOMS = (
+    "commands", "demonstrations", "devices", "label_farm", "live", "recording", "registration", "replay", "virtual_rig",
+)  # fmt: skip
+"""Rooms whose tests hold emulated devices, hosts or processes against the clock; they wait more than they compute."""
+RIGS = ("test_closed_loop.py",)
+"""Files of other rooms that do: a press that a late machine spoilt stands out there, and nothing is named."""
+STILL = 0.02
+"""A thread that wakes so much too late was kept from the machine [s]; an emulated carriage moves 0.2 mm meanwhile."""
+
+
+def in_real_time(path):
+    """Return whether the tests of a file, a path in this folder, watch the clock."""
+    return path.relative_to(TESTS).parts[0] in ROOMS or path.name in RIGS
+
+
+class Watch:
+    """A thread that sleeps, and notes how much too late it ever woke."""
+
+    PERIOD = 0.005
+
+    def __init__(self):
+        self.latest = 0.0
+        threading.Thread(target=self._watch, daemon=True, name="machine watch").start()
+
+    def _watch(self):
+        while True:
+            before = time.monotonic()
+            time.sleep(self.PERIOD)
+            self.latest = max(self.latest, time.monotonic() - before - self.PERIOD)
+
+    def stood_still(self):
+        """Return whether the machine was late, or has more to do than it has cores, since the test began."""
+        return self.latest > STILL or os.getloadavg()[0] > (os.cpu_count() or 1)
+
+
+WATCH = Watch()
+
+
+def pytest_configure():
+    """Let Ctrl-C and a hang-up reach tests that a script or nohup started in the background, where both are ignored."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+def pytest_collection_modifyitems(items):
+    """Let tests of real time be tried again; what was is told in the summary."""
+    for item in items:
+        if in_real_time(item.path):
+            item.add_marker(pytest.mark.flaky(reruns=2, condition=WATCH.stood_still))
+
+
+def pytest_runtest_setup():
+    """Watch anew for every test."""
+    WATCH.latest = 0.0

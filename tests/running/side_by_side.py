@@ -1,0 +1,60 @@
+"""Test files side by side: those that compute on every core, those that mostly wait for a clock beside them.
+
+`pytest --numprocesses 4 --waiting 2`: two of four processes take files that hold devices to the clock. The others stand
+back (nice): an emulated device is then seldom late. Whoever has no file of its kind left takes one of the other. Files
+that took longest go first (`durations.csv`).
+"""
+
+import os
+from pathlib import Path
+
+from running.durations import recorded
+from running.real_time import in_real_time
+from xdist.scheduler import LoadFileScheduling
+
+ROOT = Path(__file__).parents[2]
+STAND_BACK = 10
+"""How much computing processes are put back (nice)."""
+UNKNOWN = 5.0
+"""What a file counts that has not been timed yet [s]."""
+
+
+def pytest_addoption(parser):
+    """Add the number of processes that wait."""
+    parser.addoption("--waiting", type=int, default=0, help="how many of the processes take what waits for a clock")
+
+
+def pytest_configure(config):
+    """Stand back in a process that computes."""
+    if hasattr(config, "workerinput") and config.option.waiting and not waits(config.workerinput["workerid"], config):
+        os.nice(STAND_BACK)
+
+
+def waits(worker, config):
+    """Return whether a worker, "gw0" or "gw1" or ..., takes what waits for a clock."""
+    return int(worker.removeprefix("gw")) < config.option.waiting
+
+
+def pytest_xdist_make_scheduler(config, log):
+    """Give files out by their kind."""
+    return ByKind(config, log) if config.option.waiting else None
+
+
+class ByKind(LoadFileScheduling):
+    """Gives each process a file of its kind as long as there is one, the longest first."""
+
+    def schedule(self):
+        """Sort the files before the first are given out."""
+        if self.collection is None:
+            self.config.option.loadscopereorder = False
+        super().schedule()
+
+    def _assign_work_unit(self, node):
+        own = waits(node.gateway.id, self.config)
+        seconds = recorded()
+
+        def order(file):
+            return in_real_time(ROOT / file) != own, -seconds.get(file, UNKNOWN)
+
+        self.workqueue.move_to_end(min(self.workqueue, key=order), last=False)
+        super()._assign_work_unit(node)
