@@ -76,7 +76,6 @@ def test_every_hidden_thing_changes_what_is_read_and_size_tells_how_much():
         assert moved[1] > 1.3 * moved[0] > 0, name
 
 
-@pytest.mark.slow
 def test_limits_are_those_of_the_generator_as_it_is():
     from worlds.cases import limits
     from worlds.oracle import Oracle
@@ -139,7 +138,6 @@ def test_a_single_is_one_that_an_oracle_tells_from_any_rival_and_the_rest_are_al
     assert {("table", "gain"), ("table", "modulus")} <= alike
 
 
-@pytest.mark.slow
 def test_a_null_gets_no_name_and_a_spring_is_found_the_whole_way(tmp_path):
     told = _run(tmp_path, "nulls", "--name", "plain-4-0")
     assert told.count("\n") == 2 and "named" not in told and "crashed" not in told

@@ -63,7 +63,7 @@ def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
     assert not (tmp_path / "out" / "rig" / "rig.yaml").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.long("tacdata/commands", reason="the whole job, eight presses solved on the default skin")
 @pytest.mark.timeout(2400)
 def test_the_whole_job(tmp_path):
     done = subprocess.run(

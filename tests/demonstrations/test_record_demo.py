@@ -47,7 +47,6 @@ def recorded(tmp_path_factory):
     return path, demo
 
 
-@pytest.mark.slow
 def test_three_boards_and_a_camera_come_into_one_file(recorded):
     path, _ = recorded
     found = read_demo(path)
@@ -63,7 +62,6 @@ def test_three_boards_and_a_camera_come_into_one_file(recorded):
     assert read_demo_session(path.parent).document["episodes"][0]["file"] == path.name
 
 
-@pytest.mark.slow
 def test_the_verbs_track_and_export_it(recorded, tmp_path, capsys):
     path, demo = recorded
     shutil.copytree(path.parent, tmp_path / "demos")
@@ -84,7 +82,6 @@ def test_the_verbs_track_and_export_it(recorded, tmp_path, capsys):
     assert not (tmp_path / "more").exists()
 
 
-@pytest.mark.slow
 def test_what_a_crash_left_is_read(recorded, tmp_path):
     path, _ = recorded
     cut = tmp_path / "episode-000000.mcap"
@@ -95,7 +92,6 @@ def test_what_a_crash_left_is_read(recorded, tmp_path):
     assert min(len(stream.counts) for stream in found.taxels.values()) > 30
 
 
-@pytest.mark.slow
 def test_a_demonstration_is_no_press(recorded):
     with pytest.raises(UsageError, match="no session"):
         check(recorded[0].parent)

@@ -6,7 +6,7 @@ import pytest
 SESSIONS, PRESSES, KILLS = 2, 60, 14
 
 
-@pytest.mark.slow
+@pytest.mark.long("label_farm", reason="workers and the service are killed at random, many times over")
 @pytest.mark.timeout(600)
 def test_random_kills_leave_what_an_undisturbed_run_leaves(tmp_path):
     """`benchmarks/label_farm_chaos.py` does it with 2,000 presses and 200 kills."""

@@ -29,7 +29,6 @@ def label(folder, *options, **variables):
     return subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
 
 
-@pytest.mark.slow
 def test_a_cluster_labels_and_a_press_that_kills_its_worker_is_a_failure(tmp_path):
     session(tmp_path / "s", 6)
     # The second press kills its worker once, the third always, the fourth finds no equilibrium.
@@ -46,7 +45,6 @@ def test_a_cluster_labels_and_a_press_that_kills_its_worker_is_a_failure(tmp_pat
     assert all(counted.count(x) == 1 for x in ("-6", "-5.85", "-5.8", "-5.75"))
 
 
-@pytest.mark.slow
 def test_workers_of_other_code_are_refused(tmp_path):
     """The cluster is a host with another version: here by a variable that only its worker has."""
     session(tmp_path / "s", 2)

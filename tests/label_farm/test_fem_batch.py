@@ -13,7 +13,6 @@ from tacdata.errors import SolveError
 from tacdata.sensor import default_sensor
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_batch_gives_each_press_its_own_answer():
     whole = default_sensor()

@@ -11,7 +11,7 @@ from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
 
 
-@pytest.mark.slow
+@pytest.mark.long("label_farm", reason="presses of the default skin at twice the states")
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("indenter", [Sphere(3.0), FlatPunch(2.0, 0.2)], ids=lambda indenter: indenter.shape)
 def test_no_frame_is_further_off_than_a_state_left_out(indenter):

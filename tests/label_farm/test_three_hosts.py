@@ -12,7 +12,7 @@ from chaos import ROOT, compare, record, undisturbed
 from farm_examples import HERE
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.long("label_farm", reason="three hosts of one network: one dies, one is cut off and comes back"),
     pytest.mark.timeout(900),
     pytest.mark.skipif(not hosts.possible(), reason="this machine gives no network namespaces (root, iproute2)"),
 ]

@@ -25,7 +25,7 @@ from tacdata.recording.recorder import Recorder
 COMMAND = os.environ.get("TACDATA_GRBL_FIRMWARE", "")
 pytestmark = [
     pytest.mark.skipif(not COMMAND, reason="TACDATA_GRBL_FIRMWARE names no firmware"),
-    pytest.mark.slow,
+    pytest.mark.long("tacdata/devices", "tacdata/recording", reason="a real firmware, in its own time"),
 ]
 START = (10.0, 20.0, -20.0)
 SET_UP = (

@@ -28,7 +28,6 @@ def bench(tmp_path):
         yield ["record", "--rig", rig, "--plan", tmp_path / "plan.yaml", "--out", tmp_path / "session"]
 
 
-@pytest.mark.slow
 def test_record_asks_records_and_refuses_to_overwrite(bench, tmp_path):
     result = tacdata(*bench, stdin=subprocess.DEVNULL)
     assert result.returncode == 2
@@ -46,7 +45,6 @@ def test_record_asks_records_and_refuses_to_overwrite(bench, tmp_path):
     assert len(read_session(tmp_path / "session").episodes) == 2
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_stops_and_the_session_can_be_resumed(bench, tmp_path, number):
     child = subprocess.Popen([*TACDATA, *map(str, bench), "--yes"], stderr=subprocess.PIPE, text=True)

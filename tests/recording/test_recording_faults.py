@@ -87,7 +87,6 @@ def test_garbage_and_half_frames_in_mid_press_cost_what_they_hit(virtual, tmp_pa
     assert any("belong to none" in f.text or "damaged" in f.text for f in report.findings)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("virtual", [True], indirect=True)
 def test_a_camera_that_stalls_in_mid_press(virtual, tmp_path):
     out = tmp_path / "session"
@@ -110,7 +109,6 @@ def bench(virtual, tmp_path):
     return [*TACDATA, "record", *common, "--yes"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("room", [3_000, 12_000, 30_000])
 def test_a_full_disk_is_said_and_the_session_goes_on(bench, virtual, tmp_path, room):
     out = tmp_path / "session"
@@ -133,7 +131,6 @@ def test_a_full_disk_is_said_and_the_session_goes_on(bench, virtual, tmp_path, r
     assert "2 of 2" in result.stdout
 
 
-@pytest.mark.slow
 def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(bench, virtual, tmp_path):
     out = tmp_path / "session"
     child = subprocess.Popen(bench, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

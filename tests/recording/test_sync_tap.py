@@ -24,7 +24,6 @@ from tacdata.virtual_rig.world.mounting import mount
 MS = 1e6
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate", "delay", "timer", "limit"), [(100.0, 0.02, 0.001, 1.0), (30.0, 0.1, 0.016, 3.0), (100.0, 0.02, 0.016, 2.0)]
 )

@@ -52,7 +52,6 @@ def record(virtual, tmp_path, out, *more):
     return ["record", "--rig", virtual.path, "--plan", tmp_path / "plan.yaml", "--out", out, "--yes", *more]
 
 
-@pytest.mark.slow
 def test_register_then_record_presses_where_the_sensor_really_is(virtual, tmp_path, monkeypatch, capfd):
     truth = virtual.truth.registration
     code, said, loud = run(monkeypatch, capfd, *record(virtual, tmp_path, tmp_path / "blind"))
@@ -90,7 +89,6 @@ def test_register_then_record_presses_where_the_sensor_really_is(virtual, tmp_pa
     assert "exists" in loud
 
 
-@pytest.mark.slow
 def test_a_skin_that_is_not_there_stops_the_search_at_the_limit(virtual, tmp_path, monkeypatch, capfd):
     document = yaml.safe_load(virtual.path.read_text())
     document["registration"]["origin"][2] += 3.0

@@ -84,7 +84,6 @@ def test_new_labels_are_needed_where_labels_move(both, tmp_path):
     assert not (tmp_path / "new").exists()
 
 
-@pytest.mark.slow
 def test_readings_that_the_right_model_says_teach_more(tmp_path, monkeypatch):
     """A filter leaves labels as they are: networks learn from what either model says, and read what was measured."""
     monkeypatch.setenv("PYTHONPATH", str(HERE))

@@ -88,7 +88,7 @@ class Passed:
                 terminalreporter.write_line(f"not run: {name}: passed on {file['on']} with these inputs")
         for name, file in sorted(self.files.items()):
             passed = file["outcomes"] == {"passed"}
-            word = "passed" if passed else "not all passed"
+            word = "failed" if "failed" in file["outcomes"] else "passed" if passed else "skipped, some or all,"
             terminalreporter.write_line(f"{word} in {file['seconds']:.0f} s: {name}")
             if passed and self.whole:
                 rooms = tuple(sorted(file["rooms"]))

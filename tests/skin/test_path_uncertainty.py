@@ -99,10 +99,10 @@ def test_what_is_not_found_is_said_and_the_path_kept(skin, solved, monkeypatch):
     assert kept.provenance["uncertainty"]["remark"].count("the linear solve stalls") == 3
 
 
-@pytest.mark.slow
+@pytest.mark.long("tacdata/skin", reason="both meshes of the default skin")
 @pytest.mark.timeout(900)
 def test_on_the_default_skin_mesh_and_branch_matter_little():
-    """As the module's docstring says: `pytest -m slow -s -k matter_little` prints them."""
+    """As the module's docstring says: `pytest --long=all -s -k matter_little` prints them."""
     skin = SkinModel(default_sensor())
     press = PressRequest(Sphere(3.0), 1.1, -0.7, 0.0, (0.25, 0.5, 0.25))
     spreads = spreads_of(skin.sensor, press.indenter)

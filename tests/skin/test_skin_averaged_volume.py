@@ -119,7 +119,6 @@ def test_models_average_from_their_settings_ratio_on():
     assert pressed(0.45, 3, 1, averaged_from=0.0)._averaged
 
 
-@pytest.mark.slow
 def test_two_meshes_agree_at_every_poisson_ratio():
     """Elements of 1.0 and 0.75 mm leave 2.2 % at nu = 0.45, the contact's own, and no more towards 0.5.
 
@@ -137,7 +136,7 @@ def test_two_meshes_agree_at_every_poisson_ratio():
     assert plain[0] / plain[1] - 1 > 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.long("tacdata/skin", "benchmarks/solvers", reason="another code solves it too")
 @pytest.mark.skipif(MIXED.missing() is not None, reason=str(MIXED.missing()))
 def test_a_mixed_element_of_another_code_says_the_same(tmp_path):
     """GetFEM with Taylor and Hood's pressure on the same mesh, contact at the same points: forces within 0.5 %."""

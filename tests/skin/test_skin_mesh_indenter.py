@@ -34,7 +34,6 @@ def model():
     return SkinModel(slab_sensor(), settings, mesh=box_mesh(slab_sensor(), 8, 8, 4))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("make", "exact"), [(ball, Sphere(2.0)), (punch, FlatPunch(2.0, 0.8))])
 def test_forces_and_maps_are_those_of_the_closed_form(model, tmp_path, make, exact):
     make().export(tmp_path / "shape.stl")

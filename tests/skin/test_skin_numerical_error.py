@@ -108,7 +108,6 @@ def test_the_model_without_estimate_is_another_version_and_says_so(boxes):
     assert found.force[0, 2] == pytest.approx(solution.force[1, 2], rel=1e-3)
 
 
-@pytest.mark.slow
 def test_the_estimate_covers_the_true_error(boxes):
     """Truth: edges of 0.33 mm; of 80 % of pixels, root mean square and force within a factor of 2."""
     model, solution = boxes

@@ -33,7 +33,9 @@ BUMPS = {"outer": 0.9, "interior": 1.5, "protrusion": 1.0}
 SAME_CONTACT = GetFEM(contact="penalty", augmentation=30000.0)
 needs_getfem = pytest.mark.skipif(SAME_CONTACT.missing() is not None, reason=str(SAME_CONTACT.missing()))
 needs_calculix = pytest.mark.skipif(CalculiX().missing() is not None, reason=str(CalculiX().missing()))
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long(
+    "tacdata/skin", "benchmarks/solvers", "benchmarks/same_mesh.py", reason="other codes solve every case too"
+)
 
 
 def here(command, *_):

@@ -27,7 +27,7 @@ BESIDE = Path(__file__).resolve().parents[3] / "shared" / "reference"
 FOLDER = Path(os.environ.get("TACDATA_REFERENCE", BESIDE))
 pytestmark = [
     pytest.mark.reference,
-    pytest.mark.slow,
+    pytest.mark.long("tacdata/skin", reason="fine meshes, held against another code's solutions"),
     pytest.mark.skipif(not (FOLDER / "A1.parquet").exists(), reason=f"no reference solutions in {FOLDER}"),
 ]
 DEPTHS = (0.25, 0.5, 0.75)

@@ -138,7 +138,6 @@ def test_case_files_tilt(tmp_path):
     assert (request.tilt_x, request.tilt_y) == (2.0, -3.0)
 
 
-@pytest.mark.slow
 def test_off_the_middle_a_curved_pad_answers_as_in_the_middle():
     """A pad bent with its underside: off the middle the same depth takes the same force, up to the slope."""
     sensor = replace(CURVED, skin=Skin(8.0, 8.0, 2.0, 0.0, curvature_radius_x=20.0))
@@ -151,7 +150,7 @@ def test_off_the_middle_a_curved_pad_answers_as_in_the_middle():
     assert beside[0] / beside[2] == pytest.approx(x / 20, rel=0.2)
 
 
-@pytest.mark.slow
+@pytest.mark.long("tacdata/skin", "benchmarks/solvers", reason="another code solves it too")
 @pytest.mark.skipif(PEER.missing() is not None, reason=str(PEER.missing()))
 def test_another_code_presses_a_tilted_punch_alike(model, tmp_path):
     """GetFEM on the same mesh, contact at the same points: force within 0.5 %, the face within 1 % of the depth rms."""

@@ -3,7 +3,7 @@
 What the spreads make of a press depends little on the mesh: for a sphere of 3 mm radius, 1 mm deep in the default skin,
 the standard deviations on the companion mesh differ from those on the mesh itself by 9 to 13 % of their root mean
 square over the map, 1 to 3 % in the force; those of unloading from those of loading at the same depth by 1 %
-(`pytest -m slow -s -k matter_little` measures it again).
+(`pytest --long=all -s -k matter_little` measures it again).
 """
 
 from __future__ import annotations
