@@ -1,4 +1,4 @@
-"""What the registries hold, read from the sources: listing imports no member, needs no driver and no GPU."""
+"""Lists the registries from their sources: no import of a member, no driver, no GPU."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Registry:
     """A folder whose files are members."""
 
     name: str
-    """What people call it: the folder's name."""
+    """Name of the folder."""
     room: str
     """Dotted package name."""
     base: str
-    """File name of the base, whose docstring says what a member's file holds."""
+    """File name of the base class, whose docstring says what a member's file holds."""
     meaning: str
     """First line of the package's docstring."""
 
@@ -78,7 +78,7 @@ def _member(folder: Path, name: str) -> RegistryMember:
 
 
 def _fields(kind: ast.ClassDef) -> list[tuple[str, str]]:
-    """Name and first docstring line of the dataclass fields of a class."""
+    """Return name and first docstring line of the dataclass fields of a class."""
     if not any("dataclass" in ast.unparse(d) for d in kind.decorator_list):
         return []
     result = []

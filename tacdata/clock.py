@@ -1,4 +1,4 @@
-"""The host's one clock: monotonic, mapped once to Unix time, faster than real time for a virtual rig if wanted."""
+"""The host's only clock: monotonic, tied to Unix time once; a virtual rig may run it faster."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Clock:
-    """Nanoseconds since the Unix epoch that never step: ``epoch + rate * (monotonic - origin)``.
+    """Nanoseconds since the Unix epoch, without steps: ``epoch + rate * (monotonic - origin)``.
 
-    Two processes that hold the same three numbers read the same time, as `CLOCK_MONOTONIC` is the machine's own.
+    Two processes with the same three numbers read the same time, since `CLOCK_MONOTONIC` belongs to the machine.
     """
 
     epoch_ns: int

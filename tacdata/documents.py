@@ -1,4 +1,4 @@
-"""Read, check and write the YAML and JSON documents whose shape `schemas/` fixes."""
+"""Reads, checks and writes YAML and JSON documents by the schemas in `schemas/`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tacdata.replacement import replacement
 
 
 def read(path: Path, schema: str) -> dict[str, Any]:
-    """Return the document at ``path`` after checking it against a schema.
+    """Return the document at ``path``, checked against a schema.
 
     Raises:
         UsageError: If there is no such file.
@@ -33,7 +33,7 @@ def read(path: Path, schema: str) -> dict[str, Any]:
 
 
 def parsed(text: str, origin: str) -> Any:
-    """Return what a YAML or JSON text holds; ``origin`` names it in errors.
+    """Return the content of a YAML or JSON text; ``origin`` names it in errors.
 
     Raises:
         FormatError: If a key is given twice, with both lines.
@@ -51,7 +51,7 @@ def parsed(text: str, origin: str) -> Any:
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of a JSON text; one with a key twice is left to `_Loader`, which knows the lines."""
+    """Return an object of a JSON text; duplicate keys are left to `_Loader`, which knows the lines."""
     found = dict(pairs)
     if len(found) < len(pairs):
         raise ValueError("a key twice")
@@ -59,7 +59,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML as its version 1.2 reads numbers (``1e-7``, ``1.0e12``), without keys that are given twice."""
+    """YAML 1.2's numbers (``1e-7``, ``1.0e12``), and no duplicate keys."""
 
     origin = ""
 
@@ -72,7 +72,7 @@ class _Loader(yaml.SafeLoader):
         lines: dict[Any, int] = {}
         for key, _ in node.value:
             if key.tag == "tag:yaml.org,2002:merge":
-                continue  # what is merged in may be overruled: that is its purpose
+                continue  # merged keys may be overridden: that is their purpose
             name, line = self.construct_object(key, deep=True), key.start_mark.line + 1
             if name in lines:
                 raise FormatError(
@@ -120,7 +120,7 @@ def check(document: Any, schema: str, origin: str) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file so that a crash leaves either the old one or the new one, never a half.
+    """Write a file so that a crash leaves either the old one or the new one.
 
     Raises:
         DeviceError: If the disk refuses it.

@@ -1,4 +1,4 @@
-"""What the user sees when something is wrong: what was given, what is allowed, what to do next."""
+"""Errors for a person: what was given, what is allowed, what to do next."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ class Exit(IntEnum):
     """How a verb ends: the one table of exit codes (docs/reference/exit_codes.md)."""
 
     meaning: str
-    """What it tells a script."""
+    """What the code means, for a script."""
 
     def __new__(cls, code: int, meaning: str) -> Exit:
         """Make a member of its code and its meaning."""
@@ -29,11 +29,11 @@ class Exit(IntEnum):
 
 
 class TacdataError(Exception):
-    """Base of every error that is meant for a person.
+    """Base class of every error that is meant for a person.
 
     Args:
         given: What was found or asked for, with its value and unit, naming the object as the user knows it.
-        allowed: What would have been accepted.
+        allowed: What is accepted.
         remedy: The next thing to do.
     """
 
@@ -51,7 +51,7 @@ class UsageError(TacdataError):
 
 
 class FormatError(TacdataError):
-    """A file or stream is not what its schema says."""
+    """A file or stream does not match its schema."""
 
     exit_code = Exit.FORMAT
 

@@ -1,4 +1,4 @@
-"""The folder is the registry: a member's name is its file's name, and listing imports nothing."""
+"""Folders as registries: a member's name is its file's name, and listing imports nothing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def names(room: str, base: str) -> list[str]:
 
     Args:
         room: Dotted package name, for example ``"tacdata.indenters"``.
-        base: File name of the room's base, which is no member itself.
+        base: File name of the room's base class, which is no member.
     """
     package = importlib.import_module(room)
     return sorted(m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in (base, "__init__"))
@@ -40,7 +40,7 @@ def load_module(room: str, base: str, name: str) -> ModuleType:
 
 
 def load[T](room: str, base: str, name: str, kind: type[T]) -> type[T]:
-    """Import one member and return its one public class derived from ``kind``."""
+    """Import one member and return its only public class derived from ``kind``."""
     module = load_module(room, base, name)
     found = [
         value

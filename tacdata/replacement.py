@@ -1,4 +1,4 @@
-"""A file that takes the place of another whole: written beside it, brought to the disk, renamed."""
+"""Replaces a file as a whole: written beside it, synced to the disk, renamed."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from typing import BinaryIO
 
 @contextmanager
 def replacement(path: Path, beside: Path | None = None, settled: bool = True) -> Iterator[BinaryIO]:
-    """Give a stream whose bytes become the file ``path`` when the block ends; until then the old file stays.
+    """Yield a stream whose bytes become the file ``path`` when the block ends; until then the old file stays.
 
     A crash or a full disk leaves the old file or the new one, never a half. If the block raises, nothing is left.
 
     Args:
         path: The file; its folder is made if it is missing.
         beside: Folder of the unfinished file, on the same file system; by default the file's own, under a hidden name.
-        settled: Whether the new name too is on the disk when the block ends. Without it, a loss of power within the
-            next seconds may leave the old file, still never a half.
+        settled: Whether the new name is synced too when the block ends. Without it, a power cut in the next seconds may
+            leave the old file.
 
     Raises:
         OSError: If the disk refuses it.
@@ -42,7 +42,7 @@ def replacement(path: Path, beside: Path | None = None, settled: bool = True) ->
 
 
 def _settle(folder: Path) -> None:
-    """Bring a folder's entries to the disk, so that a rename outlives a loss of power."""
+    """Sync a folder's entries to the disk, so that a rename survives a power cut."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

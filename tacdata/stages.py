@@ -1,4 +1,4 @@
-"""Run command lines one after the other as a person would type them: shown, timed, and stopped gently."""
+"""Runs command lines one after the other, as a person would type them: shown, timed, and interruptible."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from typing import Any
 from tacdata.errors import DeviceError, TacdataError
 
 PATIENCE = 60.0
-"""Time that an interrupted verb gets to stop the motion and close its files [s]."""
+"""Time for an interrupted verb to stop the motion and close its files [s]."""
 
 LIFELINE = "TACDATA_LIFELINE"
-"""Variable that tells a stage its pipe: it closes when the process that runs the stages is gone."""
+"""Environment variable with a stage's pipe, which closes when the process that runs the stages is gone."""
 
 
 class StageError(TacdataError):
-    """A stage ended with an error of its own, which the person has already read."""
+    """A stage ended with an error that the person has already read."""
 
     def __init__(self, number: int, line: str, code: int, kept: str) -> None:
         self.exit_code = code if 0 < code < 256 else 1
@@ -36,7 +36,7 @@ class StageError(TacdataError):
 
 
 def command_line(arguments: list[str]) -> list[str]:
-    """Return the process arguments of ``tacdata ARGUMENTS`` in this very installation."""
+    """Return the process arguments of ``tacdata ARGUMENTS`` in this installation."""
     return [sys.executable, "-m", "tacdata.cli", *arguments]
 
 
@@ -46,18 +46,18 @@ def written(arguments: list[str]) -> str:
 
 
 class Line:
-    """Verbs run one after the other; each shows its command, its place and its time."""
+    """Runs verbs one after the other and shows each one's command, number and time."""
 
     def __init__(self, total: int, kept: str) -> None:
-        """Prepare for ``total`` stages; ``kept`` says in words what is left if one fails."""
+        """Prepare for ``total`` stages; ``kept`` describes what is left if one fails."""
         self.total, self.kept = total, kept
         self.number = 0
         self.begin = time.monotonic()
 
     def run(self, purpose: str, arguments: list[str], tolerated: int = 0) -> None:
-        """Run ``tacdata ARGUMENTS``; ``purpose`` says what for.
+        """Run ``tacdata ARGUMENTS``; ``purpose`` describes it.
 
-        An exit code of ``tolerated`` is shown and does not end the line: the verb after it can use what is there.
+        An exit code in ``tolerated`` is shown and does not end the line: the next verb can use what there is.
 
         Raises:
             StageError: With the verb's exit code, if it fails.
@@ -89,7 +89,7 @@ def _start(line: list[str], **streams: Any) -> subprocess.Popen:
     return subprocess.Popen(
         line,
         stdin=subprocess.DEVNULL,
-        # A group of its own: the terminal's Ctrl-C then reaches it once, through us, and not twice.
+        # A process group of its own: the terminal's Ctrl-C then reaches it once, through us, and not twice.
         process_group=0,
         pass_fds=[pipe],
         env={**os.environ, LIFELINE: str(pipe)},
@@ -99,12 +99,12 @@ def _start(line: list[str], **streams: Any) -> subprocess.Popen:
 
 @functools.cache
 def _lifeline() -> int:
-    """Return the end of a pipe on which nothing is written: the other end is held until this process is gone."""
+    """Return the end of a pipe that stays empty; the other end is held until this process is gone."""
     return os.pipe()[0]
 
 
 def follow() -> None:
-    """End this verb as by Ctrl-C once the process that runs it as a stage is gone, killed or not.
+    """End this verb as by Ctrl-C when the process that runs it as a stage is gone.
 
     Does nothing in a verb that is no stage.
     """
@@ -142,7 +142,7 @@ def stop(process: subprocess.Popen) -> None:
 
 
 class Background:
-    """A verb that runs beside the others and speaks to a log file; stopped at the end of a ``with`` block."""
+    """A verb that runs in the background and writes to a log file; stopped at the end of a ``with`` block."""
 
     def __init__(self, arguments: list[str], log: Path) -> None:
         self.arguments, self.log = arguments, log
@@ -155,10 +155,10 @@ class Background:
         return self
 
     def wait_until(self, ready: Callable[[], bool], what: str, timeout: float) -> None:
-        """Return once ``ready()``; ``what`` names in words what is waited for, at most ``timeout`` [s].
+        """Wait until ``ready()``, at most ``timeout`` [s]; ``what`` describes it.
 
         Raises:
-            DeviceError: If the verb ends before, or takes longer.
+            DeviceError: If the verb ends first, or the time is over.
         """
         deadline = time.monotonic() + timeout
         while not ready():

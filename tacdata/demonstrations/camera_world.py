@@ -1,4 +1,4 @@
-"""Where a camera stands in the world, as a file (`schemas/camera_world.schema.json`)."""
+"""A camera's pose in the world, as a file (`schemas/camera_world.schema.json`)."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ class CameraWorld:
 
     camera: str
     frame: str
-    """Name of the frame that is called the world."""
+    """Name of the world's frame."""
     matrix: np.ndarray
     """The camera's frame in the world, homogeneous, shape (4, 4) [m]."""
     method: str
-    """How it was found."""
+    """Method by which it was found."""
     poses: int
-    """Poses or images behind it."""
+    """Number of poses or images used."""
     residual: tuple[float, float]
-    """Root mean square of what the pairs leave: position [m], rotation [rad]."""
+    """Root mean square residual of the pairs: position [m], rotation [rad]."""
     spread: tuple[float, float] | None = None
-    """Standard uncertainty of the camera's place [m] and rotation [rad], if it is known."""
+    """Standard uncertainty of the camera's position [m] and rotation [rad], if known."""
     cube: np.ndarray | None = None
     """The cube in the gripper's frame, homogeneous, shape (4, 4) [m]; hand-eye only."""
     remarks: tuple[str, ...] = field(default=())
 
     def document(self, date: str) -> dict[str, Any]:
-        """Return the pose as its file holds it; ``date`` is ISO 8601."""
+        """Return the document for a file; ``date`` is ISO 8601."""
         made: dict[str, Any] = {
             "version": schemas.version("camera_world"), "camera": self.camera, "frame": self.frame,
             **_flat(self.matrix), "method": self.method, "poses": self.poses,

@@ -1,4 +1,4 @@
-"""Fingertip targets moved along their normals by what the finger felt (paper, Tactile-Guided Compensation)."""
+"""Moves fingertip targets along their normals by the contact depth (paper, Tactile-Guided Compensation)."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from tacdata import documents
 from tacdata.errors import FormatError, UsageError
 
 LARGEST = 10
-"""How many of a map's largest depths the scalar depth is the mean of (paper)."""
+"""Number of largest depths of a map whose mean is the scalar depth (paper)."""
 DEFAULT = Path(__file__).with_name("gains.yaml")
 STEPS = 12
-"""Gains tried between nothing and the largest before the interval is halved [count]."""
+"""Gains tried between zero and the largest before the interval is bisected [count]."""
 
 
 @dataclass(frozen=True)
 class Gains:
-    """How far a target moves for each millimetre of depth, task by task."""
+    """Gain alpha of each task and finger: how far a target moves per millimetre of depth."""
 
     tasks: dict[str, dict[str, float]]
     """Task -> finger -> gain [m/mm]."""
     origin: str
-    """Where they come from, for messages."""
+    """Source of the gains, for messages."""
 
     def of(self, task: str) -> dict[str, float]:
-        """Return a task's gain of each finger [m/mm].
+        """Return the gain of each finger for a task [m/mm].
 
         Raises:
             UsageError: If there is no such task.
@@ -42,7 +42,7 @@ class Gains:
 
 
 def read_gains(path: Path | None = None) -> Gains:
-    """Read a gains file (`schemas/gains.schema.json`); without a path the paper's gains.
+    """Read a gains file (`schemas/gains.schema.json`); without a path, the paper's gains.
 
     Raises:
         UsageError: If it does not exist.
@@ -59,7 +59,7 @@ def read_gains(path: Path | None = None) -> Gains:
 
 
 def contact_depth(maps: np.ndarray) -> np.ndarray:
-    """Return d(t): the mean of the ten largest depths of each map [mm], shape (n,).
+    """Return the contact depth d of each map: the mean of its ten largest depths [mm], shape (n,).
 
     Args:
         maps: Depth [mm], shape (n, pixels_x, pixels_y); a map with NaN gives NaN.
@@ -74,16 +74,16 @@ def contact_depth(maps: np.ndarray) -> np.ndarray:
 
 
 def compensate(position: np.ndarray, normal: np.ndarray, depth: np.ndarray, gain: float) -> np.ndarray:
-    """Return p + gain d n [m], shape (n, 3).
+    """Return targets p + gain d n [m], shape (n, 3).
 
     Args:
         position: Fingertips as seen [m], shape (n, 3).
         normal: Unit normals towards the object [1], shape (n, 3).
-        depth: Contact depth d [mm], shape (n,); where it is NaN nothing was felt and nothing is moved.
+        depth: Contact depth d [mm], shape (n,); NaN where nothing was felt; the target then stays.
         gain: alpha [m/mm].
 
     Raises:
-        UsageError: If the gain is negative or no number, or shapes or normals do not fit.
+        UsageError: If the gain is negative or not finite, or if shapes or normals do not fit.
     """
     if not np.isfinite(gain) or gain < 0:
         raise UsageError(f"a gain of {gain} m/mm", "0 or more", "correct the gains file")
@@ -99,19 +99,19 @@ def compensate(position: np.ndarray, normal: np.ndarray, depth: np.ndarray, gain
 def smallest_gain(
     reached: Callable[[float], float], wanted: float, largest: float = 0.03, tolerance: float = 1e-4
 ) -> float:
-    """Return the smallest gain [m/mm] with which a contact depth is reached.
+    """Return the smallest gain [m/mm] that reaches a contact depth.
 
-    Gains are tried upwards in equal steps, because a grasp need not answer evenly (an object can slip away), and the
-    first interval that reaches the depth is halved until it is narrower than ``tolerance``.
+    Gains are tried upwards in equal steps, because a grasp need not respond monotonically (an object can slip away).
+    The first interval that reaches the depth is bisected until it is narrower than ``tolerance``.
 
     Args:
-        reached: Contact depth [mm] that a replay with this gain [m/mm] reaches: a trial on the robot or in simulation.
+        reached: Function from gain [m/mm] to the contact depth [mm] of a replay, on the robot or in simulation.
         wanted: Contact depth wanted [mm].
         largest: Largest gain tried [m/mm].
-        tolerance: How closely the gain is found [m/mm].
+        tolerance: Width of the final interval [m/mm].
 
     Raises:
-        UsageError: If no gain up to the largest reaches it, or an argument means nothing.
+        UsageError: If no gain up to the largest reaches it, or an argument is invalid.
     """
     if not 0 < wanted < np.inf or not 0 < largest < np.inf or not 0 < tolerance < np.inf:
         raise UsageError(f"depth {wanted} mm, gain up to {largest} m/mm", "positive numbers", "correct them")

@@ -1,4 +1,4 @@
-"""A demonstration, worked up: fingertip paths on one time grid, with what the fingers felt."""
+"""A processed demonstration: fingertip paths on one time grid, with touch."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tacdata.sensor import Sensor
 
 @dataclass(frozen=True, eq=False)
 class FingerTrack:
-    """One finger's path on the demonstration's grid."""
+    """One finger's path on the demonstration's grid, with readings and predicted depth."""
 
     finger: str
     hand: str
@@ -26,21 +26,22 @@ class FingerTrack:
     quaternion: np.ndarray
     """From the fingertip's frame to the demonstration's, xyzw [1], shape (n, 4); NaN likewise."""
     covariance: np.ndarray
-    """Of a small turn [rad] and the position [m], both in the demonstration's frame, shape (n, 6, 6)."""
+    """Covariance of a small rotation [rad] and the position [m], both in the demonstration's frame, shape (n, 6, 6)."""
     gap: np.ndarray
-    """Whether no sighting lies near: the pose is a bridge between others, or unknown; shape (n,), bool."""
+    """Whether no sighting is near, so that the pose is interpolated or unknown; shape (n,), bool."""
     sightings: int
     """Images in which the finger was seen."""
     outliers: int
-    """Sightings left out because they contradict the others."""
+    """Outliers: sightings left out because they contradict the others."""
     signals: np.ndarray | None = None
-    """Tared readings [counts], shape (n, taxels), float32; NaN where the board said nothing. None without board."""
+    """Tared readings [counts], shape (n, taxels), float32; NaN where the board sent nothing. None without board."""
     depth: np.ndarray | None = None
     """PREDICTED depth [mm], shape (n, pixels_x, pixels_y), float32: a network's estimate, never a measurement; NaN
     where it had no reading. None without a network."""
     novelty: np.ndarray | None = None
-    """How far the readings are from all that the network learnt from [1], shape (n,), float32; above 1 farther than
-    nearly all on which it was validated, so that its depth is a guess. None where the network's run does not say."""
+    """Novelty of the readings against the training data [1], shape (n,), float32. Above 1 they are farther than nearly
+    all of the validation data, and the depth is a guess. None if the network's run does not hold it.
+    """
 
     @property
     def normal(self) -> np.ndarray:
@@ -51,7 +52,7 @@ class FingerTrack:
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """Fingers on one grid of times."""
+    """A processed demonstration: all fingers on one time grid."""
 
     recording: str
     """File name of the recording."""
@@ -61,24 +62,24 @@ class Demonstration:
     frame: str
     """Frame of all poses: the world's name, or "camera NAME"."""
     rate: float
-    """Of the grid [Hz]."""
+    """Rate of the grid [Hz]."""
     time_ns: np.ndarray
     """Times of the grid on the recording's clock [ns], shape (n,), int64."""
     tracks: dict[str, FingerTrack]
     sensors: dict[str, Sensor]
     """Finger -> its skin, of fingers with a board."""
     smoothing: dict[str, Any] = field(default_factory=dict)
-    """Settings of the smoother and what it chose, by finger."""
+    """Settings of the smoother and the process noise that it chose, by finger."""
     network: dict[str, Any] | None = None
-    """Whose predicted depth the tracks hold: hash, network, epoch, lookahead [frames], sensor; None without."""
+    """Network behind the predicted depth: hash, network, epoch, lookahead [frames], sensor; None without."""
     remarks: tuple[str, ...] = ()
-    """What a person should know of it, in words."""
+    """Remarks for a person, as sentences."""
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def guesses(self, fingers: Iterable[str] = ()) -> list[str]:
-        """Return where the predicted depth of some fingers (all if none is named) is a guess, in words.
+        """Describe where the predicted depth of some fingers (by default all) is a guess.
 
-        It is one where the network never learnt from readings alike.
+        That is where the network has not been trained on similar readings.
         """
         words, chosen = [], tuple(fingers) or tuple(self.tracks)
         for name, track in self.tracks.items():

@@ -1,4 +1,4 @@
-"""What a finger's board felt: tared readings on the demonstration's grid, and what is wrong with them."""
+"""Touch of a finger: tared readings on the demonstration's grid, and faults of its board."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 from tacdata.recording.episode import TaxelStream
 
 REST = 0.5
-"""Length of the quietest stretch, which is taken as untouched [s]."""
+"""Length of the quietest stretch, which counts as untouched [s]."""
 SILENT = 0.5
-"""A board that says nothing for longer has been silent [s]."""
+"""Time without data after which a board counts as silent [s]."""
 FELT = 0.1
-"""A finger touches while its strongest reading is above this share of its largest [1]."""
+"""Threshold of touch: share of the strongest reading's maximum [1]."""
 ODD = 0.05
-"""A share of unknown readings that is said; a tenth of a percent to a few are to be expected [1]."""
+"""Share of novel readings that is reported [1]; a tenth of a percent to a few are normal."""
 ALIEN = 1.5
-"""So many times farther from what was learnt than validation presses, an estimate is called a guess [1]."""
+"""Novelty, relative to that of validation data, above which an estimate is called a guess [1]."""
 TOUCH = 8.0
-"""A reading that rises by so many times the noise has been touched [1]."""
+"""Rise of a reading, over its noise, from which a taxel counts as touched [1]."""
 
 
 def baseline(stream: TaxelStream) -> np.ndarray:
     """Return the reading of each taxel without touch [counts], shape (taxels,).
 
-    A demonstration has no marked rest. Touch closes the taxels and raises their capacitance, so the stretch of `REST`
-    with the lowest sum of all readings is taken as untouched.
+    A demonstration has no marked rest. Touch closes the taxels and raises their capacitance. So the stretch of `REST`
+    with the lowest sum of all readings counts as untouched.
     """
     rows = max(min(round(REST / _period(stream)), len(stream.counts)), 1)
     total = np.concatenate([[0.0], np.cumsum(stream.counts.sum(axis=1))])
@@ -39,7 +39,7 @@ def on_grid(stream: TaxelStream, values: np.ndarray, times_ns: np.ndarray) -> np
 
     Args:
         stream: The board's frames, shape (m,).
-        values: One value a frame, shape (m, ...).
+        values: One value per frame, shape (m, ...).
         times_ns: Times [ns], shape (n,).
     """
     result = np.full((len(times_ns), *values.shape[1:]), np.nan, np.float32)
@@ -56,7 +56,7 @@ def on_grid(stream: TaxelStream, values: np.ndarray, times_ns: np.ndarray) -> np
 
 
 def faults(name: str, stream: TaxelStream, begin_ns: int, end_ns: int) -> list[str]:
-    """Say what is wrong with a board's signal: none, silent for a while, stuck channels, never touched."""
+    """Describe the faults of a board's signal: none, silent for a while, stuck channels, never touched."""
     if len(stream.counts) < 2:
         return [f"{name}: its board gave no signal"]
     remarks = []
@@ -80,12 +80,12 @@ def faults(name: str, stream: TaxelStream, begin_ns: int, end_ns: int) -> list[s
 
 
 def unknown(name: str, signals: np.ndarray, novelty: np.ndarray) -> list[str]:
-    """Say for which share of a finger's touches the network has never learnt from anything alike.
+    """Describe for which share of a finger's touches the network has not been trained on similar readings.
 
     Args:
         name: The finger.
         signals: Tared readings [counts], shape (n, taxels).
-        novelty: How far they are from all that it learnt from, over what is far [1], shape (n,).
+        novelty: Novelty of the readings [1], shape (n,).
     """
     known = np.isfinite(novelty) & np.isfinite(signals).all(axis=1)
     strongest = np.max(signals[known], axis=1, initial=0.0)

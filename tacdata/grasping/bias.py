@@ -1,4 +1,4 @@
-"""How far each way to find a contact's centre is off, by where it is: without noise, on a fingertip as described."""
+"""Bias of each estimate of the contact's centre, by position, without noise on an ideal fingertip."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from tacdata.grasping.strategies import strategy as strategies
 from tacdata.grasping.touch import OrangeTouch
 
 STEP = 0.25
-"""Distance of places [mm]."""
+"""Spacing of the positions [mm]."""
 FRAMES = 9
-"""Frames of each window, all alike: a network's longest, so that it sees a contact at rest [count]."""
+"""Identical frames of each window: a network's longest, so that it sees a contact at rest [count]."""
 
 
 def bias(touch: OrangeTouch, presses: PressSet, maps: Maps, force: float, band: float) -> dict[str, Any]:
-    """Return true and believed lateral places of the orange, from the middle outwards.
+    """Return true and estimated lateral positions of the orange, from the middle outwards.
 
     Args:
         touch: The skin's answer to the orange.
-        presses: The orange's presses, whose solved maps show what a perfect network would see.
+        presses: The orange's presses, whose solved maps stand for a perfect network.
         maps: The trained network.
         force: Normal force [N].
-        band: Within which a contact is accepted [mm].
+        band: Half width within which a contact is accepted [mm].
     """
     sensor = touch.sensor
     true = np.arange(0.0, touch.limit[0] + 1e-9, STEP)
@@ -52,7 +52,7 @@ def _x(centre: np.ndarray | None) -> float | None:
 
 
 def _accepted(true: np.ndarray, values: list[float | None], band: float) -> float:
-    """Return the farthest true place [mm] that is believed to lie in the band, between grid points linearly."""
+    """Return the farthest true position [mm] whose estimate lies in the band, linear between grid points."""
     believed = np.array([np.nan if v is None else v for v in values])
     inside = np.flatnonzero(believed <= band)
     last = int(inside[-1]) if len(inside) else 0
@@ -63,7 +63,7 @@ def _accepted(true: np.ndarray, values: list[float | None], band: float) -> floa
 
 
 def _solved(touch: OrangeTouch, presses: PressSet, x: float, force: float) -> np.ndarray:
-    """Return the solved map at y = 0, between places and depths linearly [mm]."""
+    """Return the solved map at y = 0, linear between positions and depths [mm]."""
     depth, places = touch.depth(x, 0.0, force), presses.place
     own = np.flatnonzero(np.abs(places[:, 1]) < 1e-9)
     at, levels = places[own, 0], presses.depths[own[0]]

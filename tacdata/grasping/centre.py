@@ -1,4 +1,4 @@
-"""Where a fingertip believes the contact to be: by its taxels, or by the pixels of an estimated map."""
+"""Estimates the contact's centre on a fingertip, by its taxels or by the pixels of an estimated map."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tacdata.sensor import Sensor
 Maps = Callable[[np.ndarray], np.ndarray]
 """Tared readings (n, taxels) [counts] -> depth maps (n, pixels_x, pixels_y) [mm]."""
 DEEP = 0.4
-"""Pixels deeper than this are contact [mm] (paper)."""
+"""Depth from which a pixel counts as contact [mm] (paper)."""
 TOUCHED = 100.0
-"""A contact is valid if the strongest taxel, averaged over the window, reads more [counts]."""
+"""Reading of the strongest taxel, averaged over the window, above which a contact is valid [counts]."""
 
 
 def touched(frames: np.ndarray) -> bool:
-    """Return whether tared readings (n, taxels) [counts] tell of a contact."""
+    """Return whether tared readings (n, taxels) [counts] show a contact."""
     return bool(frames.mean(axis=0).max() > TOUCHED)
 
 
@@ -43,7 +43,7 @@ def map_centre(depth: np.ndarray, sensor: Sensor) -> np.ndarray | None:
 
     Args:
         depth: Depth [mm], shape (pixels_x, pixels_y).
-        sensor: Whose map.
+        sensor: The sensor of the map.
     """
     inside = depth > DEEP
     if not inside.any():

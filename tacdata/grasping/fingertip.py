@@ -1,7 +1,7 @@
 """The skin on a gripper's fingertip: the default sensor, held at the border of its underside.
 
-The default sensor's side faces are taken as bonded, so that nothing may press over its rim. An object that a gripper
-takes hold of does; here a border of 1 mm of the underside is held and the sides are free.
+The default sensor's sides are bonded, so nothing may press over its rim. An object in a gripper does press over the
+rim. So here a border of 1 mm of the underside is bonded and the sides are free.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from dataclasses import replace
 from tacdata.sensor import Sensor, default_sensor
 
 RIM = 1.0
-"""Width of the underside's border that is held [mm]."""
+"""Width of the bonded border of the underside [mm]."""
 
 
 def fingertip_sensor() -> Sensor:
-    """Return the sensor of this study; all but its bonding is the default one's."""
+    """Return the sensor of this study: the default one with other bonding."""
     sensor = default_sensor()
     assumptions = {
         **sensor.assumptions,

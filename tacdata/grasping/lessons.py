@@ -1,4 +1,4 @@
-"""Solved presses to sequences of readings and maps that a network learns from: as if a guide had pressed at 30 Hz."""
+"""Turns solved presses into training sequences of readings and maps, as if a guide had pressed at 30 Hz."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from tacdata.sensor import Sensor
 REST, HELD = 5, 8
 """Frames without contact at either end, and at full depth [count]."""
 RAMP = (6, 14)
-"""Fewest and most frames of going down, and of coming up [count]."""
+"""Fewest and most frames of loading, and of unloading [count]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lesson:
-    """One press in time."""
+    """One press as a sequence."""
 
     taxels: np.ndarray
     """Tared readings [counts], shape (n, taxels), float32."""
     depth: np.ndarray
-    """The maps that go with them [mm], shape (n, pixels_x, pixels_y), float32, not negative."""
+    """Maps of the same frames [mm], shape (n, pixels_x, pixels_y), float32, not negative."""
     tip: np.ndarray
     """x, y and depth of the indenter [mm], shape (n, 3), float32."""
     indenter: str
-    """Its shape and size, in words."""
+    """Shape and size of the indenter, as text."""
     shape: str
     """Its file in tacdata/indenters."""
 
 
 def lessons(presses: PressSet, sensor: Sensor, spread: FingertipSpread, seed: int = 0) -> list[Lesson]:
-    """Return every press four times: as solved, and mirrored along x, along y and both, each with noise of its own.
+    """Return every press four times: as solved, and mirrored along x, y and both, each with its own noise.
 
-    The fingertip that is learnt from has the sensor file's gains; those of the study differ.
+    The training fingertip has the sensor file's gains; those of the study differ.
     """
     rng, signals, found = np.random.default_rng([seed, 33]), presses.signals(sensor), []
     for k in np.flatnonzero(presses.counts > 1).tolist():
@@ -68,7 +68,7 @@ def _course(deepest: float, rng: np.random.Generator) -> np.ndarray:
 
 
 def _between(levels: np.ndarray, values: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """Return values (k, ...) at depths between the levels, linearly, shape (n, ...)."""
+    """Return values (k, ...) at depths between the levels, linear, shape (n, ...)."""
     above = np.clip(np.searchsorted(levels, depth), 1, len(levels) - 1)
     share = ((depth - levels[above - 1]) / (levels[above] - levels[above - 1])).reshape(-1, *[1] * (values.ndim - 1))
     return values[above - 1] * (1 - share) + values[above] * share

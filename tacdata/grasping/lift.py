@@ -1,9 +1,11 @@
 """The lift in MuJoCo: two fingertips take an orange off a table, rise and hold it.
 
-Nothing here knows of the band. The hand lifts in another configuration than it measures in (paper, Exp. 3): the
+The simulation does not know the band. The hand lifts in another configuration than it measures in (paper, Exp. 3). The
 fingertips are turned and farther apart, and touch with the rounded ridge at the middle of their pads instead of the
-flat skin. Beside its largest-diameter section an orange is thinner and its opposing faces lean outwards, so ridges that
-part to a given distance press it less and push it out. What comes of it is left to contact, friction and gravity.
+flat skin.
+
+Beside its largest section an orange is thinner and its faces lean outwards. Ridges at a given distance then press it
+less and push it out. Contact, friction and gravity decide the result.
 """
 
 from __future__ import annotations
@@ -19,11 +21,11 @@ from tacdata.replay.engine import mujoco
 STEP = 0.001
 """Time step [s]."""
 CLOSE, RISE, HOLD = 0.5, 1.0, 5.0
-"""Time to close, to rise, and for which the orange must stay [s]; the last is the paper's."""
+"""Time to close, to rise, and to hold [s]; the last is the paper's."""
 HEIGHT = 0.05
-"""How far the hand rises [m] (paper)."""
+"""Rise of the hand [m] (paper)."""
 STAYS = 0.8
-"""An object that stays above this share of the height throughout the hold is held [1]."""
+"""Share of the height above which an object counts as held, throughout the hold [1]."""
 XML = """
 <mujoco>
  <option timestep="{step}" cone="elliptic" integrator="implicitfast" impratio="10"/>
@@ -45,15 +47,15 @@ FINGER = """<body name="{name}" pos="0 {y} 0" gravcomp="1"><joint name="{name}" 
 TORSION, IMPEDANCE, FINGER_MASS = 0.003, 0.9, 0.05
 """Friction against turning about the normal [m], the contact's impedance [1] (MuJoCo, solver parameters), mass [kg]."""
 FINEST = 2e-6
-"""How closely the lifting configuration is found [m]."""
+"""Tolerance of the search for the lifting configuration [m]."""
 LOOSEST, GROWTH, TRIES = 5e-4, 1.25, 12
-"""Squeezes that are tried first [m], by what each is larger than the last [1], and how many."""
+"""Squeezes of the search: the first [m], the ratio between two [1], and their number."""
 SIDES = {"near": -1, "far": 1}
 
 
 @dataclass(frozen=True)
 class Grip:
-    """What lifts what."""
+    """Hand and object of a lift."""
 
     radius: float = 0.035
     """Radius of the orange [m]."""
@@ -62,12 +64,13 @@ class Grip:
     friction: float = 0.2
     """Coulomb coefficient between skin and orange [1], the sensor file's."""
     squeeze: float = 0.001
-    """How much farther than touching the middle of the orange each fingertip is sent [m]; the farther apart the
-    fingertips of the lifting configuration are, the less."""
+    """How far each fingertip's target lies beyond the surface of a centred orange [m]; fingertips farther apart squeeze
+    less.
+    """
     stiffness: float = 3000.0
-    """Of a finger that holds its position [N/m]."""
+    """Stiffness of a finger that holds its position [N/m]."""
     skin: float = 3000.0
-    """Of the skin [N/m]."""
+    """Stiffness of the skin [N/m]."""
     ridge: float = 0.008
     """Radius of the ridge [m]: half the pad's width."""
     half: float = 0.006
@@ -81,7 +84,7 @@ class Grip:
 
 @dataclass(frozen=True, eq=False)
 class Lift:
-    """What became of it."""
+    """Result of a lift."""
 
     held: bool
     lowest: float
@@ -95,12 +98,12 @@ class Lift:
 
 
 def lift(grip: Grip, lateral: float, vertical: float = 0.0) -> Lift:
-    """Return what becomes of an orange that lies beside the fingertips' middle.
+    """Return the result for an orange that lies off the fingertips' middle.
 
     Args:
         grip: Hand and object.
-        lateral: How far it lies to +x [m].
-        vertical: How far its centre lies above the pads' middle [m].
+        lateral: Offset of the orange to +x [m].
+        vertical: Height of its centre above the pads' middle [m].
     """
     model, data = _built(grip, vertical)
     data.qpos[:3] = lateral, 0.0, vertical
@@ -120,7 +123,7 @@ def lift(grip: Grip, lateral: float, vertical: float = 0.0) -> Lift:
 
 
 def lifting_grip(grip: Grip, lateral: float) -> Grip:
-    """Return the grip with the widest lifting configuration that still holds an orange so far off [m].
+    """Return the grip with the widest lifting configuration that still holds an orange at this offset [m].
 
     Raises:
         UsageError: If none does.

@@ -1,4 +1,4 @@
-"""A study in one picture: success with intervals beside the paper's, by position, moves, and the centroids' bias."""
+"""Draws a study: success with intervals beside the paper's, by position, moves, and the centroids' bias."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Make the presses that ship: `python -m tacdata.grasping.pin_presses --device cuda:0 --capacity 128`."""
+"""Solves the presses that ship: `python -m tacdata.grasping.pin_presses --device cuda:0 --capacity 128`."""
 
 from __future__ import annotations
 

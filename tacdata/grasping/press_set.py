@@ -1,4 +1,4 @@
-"""Solved presses with their maps, in one file: what the study's readings and its network's labels come from."""
+"""Solved presses with their maps, in one file: the basis of the study's readings and of its network's labels."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from tacdata.skin.press import PressRequest
 
 FOLDER = Path(__file__).parent / "presses"
-"""Those that ship, made by `python -m tacdata.grasping.pin_presses`."""
+"""Folder of the presses that ship, made by `python -m tacdata.grasping.pin_presses`."""
 GRAIN = 0.002
-"""Maps are kept in steps of this [mm]: files stay small, labels need no more."""
+"""Resolution of stored maps [mm]; it keeps files small and suffices for labels."""
 LEAST = 4
-"""A press without an equilibrium at its end is tried less deep, as long as so many depths are left [count]."""
+"""A press without an equilibrium at its end is tried less deep, while at least this many depths are left [count]."""
 FIELDS = ("place", "counts", "depths", "surface", "force", "closure", "area", "normal")
 
 
@@ -45,7 +45,7 @@ class PressSet:
     depths: np.ndarray
     """Depth of each state [mm], shape (n, k)."""
     surface: np.ndarray
-    """Undeformed minus deformed height at the pixels [mm], shape (n, k, pixels_x, pixels_y)."""
+    """Height change of the surface at the pixels, undeformed minus deformed [mm], shape (n, k, pixels_x, pixels_y)."""
     force: np.ndarray
     """Normal force on each protrusion [N], shape (n, k, taxels)."""
     closure: np.ndarray
@@ -55,16 +55,16 @@ class PressSet:
     normal: np.ndarray
     """Normal force on the indenter [N], shape (n, k)."""
     provenance: dict[str, Any]
-    """What made it, the skin model's hashes among it."""
+    """Versions and hashes of what made it, the skin model's among them."""
 
     def signals(self, sensor: Sensor) -> np.ndarray:
-        """Return tared readings without noise [counts], shape (n, k, taxels), by the sensor file's transduction."""
+        """Return tared readings without noise [counts], shape (n, k, taxels), by the sensor's transduction."""
         transducer = Transducer.of(sensor)
         flat = Loads(*(v.reshape(-1, sensor.taxels.count).astype(float) for v in (self.force, self.closure, self.area)))
         return (transducer.read(flat).counts - transducer.offset).reshape(self.force.shape)
 
     def write(self, path: Path) -> None:
-        """Write it (.npz)."""
+        """Write the file (.npz)."""
         buffer, values = io.BytesIO(), {name: getattr(self, name) for name in FIELDS}
         values |= {name: values[name].astype(np.float32) for name in ("force", "closure", "area", "normal")}
         values["surface"] = np.round(self.surface / GRAIN).astype(np.int16)
@@ -100,12 +100,14 @@ def read_presses(path: Path, sensor: Sensor) -> PressSet:
 
 
 def solved_presses(model: SkinModel, asked: Sequence[PressRequest], capacity: int = 1) -> PressSet:
-    """Solve presses; one that finds no equilibrium at its deepest is tried less deep, and has no states in the end.
+    """Solve presses.
+
+    One without equilibrium at its deepest state is tried less deep; if none is found, it has no states.
 
     Args:
         model: The skin.
         asked: Presses with the same number of depths, loading only.
-        capacity: How many are in work at a time.
+        capacity: Presses solved at the same time.
     """
     answers: dict[int, PathSolution] = {}
     todo = dict(enumerate(asked))

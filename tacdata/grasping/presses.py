@@ -1,4 +1,4 @@
-"""Which presses the study rests on: of the object it grasps, and of other things to learn from."""
+"""The presses of the study: of the object that it grasps, and of others for training."""
 
 from __future__ import annotations
 
@@ -11,24 +11,27 @@ from tacdata.skin.press import PressRequest
 RADIUS = 35.0
 """Radius of the orange [mm]."""
 UNIT = 0.013
-"""Depths are this times squares [mm], as a contact's force grows."""
+"""Unit of the depths [mm]: each is the unit times a square, as a contact's force grows."""
 STATES = 8
 """Depths of a press, the undeformed state included [count]."""
 PLACES_X, PLACES_Y, SPACING = 11, 4, 0.75
-"""Places of the orange along x and y, from the middle outwards (the skin looks the same from all four sides), and their
-distance [mm]."""
+"""Positions of the orange along x and y, from the middle outwards, and their spacing [mm]. The skin is symmetric, so a
+quarter suffices.
+"""
 RADII = (4.0, 90.0)
-"""Smallest and largest radius of what is learnt from [mm]."""
+"""Smallest and largest radius for training [mm]."""
 LEFT_OUT = (25.0, 50.0)
-"""Radii that are not learnt from [mm]: the orange's is among them, so that the network has never seen it."""
+"""Radii left out of training [mm]. The orange's is among them, so the network has never seen it."""
 ROUND = 0.8
-"""Share of spheres among what is learnt from; the others are ellipsoids [1]."""
+"""Share of spheres in the training set; the others are ellipsoids [1]."""
 TRAINING = 140
-"""How many presses ship to learn from [count]; each counts four times, mirrored."""
+"""Number of training presses that ship [count]; each counts four times, mirrored."""
 BEYOND = 0.5
-"""How near to the skin's edge contacts come that are learnt from [mm]."""
+"""Smallest distance of training contacts from the skin's edge [mm]."""
 SHALLOWEST, DEEPEST, SHARP, SHARP_DEEPEST = 0.3, 0.64, 12.0, 1.0
-"""Depths that are learnt from, from and to; to which radius a thing is sharp, and how deep such things go [mm]."""
+"""Smallest and largest depth for training; radius below which a shape is sharp, and the largest depth of sharp ones
+[mm].
+"""
 
 
 def orange(radius: float = RADIUS) -> Indenter:
@@ -37,7 +40,7 @@ def orange(radius: float = RADIUS) -> Indenter:
 
 
 def orange_places() -> tuple[np.ndarray, np.ndarray]:
-    """Return the places' x, shape (a,), and y, shape (b,) [mm], from 0."""
+    """Return the positions' x, shape (a,), and y, shape (b,) [mm], from 0."""
     return SPACING * np.arange(PLACES_X), SPACING * np.arange(PLACES_Y)
 
 
@@ -49,11 +52,11 @@ def orange_presses() -> list[PressRequest]:
 
 
 def training_presses(sensor: Sensor, count: int, seed: int = 0) -> list[PressRequest]:
-    """Return presses of spheres and ellipsoids at random places, over the edge too.
+    """Return presses of spheres and ellipsoids at random positions, beyond the edge too.
 
     Args:
         sensor: The skin.
-        count: How many.
+        count: Number of presses.
         seed: Same seed, same presses.
     """
     rng = np.random.default_rng([seed, 31])

@@ -1,4 +1,4 @@
-"""The study from end to end, as a document (`schemas/grasp_study.schema.json`) and in words."""
+"""Runs the whole study; its result as a document (`schemas/grasp_study.schema.json`) and as text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tacdata.grasping.touch import OrangeTouch
 from tacdata.sensor import Sensor
 
 FINENESS = 0.25
-"""How closely it is measured to where a lift holds [mm]."""
+"""Resolution of the offset to which a lift holds [mm]."""
 
 
 def result(
@@ -45,7 +45,7 @@ def result(
         maps: The trained network.
         network: Its identity.
         interval: Successes and trials -> an interval of the proportion.
-        told: Is told how many trials are done, of how many.
+        told: Called with the number of trials done and in total.
     """
     touch, own = OrangeTouch(presses, sensor), configured(setup)
     found = trials(own, touch, maps, told)
@@ -67,7 +67,9 @@ def result(
 
 
 def _lifting(grip: Grip) -> dict[str, float]:
-    """Return the squeeze of a lifting configuration [mm], and to which offset it holds the undisturbed orange [mm]."""
+    """Return the squeeze of a lifting configuration [mm], and the offset up to which it holds the undisturbed orange
+    [mm].
+    """
     held = 0.0
     for offset in np.arange(0.0, 8.0, FINENESS).tolist():
         if not lift(grip, offset / 1000).held:
@@ -77,7 +79,7 @@ def _lifting(grip: Grip) -> dict[str, float]:
 
 
 def lines(found: dict[str, Any]) -> list[str]:
-    """Return a study's result in words, the paper's figures beside it."""
+    """Return a study's result as lines of text, beside the paper's figures."""
     said = [
         f"{'':<13} {'held':>7}  {'Wilson 95 %':<14} {'paper':>6} | at the edge                   | moves where held"
     ]

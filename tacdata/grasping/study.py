@@ -1,4 +1,4 @@
-"""Eight places, five repeats, three strategies (paper, Exp. 3): how often the orange is held, after how many moves."""
+"""The study: eight positions, five repeats, three strategies (paper, Exp. 3); success rates and numbers of moves."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tacdata.grasping.touch import Fingertip, FingertipSpread, OrangeTouch
 from tacdata.grasping.trial import Approach, Protocol, approach
 
 PLACES = (-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0)
-"""Where the orange is put beside the gripper's middle [mm]: evenly over the pad's 16 mm; Pos. 1 to 8."""
+"""Offsets of the orange from the gripper's middle [mm]: evenly over the pad's 16 mm; Pos. 1 to 8."""
 EDGE = (1, 2, 7, 8)
 """Positions that count as edge contact (paper)."""
 MARGIN = 0.5
-"""The lifting configuration is the widest that holds an orange this far beyond the band [mm]."""
+"""The lifting configuration is the widest one that holds an orange this far beyond the band [mm]."""
 OTHER_MARGINS = (0.0, 1.0)
-"""Other lifting configurations for which the rates are given too [mm]."""
+"""Other lifting configurations for which the rates are given [mm]."""
 PUBLISHED = {
     "source": "paper, Exp. 3",
     "overall": {"contact_only": [15, 40], "raw_taxel": [27, 40], "dense_depth": [35, 40]},
@@ -29,11 +29,11 @@ PUBLISHED = {
     "adjustments": {"raw_taxel": [1.07, 1.36], "dense_depth": [2.14, 1.24]},
     "edge_adjustments": {"raw_taxel": [2.56, 1.01], "dense_depth": [2.71, 1.21]},
 }
-"""What the paper reports: held and of how many; mean and standard deviation of adjustments where held."""
+"""Results of the paper: successes and trials; mean and standard deviation of adjustments where held."""
 
 
 def strategy_names() -> list[str]:
-    """Return all strategies, those of the paper first and in its order."""
+    """Return all strategies, those of the paper first, in its order."""
     known, published = strategies.names(), list(PUBLISHED["overall"])
     return [*(name for name in published if name in known), *(name for name in known if name not in published)]
 
@@ -43,10 +43,10 @@ Interval = Callable[[int, int], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Disorder:
-    """How one trial differs from the next."""
+    """Random variation between trials."""
 
     place: float = 0.5
-    """The orange lies up to so far from its place, sideways and in height [mm]."""
+    """Largest offset of the orange from its position, sideways and in height [mm]."""
     friction: float = 0.05
     """Standard deviation of the friction [1]."""
     mass: float = 0.02
@@ -55,7 +55,7 @@ class Disorder:
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything that decides a study but the network."""
+    """Everything that decides a study, except the network."""
 
     protocol: Protocol = field(default_factory=Protocol)
     grip: Grip = field(default_factory=Grip)
@@ -64,7 +64,7 @@ class Setup:
     repeats: int = 5
     """Trials at each place."""
     seed: int = 0
-    """Decides every draw."""
+    """Seed of every draw."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -76,16 +76,16 @@ class Setup:
 
 @dataclass(frozen=True)
 class GraspTrial:
-    """One trial, as it went."""
+    """One trial and its result."""
 
     strategy: str
     position: int
     """1 to 8."""
     repeat: int
     friction: float
-    """Drawn [1]."""
+    """Friction drawn [1]."""
     mass: float
-    """Drawn [kg]."""
+    """Mass drawn [kg]."""
     vertical: float
     """Height of the orange's centre over the pads' middle [mm]."""
     approach: Approach
@@ -111,7 +111,7 @@ def trials(
         setup: The study; its grip is the lifting configuration.
         touch: The skin's answer to the orange.
         maps: The trained network.
-        told: Is told how many are done, of how many.
+        told: Called with the number of trials done and in total.
     """
     found: list[GraspTrial] = []
     names = strategy_names()
@@ -136,7 +136,7 @@ def trials(
 
 
 def lifted(trial: GraspTrial, grip: Grip) -> bool:
-    """Return whether a lifting configuration holds what a trial took hold of."""
+    """Return whether a lifting configuration holds the orange of a trial."""
     if trial.approach.stopped:
         return False
     own = replace(grip, friction=trial.friction, mass=trial.mass)
@@ -170,7 +170,7 @@ def _share(found: list[GraspTrial], interval: Interval) -> dict[str, Any]:
 
 
 def _moves(found: list[GraspTrial]) -> dict[str, Any]:
-    """Return mean and standard deviation of adjustments where the orange was held, as the paper counts them."""
+    """Return mean and standard deviation of the adjustments where the orange was held, as in the paper."""
     moves = [t.approach.adjustments for t in found if t.held]
     if not moves:
         return {"mean": None, "sd": None}

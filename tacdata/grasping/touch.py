@@ -1,4 +1,4 @@
-"""What a fingertip reads that presses on the orange with a given force: the solved presses, interpolated, and noise."""
+"""Readings of a fingertip that presses on the orange with a given force: solved presses, interpolated, and noise."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tacdata.sensor import Sensor
 
 
 class OrangeTouch:
-    """Readings by place and force; the skin looks the same from all four sides, so a quarter of it is solved."""
+    """Readings by position and force; the skin is symmetric, so a quarter of it is solved."""
 
     def __init__(self, presses: PressSet, sensor: Sensor) -> None:
-        """Lay the presses of `presses.orange_presses` on their grid."""
+        """Arrange the presses of `presses.orange_presses` on their grid."""
         x, y = orange_places()
         grid = (len(x), len(y), presses.depths.shape[1])
         self.sensor, self.limit = sensor, (float(x[-1]), float(y[-1]))
@@ -25,11 +25,11 @@ class OrangeTouch:
         self._signals = RegularGridInterpolator((x, y), presses.signals(sensor).reshape(*grid, -1))
 
     def reaches(self, x: float, y: float) -> bool:
-        """Return whether an orange that lies there [mm] touches the skin inside what was solved."""
+        """Return whether an orange at this position [mm] touches the skin inside what was solved."""
         return abs(x) <= self.limit[0] and abs(y) <= self.limit[1]
 
     def depth(self, x: float, y: float, force: float) -> float:
-        """Return the depth [mm] at which the orange presses with a normal force [N]; NaN beyond the deepest solved."""
+        """Return the depth [mm] at which the orange presses with a normal force [N]; NaN beyond the deepest state."""
         forces = np.maximum.accumulate(self._normal((abs(x), abs(y))))
         return float(np.interp(force, forces, self._depths, right=np.nan))
 
@@ -37,7 +37,7 @@ class OrangeTouch:
         """Return tared readings without noise [counts], shape (taxels,).
 
         Args:
-            x: Place of the orange on the pad [mm, sensor frame].
+            x: Position of the orange on the pad [mm, sensor frame].
             y: The same across [mm].
             force: Normal force [N].
         """
@@ -48,7 +48,7 @@ class OrangeTouch:
 
 
 def mirrored(values: np.ndarray, sensor: Sensor, over_x: bool, over_y: bool) -> np.ndarray:
-    """Return readings (..., taxels) as a press on the other side along x, along y or both would give them."""
+    """Return readings (..., taxels) of the press mirrored along x, y or both."""
     array = values.reshape(*values.shape[:-1], sensor.taxels.rows, sensor.taxels.columns)
     array = array[..., ::-1] if over_x else array
     array = array[..., ::-1, :] if over_y else array
@@ -57,29 +57,29 @@ def mirrored(values: np.ndarray, sensor: Sensor, over_x: bool, over_y: bool) -> 
 
 @dataclass(frozen=True)
 class FingertipSpread:
-    """How a fingertip differs from the sensor file, and one frame from the next."""
+    """Random differences of a fingertip from the sensor file, and between frames."""
 
     gain: float = 0.03
     """Standard deviation of each taxel's gain [1]."""
     noise: float = 5.0
     """Standard deviation of a reading [counts]."""
     drift: float = 4.0
-    """Standard deviation of a reading's wander since it was tared [counts]."""
+    """Standard deviation of a reading's drift since it was tared [counts]."""
     mount: float = 0.2
-    """Standard deviation of where the sensor sits on its finger, along x and y [mm]."""
+    """Standard deviation of the sensor's position on its finger, along x and y [mm]."""
 
 
 class Fingertip:
-    """One of the two; where it sits and what its taxels are off by is drawn once."""
+    """One of the two fingertips; its position and taxel errors are drawn once."""
 
     def __init__(self, touch: OrangeTouch, spread: FingertipSpread, side: int, rng: np.random.Generator) -> None:
         """Draw it.
 
         Args:
             touch: The skin's answer.
-            spread: How it differs.
+            spread: Standard deviations of its differences.
             side: +1 if the sensor's x runs with the gripper's lateral direction, -1 if against it.
-            rng: Decides everything, noise too.
+            rng: Random generator of everything, noise too.
         """
         count = touch.sensor.taxels.count
         self.side, self._touch, self._spread, self._rng = side, touch, spread, rng
@@ -87,10 +87,10 @@ class Fingertip:
         self._mount = rng.normal(0.0, spread.mount, 2)
 
     def frames(self, lateral: float, vertical: float, force: float, count: int) -> np.ndarray:
-        """Return tared readings [counts], shape (count, taxels); noise alone where the orange is beyond the skin.
+        """Return tared readings [counts], shape (count, taxels); noise only where the orange is beyond the skin.
 
         Args:
-            lateral: Place of the orange in the gripper's frame [mm].
+            lateral: Position of the orange in the gripper's frame [mm].
             vertical: The same upwards [mm].
             force: Normal force [N].
             count: Frames.

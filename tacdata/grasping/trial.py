@@ -1,4 +1,4 @@
-"""One trial: close, measure, move toward the band, measure again, and in the end lift."""
+"""One trial: close, measure, move toward the band, measure again, and finally lift."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from tacdata.grasping.touch import Fingertip
 
 @dataclass(frozen=True)
 class Protocol:
-    """How the hand proceeds."""
+    """How the hand proceeds: band, forces, moves, safety stops."""
 
     band: float = 2.0
-    """Contacts within this of the middle are accepted [mm] (paper)."""
+    """Largest offset from the middle at which a contact is accepted [mm] (paper)."""
     window: float = 5.0
     """Time over which readings are averaged [s] (paper)."""
     force: float = 1.8
     """Normal force of each fingertip while it measures [N]."""
     largest_move: float = 2.0
-    """No adjustment moves the arm farther [mm]: half the band's width."""
+    """Largest move of the arm per adjustment [mm]: half the band's width."""
     off: float = 0.1
-    """Standard deviation of where the arm comes to a halt [mm]."""
+    """Standard deviation of the arm's positioning error [mm]."""
     most: int = 20
-    """Safety stop: after so many adjustments the trial ends as failed [count]; the strategies know no limit."""
+    """Safety stop: largest number of adjustments; then the trial has failed [count]. The strategies know no limit."""
     reach: float = 12.0
-    """Safety stop: the arm moves no farther than this from where it began [mm]."""
+    """Safety stop: largest distance of the arm from its start [mm]."""
 
 
 @dataclass(frozen=True)
 class Approach:
-    """How the search for a place to grasp ended."""
+    """Result of the search for a position to grasp."""
 
     lateral: float
-    """Where the orange then truly lies beside the gripper's middle [mm]."""
+    """True offset of the orange from the gripper's middle at the end [mm]."""
     adjustments: int
-    """How often the arm moved."""
+    """Number of adjustments."""
     estimates: tuple[float, ...]
-    """What was believed at each measurement [mm]."""
+    """Estimated offset at each measurement [mm]."""
     truths: tuple[float, ...]
-    """What was true at each [mm]."""
+    """True offset at each measurement [mm]."""
     stopped: str
-    """Why nothing is lifted, in words; empty if it is."""
+    """Why nothing is lifted, as a sentence; empty if it is lifted."""
 
 
 def fused(fingers: Sequence[Fingertip], centres: Sequence[np.ndarray | None]) -> float | None:
-    """Return the lateral offset in the gripper's frame [mm], averaged over the fingertips that know one."""
+    """Return the lateral offset in the gripper's frame [mm], averaged over the fingertips with an estimate."""
     known = [finger.side * float(c[0]) for finger, c in zip(fingers, centres, strict=True) if c is not None]
     return float(np.mean(known)) if known else None
 
@@ -57,16 +57,16 @@ def approach(
     fingers: Sequence[Fingertip], lateral: float, vertical: float, strategy: Strategy, protocol: Protocol,
     rate: float, rng: np.random.Generator,
 ) -> Approach:  # fmt: skip
-    """Close, measure and move until the contact is believed to lie in the band.
+    """Close, measure and move until the contact is estimated to lie in the band.
 
     Args:
         fingers: The two fingertips.
-        lateral: Where the orange lies at first [mm].
+        lateral: Initial offset of the orange [mm].
         vertical: The same upwards [mm].
-        strategy: Where each fingertip believes the contact to be.
+        strategy: Estimate of each fingertip's contact.
         protocol: How the hand proceeds.
         rate: Frames a second [Hz].
-        rng: Decides where the arm comes to a halt.
+        rng: Random generator of the positioning errors.
     """
     start, count = lateral, round(protocol.window * rate)
     believed: list[float] = []

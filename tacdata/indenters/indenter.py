@@ -1,17 +1,18 @@
-"""What an indenter's file holds.
+"""Base class of an indenter's shape.
 
-A file ``tacdata/indenters/my_shape.py`` defines one frozen dataclass derived from `Indenter`. Its fields are
-lengths [mm] or angles [deg]; they are the shape's parameters in plans, recordings and labels. Indenter frame:
-origin at the lowest point (a ring: at the middle of its lowest circle), z pointing away from the skin; the
-solid fills z >= 0 around it.
+A file ``tacdata/indenters/my_shape.py`` defines one frozen dataclass derived from `Indenter`. Its fields are lengths
+[mm] or angles [deg]; they are the shape's parameters in plans, recordings and labels.
 
-Distance functions are Warp functions defined inside `Indenter.distance_function`, so that listing or reading
-plans never imports Warp. ``wp = warp()`` must be used in the function's body: that makes it a closure
-variable, by which Warp resolves the annotations (strings, under ``from __future__ import annotations``). Warp
-matches vector types by length and scalar, so ``wp.types.vector(8, wp.float64)`` may be written anew in every
-file. Take lengths with ``wp.length``, not ``wp.sqrt``: its derivative at zero (points on the axis) is zero
-instead of NaN. Kernels built over a distance function want ``@wp.kernel(module="unique")``; else each shape
-recompiles the others.
+Indenter frame: origin at the lowest point (a ring: at the middle of its lowest circle), z pointing away from the skin;
+the solid fills z >= 0 around it.
+
+Distance functions are Warp functions defined inside `Indenter.distance_function`, so that listing or reading plans
+never imports Warp. Write ``wp = warp()`` in the function's body. That makes it a closure variable, by which Warp
+resolves the annotations (strings, under ``from __future__ import annotations``).
+
+Warp matches vector types by length and scalar, so ``wp.types.vector(8, wp.float64)`` may be written anew in every file.
+Take lengths with ``wp.length``, not ``wp.sqrt``: its derivative at zero (points on the axis) is zero instead of NaN.
+Kernels over a distance function need ``@wp.kernel(module="unique")``; otherwise each shape recompiles the others.
 """
 
 from __future__ import annotations
@@ -36,10 +37,10 @@ ROOM, BASE = "tacdata.indenters", "indenter"
 
 @dataclass(frozen=True)
 class Indenter(ABC):
-    """A rigid shape."""
+    """Base class: a rigid shape that presses the skin."""
 
     def __post_init__(self) -> None:
-        """Refuse lengths that are no lengths.
+        """Refuse parameters that are not positive and finite.
 
         Raises:
             FormatError: If a parameter is not positive and finite.
@@ -58,7 +59,7 @@ class Indenter(ABC):
     @classmethod
     @abstractmethod
     def example(cls) -> Self:
-        """Return a typical one, fit to press a skin 3 mm thick; catalogues and conformance tests use it."""
+        """Return a typical example, fit to press a skin 3 mm thick; catalogues and conformance tests use it."""
 
     @property
     def shape(self) -> str:
@@ -73,10 +74,10 @@ class Indenter(ABC):
     @property
     @abstractmethod
     def parameters(self) -> tuple[float, ...]:
-        """At most 8 numbers handed to the distance function, in mm or radians."""
+        """At most 8 numbers for the distance function, in mm or radians."""
 
     def device_parameters(self, device: str) -> tuple[float, ...]:
-        """Return `parameters` for kernels on a device; a shape with data of its own puts them there at the first call.
+        """Return `parameters` for kernels on a device; data of a shape are copied there at the first call.
 
         Args:
             device: Warp's name of the device, for example "cuda:0".
@@ -85,22 +86,22 @@ class Indenter(ABC):
 
     @property
     def exactness(self) -> float:
-        """How far the zero of the distance function may lie from the shape [mm]; next to nothing for closed forms."""
+        """Largest distance between the zero of the distance function and the shape [mm]; nearly 0 for closed forms."""
         return 1e-7
 
     @property
     def sharpest(self) -> float:
-        """The smallest radius of curvature that a skin may meet [mm]: by default the shape's smallest length."""
+        """Smallest radius of curvature that may touch a skin [mm]; by default the shape's smallest length."""
         lengths = [value for name, value in asdict(self).items() if "angle" not in name]
         return min(float(value) for value in lengths if isinstance(value, int | float))
 
     @classmethod
     def complete(cls, values: dict[str, Any], origin: str, folder: Path | None) -> dict[str, Any]:
-        """Return a document's parameters with those filled in that follow from the others; a hook for shapes in files.
+        """Return a document's parameters, completed by those that follow from others; a hook for shapes in files.
 
         Args:
             values: Parameters as given.
-            origin: What gave them, for errors.
+            origin: Their source, for errors.
             folder: Folder that file names are relative to; None where the document lies in no file.
         """
         return values
@@ -126,9 +127,9 @@ class Indenter(ABC):
         """Largest horizontal distance [mm] of the solid from its axis."""
 
     def surface(self, height: float = 6.0) -> trimesh.Trimesh:
-        """Return a surface for pictures [mm, indenter frame], cut off at ``height`` [mm].
+        """Return a surface for pictures [mm, indenter frame], cut at ``height`` [mm].
 
-        The default samples `profile` and is open above; a shape returns something closed where that is easy.
+        The default samples `profile` and is open above. A shape returns a closed one where that is easy.
         """
         import trimesh
 
@@ -143,13 +144,15 @@ class Indenter(ABC):
         return trimesh.Trimesh(lower, faces[inside], process=True)
 
     def _grid(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return places that cover the solid [mm], two arrays of shape (65, 65)."""
+        """Return sample positions that cover the solid [mm], two arrays of shape (65, 65)."""
         samples = np.linspace(-self.extent, self.extent, 65)
         x, y = np.meshgrid(samples, samples, indexing="ij")
         return x, y
 
     def footprint(self, depth: float, yaw: float) -> tuple[float, float]:
-        """Return how far the part below ``depth`` [mm] reaches along x and y [mm], turned by ``yaw`` [deg]."""
+        """Return the extent of the part below ``depth`` [mm] along x and y [mm], for an indenter turned by ``yaw``
+        [deg].
+        """
         x, y = self._grid()
         within = self.profile(x, y) <= depth
         if not within.any():
@@ -178,7 +181,7 @@ def rounded_hull(corners: np.ndarray, radius: float, height: float) -> trimesh.T
 
     normals = np.asarray(trimesh.creation.icosphere(subdivisions=3).vertices)
     support = normals @ corners.T
-    # The sum's surface point of a normal rises over the corner that lies farthest along it.
+    # The sum's surface point with a given normal lies over the corner that is farthest along it.
     normal, corner = np.nonzero(support > support.max(axis=1, keepdims=True) - 1e-9)
     return cut(trimesh.convex.convex_hull(corners[corner] + radius * normals[normal]), height)
 
@@ -202,7 +205,7 @@ def from_document(document: dict[str, Any], origin: str = "indenter", folder: Pa
 
     Args:
         document: The indenter as plain data.
-        origin: What it comes from, for errors.
+        origin: Its source, for errors.
         folder: Folder that file names in it are relative to.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Any closed solid, from an STL, OBJ or PLY file."""
+"""Any closed solid, from an STL, OBJ, PLY or STEP file."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ SHAPES = Path(__file__).parent / "shapes"
 """Surface files that ship."""
 
 _SMALLEST, _LARGEST = 0.2, 200.0
-"""Extents between which a solid presses a skin [mm]; others are files in another unit."""
+"""Smallest and largest extent of a solid [mm]; others are files in another unit."""
 _OFF_AXIS = 0.02
-"""How far inside its bounding box the press axis must pass, of the box [1]: at the very border it passes beside."""
+"""Minimum distance of the press axis from the border of the bounding box, over the box's size [1]."""
 
 
 @dataclass(frozen=True)
 class Mesh(Indenter):
-    """A closed solid as it stands in its file: z is the press's axis, its lowest point is put at z = 0."""
+    """A closed solid as in its file: z is the press's axis; its lowest point is moved to z = 0."""
 
     file: str = field(compare=False)
-    """Name of the surface file, beside the plan or case that names it; its content decides, not its name."""
+    """Name of the surface file, beside the plan or case that names it; its content matters, not its name."""
     sha256: str
-    """SHA-256 of the file (hex); filled in where a plan or case leaves it out."""
+    """SHA-256 of the file (hex); computed if a plan or case leaves it out."""
     scale: float = 1.0
     """Millimetres in the file's unit [mm]: 1 for mm, 1000 for m, 25.4 for inches."""
 
     def __post_init__(self) -> None:
-        """Refuse what names no file.
+        """Refuse a wrong file name, hash or scale.
 
         Raises:
             FormatError: If a parameter is not of its kind.
@@ -55,11 +55,11 @@ class Mesh(Indenter):
 
     @classmethod
     def complete(cls, values: dict[str, Any], origin: str, folder: Path | None) -> dict[str, Any]:
-        """Find and check the file that a plan or case names, keep a copy, and add its hash.
+        """Find and check the file of a plan or case, store a copy, and add its hash.
 
         Raises:
             UsageError: If it is not found.
-            FormatError: If it bounds no solid, is no size to press with, or is not the file of the hash given.
+            FormatError: If it bounds no solid, has an impossible size, or is not the file of the hash given.
         """
         file, wanted = values.get("file"), values.get("sha256")
         if not isinstance(file, str) or (wanted and folder is None):
@@ -99,12 +99,12 @@ class Mesh(Indenter):
 
     @property
     def exactness(self) -> float:
-        """Two micrometres [mm]: what the smooth surface behind a usual tessellation is off by."""
+        """Two micrometres [mm]: the error of the smooth surface behind a usual tessellation."""
         return 2e-3
 
     @property
     def sharpest(self) -> float:
-        """Three tenths of a millimetre: a file does not tell, and finer edges than about this its grid rounds."""
+        """Three tenths of a millimetre: a file does not state its sharpest edge, and its grid rounds finer ones."""
         return 0.3
 
     @property
@@ -113,7 +113,7 @@ class Mesh(Indenter):
         return self.device_parameters("cpu")
 
     def device_parameters(self, device: str) -> tuple[float, ...]:
-        """Return the address of the distance on a device, which gets its data at the first call."""
+        """Return the address of the distance on a device; data are copied there at the first call."""
         return self.solid.handle(device)
 
     @property
@@ -123,7 +123,7 @@ class Mesh(Indenter):
         return 1.005 * float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
 
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return where vertical lines first meet the solid [mm]: up by the distance itself, then by bisection."""
+        """Return the height at which vertical lines first meet the solid [mm]: sphere tracing, then bisection."""
         grid, top = self.solid.grid, float(self.solid.mesh.bounds[1, 2])
         plan = np.stack([np.ravel(x), np.ravel(y)], axis=-1).astype(float)
         z = np.full(len(plan), -grid.spacing)
@@ -131,7 +131,7 @@ class Mesh(Indenter):
         while len(going):
             d = grid.distance(np.column_stack([plan[going], z[going]]))
             found[going[d < 0]] = True
-            # No surface is nearer than the distance; a least step goes through it where it is grazed.
+            # No surface is nearer than the distance; a minimum step passes it where the line grazes it.
             z[going] += np.where(d < 0, 0.0, np.maximum(d, 0.25 * grid.spacing))
             going = going[(d >= 0) & (z[going] < min(top, grid.high[2]))]
         high = z[found]
@@ -147,7 +147,7 @@ class Mesh(Indenter):
     @staticmethod
     @cache
     def distance_function() -> Function:
-        """Return the spline of `tacdata.surfaces.distance_grid`, read where the parameters point."""
+        """Return the spline of `tacdata.surfaces.distance_grid`, at the address in the parameters."""
         from tacdata.surfaces.distance_grid import MARGIN
 
         wp = warp()
@@ -198,7 +198,7 @@ class Mesh(Indenter):
         return mesh_distance
 
     def surface(self, height: float = 6.0) -> trimesh.Trimesh:
-        """Return the solid as tessellated, cut off at ``height`` [mm]."""
+        """Return the solid as tessellated, cut at ``height`` [mm]."""
         import trimesh
 
         whole = self.solid.mesh
@@ -225,9 +225,9 @@ def _check_size(body: Solid, indenter: Mesh, origin: str) -> None:
 
 
 def _check_axis(body: Solid, indenter: Mesh, origin: str) -> None:
-    """Refuse a solid that stands beside the axis it is pressed along, as a file of a build plate leaves it.
+    """Refuse a solid beside the axis along which it is pressed, as in a file of a whole build plate.
 
-    The axis may pass between two tips of one holder, so that it need not meet the solid, only its bounding box.
+    The axis may pass between two tips of one holder. So it must meet the bounding box, not the solid.
     """
     low, high = np.asarray(body.mesh.bounds)[:, :2]
     inset = _OFF_AXIS * (high - low)

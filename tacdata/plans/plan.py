@@ -14,14 +14,14 @@ from tacdata.sensor import Sensor
 
 @dataclass(frozen=True)
 class Press:
-    """One press: the nominal contact configuration and how it is driven. Sensor frame."""
+    """One press: contact configuration and motion, in the sensor frame."""
 
     index: int
-    """Place in the plan, from 0; also the episode's number."""
+    """Number in the plan, from 0; also the episode's number."""
     indenter: Indenter
-    """What presses."""
+    """The indenter."""
     indenter_name: str
-    """The plan's name for that specimen."""
+    """The plan's name for that indenter."""
     x: float
     """Location of the indenter's tip [mm]: its lowest point, if it stands upright."""
     y: float
@@ -29,7 +29,8 @@ class Press:
     yaw: float
     """Rotation of the indenter about its own axis [deg]."""
     depth: float
-    """Depth of the lowest point below the undeformed outer face at (x, y) [mm]; negative flies over without contact."""
+    """Depth of the lowest point below the undeformed outer face at (x, y) [mm]; negative passes above without contact.
+    """
     speed: float
     """Loading and unloading speed [mm/s]."""
     hold: float
@@ -37,40 +38,40 @@ class Press:
     repeat: int = 0
     """Which repetition of the same configuration this is, from 0."""
     rest: float | None = None
-    """Time without contact before the press [s]; None: as the plan's motion says."""
+    """Time without contact before the press [s]; None: by the plan's motion settings."""
     recovery: float = 0.0
-    """Time without contact after the release that still belongs to the recording [s]."""
+    """Recorded time without contact after the release [s]."""
     approach_from: str = ""
-    """Side from which the guide comes over the site: "+x", "-x", "+y" or "-y"; empty: as it happens to come."""
+    """Side from which the guide comes over the site: "+x", "-x", "+y" or "-y"; empty for any."""
     overshoot: float = 0.0
     """How much deeper than ``depth`` the guide goes before it comes back up to it [mm]."""
     purpose: str = ""
-    """What the press is for, in words; presses with the same words belong together."""
+    """Purpose of the press, as text; presses with the same purpose belong together."""
     tilt_x: float = 0.0
-    """How far the indenter's axis leans about x [deg], after the yaw and the tilt about y."""
+    """Tilt of the indenter's axis about x [deg], applied after the yaw and the tilt about y."""
     tilt_y: float = 0.0
-    """How far the indenter's axis leans about y [deg], after the yaw."""
+    """Tilt of the indenter's axis about y [deg], applied after the yaw."""
 
     @property
     def angles(self) -> dict[str, float]:
-        """How the indenter is turned [deg]: the yaw, and the tilts that are not 0, as entries of a plan."""
+        """Angles of the indenter [deg]: the yaw, and tilts that are not 0, as entries of a plan."""
         tilts = {"tilt_x": self.tilt_x, "tilt_y": self.tilt_y}
         return {"yaw": self.yaw, **{name: tilt for name, tilt in tilts.items() if tilt}}
 
     @property
     def turned(self) -> str:
-        """The angles in words, for example ``15 deg, leaning 5 deg about x``."""
+        """The angles as text, for example ``15 deg, leaning 5 deg about x``."""
         leans = [f"{t:g} deg about {axis}" for axis, t in (("x", self.tilt_x), ("y", self.tilt_y)) if t]
         return f"{self.yaw:g} deg" + (f", leaning {' and '.join(leans)}" if leans else "")
 
     @property
     def mounting(self) -> tuple[str, float, float, float]:
-        """The indenter's name and angles [deg]: presses that share it follow each other without a hand."""
+        """The indenter's name and angles [deg]; presses that share it need no remounting between them."""
         return self.indenter_name, self.yaw, self.tilt_x, self.tilt_y
 
     @property
     def deepest(self) -> float:
-        """Largest depth that is commanded [mm]."""
+        """Largest commanded depth [mm]."""
         return self.depth + self.overshoot
 
     @property
@@ -82,13 +83,13 @@ class Press:
 
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str = "press") -> Press:
-        """Rebuild a press from `document`."""
+        """Read a press from its `document`."""
         return cls(**{**document, "indenter": from_document(document["indenter"], origin)})
 
 
 @dataclass(frozen=True)
 class MotionSettings:
-    """How the plan's presses are driven unless a press says otherwise."""
+    """Motion of the plan's presses, unless a press states otherwise."""
 
     clearance: float
     """Height above the skin for travel between sites [mm]."""
@@ -103,25 +104,25 @@ class MotionSettings:
     rest: float
     """Time without contact before each press [s]."""
     standoff: float = 0.3
-    """Height at which the approach speed gives way to the press speed [mm]."""
+    """Height at which the approach speed changes to the press speed [mm]."""
     run_up: float = 1.0
-    """Sideways way over which a press with ``approach_from`` comes to its site [mm]."""
+    """Sideways distance over which a press with ``approach_from`` comes to its site [mm]."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A named list of presses."""
+    """A named list of presses, with their indenters and motion settings."""
 
     name: str
     motion: MotionSettings
     presses: tuple[Press, ...]
     purpose: str = ""
     document: dict[str, Any] | None = None
-    """The file's document, kept as written."""
+    """The file's document, unchanged."""
 
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str, folder: Path | None = None) -> Plan:
-        """Build a plan from a parsed file; ``folder`` is what names of surface files in it are relative to.
+        """Build a plan from a parsed file; names of surface files in it are relative to ``folder``.
 
         Raises:
             FormatError: If the document breaks the schema or a press names an unknown indenter.
@@ -131,7 +132,7 @@ class Plan:
             name: from_document(values, f"{origin}: indenters/{name}", folder)
             for name, values in document["indenters"].items()
         }
-        # A shape from a file is named by its content from here on.
+        # From here on, a shape from a file is identified by its content.
         document = {**document, "indenters": {name: found.document for name, found in indenters.items()}}
         motion = MotionSettings(**document["motion"])
         presses = []
@@ -153,7 +154,7 @@ class Plan:
         return cls(document["name"], motion, tuple(presses), document.get("purpose", ""), document)
 
     def check_against(self, sensor: Sensor) -> None:
-        """Refuse presses that would miss the skin or go through it.
+        """Refuse presses that would miss the skin or pierce it.
 
         Raises:
             FormatError: Naming the first such press.

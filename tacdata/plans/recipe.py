@@ -1,4 +1,4 @@
-"""A plan in short: blocks of sites x depths x speeds x holds x repeats, written out to presses."""
+"""A plan in short form: blocks of sites x depths x speeds x holds x repeats, expanded to presses."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ from tacdata.plans.sites import sites
 from tacdata.sensor import Sensor
 
 COPIED = ("rest", "recovery", "overshoot", "purpose")
-"""What a block says for all of its presses."""
+"""Entries of a block that hold for all of its presses."""
 
 
 def write_out(recipe: dict[str, Any], sensor: Sensor, origin: str, seed: int = 0) -> dict[str, Any]:
     """Return the plan's document (`schemas/plan.schema.json`) of a recipe (`plan_recipe.schema.json`).
 
-    Within a block the repeats of one press follow each other; holds vary fastest next, then speeds, depths,
-    approach directions, sites, tilts and yaws. ``order: random`` shuffles the block. Blocks keep their order, except
-    that presses of one indenter, yaw and tilt are brought together, so that each is mounted once, unless the recipe
-    says ``grouped: false``.
+    Within a block the repeats of one press follow each other. Then holds vary fastest, then speeds, depths, approach
+    directions, sites, tilts and yaws. ``order: random`` shuffles the block.
+
+    Blocks keep their order, but presses of one indenter, yaw and tilt are brought together, so that each is mounted
+    once. ``grouped: false`` switches that off.
 
     Args:
         recipe: The recipe's document.
         sensor: The skin.
         origin: Names the recipe in errors.
-        seed: Decides random sites and orders.
+        seed: Seed of random sites and orders.
 
     Raises:
         FormatError: If the recipe breaks its schema, or a press misses the skin or pierces it.

@@ -1,4 +1,4 @@
-"""Where on a skin to press: grids, taxels, gaps between them, the edge, random places."""
+"""Sites on a skin: grids, taxels, gaps between them, the edge, random places."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.indenters import from_document
 from tacdata.sensor import Sensor
 
 MARGIN = 0.5
-"""Distance from the array's box, inwards, that grids and random places keep if none is given [mm]."""
+"""Default distance of grids and random places from the array's box, inwards [mm]."""
 
 
 def sites(description: dict[str, Any], sensor: Sensor, rng: np.random.Generator, origin: str) -> np.ndarray:
@@ -21,14 +21,14 @@ def sites(description: dict[str, Any], sensor: Sensor, rng: np.random.Generator,
     Args:
         description: ``{"kind": name, ...}`` as in `schemas/plan_recipe.schema.json`.
         sensor: The skin.
-        rng: Decides random places.
+        rng: Random generator.
         origin: Names the block in errors.
 
     Returns:
         Sites [mm, sensor frame], shape (n, 2).
 
     Raises:
-        FormatError: If the description misses what its kind needs, or names a taxel that is not there.
+        FormatError: If the description lacks an entry of its kind, or names a taxel that does not exist.
     """
     values = dict(description)
     kind = values.pop("kind")
@@ -53,7 +53,7 @@ def clear_of_rim(presses: list[dict[str, Any]], indenters: dict[str, Any], senso
         presses: The document's presses.
         indenters: The document's indenters.
         sensor: The skin; its frame holds the rim.
-        clearance: Least distance of each indenter at full depth from the rim [mm].
+        clearance: Minimum distance of each indenter at full depth from the rim [mm].
     """
     half = np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2
     for press in presses:

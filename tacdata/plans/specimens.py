@@ -1,4 +1,4 @@
-"""Indenters that a lab can print, by the names that plans give them."""
+"""Indenters that a lab can print, by their names in plans."""
 
 from __future__ import annotations
 

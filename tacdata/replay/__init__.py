@@ -1,1 +1,1 @@
-"""What a robot is to do with a demonstration: fingertip targets, joints, and a scene to try them in."""
+"""Replays demonstrations: fingertip targets, joint values, and a simulated scene to try them in."""

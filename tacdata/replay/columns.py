@@ -1,4 +1,4 @@
-"""Targets as flat named columns, and back: the one place that knows their names."""
+"""Targets as named columns for files, and back: the only place that knows the column names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MuJoCo, imported when it is needed; its bindings carry no types, so it is handed out as it is."""
+"""Imports MuJoCo when it is needed; its bindings have no types."""
 
 from __future__ import annotations
 

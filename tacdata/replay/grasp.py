@@ -1,4 +1,4 @@
-"""One grasp out of a demonstration: from open fingers to their letting go."""
+"""Cuts one grasp out of a demonstration: from open fingers until they let go."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from tacdata.errors import UsageError
 from tacdata.replay.targets import FingertipTargets
 
 FELT = 0.5
-"""A finger touches where it feels more than this share of its largest depth [1]."""
+"""Threshold of touch: share of a finger's largest depth [1]."""
 LEAST_DEPTH = 0.05
-"""A largest depth below this is no touch [mm]."""
+"""Smallest maximum depth that counts as touch [mm]."""
 BEFORE, AFTER = 1.0, 0.2
-"""What of the approach and of the letting go belongs to a grasp [s]."""
+"""Time before and after the touch that belongs to a grasp [s]."""
 SHORT = 0.5
-"""A touch that lasts less is no grasp [s]."""
+"""Shortest touch that counts as a grasp [s]."""
 
 
 def touching(targets: FingertipTargets) -> np.ndarray:
-    """Return when all fingers feel something at once, shape (n,), bool."""
+    """Return when all fingers touch at once, shape (n,), bool."""
     depth = np.nan_to_num(targets.depth)
     return (depth > FELT * np.maximum(depth.max(axis=0), LEAST_DEPTH / FELT)).all(axis=1)
 
 
 def first_grasp(targets: FingertipTargets) -> tuple[int, int, int]:
-    """Return the rows of the first grasp that begins with open fingers: its beginning, first touch, and end.
+    """Return rows of the first grasp that begins with open fingers: its beginning, first touch, and end.
 
     Raises:
         UsageError: If there is none.

@@ -1,8 +1,8 @@
 """Joint values that bring a robot's fingertips to their targets, by mink on MuJoCo's kinematics (decision 0011).
 
-Each time is solved from the one before; then it is measured where the fingertips are. Where they are not at their
-targets, other beginnings are tried: the last that reached, the home, some at random. What does not reach its target is
-said, and its joint values are NaN.
+Each time is solved from the one before, and the resulting fingertip positions are checked. Where they miss their
+targets, other starts are tried: the last success, the home position, some at random. Targets out of reach are named,
+and their joint values are NaN.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from tacdata.replay.robot import Robot
 from tacdata.replay.targets import FingertipTargets
 
 COUPLED = 1e-4
-"""How far a mimic joint may be off the joint that it follows [rad or m]; beyond, no target of that time is reached."""
+"""Largest deviation of a mimic joint from its joint [rad or m]; beyond it no target of that time counts as reached."""
 AGAIN = 15
-"""While a target stays out of reach, other beginnings are tried at every so many times [count]."""
+"""While a target is out of reach, other starts are tried at every this many times [count]."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointPath:
-    """What the joints do, and what cannot be done."""
+    """Joint values, and which targets they miss."""
 
     joints: tuple[Joint, ...]
     time_ns: np.ndarray
@@ -32,19 +32,19 @@ class JointPath:
     values: np.ndarray
     """Joint values [rad or m], shape (n, joints); NaN in rows where a target is not reached."""
     position_error: np.ndarray
-    """Distance of each fingertip from its target, at the best that was found [m], shape (n, f)."""
+    """Distance of each fingertip from its target, at the best solution [m], shape (n, f)."""
     rotation_error: np.ndarray
     """Angle between each fingertip and its target [rad], shape (n, f)."""
     unreached: dict[str, tuple[int, ...]]
-    """Finger -> rows whose target lies further than the tolerance from where the fingertip can be."""
+    """Finger -> rows whose target is missed by more than the tolerance."""
     outside_workspace: dict[str, tuple[int, ...]]
     """Finger -> rows whose target lies outside the robot's workspace."""
     too_fast: dict[str, tuple[int, ...]]
-    """Joint -> rows that are reached only faster than the joint's limit."""
+    """Joint -> rows that need more speed than the joint's limit."""
 
 
 def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinematics]:
-    """Return the joint path that follows the targets, with everything that cannot be followed named.
+    """Return the joint path that follows the targets; everything that cannot be followed is named.
 
     Raises:
         UsageError: If the robot has no fingertip for a finger.
@@ -72,7 +72,7 @@ def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinemati
 
 
 def _search(model: Kinematics, places: np.ndarray, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return joint values, shape (n, joints), and what is left of each target: [m] and [rad], shape (n, f)."""
+    """Return joint values, shape (n, joints), and the errors of each target: [m] and [rad], shape (n, f)."""
     search, count = KinematicSearch(model), len(places)
     values, errors = np.empty((count, len(model.joints))), np.empty(places.shape[:2])
     angles = np.empty_like(errors)

@@ -1,8 +1,8 @@
-"""Joint values nearest to fingertip targets: Levenberg and Marquardt's steps, each a problem within the joints' limits.
+"""Joint values nearest to fingertip targets: Levenberg-Marquardt steps, each within the joints' limits.
 
-A step that does not bring the fingertips nearer is taken back and tried again shorter (D. W. Marquardt, SIAM Journal on
-Applied Mathematics 11 (1963) 431). So a target that cannot be reached ends at the nearest place that the steps lead to,
-and the targets after it are searched for from there instead of from wherever a long step has thrown the joints.
+A step that does not reduce the error is rejected and repeated with more damping (D. W. Marquardt, SIAM Journal on
+Applied Mathematics 11 (1963) 431). So the search for an unreachable target ends at the nearest configuration that the
+steps lead to, and the next target starts from there.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ import numpy as np
 from tacdata.replay.kinematics import Kinematics
 
 STEPS = 60
-"""Largest number of steps from one beginning [count]; the first time gets ten times as many."""
+"""Largest number of steps from one start [count]; the first time gets ten times as many."""
 REST = 1e-7
-"""A step that moves no joint by more has come to rest [rad or m]."""
+"""Step size below which the search has converged [rad or m]."""
 THERE = 1e-16
-"""A sum of squared errors below which nothing is left to gain [m^2]."""
+"""Sum of squared errors below which the search ends [m^2]."""
 DAMPING = 1e-6, 1e4
-"""Damping at the beginning, and beyond which no step is tried any more [m^2]."""
+"""Initial damping, and the damping at which the search ends [m^2]."""
 LONGER, SHORTER = 0.25, 8.0
-"""Factors of the damping after a step that helped, and after one that did not [1]."""
+"""Factors of the damping after an accepted and after a rejected step [1]."""
 OTHERS = 4
-"""Beginnings drawn at random where a target is not reached [count]."""
+"""Random starts where a target is not reached [count]."""
 COUPLING = 10.0
-"""How much a mimic joint that is off counts against a metre [m/rad or 1]."""
+"""Weight of a mimic joint's deviation relative to a metre [m/rad or 1]."""
 SOLVER = "daqp"
 
 
@@ -46,13 +46,13 @@ class KinematicSearch:
         self._state = mink.Configuration(model.model, q=model.home)
 
     def aim(self, places: np.ndarray, turns: np.ndarray) -> None:
-        """Take targets in the robot's root frame: places [m], shape (f, 3), and rotations, shape (f, 3, 3)."""
+        """Set the targets in the robot's root frame: positions [m], shape (f, 3), and rotations, shape (f, 3, 3)."""
         mink = self._mink
         for task, place, turn in zip(self._tips, places, turns, strict=True):
             task.set_target(mink.SE3.from_rotation_and_translation(mink.SO3.from_matrix(turn), place))
 
     def settle(self, begin: np.ndarray, steps: int = STEPS) -> tuple[np.ndarray, float]:
-        """Return the joint values that steps from ``begin`` lead to, shape (joints,), and the cost there [m^2]."""
+        """Return the joint values that the steps from ``begin`` lead to, shape (joints,), and the cost there [m^2]."""
         values, damping = np.array(begin, float), DAMPING[0]
         self._state.update(values)
         cost = self._cost()
@@ -76,16 +76,16 @@ class KinematicSearch:
         return values, cost
 
     def errors(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return what joint values leave of each target: [m] and [rad], shapes (f,), and of mimic joints [rad or m]."""
+        """Return the errors of joint values: targets [m] and [rad], shapes (f,), and mimic joints [rad or m]."""
         self._state.update(values)
         left = np.array([task.compute_error(self._state) for task in self._tips])
         off = 0.0 if self._coupled is None else float(np.abs(self._coupled.compute_error(self._state)).max())
         return np.linalg.norm(left[:, :3], axis=1), np.linalg.norm(left[:, 3:], axis=1), off
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
-        """Return joint values at random within the limits, or half a turn, shape (joints,).
+        """Return random joint values within the limits, or half a turn, shape (joints,).
 
-        Joints that move no fingertip stay at home: a leg must not jump because a finger cannot reach.
+        Joints that move no fingertip stay at home: a leg must not move because a finger cannot reach.
         """
         values = self.model.home
         for k in self.model.moving:

@@ -14,7 +14,7 @@ from tacdata.replay.robot import Robot
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint that moves."""
+    """A movable joint."""
 
     name: str
     unit: str
@@ -82,7 +82,7 @@ class Kinematics:
 
     @property
     def moving(self) -> list[int]:
-        """Joints between the root and a fingertip: all that moves one, but for mimic joints elsewhere."""
+        """Joints between the root and a fingertip, without mimic joints elsewhere."""
         bodies = set()
         for name in self.fingers:
             body = int(self.model.site(f"tip {name}").bodyid[0])
@@ -93,12 +93,14 @@ class Kinematics:
 
     @property
     def home(self) -> np.ndarray:
-        """Where the search begins [rad or m], shape (joints,)."""
+        """Start of the search [rad or m], shape (joints,)."""
         middles = [0.0 if j.lower is None or j.upper is None else (j.lower + j.upper) / 2 for j in self.joints]
         return np.array([self.robot.home.get(j.name, m) for j, m in zip(self.joints, middles, strict=True)])
 
     def tips(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return fingertips of joint values, shape (joints,): places [m], shape (f, 3), rotations, shape (f, 3, 3)."""
+        """Return the fingertips for joint values, shape (joints,): positions [m], shape (f, 3), rotations, shape (f, 3,
+        3).
+        """
         engine = mujoco()
         data = engine.MjData(self.model)
         data.qpos[:] = values

@@ -1,9 +1,9 @@
-"""An object on a table, and fingertips that follow targets like a robot's: springs pull them, contact pushes back.
+"""Simulates an object and fingertips that follow targets: springs pull them, contact pushes back.
 
-A fingertip is a soft sphere whose place is held by springs (the compliance of joints and controllers; an infinitely
-stiff robot would need no compensation). A direct replay brings the pads to where they were seen, so that the springs
-hardly press; targets that are moved into the object stretch them. Whether the ball is lifted is Coulomb's friction and
-gravity, in MuJoCo; nothing here decides it.
+A fingertip is a soft sphere held by springs (the compliance of joints and controllers; an infinitely stiff robot would
+need no compensation). A direct replay brings the pads to where they were seen, so that the springs hardly press.
+Targets that are moved into the object stretch them. Coulomb friction and gravity in MuJoCo decide whether the object is
+lifted.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from tacdata.replay.scene_model import PAD, SceneModel
 from tacdata.replay.targets import FingertipTargets
 
 HIGH = 0.9
-"""The object is held high while the fingers are above this share of their lift [1]."""
+"""Share of the fingers' lift above which they count as high [1]."""
 HELD = 0.5
-"""The object is held if it never sinks below this share of the fingers' lift meanwhile [1]."""
+"""The object is held if it never sinks below this share of the fingers' lift while they are high [1]."""
 LEAST_LIFT = 0.01
-"""Targets that rise by less lift nothing, those that move by less wipe nothing [m]."""
+"""Smallest lift, and smallest movement of a wipe, that counts [m]."""
 BEHIND = 0.015
-"""An eraser that falls behind the fingers by more is lost [m]."""
+"""Distance behind the fingers from which an eraser is lost [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReplayOutcome:
-    """What became of the ball."""
+    """Result of a replay."""
 
     held: bool
     lift: float
-    """Lowest height of the ball over where it lay, while the fingers are high [m]."""
+    """Lowest height of the ball above its start, while the fingers are high [m]."""
     force: dict[str, float]
-    """Finger -> mean normal force meanwhile [N]."""
+    """Finger -> mean normal force in that time [N]."""
     depth: dict[str, float]
-    """Finger -> mean depth of the simulated skin meanwhile [mm]."""
+    """Finger -> mean depth of the simulated skin in that time [mm]."""
     time: np.ndarray
     """Times of the replay [s], shape (n,)."""
     ball: np.ndarray
@@ -46,11 +46,11 @@ class ReplayOutcome:
     tips: np.ndarray
     """Centres of the fingertips' pads [m], shape (n, f, 3)."""
     slip: float = 0.0
-    """How far an eraser fell behind the fingertips along the strokes [m]; 0 of a ball."""
+    """Distance of an eraser behind the fingertips along the strokes [m]; 0 for a ball."""
 
 
 def ball_centre(targets: FingertipTargets, touch: int, radius: float) -> np.ndarray:
-    """Return where a ball's centre was in a row in which all fingers touch it [m], shape (3,).
+    """Return a ball's centre in a row in which all fingers touch it [m], shape (3,).
 
     Each pad touches the ball, so the centre lies a radius along its normal, less the depth that it felt.
     """
@@ -65,9 +65,10 @@ def normals(targets: FingertipTargets) -> np.ndarray:
 
 
 def replay_targets(targets: FingertipTargets, scene: ReplayScene, centre: np.ndarray) -> ReplayOutcome:
-    """Return what becomes of an object that lies with its centre at ``centre`` [m] when fingertips follow targets.
+    """Return the outcome of a replay for an object whose centre starts at ``centre`` [m].
 
-    A ball is held if it stays high while the fingers are; an eraser, if it never falls behind the fingers' strokes.
+    A ball is held if it stays high while the fingers are. An eraser is held if it never falls behind the fingers'
+    strokes.
 
     Raises:
         UsageError: If the targets do not lift, or wipe.
@@ -103,7 +104,7 @@ def _high(pads: np.ndarray) -> np.ndarray:
 
 
 def _wiping(pads: np.ndarray, targets: FingertipTargets) -> np.ndarray:
-    """Return the rows from the first stroke to the last: while all fingers feel something."""
+    """Return the rows from the first stroke to the last: while all fingers touch."""
     rows = touching(targets)
     rows[np.argmax(rows) : len(rows) - np.argmax(rows[::-1])] = rows.any()
     stroke = np.ptp(pads[rows].mean(axis=1), axis=0).max() if rows.any() else 0.0
@@ -113,7 +114,7 @@ def _wiping(pads: np.ndarray, targets: FingertipTargets) -> np.ndarray:
 
 
 def _slip(fingers: np.ndarray, eraser: np.ndarray) -> float:
-    """Return how far the eraser fell behind along the direction in which the fingers move most [m]."""
+    """Return the distance of the eraser behind the fingers, along their main direction of movement [m]."""
     moved = fingers - fingers[0]
     along = np.linalg.svd(moved - moved.mean(axis=0), full_matrices=False)[2][0]
     return float(np.abs((eraser - eraser[0] - moved) @ along).max())

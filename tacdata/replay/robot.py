@@ -1,4 +1,4 @@
-"""A robot that is to follow fingertips (`schemas/robot.schema.json`), and its URDF without shapes and masses."""
+"""A robot file (`schemas/robot.schema.json`), and its URDF without shapes and masses."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from tacdata.demonstrations.camera_world import pose_matrix
 from tacdata.errors import FormatError, UsageError
 
 POSITION_TOLERANCE = 0.0005
-"""A fingertip that comes so near has reached its target [m]."""
+"""Default position tolerance of a target [m]."""
 ORIENTATION_WEIGHT = 0.02
-"""How much a turn of one radian counts against a metre [m/rad]: 1 deg as 0.35 mm."""
+"""Weight of a rotation error relative to a position error [m/rad]: 1 deg counts as 0.35 mm."""
 HAIR = 1e-6
-"""How far a joint whose limits are equal may move to either side [rad or m]."""
+"""Range given to a joint whose limits are equal [rad or m]."""
 SHAPES = ("visual", "collision", "inertial", "transmission", "gazebo")
-"""Elements of a URDF that kinematics does not need: meshes are often missing where a trajectory is computed, and many
-files hold inertias that cannot be."""
+"""Elements of a URDF that kinematics does not need. Meshes are often missing where a trajectory is computed, and many
+files hold impossible inertias.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot and what it must respect."""
+    """A robot: its URDF, fingertips and limits."""
 
     name: str
     urdf: str
@@ -38,11 +39,11 @@ class Robot:
     tips: dict[str, tuple[str, np.ndarray]]
     """Finger -> link, and the fingertip's frame in it, shape (4, 4) [m]."""
     home: dict[str, float]
-    """Joint -> where the search begins [rad or m]."""
+    """Joint -> start of the search [rad or m]."""
     orientation_weight: float
-    """[m/rad]"""
+    """Weight of a rotation error relative to a position error [m/rad]."""
     tolerance: tuple[float, float | None]
-    """Position [m], rotation [rad] or None: rotations are not checked."""
+    """Tolerance of position [m] and rotation [rad]; None: rotations are not checked."""
     velocity: dict[str, float]
     """Joint -> largest speed [rad/s or m/s]: the robot file's, else the URDF's; joints without limit are missing."""
     workspace: tuple[np.ndarray, np.ndarray] | None
@@ -104,7 +105,7 @@ HERE = {"position": [0.0, 0.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0]}
 
 
 def _locked(root: ET.Element) -> None:
-    """Give joints whose limits are equal a hair's breadth: MuJoCo would take them for joints without limits."""
+    """Give joints with equal limits a tiny range: MuJoCo would take them for joints without limits."""
     for joint in root.iter("joint"):
         limit = joint.find("limit")
         if limit is None or joint.get("type") not in ("revolute", "prismatic"):

@@ -1,4 +1,4 @@
-"""What a robot and its object are: a ball on a table, or an eraser on a board, and fingertips on springs."""
+"""Robot and object of a replay: a ball on a table, or an eraser on a board, and fingertips on springs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ReplayScene:
-    """What the robot and the object are; the spreads are those of `drawn`."""
+    """Parameters of robot and object; `drawn` gives their spreads."""
 
     radius: float = 0.035
     """Radius of the ball [m]."""
@@ -19,11 +19,11 @@ class ReplayScene:
     friction: float = 0.8
     """Coulomb coefficient between skin and ball [1]."""
     stiffness: float = 300.0
-    """Of the springs that hold a fingertip at its target [N/m]."""
+    """Stiffness of the springs that hold a fingertip at its target [N/m]."""
     skin: float = 3000.0
     """Stiffness of the skin [N/m]."""
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """How far the ball lies from where it lay in the demonstration [m]."""
+    """Offset of the ball from its position in the demonstration [m]."""
     task: str = "grasp"
     """"grasp": a ball is lifted; "wipe": an eraser is moved to and fro on a board."""
     eraser: tuple[float, float, float] = (0.025, 0.055, 0.015)
@@ -31,9 +31,9 @@ class ReplayScene:
     board_friction: float = 0.5
     """Coulomb coefficient between the object and what it lies on [1]."""
     pull: float = 0.0
-    """With which an object is drawn to what it lies on, beside its weight [N]."""
+    """Force that pulls the object onto its support, beside its weight [N]."""
     bias: tuple[tuple[float, float, float], ...] = ()
-    """How far each fingertip's targets are off in the robot's frame [m]: calibration, another hand's shape."""
+    """Offset of each fingertip's targets in the robot's frame [m]: calibration, another hand's shape."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -44,22 +44,22 @@ class ReplayScene:
 
     @property
     def geometry(self) -> str:
-        """What MuJoCo calls the object's shape."""
+        """MuJoCo's name of the object's shape."""
         return "sphere" if self.task == "grasp" else "box"
 
     @property
     def sizes(self) -> tuple[float, ...]:
-        """Its sizes for MuJoCo [m]."""
+        """Its size parameters for MuJoCo [m]."""
         return (self.radius,) if self.task == "grasp" else self.eraser
 
     @property
     def height(self) -> float:
-        """Of its middle over what it lies on [m]."""
+        """Height of its centre above the support [m]."""
         return self.radius if self.task == "grasp" else self.eraser[2]
 
     @property
     def reach(self) -> float:
-        """From its middle to where fingers touch it [m]."""
+        """Distance from its centre to the fingers' contact [m]."""
         return self.radius if self.task == "grasp" else self.eraser[0]
 
 

@@ -10,7 +10,7 @@ from tacdata.replay.engine import mujoco
 from tacdata.replay.scene import ReplayScene
 
 STEP = 0.001
-"""Time step [s]."""
+"""Time step of the simulation [s]."""
 COMMAND = 5
 """Steps between two commands to the fingertips [count]: 200 Hz."""
 SETTLE = 0.3
@@ -18,9 +18,9 @@ SETTLE = 0.3
 PAD = 0.009
 """Radius of a fingertip's pad [m]."""
 TIP_MASS = 0.05
-"""What moves with a fingertip [kg]."""
+"""Mass that moves with a fingertip [kg]."""
 TORSION = 0.003
-"""Coefficient of friction against turning about a contact's normal [m]: a patch of a few millimetres."""
+"""Coefficient of torsional friction about a contact's normal [m]: a patch of a few millimetres."""
 XML = """
 <mujoco>
  <option timestep="{step}" cone="elliptic" integrator="implicitfast" impratio="10"/>
@@ -40,13 +40,13 @@ TIP = """<body name="tip{k}" pos="{x} {y} {z}" gravcomp="1">
  <geom name="tip{k}" type="sphere" size="{pad}" mass="{mass}" contype="2" conaffinity="1" condim="4" priority="1"
   friction="{friction} {torsion} 0.0001" solref="-{skin} -{damping}" solimp="{impedance} {impedance} 0.001"/></body>"""
 IMPEDANCE = 0.9
-"""Of the contact between skin and ball [1] (MuJoCo, solver parameters)."""
+"""Impedance of the contact between skin and ball [1] (MuJoCo, solver parameters)."""
 SPRING = '<position name="{joint}" joint="{joint}" kp="{kp}" kv="{kv}"/>'
 
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """What happened, at the times of the targets."""
+    """State of the simulation at the times of the targets."""
 
     ball: np.ndarray
     """Centre of the ball [m], shape (n, 3)."""
@@ -55,11 +55,11 @@ class Rollout:
     force: np.ndarray
     """Normal force of each pad on the ball [N], shape (n, f)."""
     depth: np.ndarray
-    """How deep each pad's skin is pressed [m], shape (n, f)."""
+    """Depth of each pad's skin [m], shape (n, f)."""
 
 
 class SceneModel:
-    """One trial."""
+    """The simulation of one trial."""
 
     def __init__(self, scene: ReplayScene, begin: np.ndarray, centre: np.ndarray) -> None:
         """Build it with the pads' centres at ``begin`` [m], shape (f, 3), and the ball's at ``centre`` [m]."""

@@ -1,4 +1,4 @@
-"""Where a robot's fingertips are to be, time by time: as seen, or moved by what was felt."""
+"""Targets of a robot's fingertips over time: as seen, or moved by the contact depth."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class FingertipTargets:
     rate: float
     """[Hz]"""
     fingers: tuple[str, ...]
-    """Their order in the arrays, f of them."""
+    """Order of the fingers in the arrays, f of them."""
     kind: str
     """"direct" or "compensated"."""
     gains: dict[str, float]
@@ -43,20 +43,20 @@ class FingertipTargets:
     seen: np.ndarray
     """Where the fingertips were seen [m], shape (n, f, 3)."""
     depth: np.ndarray
-    """Predicted contact depth [mm], shape (n, f); NaN where nothing is known."""
+    """Predicted contact depth [mm], shape (n, f); NaN where unknown."""
     gap: np.ndarray
-    """Whether the pose is a bridge over a gap, shape (n, f), bool."""
+    """Whether the pose is interpolated over a gap, shape (n, f), bool."""
     network: dict[str, Any] | None = None
-    """Whose predicted depth this is."""
+    """Network behind the predicted depth."""
     remarks: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     source: Demonstration | None = None
-    """The demonstration; None of targets that were read back."""
+    """The demonstration; None for targets read from a file."""
     rows: slice = slice(None)
-    """Which of the source's times these are."""
+    """Rows of the source at these times."""
 
     def header(self, columns: Iterable[str]) -> dict[str, Any]:
-        """Return what a file says of them (`schemas/fingertip_targets.schema.json`)."""
+        """Return the header of a file (`schemas/fingertip_targets.schema.json`)."""
         names = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
         return {
             "version": schemas.version("fingertip_targets"), **{name: getattr(self, name) for name in names},
@@ -71,7 +71,7 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
     Args:
         made: The demonstration.
         gains: Finger -> gain [m/mm] of compensated targets; None for direct ones.
-        fingers: Which fingers, in which order; all if none is named.
+        fingers: Fingers in their order; by default all.
 
     Raises:
         UsageError: If a finger has no path or no gain, no time has all of them, or there is no predicted depth.

@@ -1,4 +1,4 @@
-"""Many trials of one grasp or wipe, direct and compensated, each seed a world of its own."""
+"""Repeats one grasp or wipe over seeds, direct and compensated; each seed draws a scene."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ Interval = Callable[[int, int], tuple[float, float]]
 
 
 class Trials:
-    """The first grasp or wipe of a demonstration, to be tried."""
+    """The first grasp or wipe of a demonstration, ready for trials."""
 
     def __init__(self, made: Demonstration, gains: dict[str, dict[str, float]], scene: ReplayScene) -> None:
-        """Cut it out and find where the object lay.
+        """Cut it out and find where the object was.
 
         Args:
             made: A demonstration with predicted depth.
-            gains: Kind of replay ("compensated", "chosen") -> finger -> gain [m/mm]; "direct" comes by itself.
-            scene: The undisturbed world.
+            gains: Kind of replay ("compensated", "chosen") -> finger -> gain [m/mm]; "direct" is added.
+            scene: The undisturbed scene.
 
         Raises:
             UsageError: If it holds no grasp, or fingers lack predicted depth or gains.
@@ -43,7 +43,7 @@ class Trials:
         return replay_targets(self.paths[kind], scene, self._centre)
 
     def smallest_gain(self, wanted: float) -> float:
-        """Return the smallest common gain [m/mm] with which every skin is pressed to a depth [mm] while holding.
+        """Return the smallest common gain [m/mm] at which every skin is pressed to a depth [mm] while holding.
 
         Raises:
             UsageError: If none reaches it.
@@ -56,7 +56,7 @@ class Trials:
         return smallest_gain(reached, wanted)
 
     def trials(self, seeds: int) -> list[dict[str, Any]]:
-        """Return every trial of seeds 0 ..., as plain data."""
+        """Run all trials of seeds 0, 1, ...; return them as plain data."""
         found = []
         for seed in range(seeds):
             world = drawn(self._scene, len(self.paths[DIRECT].fingers), seed)
@@ -81,8 +81,8 @@ def result(
         tried: One or more demonstrations.
         seeds: Trials of each kind and demonstration.
         interval: Successes and trials -> an interval of the proportion.
-        scene: The undisturbed world.
-        chosen: On which recording, and for which depth, the gain of the kind "chosen" was found.
+        scene: The undisturbed scene.
+        chosen: Recording and depth for which the gain of the kind "chosen" was found.
     """
     found = [trial for one in tried for trial in one.trials(seeds)]
     kinds, first = list(tried[0].paths), tried[0]
@@ -106,6 +106,6 @@ def result(
 
 
 def rate(trials: Sequence[dict[str, Any]], interval: Interval) -> dict[str, Any]:
-    """Return how many of some trials held, of how many, and the interval of the proportion."""
+    """Return the number of successes and trials, and the interval of the proportion."""
     held = sum(trial["held"] for trial in trials)
     return {"held": held, "of": len(trials), "wilson_95": list(interval(held, len(trials)))}

@@ -1,1 +1,1 @@
-"""What follows a verdict: the effect is added, labels are made again, the gap is shown, the next presses are named."""
+"""Acts on a verdict: adds the effect, makes labels again, shows the gap, plans the next presses."""

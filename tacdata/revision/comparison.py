@@ -1,4 +1,4 @@
-"""A model with and without further effects, held against the same recordings."""
+"""Compares a model with and without further effects on the same recordings."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from tacdata.effects import Placed
 from tacdata.revision.episodes import part
 
 STEPS = 2
-"""Steps of a fit to a part of the episodes, from the numbers that all of them gave."""
+"""Gauss-Newton steps of a fit to some of the episodes, from the parameters of all of them."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Recordings and the model that they are held against."""
+    """Recordings, and the model that is compared with them."""
 
     course: Course
     spec: Spec
     answer: tuple[Placed, ...] = ()
-    """Effects beside which the noise is told: a large one that is missing would be taken for noise."""
+    """Effects that are in the model while the noise is estimated; a missing large effect would count as noise."""
 
     @cached_property
     def setting(self) -> Setting:
@@ -38,29 +38,29 @@ class Comparison:
 
     @cached_property
     def frame(self) -> Frame:
-        """Noise and nuisances, the same before and after."""
+        """Noise and nuisance parameters, the same before and after."""
         response = corrected(self.setting, self.answer)
         return frame(replace(self.setting, response=response, given=(*self.setting.given, *self.answer)))
 
     @cached_property
     def before(self) -> Refined:
-        """The model as it was."""
+        """The model without further effects."""
         return refine(self.setting, [], self.frame)
 
     @cached_property
     def values(self) -> np.ndarray:
-        """Whitened values behind each episode [1], shape (episodes,)."""
+        """Whitened values of each episode [1], shape (episodes,)."""
         rows = np.bincount(self.course.reduced.episode, minlength=self.course.episodes)
         return np.maximum(rows * Streams.of(self.course).count, 1).astype(float)
 
     def after(self, placed: Sequence[Placed]) -> Refined:
-        """Return the model with effects whose numbers stay as they are; a fitted response takes up the rest."""
+        """Return the model with effects of fixed parameters; a fitted response takes up the rest."""
         return refine(self.setting, placed, self.frame, steps=0)
 
     def fitted_without(self, placed: Sequence[Placed], left_out: np.ndarray) -> tuple[Placed, ...]:
-        """Return effects with their numbers fitted to all episodes but some.
+        """Return effects with parameters fitted to all episodes except some.
 
-        What those did to the skin stays known, unless a place or tool was pressed in no other.
+        Those episodes still inform the skin's response where a place or tool was pressed in no other.
         """
         kept = np.setdiff1d(np.arange(self.course.episodes), left_out)
         if set(self._contexts[left_out]) <= set(self._contexts[kept]):
@@ -79,22 +79,24 @@ class Comparison:
         return course.site * len(course.tools) + course.tool[first]
 
     def mean_square(self, model: Refined, episodes: np.ndarray) -> float:
-        """Return the whitened residual's mean square in some episodes [1]; 1 is the noise floor."""
+        """Return the mean square of the whitened residual over some episodes [1]; 1 is the noise floor."""
         return float(2 * model.energy[episodes].sum() / self.values[episodes].sum())
 
     def said(self, response: Response, placed: Sequence[Placed]) -> np.ndarray:
-        """Return what a model says of the readings, shape (rows, channels)."""
+        """Return a model's predicted readings, shape (rows, channels)."""
         return predict(self.course, response, [*self.setting.given, *placed]).signal
 
 
 def _frame_of(whole: Frame, course: Course, rows: np.ndarray, episodes: np.ndarray | None) -> Frame:
-    """Return a frame for some of the rows: what weighs readings is known from all of them, what they say is not.
+    """Return the null model restricted to some rows.
+
+    Their weights are still estimated from all rows; their readings are not used.
 
     Args:
-        whole: Of all rows.
+        whole: The null model of all rows.
         course: With the rows that are kept.
-        rows: Which are kept, shape (m,), bool.
-        episodes: Those that are left, if they are numbered anew.
+        rows: Rows that are kept, shape (m,), bool.
+        episodes: The remaining episodes, if they are renumbered.
     """
     return Frame.of(
         course.reduced, whole.context[rows], None if whole.features is None else whole.features[rows],

@@ -1,4 +1,4 @@
-"""Parts of a course: episodes sealed before the verdict, groups that are left out to see how far a model reaches."""
+"""Parts of a course: sealed episodes, and groups that are left out to test extrapolation."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from tacdata.chain import Course
 from tacdata.discrepancy.verdict.sealed import chosen
 
 SHARE = 0.25
-"""Share of the episodes that is sealed where the verdict sealed none [1]."""
+"""Share of the episodes that is sealed if the verdict sealed none [1]."""
 FEWEST = 3
-"""Episodes that a group must have on either side."""
+"""Minimum number of episodes inside and outside a group."""
 
 
 @dataclass(frozen=True)
 class Sealed:
-    """Episodes that the gap is shown on."""
+    """Episodes on which the gap is shown."""
 
     numbers: np.ndarray
-    """Which episodes, shape (k,), int64."""
+    """Their numbers, shape (k,), int64."""
     unseen: bool
-    """Whether the verdict was reached without them; else only the effects' numbers are fitted without them."""
+    """Whether the verdict was reached without them; otherwise only the effects' parameters are fitted without them."""
 
 
 def sealed(course: Course, verdict: dict[str, Any]) -> Sealed:
-    """Return the episodes that the verdict sealed; where it sealed none, a share by the hash of their names.
+    """Return the episodes that the verdict sealed; if it sealed none, a share chosen by the hash of their names.
 
     Args:
-        course: What the verdict was reached from.
+        course: The course of the verdict.
         verdict: The verdict's document.
     """
     own = chosen(course)
@@ -42,7 +42,7 @@ def sealed(course: Course, verdict: dict[str, Any]) -> Sealed:
 
 
 def part(course: Course, numbers: np.ndarray) -> Course:
-    """Return the course of some episodes alone, on the same clock."""
+    """Return the course of some episodes, on the same clock."""
     keep = np.sort(np.asarray(numbers))
     rows = np.flatnonzero(np.isin(course.episode, keep))
     fields = ("time", "tip", "tool", "readings", "averaged", "force", "tag", "temperature")
@@ -55,7 +55,7 @@ def part(course: Course, numbers: np.ndarray) -> Course:
 
 
 def groups(course: Course) -> list[tuple[str, np.ndarray]]:
-    """Return groups of episodes that differ from all others by rate, depth or indenter: each is left out in turn."""
+    """Return groups of episodes that differ from all others by rate, depth or indenter; each is left out in turn."""
     number = np.arange(course.episodes)
     inside = course.tip[:, 2] > 0  # the approach is as fast in every episode
     speed = np.array([np.abs(course.speed[inside & (course.episode == e)]).max(initial=0.0) for e in number])

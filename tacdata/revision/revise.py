@@ -40,36 +40,36 @@ from tacdata.surrogate.pressed import pressed
 REVISION, SPEC, CARD, PICTURE, TABLE, CSV, PLAN, LABELS = (
     "revision.json", "spec.json", "card.html", "gap.png", "gap.md", "gap.csv", "next.yaml", "labels",
 )  # fmt: skip
-"""Files of the folder."""
+"""Names of the folder's files."""
 
 KIND = "recording "
-"""What the names of a verdict's recordings begin with among its parents."""
+"""Prefix of a verdict's recordings among its parents."""
 NETWORKS = "networks"
-"""Folder of the datasets and networks of either model."""
+"""Folder of the datasets and networks of both models."""
 Note = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class RevisionOptions:
-    """What is to be done beside the card."""
+    """What to do besides the card."""
 
     relabel: FarmSettings | None = None
-    """How to make labels again; None to say only how far the tip moves."""
+    """How to make labels again; None to report only how far the tip moves."""
     store: Path | None = None
-    """Where solved paths lie; each session's own if not given."""
+    """Store of solved paths; by default each session's own."""
     confirm: int = 0
     """Presses to solve by finite elements where the revision moves the loads most."""
     presses: int = 4
     """Different presses of the next plan."""
     retrain: Recipe | None = None
-    """How to train networks before and after; None to train none."""
+    """How to train networks before and after; None for no training."""
     truth: Path | None = None
-    """File of the tip's true path (`tacdata.revision.labels.realised.COLUMNS`); else what a tag or gauge saw."""
+    """File of the tip's true path (`tacdata.revision.labels.realised.COLUMNS`); otherwise a tag or gauge is used."""
 
 
 @dataclass(frozen=True)
 class Revised:
-    """What was made."""
+    """Result of a revision."""
 
     document: dict[str, Any]
     """`schemas/revision.schema.json`."""
@@ -82,19 +82,19 @@ def revise(
     judged: Path, recordings: list[Path], spec: Spec, out: Path, wishes: RevisionOptions | None = None,
     note: Note = lambda text: None,
 ) -> Revised:  # fmt: skip
-    """Do all that follows a verdict.
+    """Do everything that follows a verdict.
 
     Args:
         judged: Folder that `tacdata discrepancy` wrote.
-        recordings: What it was given.
-        spec: The model that it was given.
+        recordings: The recordings of the verdict.
+        spec: The model spec of the verdict.
         out: Folder to create.
-        wishes: What else is to be done.
-        note: Is told what is being done.
+        wishes: What to do besides the card.
+        note: Called with a line of progress.
 
     Raises:
         UsageError: If ``out`` exists, or the verdict was reached from other recordings or another model.
-        FormatError: If the verdict is none.
+        FormatError: If the file is no verdict.
     """
     asked = wishes or RevisionOptions()
     if out.exists():
@@ -217,7 +217,7 @@ def _confirmed(
 
 
 def _mesh(path: Path) -> MeshSettings:
-    """Return the mesh that a table was made on; the default one where it does not say."""
+    """Return the mesh of a table; the default one if it is not stated."""
     import numpy as np
 
     with np.load(path, allow_pickle=False) as data:

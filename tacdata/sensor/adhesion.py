@@ -1,4 +1,4 @@
-"""How the skin sticks to what presses it."""
+"""Adhesion between the skin and an indenter."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Adhesion:
-    """Attraction between indenter and outer face."""
+    """Adhesion between indenter and outer face."""
 
     law: str
-    """File name in tacdata/skin/adhesions: how traction falls with the gap."""
+    """File name in tacdata/skin/adhesions: traction as a function of the gap."""
     work: float
-    """Work of adhesion w: what it costs to part a unit of area [J/m^2 = N/m]."""
+    """Work of adhesion w per unit of area [J/m^2 = N/m]."""
     range: float
-    """Length that scales the gap in the law [mm]."""
+    """Length scale of the gap in the law [mm]."""
 
     @property
     def document(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What the skin is made of: elastic constants, the law that they enter, and how it relaxes."""
+"""The skin's material: elastic constants, hyperelastic law, relaxation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class PronyTerm:
 
 @dataclass(frozen=True)
 class Material:
-    """Elastic constants of slow loading, the law that they enter, and how the material relaxes towards them."""
+    """Long-term elastic constants, hyperelastic law and relaxation of the skin."""
 
     law: str
     """File name in tacdata/skin/materials."""
@@ -29,7 +29,7 @@ class Material:
     poisson_ratio: float
     """Poisson's ratio nu [1], long-term."""
     parameters: dict[str, Any] = field(default_factory=dict)
-    """The law's own numbers, by name; what is not given keeps its default, at which the law is Neo-Hookean."""
+    """The law's own parameters, by name. Missing ones keep their default, at which the law is Neo-Hookean."""
     prony: tuple[PronyTerm, ...] = ()
     """Relaxation of the isochoric part; empty for an elastic skin."""
 
@@ -47,7 +47,7 @@ class Material:
     def document(self) -> dict[str, Any]:
         """The material as its part of the sensor file.
 
-        What a file leaves out stays out, so that a sensor's hash outlives the formats that add such fields.
+        What a file leaves out stays out, so that a sensor's hash survives additions to the format.
         """
         document: dict[str, Any] = {
             "law": self.law,
@@ -67,7 +67,7 @@ class Material:
         """Build a material from its part of a checked sensor file; ``origin`` names the file in errors.
 
         Raises:
-            FormatError: If the Prony series leaves no long-term modulus or names a relaxation time twice.
+            FormatError: If the Prony series leaves no long-term modulus or has a relaxation time twice.
         """
         values = dict(document)
         terms = tuple(PronyTerm(**term) for term in values.pop("prony", ()))

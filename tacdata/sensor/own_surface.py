@@ -1,4 +1,4 @@
-"""A skin's own surface from a file, and which of its faces are what."""
+"""A skin's own surface from a file, with rules that sort its faces into parts."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ PARTS = ("protrusions", "outer", "bottom", "sides")
 """Parts of the surface; a face belongs to the first that selects it."""
 
 _FIT = 0.02
-"""How far the surface's box may differ from the sizes that the file states [1]."""
+"""Largest difference between the surface's box and the sizes in the file [1]."""
 
 
 @dataclass(frozen=True)
 class Selector:
-    """A rule by which faces are chosen: every condition that is given must hold."""
+    """A rule that selects faces: all given conditions must hold."""
 
     normal: tuple[float, float, float] | None = None
-    """Direction that the face looks to; any length."""
+    """Outward direction of the faces; of any length."""
     angle: float = 45.0
     """Largest angle between that direction and the face's normal [deg]."""
     low: tuple[float, float, float] | None = None
@@ -33,7 +33,7 @@ class Selector:
     """The opposite corner [mm]."""
 
     def chosen(self, centers: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """Return which faces hold, shape (f,), from their centres [mm] and unit normals, both (f, 3)."""
+        """Return which faces are selected, shape (f,), from their centres [mm] and unit normals, both (f, 3)."""
         held = np.ones(len(centers), dtype=bool)
         if self.normal is not None:
             direction = np.array(self.normal) / np.linalg.norm(self.normal)
@@ -52,7 +52,7 @@ USUAL: dict[str, tuple[Selector, ...]] = {
     "bottom": (Selector(normal=(0.0, 0.0, -1.0), angle=45.0),),
     "sides": tuple(Selector(normal=n, angle=60.0) for n in ((1.0, 0, 0), (-1.0, 0, 0), (0, 1.0, 0), (0, -1.0, 0))),
 }
-"""What selects a part that the file says nothing of: protrusions lie below z = 0, the outer face looks up."""
+"""Default rules of parts: protrusions lie below z = 0, the outer face points up."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class OwnSurface:
     file: str
     """Name of the STL, OBJ or PLY file, beside the sensor file that names it."""
     sha256: str
-    """SHA-256 of the file (hex); filled in where a sensor file leaves it out."""
+    """SHA-256 of the file (hex); computed if a sensor file leaves it out."""
     scale: float = 1.0
     """Millimetres in the file's unit [mm]."""
     rules: dict[str, tuple[Selector, ...]] = field(default_factory=dict)
@@ -101,11 +101,11 @@ class OwnSurface:
 
 
 def complete(document: dict[str, Any], origin: str, folder: Path | None) -> dict[str, Any]:
-    """Return a skin's document with its surface found, checked against the sizes stated, kept, and named by hash.
+    """Return a skin's document with its surface found, checked against the stated sizes, stored, and named by hash.
 
     Raises:
         UsageError: If the file is not found.
-        FormatError: If it bounds no solid, is not of the sizes stated, or is not the file of the hash given.
+        FormatError: If it bounds no solid, has other sizes than stated, or another hash than given.
     """
     given = document["surface"]
     path = (folder or Path()) / given["file"]

@@ -50,22 +50,22 @@ class Taxels:
 
 @dataclass(frozen=True)
 class ContactProperties:
-    """What touches and holds the skin."""
+    """Contact properties: friction, bonding, board, adhesion."""
 
     friction: float
     """Coulomb coefficient between indenter and skin [1]."""
     bonded: tuple[str, ...]
-    """What is fixed to the support: "sides", "bottom" (the underside between protrusions), "rim" (its border)."""
+    """Faces fixed to the support: "sides", "bottom" (the underside between protrusions), "rim" (its border)."""
     board: bool = False
-    """True if a rigid board at the protrusions' tips (z = -skin.protrusion_tip) carries them (unilateral)."""
+    """True if a rigid board carries the protrusions' tips, at z = -skin.protrusion_tip (unilateral contact)."""
     rim_width: float = 1.0
     """Width of the underside's border that "rim" fixes [mm]."""
     adhesion: Adhesion | None = None
-    """How the outer face sticks to the indenter; None: not at all."""
+    """Adhesion of the outer face to the indenter; None without."""
 
     @property
     def document(self) -> dict[str, Any]:
-        """The contact as its part of the sensor's document; what nothing uses is left out."""
+        """The contact as its part of the sensor's document; unused entries are left out."""
         values: dict[str, Any] = {**asdict(self), "bonded": list(self.bonded)}
         if "rim" not in self.bonded:
             del values["rim_width"]
@@ -91,7 +91,7 @@ class DepthMap:
 
     @property
     def document(self) -> dict[str, Any]:
-        """The map as its part of the sensor's document; sampling is left out where it is the usual one."""
+        """The map as its part of the sensor's document; default sampling is left out."""
         return {k: v for k, v in asdict(self).items() if (k, v) != ("sampling", "point")}
 
     @property
@@ -124,9 +124,9 @@ class Sensor:
     """Field path -> why the value is an assumption."""
     source: str = ""
     transduction: Transduction | None = None
-    """From loads of protrusions to counts; None if the file says nothing of it."""
+    """Transduction from loads to counts; None if the file has none."""
     uncertainty: dict[str, float] = field(default_factory=dict)
-    """Standard deviations of the skin model's parameters, in their units; empty if the file says nothing of them."""
+    """Standard deviations of the skin model's parameters, in their units; empty if the file has none."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -143,8 +143,7 @@ class Sensor:
 
     @cached_property
     def content_hash(self) -> str:
-        """Hash of every value that can change a label; names, remarks, spreads and the transduction do not
-        count."""
+        """Hash of every value that can change a label; without names, remarks, uncertainties and transduction."""
         document = {**self.document, "skin": self.skin.identity}
         return provenance.content_hash({k: document[k] for k in ("taxels", "skin", "material", "contact", "map")})
 

@@ -1,4 +1,4 @@
-"""The skin's stress-free geometry as data, with the few formulas that follow from it."""
+"""The skin's stress-free geometry as data, with formulas that follow from it."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from tacdata.sensor import own_surface
 from tacdata.sensor.own_surface import OwnSurface
 
 _OPTIONAL = {"protrusion_height": None, "curvature_radius_x": 0.0, "curvature_radius_y": 0.0, "underside": "bent"}
-"""Fields that a document leaves out where they say nothing, so that files and hashes of format 1.0 stay."""
+"""Optional fields, left out of a document at their default, so that files and hashes of format 1.0 stay valid."""
 
 _LEAST = 0.2
-"""Thickness at the rim of a curved pad with a flat underside, over `thickness`, below which it is refused [1]."""
+"""Minimum thickness at the rim of a curved pad with a flat underside, over `thickness` [1]."""
 
 
 @dataclass(frozen=True)
 class Skin:
-    """Stress-free geometry: a slab from z = 0 to z = thickness, protrusions hanging below z = 0 under the taxels.
+    """Stress-free geometry: a slab from z = 0 to z = thickness, with protrusions below z = 0 under the taxels.
 
-    A curved pad is that slab bent, its outer face convex; the outer face keeps its rectangle in plan.
+    A curved pad is that slab bent, its outer face convex; in plan the outer face keeps its rectangle.
     """
 
     size_x: float
@@ -48,12 +48,12 @@ class Skin:
 
     @property
     def protrusion_tip(self) -> float:
-        """How far the protrusions' tips lie below z = 0 [mm]; a board touches them at z = -protrusion_tip."""
+        """Depth of the protrusions' tips below z = 0 [mm]; a board touches them at z = -protrusion_tip."""
         return self.protrusion_radius if self.protrusion_height is None else self.protrusion_height
 
     @property
     def curved(self) -> bool:
-        """True if the outer face is no plane."""
+        """Whether the outer face is curved."""
         return bool(self.curvature_radius_x or self.curvature_radius_y)
 
     @property
@@ -65,7 +65,7 @@ class Skin:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What of the document decides a mesh or a label: of a surface file its content, not its name."""
+        """The part of the document that decides a mesh or a label; of a surface file its content, not its name."""
         values = self.document
         if self.surface is not None:
             values["surface"] = {k: v for k, v in values["surface"].items() if k != "file"}
@@ -90,7 +90,7 @@ class Skin:
         return cls(**{**document, "surface": OwnSurface.from_document(document["surface"])})
 
     def outer_height(self, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
-        """Return the height z of the undeformed outer face [mm] at (x, y) [mm], like the arguments in shape."""
+        """Return the height z of the undeformed outer face [mm] at (x, y) [mm], of the arguments' shape."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         rx, ry = self.curvature_radius_x, self.curvature_radius_y
         if rx and ry:

@@ -1,4 +1,4 @@
-"""How a sensor turns what its protrusions feel into readings."""
+"""A sensor's transduction as data: principle, parameters, gain and offset."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from tacdata.errors import FormatError
 
 @dataclass(frozen=True)
 class Transduction:
-    """The principle and its numbers; `tacdata.transduction` computes with it."""
+    """Principle and its parameters; `tacdata.transduction` computes with them."""
 
     principle: str
     """File name in tacdata/transduction/principles."""
     parameters: dict[str, Any] = field(default_factory=dict)
-    """Numbers of the principle by name, one for all taxels or a list with one for each; others keep their default."""
+    """Parameters of the principle by name: one number for all taxels or a list with one for each. Missing ones keep
+    their default.
+    """
     gain: tuple[float, ...] = (1.0,)
     """Counts per change of capacitance [counts/pF]: one for all taxels, or one for each."""
     offset: tuple[float, ...] = (0.0,)
     """Reading without load [counts]: one for all taxels, or one for each."""
     full_scale: float | None = None
-    """Largest reading of the electronics [counts]; readings end there and at 0. None for no end."""
+    """Largest reading of the electronics [counts]; readings are clipped to it and to 0. None for no limit."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -38,7 +40,7 @@ class Transduction:
 
     @cached_property
     def content_hash(self) -> str:
-        """Hash of every value that can change a reading beside those that change a label."""
+        """Hash of every value that can change a reading but no label."""
         return provenance.content_hash(self.document)
 
     @classmethod

@@ -1,1 +1,1 @@
-"""Closed triangle surfaces from files: read, checked, kept by content, smoothed, and asked for distances."""
+"""Closed triangle surfaces from files: read, checked, stored by content, smoothed, with distances."""

@@ -1,4 +1,4 @@
-"""A closed surface from an STL, OBJ, PLY or STEP file, refused with a place where it bounds no solid."""
+"""Reads a closed surface from an STL, OBJ, PLY or STEP file; refuses it, with the place, if it bounds no solid."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ FORMATS = (".stl", ".obj", ".ply", *step_file.FORMATS)
 _CAD = (".iges", ".igs", ".brep", ".3mf", ".sldprt", ".f3d")
 
 _FEWEST = 1e-9
-"""Volume over that of the bounding box at which a surface counts as flat [1]."""
+"""Volume over that of the bounding box below which a surface counts as flat [1]."""
 
 
 def read_closed(path: Path, scale: float, what: str) -> trimesh.Trimesh:
-    """Return the surface in a file, in mm, once it is known to bound a solid.
+    """Return the surface in a file, in mm, after checking that it bounds a solid.
 
     Args:
         path: The file.
-        scale: Millimetres in the file's unit (1 for mm, 1000 for m, 25.4 for inches); a STEP file knows its own, so 1.
-        what: What the file is to be, for errors ("indenter", "skin").
+        scale: Millimetres in the file's unit (1 for mm, 1000 for m, 25.4 for inches); 1 for a STEP file, which states
+            its own unit.
+        what: Use of the file, for errors ("indenter", "skin").
 
     Raises:
         UsageError: If there is no such file, or its format is not read.
-        FormatError: If it is damaged, or its surface is open, inside out, flat or runs through itself, with the place.
+        FormatError: If it is damaged, or its surface is open, inside out, flat or self-intersecting, with the place.
     """
     import trimesh
 
@@ -44,7 +45,7 @@ def read_closed(path: Path, scale: float, what: str) -> trimesh.Trimesh:
             mesh = trimesh.load_mesh(path, file_type=path.suffix[1:].lower(), process=True)
     except TacdataError:
         raise
-    except Exception as error:  # readers of trimesh raise whatever their parser meets
+    except Exception as error:  # trimesh's readers raise any of their parsers' errors
         raise FormatError(
             f"{what} surface {path.name} cannot be read: {error or type(error).__name__}",
             f"a {path.suffix[1:].upper()} file of triangles", "export it again",
@@ -77,7 +78,7 @@ def _check_name(path: Path, what: str) -> None:
 
 
 def check_closed(mesh: trimesh.Trimesh, name: str) -> None:
-    """Refuse a surface [mm] that bounds no solid; ``name`` stands for it in errors.
+    """Refuse a surface [mm] that bounds no solid; ``name`` names it in errors.
 
     Raises:
         FormatError: With the place of the fault.

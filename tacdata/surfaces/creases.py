@@ -9,7 +9,7 @@ import numpy as np
 from tacdata.surfaces.smooth import CREASE
 
 _CHUNK = 4_000_000
-"""Pairs of a point and an edge looked at together: bounds the memory."""
+"""Pairs of a point and an edge per chunk; bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Creases:
     ends: np.ndarray
     """Their ends [mm], shape (e, 2, 3)."""
     corners: np.ndarray
-    """Points where other than two of them meet [mm], shape (c, 3)."""
+    """Points where not exactly two of them meet [mm], shape (c, 3)."""
 
     @staticmethod
     def of(vertices: np.ndarray, faces: np.ndarray, crease: float = CREASE) -> Creases:
@@ -36,11 +36,11 @@ class Creases:
         return Creases(vertices[sharp], vertices[(meet > 0) & (meet != 2)])
 
     def snapped(self, points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return points put on the crease or corner within reach, and which were.
+        """Return points moved to the crease or corner within reach, and which were moved.
 
         Args:
             points: Positions [mm], shape (n, 3).
-            reach: Greatest distance to a crease or corner [mm].
+            reach: Largest distance to a crease or corner [mm].
         """
         moved, found = points.copy(), np.zeros(len(points), dtype=bool)
         for ends in (self.ends, np.stack([self.corners, self.corners], axis=1)):

@@ -1,7 +1,7 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
 # pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
 # pyright: reportAttributeAccessIssue=false, reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
-"""Nearest places on a closed triangle surface, and on which side of it points lie."""
+"""Nearest points on a closed triangle surface, with sign."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _query(
 
 @dataclass(frozen=True)
 class NearestPoints:
-    """Nearest places of some points."""
+    """Nearest points on the surface for some query points."""
 
     face: np.ndarray
     """Triangle, shape (n,), int32."""
@@ -36,19 +36,19 @@ class NearestPoints:
 
 
 class Nearest:
-    """A closed surface that can be asked for nearest places."""
+    """A closed surface with a search tree for nearest points."""
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
-        """Sort triangles (f, 3) over vertices (v, 3) [mm] into a tree."""
+        """Build the tree of triangles (f, 3) over vertices (v, 3) [mm]."""
         self._corners = vertices[faces]
         indices = wp.array(np.ascontiguousarray(faces, dtype=np.int32).ravel(), dtype=wp.int32, device="cpu")
         points = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device="cpu")
         self._mesh = wp.Mesh(points=points, indices=indices)
 
     def places(self, points: np.ndarray) -> NearestPoints:
-        """Return the nearest places of points [mm], shape (n, 3).
+        """Return the nearest surface points of points [mm], shape (n, 3).
 
-        The tree is searched in single precision, the place itself computed in double.
+        The tree is searched in single precision; the point is then computed in double.
         """
         n = len(points)
         face, place = wp.zeros(n, dtype=wp.int32, device="cpu"), wp.zeros(n, dtype=wp.vec2, device="cpu")
@@ -61,9 +61,10 @@ class Nearest:
 
 
 def _on_triangle(points: np.ndarray, corners: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return the nearest point of each triangle (n, 3, 3) in double precision, from weights of its first two corners.
+    """Return the nearest point of each triangle (n, 3, 3) in double precision, from the weights of its first two
+    corners.
 
-    Inside the triangle that is the foot of the perpendicular; on an edge or a corner the weights given are kept.
+    Inside the triangle that is the foot of the perpendicular; on an edge or a corner the given weights are kept.
     """
     u, v = np.clip(place, 0.0, 1.0).T
     weights = np.stack([u, v, np.clip(1 - u - v, 0.0, 1.0)], axis=-1)

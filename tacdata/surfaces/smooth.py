@@ -1,8 +1,8 @@
-"""The smooth surface that a tessellation stands for: quadratic edges from vertex normals, creases kept.
+"""The smooth surface behind a tessellation: quadratic edges from vertex normals, creases kept.
 
-CAD programs put vertices on the true surface and chords between them. Every edge that is no crease gets the rise of
-the parabola that has the end normals' slopes there (Nagata 2005), the smaller of the two ends' (so that a flat beside a
-fillet does not bulge); triangles become quadratic ones and are divided until their chords are shorter than asked.
+CAD programs put vertices on the true surface and chords between them. Every edge that is no crease gets the arc of the
+parabola with the end normals' slopes (Nagata 2005). The smaller of the two ends' is used, so that a flat beside a
+fillet does not bulge. Triangles become quadratic and are divided until their chord error is small enough.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ CREASE = 30.0
 """Angle between neighbouring triangles from which their edge counts as sharp [deg]."""
 
 _MOST = 16
-"""Parts into which an edge is divided at most."""
+"""Largest number of parts of an edge."""
 
 _PLANE = 0.02
-"""Angle between neighbouring triangles up to which they lie in one plane [deg]."""
+"""Angle between neighbouring triangles below which they lie in one plane [deg]."""
 
 _WIDE = 3.0
-"""Width of a plane part over that of its neighbours from which it counts as truly flat [1]."""
+"""Width of a plane part over that of its neighbours from which it counts as flat [1]."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Smooth:
     faces: np.ndarray
     """Its triangles, shape (f, 3), int64."""
     middles: np.ndarray
-    """Where the middle of each triangle's edges 01, 12, 20 lies on the smooth surface [mm], shape (f, 3, 3)."""
+    """Smooth surface's points at the middle of each triangle's edges 01, 12, 20 [mm], shape (f, 3, 3)."""
 
     @property
     def rise(self) -> np.ndarray:
@@ -47,7 +47,7 @@ class Smooth:
         """Return a finer tessellation: vertices (n, 3) [mm], triangles (m, 3), and the parent of each, shape (m,).
 
         Args:
-            chord: Greatest height of an arc over its chord that may remain [mm].
+            chord: Largest remaining height of an arc over its chord [mm].
         """
         # One number for all: neighbours must agree on the parts of the edge between them.
         parts = int(np.clip(np.ceil(np.sqrt(self.rise.max(initial=0.0) / chord)), 1, _MOST))
@@ -136,8 +136,8 @@ def _angles(corners: np.ndarray) -> np.ndarray:
 def _corner_normals(normals: np.ndarray, angle: np.ndarray, flat: np.ndarray, edges: _Edges) -> np.ndarray:
     """Return the smooth surface's unit normal at every corner of every triangle, shape (3 f, 3).
 
-    Triangles around a vertex between two creases have one normal there, weighted by their angles (Thuermer and
-    Wuethrich 1998); truly flat parts impose theirs.
+    Triangles around a vertex between two creases share one normal, weighted by their angles (Thuermer and Wuethrich
+    1998). Flat parts impose theirs.
     """
     first, second = edges.corner[edges.soft].T
     ahead = [corner - corner % 3 + (corner + 1) % 3 for corner in (first, second)]
@@ -165,7 +165,7 @@ def _flat(area: np.ndarray, edges: _Edges) -> np.ndarray:
 
 
 def _components(count: int, links: np.ndarray) -> np.ndarray:
-    """Return the number of the connected part to which each of ``count`` things belongs; ``links`` is (2, n)."""
+    """Return the number of the connected component of each of ``count`` nodes; ``links`` is (2, n)."""
     graph = coo_matrix((np.ones(links.shape[1]), (links[0], links[1])), shape=(count, count))
     return connected_components(graph, directed=False)[1]
 

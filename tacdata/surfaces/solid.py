@@ -1,4 +1,4 @@
-"""A solid from a surface file: its checked surface, lowest point at z = 0, and its distance on each device."""
+"""A rigid solid from a surface file: checked surface, lowest point at z = 0, distance on each device."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from tacdata.surfaces.distance_grid import DistanceGrid
 
 TOP = 6.0
-"""Height of a solid above which it goes on as a column, for its distance [mm]; no skin is pressed so deep."""
+"""Height above which a solid continues as a column, for its distance [mm]; no skin is pressed that deep."""
 
 _RECIPE = 1
-"""Raised when `tacdata.surfaces` would fit another distance to the same file."""
+"""Version of the distance fit; raise it if `tacdata.surfaces` would compute another distance for the same file."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Solid:
     mesh: trimesh.Trimesh
     """Its surface as tessellated [mm], lowest point at z = 0."""
     key: str
-    """Name under which its distance is kept."""
+    """Name under which its distance is stored."""
 
     @cached_property
     def grid(self) -> DistanceGrid:
@@ -59,7 +59,7 @@ class Solid:
         """Return the address of the distance on a device, in two numbers that single precision holds.
 
         It leads to eight float64: address of the coefficients, origin x, y, z and spacing [mm], nodes along x, y, z.
-        The data live as long as the process: kernels hold nothing but the address.
+        The data live as long as the process: kernels hold only the address.
         """
         import warp as wp
 

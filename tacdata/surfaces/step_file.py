@@ -1,4 +1,4 @@
-"""Solids from STEP files, as triangles: OpenCASCADE reads them, through the package cascadio."""
+"""Reads solids from STEP files as triangles, by OpenCASCADE (package cascadio)."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ FORMATS = (".step", ".stp")
 """File endings that are read."""
 
 CHORD, TURN = 0.005, 0.2
-"""How far triangles may lie off the solid's faces [mm], and neighbours differ in direction [rad]."""
+"""Largest distance of triangles from the solid's faces [mm], and angle between neighbours [rad]."""
 
 _PER_METRE = 1000.0
-"""What cascadio writes is in metres, whatever unit the file states [mm]."""
+"""Millimetres in cascadio's output unit, which is always the metre [mm]."""
 
 _DIGITS = 6
-"""Decimal places [mm] to which corners of neighbouring faces agree: single precision holds no more."""
+"""Decimal places [mm] to which corners of neighbouring faces agree, by single precision."""
 
 
 def read_step(path: Path, what: str) -> trimesh.Trimesh:
-    """Return all solids of a file as one surface [mm], corners of neighbouring faces joined; not checked further.
+    """Return all solids of a file as one surface [mm], with corners of neighbouring faces merged; not checked further.
 
     Args:
         path: The file.
-        what: What it is to be, for errors.
+        what: Use of the file, for errors.
 
     Raises:
         PackageError: If cascadio is not installed.

@@ -1,4 +1,4 @@
-"""Surface files kept by content, so that a document names a shape by its hash and no path of a machine."""
+"""Stores surface files by content, so that a document names a shape by its hash and no path."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tacdata.errors import FormatError, UsageError
 
 
 def cache_folder() -> Path:
-    """Return where things made from a user's files are kept: ``TACDATA_CACHE``, or the user's cache folder."""
+    """Return the folder of data made from a user's files: ``TACDATA_CACHE``, or the user's cache folder."""
     root = os.environ.get("TACDATA_CACHE")
     return Path(root) if root else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "tacdata"
 
 
 def keep(path: Path) -> str:
-    """Keep a copy of a surface file; return its SHA-256 (hex, 64 characters)."""
+    """Store a copy of a surface file; return its SHA-256 (hex, 64 characters)."""
     digest = provenance.file_hash(path)
     kept = _kept(digest, path.name)
     if not kept.is_file():
@@ -29,11 +29,11 @@ def keep(path: Path) -> str:
 
 
 def find(file: str, digest: str, what: str) -> Path:
-    """Return a surface file of that content: from what was kept, or by name from the folders in ``TACDATA_SHAPES``.
+    """Return a surface file of that content, from the store or by name from the folders in ``TACDATA_SHAPES``.
 
     Raises:
-        UsageError: If it is not on this machine.
-        FormatError: If a file of that name is, and it is not the same.
+        UsageError: If it is not found.
+        FormatError: If a file of that name has another content.
     """
     kept = _kept(digest, file)
     if kept.is_file():

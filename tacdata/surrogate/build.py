@@ -1,4 +1,4 @@
-"""From what was pressed to a table of finite-element presses, and how far it is off between its nodes."""
+"""Builds a table of finite-element presses from what was pressed, and measures its interpolation error."""
 
 from __future__ import annotations
 
@@ -21,51 +21,52 @@ from tacdata.surrogate.table import LoadTable, assembled
 from tacdata.transduction import Loads, Transducer
 
 COARSE = MeshSettings(outer=0.8, tip=0.24)
-"""A mesh that costs half of the default one; `tacdata/surrogate/README.md` says what it leaves off."""
+"""A mesh at half the cost of the default one; `tacdata/surrogate/README.md` gives its error."""
 
 FINE, WIDE = 0.8, 1.6
-"""Distances of places [mm]; the README says what they leave off."""
+"""Spacings of the positions [mm]; the README gives their errors."""
 LEFT_OUT = 3
 """Presses left out of a table, to measure its error."""
 
 Progress = Callable[[int, int, float], None]
-"""Told how many presses are done, of how many, and about how many seconds are left."""
+"""Called with the presses done, their total, and about how many seconds are left."""
 
 
 @dataclass(frozen=True)
 class TableSettings:
-    """How a table is made."""
+    """Settings of a table."""
 
     spacing: float | None = None
-    """Distance of places [mm]; None: `FINE` where those presses are known already, else `WIDE`."""
+    """Spacing of the positions [mm]; None: `FINE` where those presses are known already, else `WIDE`."""
     mesh: MeshSettings | None = None
     """The skin's mesh; None: the default one where its presses are known already, else `COARSE`."""
     device: str = "cpu"
-    """"cpu", or a card such as "cuda:0"."""
+    """"cpu", or a GPU such as "cuda:0"."""
     capacity: int = 1
-    """Presses in work at a time: 1 on a CPU, hundreds on a card."""
+    """Presses solved at the same time: 1 on a CPU, hundreds on a GPU."""
     left_out: int | None = None
-    """Presses solved beside the table, to measure how far it is off between its nodes; None: 3, or none where the
-    table itself costs nothing because its presses ship."""
+    """Presses solved beside the table, to measure its interpolation error. None: 3, or 0 where the table's own presses
+    ship.
+    """
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """How far a table is off at presses that it was not made from, all of it errors of interpolation."""
+    """Interpolation error of a table, at presses that are not in it."""
 
     load: float
-    """Root mean square over channels and depths of the loads' error, over the largest load of each press [1]."""
+    """Root mean square error of the loads over channels and depths, over the largest load of each press [1]."""
     worst: float
-    """The largest error of a load, over the largest load of its press [1]."""
+    """Largest error of a load, over the largest load of its press [1]."""
     normal: float
     """Root mean square error of the normal force, over its largest [1]."""
     presses: int
-    """How many presses were left out."""
+    """Number of presses left out."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """A table that can be made: what it takes is known before it is begun."""
+    """A table that can be made; its cost is known before it is begun."""
 
     sensor: Sensor
     settings: TableSettings
@@ -75,7 +76,7 @@ class Work:
     names: tuple[str, ...]
     """Name of each tool."""
     reaches: tuple[Reach, ...]
-    """What each tool did."""
+    """Positions and depths of each tool."""
 
     @cached_property
     def requests(self) -> list[tuple[int, tuple[int, int], PressRequest]]:
@@ -90,12 +91,12 @@ class Work:
 
     @property
     def presses(self) -> int:
-        """Presses of the table and beside it."""
+        """Presses of the table, and those left out of it."""
         return len(self.requests) + len(self.probes)
 
     @cached_property
     def probes(self) -> list[tuple[int, PressRequest]]:
-        """Tool and press of those left out, at places between nodes drawn with a fixed seed, unfolded."""
+        """Tool and press of those left out, at positions between nodes drawn with a fixed seed, not mirrored."""
         rng, found, wanted = np.random.default_rng(0), [], self.settings.left_out
         if wanted is None:
             wanted = 0 if self._ships else LEFT_OUT
@@ -117,18 +118,18 @@ class Work:
 
     @property
     def missing(self) -> list[PressRequest]:
-        """Presses that are still to be solved."""
+        """Presses that are not solved yet."""
         asked = [press for _, _, press in self.requests] + [press for _, press in self.probes]
         return [asked[k] for k in self.store.missing(asked)]
 
     @property
     def expected_seconds(self) -> float:
-        """About how long it will take [s]."""
+        """Expected duration [s]."""
         asked = [press for _, _, press in self.requests] + [press for _, press in self.probes]
         return self.store.expected_seconds(asked)
 
     def done(self, progress: Progress = lambda *_: None) -> tuple[LoadTable, LeftOut | None]:
-        """Solve what is missing and return the table with its error; broken off, a second call goes on.
+        """Solve what is missing and return the table with its error; after an interruption a second call continues.
 
         Raises:
             SolveError: If a press that is possible was not solved.
@@ -170,11 +171,11 @@ class Work:
 
 
 def work(sensor: Sensor, reaches: dict[str, Reach], settings: TableSettings | None = None) -> Work:
-    """Return what a table of these tools takes; builds the skin model, which costs seconds.
+    """Return the work for a table of these tools; builds the skin model, which takes seconds.
 
     Args:
         sensor: The sensor.
-        reaches: Name of each tool, and what it did.
+        reaches: Name of each tool, with its positions and depths.
         settings: How the table is made.
 
     Raises:

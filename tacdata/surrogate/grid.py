@@ -1,7 +1,7 @@
-"""Which presses a table is solved on: places and depths that are the same for every session, so that presses are kept.
+"""The presses of a table: positions and depths common to all sessions, so that presses are reused.
 
-Places are multiples of a spacing from the array's centre, depths `UNIT` times squares: equally spaced in their root, as
-loads at first touch ask for.
+Positions are multiples of a spacing from the array's centre. Depths are `UNIT` times squares: equally spaced in their
+square root, as loads at first contact require.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from tacdata.skin.press import PressRequest
 from tacdata.surrogate.symmetry import foldable
 
 EDGE = 2
-"""Nodes beyond what is solved, at every end: splines are mirrored at the table's ends, and there it does no harm."""
+"""Nodes beyond the solved ones, at every end: splines are mirrored at the table's ends, where that does no harm."""
 MARGIN = 0.2
-"""How far a table goes beyond the places pressed [mm]: effects move the tip."""
+"""Margin around the pressed positions [mm]: effects move the tip."""
 DEEPER = 0.1
-"""How much deeper than the deepest press it goes [mm]."""
+"""Margin below the deepest press [mm]."""
 UNIT = 0.03
 """Depth of the first node [mm]."""
 FEWEST = 5
-"""Depths that are solved at least, the undeformed state included."""
+"""Minimum number of depths, the undeformed state included."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """What one tool did: where and how deep."""
+    """Positions and depths of one tool."""
 
     indenter: Indenter
     yaw: float
-    """How it was mounted [deg]."""
+    """Yaw of its mounting [deg]."""
     low: tuple[float, float]
     """Least x and y [mm]."""
     high: tuple[float, float]
@@ -43,7 +43,7 @@ class Reach:
     deepest: float
     """Largest depth [mm]."""
     tilt: tuple[float, float] = (0.0, 0.0)
-    """How far its axis leans about x and y [deg]."""
+    """Tilt of its axis about x and y [deg]."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Grid:
     depth: np.ndarray
     """[mm], shape (d,), from 0, equally spaced in their root, `EDGE` of them beyond what is solved."""
     folded: bool
-    """Whether the sensor looks the same from both sides, so that a quarter of the places is solved."""
+    """Whether the sensor is symmetric, so that a quarter of the positions is solved."""
 
     @property
     def states(self) -> int:
@@ -65,7 +65,7 @@ class Grid:
         return len(self.depth) - EDGE
 
     def presses(self, reach: Reach) -> list[tuple[int, int]]:
-        """Return the nodes that are solved for a tool, by number along x and y: those around what it pressed."""
+        """Return the nodes to solve for a tool, by number along x and y: those around what it pressed."""
         i, j = (
             _near(axis, low, high, self.folded)
             for axis, low, high in zip((self.x, self.y), reach.low, reach.high, strict=True)
@@ -74,12 +74,12 @@ class Grid:
 
 
 def covering(reaches: list[Reach], sensor: Sensor, spacing: float) -> Grid:
-    """Return the grid that covers what all tools did.
+    """Return the grid that covers the positions and depths of all tools.
 
     Args:
-        reaches: What each tool did.
+        reaches: Positions and depths of each tool.
         sensor: The sensor.
-        spacing: Distance of places [mm].
+        spacing: Spacing of the positions [mm].
     """
     low, high = np.min([r.low for r in reaches], axis=0), np.max([r.high for r in reaches], axis=0)
     end = max(r.deepest for r in reaches) + DEEPER
@@ -95,7 +95,7 @@ def covering(reaches: list[Reach], sensor: Sensor, spacing: float) -> Grid:
 
 
 def _near(axis: np.ndarray, low: float, high: float, folded: bool) -> np.ndarray:
-    """Return the inner nodes no farther than a node and the margin from a stretch, on one side if folded."""
+    """Return the inner nodes within a node and the margin of a stretch, on one side if folded."""
     inner, room = np.arange(EDGE, len(axis) - EDGE), MARGIN + axis[1] - axis[0]
     if not folded:
         return inner[(axis[inner] >= low - room) & (axis[inner] <= high + room)]
@@ -111,7 +111,7 @@ def _axis(low: float, high: float, spacing: float) -> np.ndarray:
 
 
 def request(reach: Reach, x: float, y: float, depths: np.ndarray, sensor: Sensor) -> PressRequest | None:
-    """Return the press of one place, as deep as it is possible there; None if it is not at all."""
+    """Return the press at one position, as deep as possible there; None if none is possible."""
     for count in range(len(depths), 1, -1):
         wanted = PressRequest(
             reach.indenter, round(float(x), 6), round(float(y), 6), reach.yaw,

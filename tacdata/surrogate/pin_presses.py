@@ -1,4 +1,4 @@
-"""Make the presses that ship: `python -m tacdata.surrogate.pin_presses --device cuda:0`."""
+"""Solves the presses that ship: `python -m tacdata.surrogate.pin_presses --device cuda:0`."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from tacdata.surrogate.shipped import Shipped
 from tacdata.surrogate.solved import Solved
 
 TOOLS = ("sphere_2", "sphere_4", "punch", "ring", "cone")
-"""Those that look the same from all sides, so that a quarter of the places says everything."""
+"""Tools that are round, so that a quarter of the positions suffices."""
 SPACING, COLUMNS, ROWS, STATES = 0.8, 8, 6, 9
-"""Distance of places [mm], places along x and y from the middle, depths."""
+"""Spacing of the positions [mm], number of positions along x and y from the middle, number of depths."""
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Solved presses, kept by the hash of all that decides them: a table that is broken off goes on where it stood."""
+"""Solved presses, stored by a hash of everything that decides them; an interrupted table continues from there."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ from tacdata.transduction import Loads
 
 FIELDS = ("force", "closure", "area", "normal", "seconds", "ended")
 TRIES, LEAST = 4, 3
-"""A press without an equilibrium is tried so many times, a depth less each time, as long as so many are left."""
+"""A press without an equilibrium is tried this many times, one depth less each time, while at least this many are left.
+"""
 SECONDS_EACH = 4e-4
-"""Time of a node of the mesh and a state on one core of a CPU [s], where none was measured yet."""
+"""Solver time per node of the mesh and state on one CPU core [s], used before any was measured."""
 
 
 @dataclass
@@ -35,7 +36,7 @@ class PressStore:
 
     model: SkinModel
     folder: Path
-    """Where they are kept; made when the first press is written."""
+    """The folder; created with the first press."""
     shipped: Shipped
     """Presses of this sensor and mesh that come with tacdata."""
 
@@ -46,7 +47,7 @@ class PressStore:
         return cls(model, folder, Shipped.of(model.sensor, model.settings.mesh))
 
     def path(self, request: PressRequest) -> Path:
-        """Return where a press is kept: its name is a hash of all that decides it but its end (32 hex digits)."""
+        """Return the path of a press: named by a hash of everything that decides it but its end (32 hex digits)."""
         parts = {
             "indenter": request.indenter.document, "x": request.x, "y": request.y, "yaw": request.yaw,
             **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(request, name))},
@@ -55,7 +56,7 @@ class PressStore:
         return self.folder / f"{provenance.content_hash(parts)[:32]}.npz"
 
     def get(self, request: PressRequest) -> Solved | None:
-        """Return a press that was solved before, at least as deep; a damaged file counts as none."""
+        """Return a stored press that goes at least as deep; a damaged file counts as none."""
         if (found := self.shipped.get(request)) is not None:
             return found
         try:
@@ -68,7 +69,7 @@ class PressStore:
         return kept.down_to(request.depths)
 
     def put(self, request: PressRequest, solved: Solved) -> None:
-        """Keep a press."""
+        """Store a press."""
         self.folder.mkdir(parents=True, exist_ok=True)
         buffer, loads = io.BytesIO(), solved.loads
         np.savez_compressed(
@@ -79,11 +80,11 @@ class PressStore:
             stream.write(buffer.getvalue())
 
     def missing(self, requests: Sequence[PressRequest]) -> list[int]:
-        """Return which presses are still to be solved."""
+        """Return the presses that are not solved yet."""
         return [k for k, request in enumerate(requests) if self.get(request) is None]
 
     def expected_seconds(self, requests: Sequence[PressRequest]) -> float:
-        """Return about how long missing presses will take [s]: as those kept did, or by the mesh's size."""
+        """Return the expected time for missing presses [s], from stored ones or from the mesh's size."""
         found = [self.get(r) for r in requests]
         known = [s.seconds / len(s.normal) for s in found if s is not None and s.seconds > 0]
         each = float(np.median(known)) if known else SECONDS_EACH * len(self.model.mesh.nodes)
@@ -93,12 +94,12 @@ class PressStore:
         self, requests: Sequence[PressRequest], capacity: int = 1,
         progress: Callable[[int, int, float], None] = lambda *_: None,
     ) -> list[Solved | SolveError]:  # fmt: skip
-        """Return presses, those that are missing solved now and kept at once.
+        """Return presses; missing ones are solved now and stored at once.
 
         Args:
-            requests: What to press.
-            capacity: How many are in work at a time (1 on a CPU, hundreds on a card).
-            progress: Told how many are done, of how many, and about how many seconds are left.
+            requests: The presses.
+            capacity: Presses solved at the same time (1 on a CPU, hundreds on a GPU).
+            progress: Called with the presses done, their total, and about how many seconds are left.
         """
         found: list[Solved | SolveError | None] = [self.get(r) for r in requests]
         begin, before = time.perf_counter(), sum(f is not None for f in found)

@@ -1,4 +1,4 @@
-"""What recordings pressed: sensor, tools, places and depths."""
+"""What recordings pressed: sensor, tools, positions and depths."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from tacdata.surrogate.grid import Reach
 from tacdata.surrogate.symmetry import round_about_axis
 
 _DESCRIBED = ("sensor", "indenter", "contact")
-"""What an import must not have made up, if its presses are to be solved."""
+"""What an import must have been told, not assumed, if its presses are to be solved."""
 
 
 @dataclass(frozen=True)
 class Pressed:
-    """What was pressed into one sensor."""
+    """Everything that was pressed into one sensor."""
 
     sensor: Sensor
     reaches: dict[str, Reach]
-    """Name of each tool, and what it did."""
+    """Name of each tool, with its positions and depths."""
     places: tuple[tuple[str, np.ndarray, float], ...]
     """Tool, x and y [mm], shape (2,), and depth [mm] of every press with contact."""
 
 
 def unmodelled(episode: Episode) -> str:
-    """Return in words why a recording's sensor has no finite-element model; empty if it has one."""
+    """Return why a recording's sensor has no finite-element model, as a sentence; empty if it has one."""
     stand_ins = [text.split(":")[0] for text in episode.rig.get("imported", {}).get("stand_ins", [])]
     made_up = [name for name in stand_ins if name.split("/")[0] in _DESCRIBED]
     if made_up:
@@ -38,7 +38,7 @@ def unmodelled(episode: Episode) -> str:
 
 
 def pressed(paths: list[Path]) -> Pressed:
-    """Read what was pressed.
+    """Read what was pressed in recordings.
 
     Args:
         paths: Recordings, or folders of sessions.

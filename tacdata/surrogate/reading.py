@@ -1,4 +1,4 @@
-"""From the loads of protrusions to one number a channel, and the curve from it to readings."""
+"""Maps loads of protrusions to one number per channel, and that to readings."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from tacdata.transduction import Loads, Transducer
 POINTS = 400
 """Points of the curve."""
 _NOTHING = 1e-9
-"""A derivative that is smaller than this share of the largest counts as none."""
+"""Share of the largest derivative below which a derivative counts as zero."""
 
 
 @dataclass(frozen=True)
 class ReadingCurve:
-    """How a table's loads become readings."""
+    """The curve from a table's loads to readings."""
 
     by: str
-    """What the load is: "force" [N], "closure" [mm] or "capacitance" [pF], whichever a reading follows alone."""
+    """Kind of load: "force" [N], "closure" [mm] or "capacitance" [pF], whichever alone determines a reading."""
     curve_load: np.ndarray
     """Loads [as above], shape (m,), increasing."""
     curve_signal: np.ndarray
@@ -31,21 +31,21 @@ class ReadingCurve:
     """Reading without load [counts], shape (taxels,)."""
 
     def load(self, loads: Loads, transducer: Transducer) -> np.ndarray:
-        """Return the one number that a reading follows, shape (n, taxels)."""
+        """Return the one number that determines a reading, shape (n, taxels)."""
         if self.by == "capacitance":
             return transducer.principle.capacitance(loads) - transducer.rest
         return np.asarray(getattr(loads, self.by))
 
 
 def reading_of(sensor: Sensor, loads: Loads) -> ReadingCurve:
-    """Return how loads such as these become readings, by the sensor file's transduction.
+    """Return the curve from such loads to readings, by the sensor's transduction.
 
-    A reading that follows the force alone, or the closure alone, by one curve for all taxels, keeps it as the load:
-    effects of the skin act on it. Otherwise the load is the change of capacitance itself.
+    If the force alone, or the closure alone, determines a reading by one curve for all taxels, it is the load; effects
+    of the skin act on it. Otherwise the load is the change of capacitance.
 
     Args:
-        sensor: Whose transduction.
-        loads: Of states as they occur, shapes (n, taxels).
+        sensor: The sensor.
+        loads: Loads of typical states, shapes (n, taxels).
     """
     transducer = Transducer.of(sensor)
     slopes = transducer.derivatives(loads)

@@ -1,7 +1,7 @@
-"""Presses that come with tacdata: of the default sensor, on its default mesh, under round tools.
+"""Presses that ship with tacdata: of the default sensor, on its default mesh, under round tools.
 
-Made by `python -m tacdata.surrogate.pin_presses`. They are found by sensor and mesh, whatever the code became since;
-a test holds one of them against the model of today.
+Made by `python -m tacdata.surrogate.pin_presses`. They are found by sensor and mesh, whatever the version of the code;
+a test compares one of them with today's model.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FOLDER = Path(__file__).parent / "presses"
 
 
 def shelf(sensor: Sensor, mesh: MeshSettings) -> str:
-    """Return the name of the folder of such presses: a hash of sensor (without its readings) and mesh."""
+    """Return the folder name of such presses: a hash of sensor (without its readings) and mesh."""
     document = sensor.document
     physical = {name: document[name] for name in ("taxels", "skin", "material", "contact")}
     return provenance.content_hash({"sensor": physical, "mesh": asdict(mesh)})[:16]
@@ -31,21 +31,21 @@ def shelf(sensor: Sensor, mesh: MeshSettings) -> str:
 
 @dataclass(frozen=True)
 class Shipped:
-    """The presses of one sensor and mesh."""
+    """The presses that ship for one sensor and mesh."""
 
     folder: Path
 
     @classmethod
     def of(cls, sensor: Sensor, mesh: MeshSettings) -> Shipped:
-        """Return what there is; it may be nothing."""
+        """Return what there is; it may be empty."""
         return cls(FOLDER / shelf(sensor, mesh))
 
     def path(self, indenter: dict) -> Path:
-        """Return where the presses of an indenter lie, or would lie."""
+        """Return the path of an indenter's presses, existing or not."""
         return self.folder / f"{provenance.content_hash(indenter)[:16]}.npz"
 
     def get(self, request: PressRequest) -> Solved | None:
-        """Return a press, if it is among them: upright ones are."""
+        """Return a press if it ships; only upright ones do."""
         if request.tilt_x or request.tilt_y:
             return None
         press = _read(self.path(request.indenter.document)).get((request.x, request.y, request.yaw))

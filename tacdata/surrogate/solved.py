@@ -17,18 +17,18 @@ class Solved:
     depths: np.ndarray
     """Depth of each state [mm], shape (k,), rising from 0."""
     loads: Loads
-    """Of each state, shapes (k, taxels)."""
+    """Loads of each state, shapes (k, taxels)."""
     normal: np.ndarray
     """Normal force on the indenter [N], shape (k,)."""
     seconds: float
-    """What it took [s]; 0 where that is not known."""
+    """Time of the solution [s]; 0 if unknown."""
     ended: bool = False
-    """Whether it was asked to go deeper and found no equilibrium."""
+    """Whether the press was requested deeper but found no equilibrium."""
 
     def down_to(self, depths: Sequence[float]) -> Solved | None:
-        """Return the states at these depths [mm], from the first; None if it does not go as deep, or by other steps.
+        """Return the states at these depths [mm], from the first; None if they were not solved.
 
-        A press that ended before gives what it has.
+        A press that ended early returns what it has.
         """
         count = min(len(depths), len(self.depths)) if self.ended else len(depths)
         if len(self.depths) < count or not np.allclose(self.depths[:count], depths[:count], atol=1e-6):

@@ -1,4 +1,4 @@
-"""A table of presses as the response of a model spec."""
+"""Writes a table of presses as the response of a model spec."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ SPEC, TABLE = "spec.json", "response.npz"
 
 
 def written_spec(folder: Path, work: Work, table: LoadTable, off: LeftOut | None) -> Path:
-    """Write the table and a model spec without effects that starts from it; return the spec's path.
+    """Write the table and a model spec without effects that uses it; return the spec's path.
 
     Args:
-        folder: To make, or empty.
-        work: What the table was made by.
+        folder: A new or empty folder.
+        work: The work that made the table.
         table: The table.
-        off: How far it is off between its nodes.
+        off: Its interpolation error.
 
     Raises:
         UsageError: If the folder holds a spec or a table already.

@@ -1,4 +1,4 @@
-"""A sensor that looks the same from both sides: one press tells of four."""
+"""Symmetry of a sensor: one press gives four."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from tacdata.indenters import Indenter
 from tacdata.sensor import Sensor
 
 _CLOSE = 1e-6
-"""Heights that differ by less are the same [mm]."""
+"""Difference of heights below which they count as equal [mm]."""
 
 
 def foldable(sensor: Sensor, indenter: Indenter, yaw: float) -> bool:
-    """Return whether mirroring a press along x or y mirrors the loads: a plain box under a mirrored shape."""
+    """Return whether mirroring a press along x or y mirrors the loads: a plain box under a symmetric shape."""
     if sensor.skin.surface is not None:
         return False
     x, y = _places(indenter)
@@ -21,7 +21,7 @@ def foldable(sensor: Sensor, indenter: Indenter, yaw: float) -> bool:
 
 
 def round_about_axis(indenter: Indenter) -> bool:
-    """Return whether turning an indenter about its axis changes nothing."""
+    """Return whether rotating an indenter about its axis changes nothing."""
     x, y = _places(indenter)
     upright = _turned(indenter, x, y, 0.0)
     return all(_same(upright, _turned(indenter, x, y, angle)) for angle in (17.0, 41.0, 90.0))
@@ -37,7 +37,7 @@ def mirrored(values: np.ndarray, sensor: Sensor, along_x: bool, along_y: bool) -
 
 
 def _places(indenter: Indenter) -> tuple[np.ndarray, np.ndarray]:
-    # Within half of the extent: edges of a solid, where heights jump, would be hit or missed by rounding.
+    # Within half of the extent: at edges of a solid, where heights jump, rounding would decide.
     samples = np.linspace(-0.53, 0.53, 24) * indenter.extent
     x, y = np.meshgrid(samples, samples, indexing="ij")
     return x, y

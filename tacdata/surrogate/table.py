@@ -1,4 +1,4 @@
-"""Solved presses to the table that a `TableResponse` reads: mirrored, continued beyond its ends, written."""
+"""Assembles solved presses into the table of a `TableResponse`: mirrored, continued beyond its ends, written."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from tacdata.surrogate.symmetry import mirrored
 from tacdata.transduction import Transducer
 
 _STEEPEST = 3.0
-"""Largest exponent of force over depth by which a press is continued to depths that were not solved [1]."""
+"""Largest exponent of force over depth for continuing a press to deeper states [1]."""
 
 
 @dataclass(frozen=True)
 class LoadTable:
-    """Loads by place and depth, and how they become readings."""
+    """Loads by position and depth, and their curve to readings."""
 
     grid: Grid
     tools: tuple[str, ...]
@@ -36,19 +36,19 @@ class LoadTable:
     normal: np.ndarray
     """Normal force on the indenter [N], shape (tools, a, b, d)."""
     solved: np.ndarray
-    """Whether a node is a solved press (or the mirror image of one), shape (tools, a, b, d), bool."""
+    """Whether a node is a solved press (or its mirror image), shape (tools, a, b, d), bool."""
     reading: ReadingCurve
 
     @property
     def response(self) -> TableResponse:
-        """The response that it makes."""
+        """The response of the table."""
         g, r = self.grid, self.reading
         return TableResponse(
             g.x, g.y, g.depth, self.load, self.normal, r.curve_load, r.curve_signal, r.gain, r.offset, self.tools
         )
 
     def write(self, path: Path, provenance: dict[str, Any]) -> None:
-        """Write the table (.npz), with what made it as JSON text in ``provenance``."""
+        """Write the table (.npz), with ``provenance`` as JSON text."""
         g, r = self.grid, self.reading
         with replacement(path) as stream:
             np.savez_compressed(
@@ -59,11 +59,11 @@ class LoadTable:
             )  # fmt: skip
 
     def uncovered(self, places: Sequence[tuple[str, np.ndarray, float]]) -> list[tuple[str, np.ndarray, float]]:
-        """Return the presses (tool, x and y [mm], depth [mm]) that do not lie among solved nodes."""
+        """Return the presses (tool, x and y [mm], depth [mm]) that are not covered by solved nodes."""
         return [p for p in places if not self.covers(self.tools.index(p[0]), p[1], p[2])]
 
     def covers(self, tool: int, place: np.ndarray, deepest: float) -> bool:
-        """Return whether a press lies among solved nodes.
+        """Return whether a press is covered by solved nodes.
 
         Args:
             tool: Number of the tool.
@@ -84,13 +84,13 @@ def assembled(
     grid: Grid, presses: Sequence[dict[tuple[int, int], Solved]], tools: tuple[str, ...], reading: ReadingCurve,
     sensor: Sensor,
 ) -> LoadTable:  # fmt: skip
-    """Return the table of presses solved for each tool, by node.
+    """Return the table from the presses of each tool, by node.
 
     Args:
         grid: The nodes.
-        presses: For each tool, node to press; nodes that cannot be pressed are absent.
+        presses: For each tool, node -> press; nodes that cannot be pressed are missing.
         tools: Name of each tool.
-        reading: How loads become readings.
+        reading: The curve from loads to readings.
         sensor: The sensor.
 
     Raises:
@@ -130,7 +130,9 @@ def _place(
 
 
 def _continue(grid: Grid, load: np.ndarray, normal: np.ndarray, solved: np.ndarray) -> None:
-    """Fill what was not solved: deeper by a power law, elsewhere from the nearest place; ends by parabolas."""
+    """Fill the nodes that were not solved: deeper by a power law, elsewhere from the nearest position; ends by
+    parabolas.
+    """
     pressed = np.asarray(np.any(solved, axis=2))
     nodes = np.argwhere(pressed)
     levels = np.sum(solved, axis=2)

@@ -1,4 +1,4 @@
-"""From what protrusions feel to what taxels read: capacitance and counts, their derivatives and inverse."""
+"""Transduction: from loads on protrusions to capacitance and counts, with derivatives and inverse."""
 
 from tacdata.transduction.loads import Loads
 from tacdata.transduction.transducer import TaxelReadings, Transducer

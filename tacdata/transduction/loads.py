@@ -1,4 +1,4 @@
-"""What each protrusion feels."""
+"""Loads on the protrusions: force, closure, contact area."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from tacdata.errors import FormatError
 
 @dataclass(frozen=True)
 class Loads:
-    """Force, closure and contact area of n states, or anything that has one value for each of them."""
+    """Force, closure and contact area of n states; also used for one value of each, such as derivatives."""
 
     force: np.ndarray
     """Normal force on each protrusion [N], shape (n, taxels); pressing is positive."""
     closure: np.ndarray
-    """How much the gap over each taxel has closed [mm], shape (n, taxels)."""
+    """Closure of the gap over each taxel [mm], shape (n, taxels)."""
     area: np.ndarray
     """Contact area of each protrusion with the board [mm^2], shape (n, taxels)."""
 
@@ -24,7 +24,7 @@ class Loads:
         """Refuse loads that are not of (n, ``taxels``) finite numbers.
 
         Raises:
-            FormatError: Saying which.
+            FormatError: Naming the wrong load.
         """
         for name in ("force", "closure", "area"):
             values = np.asarray(getattr(self, name))

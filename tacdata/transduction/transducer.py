@@ -16,21 +16,24 @@ from tacdata.transduction.principles.principle import BASE, ROOM, Principle
 
 @dataclass(frozen=True)
 class TaxelReadings:
-    """What the taxels say of n states."""
+    """Predicted readings of n states."""
 
     capacitance: np.ndarray
     """Capacitance [pF], shape (n, taxels)."""
     counts: np.ndarray
     """Reading [counts], shape (n, taxels), neither rounded nor noisy, clipped to 0 and full scale."""
     saturated: np.ndarray
-    """Where more load changes nothing any more (crushed, plates met, clipped), shape (n, taxels), bool."""
+    """Where a larger load no longer changes the reading (crushed, plates met, clipped), shape (n, taxels), bool."""
     remarks: tuple[str, ...]
-    """In words, one for each taxel that saturates and why."""
+    """One sentence for each taxel that saturates, with the reason."""
 
 
 @dataclass(frozen=True)
 class Transducer:
-    """The principle with the gain, offset and range of each taxel: counts = offset + gain (C - C without load)."""
+    """A sensor's taxels: principle, gain, offset and range.
+
+    counts = offset + gain (C - C without load).
+    """
 
     principle: Principle
     """How loads change a capacitance."""
@@ -39,14 +42,14 @@ class Transducer:
     offset: np.ndarray
     """Reading without load [counts], shape (taxels,)."""
     full_scale: float | None = None
-    """Largest reading [counts]; None for no end."""
+    """Largest reading [counts]; None for no limit."""
 
     @classmethod
     def of(cls, sensor: Sensor) -> Self:
         """Return the transducer that a sensor's file describes.
 
         Raises:
-            FormatError: If the file describes none, or with numbers that the principle does not take.
+            FormatError: If the file describes none, or has parameters that the principle refuses.
             UsageError: If no such principle is known.
         """
         given = sensor.transduction
@@ -91,7 +94,7 @@ class Transducer:
         return TaxelReadings(capacitance, counts, end | low | high, remarks)
 
     def derivatives(self, loads: Loads) -> Loads:
-        """Return the change of counts with force [1/N], closure [1/mm] and area [1/mm^2]; 0 where they are clipped.
+        """Return the derivatives of counts by force [1/N], closure [1/mm] and area [1/mm^2]; 0 where they are clipped.
 
         Raises:
             FormatError: If the loads are not finite or not of shape (n, taxels).
@@ -103,7 +106,7 @@ class Transducer:
         return Loads(factor * slopes.force, factor * slopes.closure, factor * slopes.area)
 
     def loads(self, counts: np.ndarray, area: np.ndarray | None = None) -> Loads:
-        """Return the loads that readings tell of, NaN where they tell nothing.
+        """Return the loads for readings, NaN where a reading is not invertible.
 
         Args:
             counts: Readings [counts], shape (n, taxels).
@@ -130,7 +133,7 @@ class Transducer:
         return Loads(none, none, none)
 
     def _clipped(self, counts: np.ndarray, ends: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return where counts leave the range at its low and its high end; with ``ends``, also where they reach it."""
+        """Return where counts exceed the low and the high end of the range; with ``ends``, also where they reach it."""
         if self.full_scale is None:
             return np.zeros(counts.shape, dtype=bool), np.zeros(counts.shape, dtype=bool)
         return (counts <= 0, counts >= self.full_scale) if ends else (counts < 0, counts > self.full_scale)

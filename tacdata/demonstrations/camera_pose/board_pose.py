@@ -17,7 +17,7 @@ from tacdata.tags.camera import PinholeCamera
 def board_poses(
     images: Iterable[tuple[str, np.ndarray]], board: Board, intrinsics: dict[str, Any]
 ) -> tuple[list[np.ndarray], float, float]:
-    """Return the board in the camera for every image that shows it.
+    """Return the board's pose in the camera for every image that shows it.
 
     The board's frame is OpenCV's: origin at an outer corner of the board, x along its columns, y along its rows.
 
@@ -27,8 +27,8 @@ def board_poses(
         intrinsics: Of the camera [px].
 
     Returns:
-        Poses, shape (4, 4) [m]; how far the corners lie from where the poses put them, root mean square [m at the
-        board]; standard uncertainty of the camera's place from one image [m].
+        Poses, shape (4, 4) [m]; reprojection error, root mean square [m at the board]; standard uncertainty of the
+        camera's position from one image [m].
 
     Raises:
         UsageError: If no image shows the board, or an image is of another size.
@@ -64,7 +64,7 @@ def board_poses(
 
 
 def _pixels(places: np.ndarray, pose: np.ndarray, camera: PinholeCamera) -> np.ndarray:
-    """Return where points of the board [m], shape (n, 3), are seen [px], shape (n, 2)."""
+    """Return the pixels, shape (n, 2), of points of the board [m], shape (n, 3)."""
     import cv2
 
     seen = places @ pose[:3, :3].T + pose[:3, 3]
@@ -72,7 +72,7 @@ def _pixels(places: np.ndarray, pose: np.ndarray, camera: PinholeCamera) -> np.n
 
 
 def _camera_spread(places: np.ndarray, pose: np.ndarray, camera: PinholeCamera, variance: float) -> float:
-    """Return the standard uncertainty of the camera's place in the board's frame [m]: -R^T t, with both in doubt."""
+    """Return the standard uncertainty of the camera's position in the board's frame, -R^T t [m]."""
     start, step, columns = _pixels(places, pose, camera), 1e-6, []
     for k in range(6):
         x, moved = step * np.eye(6)[k], pose.copy()
@@ -82,5 +82,5 @@ def _camera_spread(places: np.ndarray, pose: np.ndarray, camera: PinholeCamera, 
     covariance = variance * np.linalg.pinv(slopes.T @ slopes)
     x, y, z = pose[:3, 3]
     lever = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    both = np.hstack([lever, np.eye(3)])  # a small turn of the board in the camera, then its shift
+    both = np.hstack([lever, np.eye(3)])  # a small rotation of the board in the camera, then its translation
     return float(np.sqrt(np.trace(both @ covariance @ both.T)))

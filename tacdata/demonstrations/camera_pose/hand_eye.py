@@ -1,9 +1,9 @@
-"""Where a camera stands: from a robot that carries a tag cube, or from a board that lies at the world's origin.
+"""Estimates where a camera stands: by a robot that carries a tag cube, or by a board at the world's origin.
 
-Hand-eye: gripper_i X = Y cube_i, with the cube in the gripper X and the camera in the robot's base Y unknown
+Hand-eye calibration: gripper_i X = Y cube_i. Unknown are the cube in the gripper X and the camera in the robot's base Y
 (F. Dornaika and R. Horaud, IEEE Trans. Robotics and Automation 14 (1998) 617: robot-world, hand-eye). OpenCV's closed
-form (`cv2.calibrateRobotWorldHandEye`) begins it, least squares over all pairs, rotations and places weighted
-by what a tag pose is known to, ends it.
+form (`cv2.calibrateRobotWorldHandEye`) gives the start. Least squares over all pairs follows, rotations and positions
+weighted by the uncertainty of a tag pose.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from tacdata.demonstrations.paths.motion_filter import exponential, logarithm
 from tacdata.errors import FormatError, UsageError
 
 WEIGHTS = 0.0003, float(np.radians(0.2))
-"""Standard deviation of a tag cube's place [m] and rotation [rad] by which residuals are weighted."""
+"""Standard deviation of a tag cube's position [m] and rotation [rad], which weights the residuals."""
 LEAST_TURN = np.radians(15.0)
-"""The gripper must have turned by so much, about two axes, or the answer is not determined [rad]."""
+"""Minimum rotation of the gripper about two axes [rad]; with less the solution is not determined."""
 OUTLYING = 5.0
-"""A pair is left out if its residual is so many times the median one [1]."""
+"""A pair is an outlier if its residual is this many times the median [1]."""
 
 
 def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -> CameraWorld:
-    """Return where a camera stands in a robot's base.
+    """Return the pose of a camera in a robot's base.
 
     Args:
         camera: Name of the camera.
@@ -66,14 +66,14 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
 
 
 def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float, spread: float) -> CameraWorld:
-    """Return where a camera stands in the frame of a board, from the board's pose in one or more images.
+    """Return the pose of a camera in the frame of a board, from the board's pose in one or more images.
 
     Args:
         camera: Name of the camera.
         frame: Name of the board's frame.
-        poses: Board in the camera, shape (4, 4) [m], one an image; the board and the camera were at rest.
-        rms: Distance of the board's corners from where the pose puts them [m], root mean square.
-        spread: Standard uncertainty of the camera's place from one image [m].
+        poses: Board in the camera, shape (4, 4) [m], one per image; the board and the camera were at rest.
+        rms: Reprojection error at the board [m], root mean square.
+        spread: Standard uncertainty of the camera's position from one image [m].
     """
     from scipy.spatial.transform import Rotation
 
@@ -106,7 +106,7 @@ def _begun(grippers: np.ndarray, cubes: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Return camera in base and cube in gripper, shapes (4, 4) [m], by OpenCV's closed form."""
     import cv2
 
-    # OpenCV thinks of a camera on the gripper: its world is our cube, its base our gripper, its gripper our base.
+    # OpenCV assumes a camera on the gripper: its world is our cube, its base our gripper, its gripper our base.
     found = cv2.calibrateRobotWorldHandEye(
         list(cubes[:, :3, :3]), list(cubes[:, :3, 3]), list(grippers[:, :3, :3]), list(grippers[:, :3, 3])
     )
@@ -124,13 +124,13 @@ def _refined(
     def moved(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _nudged(base, x[:6]), _nudged(held, x[6:])
 
-    # A single wrong pair must not pull the others: residuals beyond two deviations count linearly.
+    # Robust loss against a single wrong pair: residuals beyond two standard deviations count linearly.
     found = least_squares(lambda x: _residuals(*moved(x), grippers, cubes), np.zeros(12), loss="soft_l1", f_scale=2.0)
     return moved(found.x)
 
 
 def _spread(base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.ndarray) -> tuple[float, float]:
-    """Return the standard uncertainty of the camera's place [m] and rotation [rad] from what the pairs leave."""
+    """Return the standard uncertainty of the camera's position [m] and rotation [rad], from the residuals."""
     start, step = _residuals(base, held, grippers, cubes), 1e-6
     jacobian = np.empty((len(start), 12))
     for k in range(12):
@@ -148,7 +148,7 @@ def _nudged(pose: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _residuals(base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.ndarray) -> np.ndarray:
-    """Return turn and shift of each pair over `WEIGHTS` [1], shape (6 n,)."""
+    """Return rotation and translation residuals of each pair over `WEIGHTS` [1], shape (6 n,)."""
     rows = []
     for left, right in zip(grippers @ held, base @ cubes, strict=True):
         rows += [logarithm(left[:3, :3] @ right[:3, :3].T) / WEIGHTS[1], (left[:3, 3] - right[:3, 3]) / WEIGHTS[0]]

@@ -1,4 +1,4 @@
-"""Hand-eye pairs from a file (`schemas/hand_eye_pairs.schema.json`), with the cube's poses or with images of it."""
+"""Reads hand-eye pairs (`schemas/hand_eye_pairs.schema.json`), with cube poses or with images, and solves them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tacdata.errors import FormatError, UsageError
 
 
 def solve_pairs(path: Path) -> CameraWorld:
-    """Return where the camera of a file of pairs stands.
+    """Return the pose of the camera from a file of pairs.
 
     Raises:
         UsageError: If the file or an image does not exist, or the pairs do not determine the camera.
@@ -32,7 +32,7 @@ def solve_pairs(path: Path) -> CameraWorld:
 
 
 def _cube(pair: dict[str, Any], document: dict[str, Any], folder: Path, origin: str) -> np.ndarray | None:
-    """Return the cube in the camera, shape (4, 4) [m]; None if its image shows it not, or not surely."""
+    """Return the cube in the camera, shape (4, 4) [m]; None if its image does not show it unambiguously."""
     if "cube" in pair:
         return pose_matrix(pair["cube"], f"{origin}/cube")
     import cv2

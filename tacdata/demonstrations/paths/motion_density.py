@@ -1,4 +1,4 @@
-"""How freely a finger moves, chosen by the likelihood of what was seen of it."""
+"""Chooses the process noise of a finger's motion by maximum likelihood."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from tacdata.demonstrations.paths.motion_filter import ProcessNoise, smooth
 from tacdata.demonstrations.paths.sightings import Sightings
 
 VELOCITIES = (0.0001, 0.001, 0.01, 0.1, 1.0, 10.0, 100.0)
-"""Densities of the acceleration that are tried [(m/s^2)^2 s]."""
+"""Spectral densities of the acceleration in the search grid [(m/s^2)^2 s]."""
 TURNINGS = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)
-"""Densities of the angular acceleration that are tried [(rad/s^2)^2 s]."""
+"""Spectral densities of the angular acceleration in the search grid [(rad/s^2)^2 s]."""
 ENOUGH = 250
-"""Sightings from which the choice is made."""
+"""Minimum number of sightings for the choice."""
 
 
 def choose(seen: Sightings) -> ProcessNoise:
-    """Return the densities, out of `VELOCITIES` and `TURNINGS`, under which the sightings are likeliest."""
+    """Return the densities, out of `VELOCITIES` and `TURNINGS`, with the largest likelihood."""
     kept = np.zeros(len(seen), bool)
     kept[:ENOUGH] = True
     part, nothing = seen.where(kept), np.zeros(0, np.int64)
@@ -31,7 +31,7 @@ def choose(seen: Sightings) -> ProcessNoise:
 
 
 def _climb(values: Sequence[float], worth: Callable[[float], float]) -> float:
-    """Return the value of largest worth, going uphill from the middle: the likelihood has one summit."""
+    """Return the value of largest ``worth``, by hill climbing from the middle: the likelihood has one maximum."""
     known: dict[int, float] = {}
 
     def at(k: int) -> float:

@@ -1,10 +1,12 @@
-"""Fixed-interval smoothing of a pose: an error-state Kalman filter forth and Rauch, Tung and Striebel's pass back.
+"""Fixed-interval smoothing of a pose: an error-state Kalman filter forward, Rauch-Tung-Striebel backward.
 
-State: position p [m], rotation R, velocity v [m/s], turn rate w [rad/s, world]. Between two times p' = p + v dt,
-R' = exp(w dt) R, and v and w wander as integrated white noise (a constant-velocity model, Bar-Shalom, Li and
-Kirubarajan, Estimation with Applications to Tracking and Navigation, section 6.2). Errors are a small turn in the
-world, dp, dw, dv in this order, so that a rotation never leaves SO(3) and a sighting's covariance is used as it is.
-The backward pass is H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965) 1445, on those errors.
+State: position p [m], rotation R, velocity v [m/s], angular velocity w [rad/s, world]. Between two times p' = p + v dt
+and R' = exp(w dt) R; v and w are integrated white noise (a constant-velocity model, Bar-Shalom, Li and Kirubarajan,
+Estimation with Applications to Tracking and Navigation, section 6.2).
+
+The error state is a small rotation in the world, dp, dw, dv in this order. So a rotation never leaves SO(3), and a
+sighting's covariance is used unchanged. The backward pass is H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3
+(1965) 1445, on those errors.
 """
 
 from __future__ import annotations
@@ -16,45 +18,45 @@ import numpy as np
 from tacdata.demonstrations.paths.sightings import Sightings
 
 GATE = 27.9
-"""Squared Mahalanobis distance in six dimensions beyond which a sighting is an outlier (chi-squared, 0.9999)."""
+"""Gate: squared Mahalanobis distance in six dimensions beyond which a sighting is an outlier (chi-squared, 0.9999)."""
 FIRST_SPEED = 1.0, 10.0
-"""Standard deviation of the velocity [m/s] and turn rate [rad/s] before anything is known of them."""
+"""Prior standard deviation of the velocity [m/s] and angular velocity [rad/s]."""
 NS = 1e-9
 
 
 @dataclass(frozen=True)
 class ProcessNoise:
-    """How freely a finger moves."""
+    """Process noise of a finger's motion."""
 
     velocity: float
-    """Density of the white acceleration [(m/s^2)^2 s]."""
+    """Spectral density of the white acceleration [(m/s^2)^2 s]."""
     turning: float
-    """Density of the white angular acceleration [(rad/s^2)^2 s]."""
+    """Spectral density of the white angular acceleration [(rad/s^2)^2 s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """A pose at every time asked for, from all sightings."""
+    """A smoothed pose at every requested time."""
 
     position: np.ndarray
-    """[m], shape (n, 3)."""
+    """Position [m], shape (n, 3)."""
     rotation: np.ndarray
     """From the finger's frame to the world's [1], shape (n, 3, 3)."""
     covariance: np.ndarray
-    """Of a small turn in the world [rad] and the position [m], shape (n, 6, 6)."""
+    """Covariance of a small rotation in the world [rad] and the position [m], shape (n, 6, 6)."""
     velocity: np.ndarray
-    """[m/s], shape (n, 3)."""
+    """Velocity [m/s], shape (n, 3)."""
     accepted: np.ndarray
-    """Which sightings were used, shape (p,), bool; the others contradict them."""
+    """Which sightings were used, shape (p,), bool; the others are outliers."""
     distance: np.ndarray
-    """Squared Mahalanobis distance of each sighting from what was expected [1], shape (p,)."""
+    """Squared Mahalanobis distance of each sighting from its prediction [1], shape (p,)."""
     log_likelihood: float
-    """Of the sightings; an outlier counts as one at the gate's edge."""
+    """Log-likelihood of the sightings; an outlier counts as one at the gate."""
 
 
 @dataclass(eq=False)
 class _Node:
-    """One time: as expected, and as known after its sighting."""
+    """One time: the predicted and the updated state."""
 
     expected: _State
     spread: np.ndarray
@@ -88,8 +90,8 @@ def smooth(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise, back: bo
     Args:
         seen: At least two sightings.
         times_ns: Times [ns], shape (n,), ascending; poses outside the sightings' span are NaN.
-        wander: How freely the finger moves.
-        back: Whether to go back too; without it poses rest on the past alone.
+        wander: The process noise.
+        back: Whether to smooth backward; without it poses depend on the past only.
 
     Returns:
         Poses, and which sightings were used.
@@ -131,7 +133,7 @@ def _collected(
 
 
 def _beginning(seen: Sightings) -> int:
-    """Return the first sighting that the two after it do not contradict: a mirrored pose must not begin a path."""
+    """Return the first sighting that the next two do not contradict: a path must not begin with a mirrored pose."""
     for k in range(min(len(seen) - 2, 20)):
         near = [
             np.linalg.norm(logarithm(seen.rotation[k] @ seen.rotation[j].T)) < 0.5
@@ -145,7 +147,7 @@ def _beginning(seen: Sightings) -> int:
 
 def _first(seen: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
     known = np.zeros((12, 12))
-    known[:6, :6] = 100 * seen.covariance[k]  # its own sighting comes next and must not count twice
+    known[:6, :6] = 100 * seen.covariance[k]  # its own sighting is processed next and must not count twice
     known[6:9, 6:9], known[9:, 9:] = FIRST_SPEED[1] ** 2 * np.eye(3), FIRST_SPEED[0] ** 2 * np.eye(3)
     return _State(seen.rotation[k], seen.position[k], np.zeros(3), np.zeros(3)), known, int(seen.time_ns[k])
 
@@ -168,7 +170,7 @@ def _predicted(
 
 
 def _updated(expected: _State, spread: np.ndarray, seen: Sightings, n: int) -> tuple[_State, np.ndarray, float, float]:
-    """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes none."""
+    """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes neither."""
     surprise = np.concatenate([
         logarithm(seen.rotation[n] @ expected.rotation.T), seen.position[n] - expected.position
     ])  # fmt: skip

@@ -1,4 +1,4 @@
-"""What is wrong with a finger's sightings, in words: gaps, poses that contradict the path, fingers exchanged."""
+"""Faults of a finger's sightings: gaps, poses that contradict the path, exchanged fingers."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from tacdata.tags.fingers import Finger
 from tacdata.tags.mixups import handedness
 
 GAP = 0.25
-"""A finger unseen for longer has a gap there [s]."""
+"""Time without a sighting that counts as a gap [s]."""
 TURNED = np.radians(20.0)
-"""A sighting that is turned by more against the path, at its place, is a flip [rad]."""
+"""Angle to the path, at the same position, from which a sighting is a flip [rad]."""
 LEAST = 5
-"""Sightings of one tag alone from which it is judged [count]."""
+"""Minimum number of sightings of a single tag for judging it [count]."""
 NEAR = 0.5
-"""Share of the way between two fingers that a contradicting sighting may be off the other one's path [1]."""
+"""Largest distance from another finger's path, over the distance of the two fingers, that counts as an exchange [1]."""
 STANDING = 0.2
-"""Share of the time for which fingers must stand as the other hand's before that is said [1]."""
+"""Share of the time for which fingers must be arranged like the other hand's, for a warning [1]."""
 
 
 def gaps(time_ns: np.ndarray, begin_ns: int, end_ns: int) -> list[tuple[int, int]]:
-    """Return where a finger is not seen for longer than `GAP`: beginnings and ends [ns].
+    """Return the gaps: where a finger is not seen for longer than `GAP`, as beginnings and ends [ns].
 
     Args:
         time_ns: Times of sightings that were used [ns], shape (p,), ascending.
@@ -48,11 +48,11 @@ def turn_against(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> np.nd
 
 
 def wrong_tags(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> tuple[dict[int, float], tuple[int, ...]]:
-    """Return tags that, seen alone, contradict the other tags, and by which angle [rad]: turned, or with wrong numbers.
+    """Return the tags that, seen alone, contradict the other tags, and by which angle [rad]: turned, or misnumbered.
 
-    The path may rest on the wrong tag, if that is seen most. So tags are grouped by how they are turned against the
-    path; the group of most tags is right, of two such groups the one that is seen more often. In that case nothing but
-    frequency speaks for it, and its tags are returned too; otherwise no tags are.
+    The path may rest on the wrong tag, if that one is seen most. So tags are grouped by their angle to the path, and
+    the largest group is right. Of two equally large groups the more frequent one is right. Then only frequency speaks
+    for it, and its tags are returned too; otherwise no tags are.
     """
     nearest = _nearest(times_ns, seen.time_ns)
     turns: dict[int, list[np.ndarray]] = {}
@@ -81,13 +81,13 @@ def _angle(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _mean(rotations: list[np.ndarray]) -> np.ndarray:
-    """Return the rotation nearest to most of some, shape (3, 3): the one with the smallest sum of angles to others."""
+    """Return the median rotation, shape (3, 3): the one with the smallest sum of angles to the others."""
     few = rotations[:: max(len(rotations) // 30, 1)]
     return few[int(np.argmin([sum(_angle(a, b) for b in few) for a in few]))]
 
 
 def flips(seen: Sightings, accepted: np.ndarray, angle: np.ndarray, name: str) -> list[str]:
-    """Say how many sightings were turned against the path, and by how much."""
+    """Describe how many sightings were flipped against the path, and by how much."""
     turned = ~accepted & (angle > TURNED)
     if not turned.any():
         return []
@@ -101,7 +101,7 @@ def flips(seen: Sightings, accepted: np.ndarray, angle: np.ndarray, name: str) -
 
 
 def exchanges(seen: dict[str, Sightings], paths: dict[str, Smoothed], times_ns: np.ndarray, begin_ns: int) -> list[str]:
-    """Say where sightings of one finger lie on another's path and the other way round: numbers exchanged."""
+    """Describe where sightings of two fingers lie on each other's path: their numbers are exchanged."""
     remarks = []
     for one, other in combinations(seen, 2):
         found = [_on_the_others_path(seen[a], paths[a], paths[b], times_ns) for a, b in ((one, other), (other, one))]
@@ -116,7 +116,7 @@ def exchanges(seen: dict[str, Sightings], paths: dict[str, Smoothed], times_ns: 
 
 
 def _on_the_others_path(seen: Sightings, own: Smoothed, other: Smoothed, times_ns: np.ndarray) -> np.ndarray:
-    """Return the times [ns] of refused sightings that lie much nearer to another finger's path than to the own."""
+    """Return the times [ns] of outliers that lie much nearer to another finger's path than to their own."""
     refused = ~own.accepted & (seen.time_ns >= times_ns[0]) & (seen.time_ns <= times_ns[-1])
     times = seen.time_ns[refused]
     here, there = (
@@ -128,7 +128,7 @@ def _on_the_others_path(seen: Sightings, own: Smoothed, other: Smoothed, times_n
 
 
 def other_hand(paths: dict[str, Smoothed], fingers: dict[str, Finger], rate: float) -> list[str]:
-    """Say for which hand index and middle finger stand, along the whole path, as those of the other one."""
+    """Name the hand whose index and middle finger are arranged, along the whole path, as those of the other hand."""
     remarks = []
     for hand in ("left", "right"):
         own = {n: replace(f, tip=np.eye(4)) for n, f in fingers.items() if f.hand == hand and n in paths}

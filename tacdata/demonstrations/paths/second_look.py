@@ -1,4 +1,4 @@
-"""Every stored image searched for tags: a recorder on a busy host only searches those that it has time for."""
+"""Searches every stored image for tags; a recorder on a busy host only searches some of them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from tacdata.tags.tracker import FingerTracker
 
 
 def look_again(recording: DemoRecording, told: Callable[[int], None] = lambda done: None) -> DemoRecording:
-    """Return a demonstration with the fingertips of every image in it, instead of those seen while it was recorded.
+    """Return a demonstration with the fingertips of all its images, in place of those found while recording.
 
     Args:
-        recording: As read.
-        told: Is told how many images have been searched.
+        recording: The demonstration.
+        told: Called with the number of images searched.
 
     Raises:
         UsageError: If the file is gone.

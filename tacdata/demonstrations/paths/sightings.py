@@ -1,4 +1,4 @@
-"""What the cameras saw of one finger, in the world, in the order of time."""
+"""Poses of one finger from all cameras, in the world, in the order of time."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from tacdata.demonstrations.recording.rig import DemoRig
 from tacdata.recording.episode import TagStream
 
 FLOOR = 0.0002, float(np.radians(0.2))
-"""Standard deviation [m], [rad] that every sighting has beyond its image noise: print, mounting, calibration."""
+"""Standard deviation [m], [rad] of every sighting beyond its image noise: print, mounting, calibration."""
 UNKNOWN = 0.002, float(np.radians(3.0))
-"""Standard deviation [m], [rad] of a sighting whose covariance was not stored."""
+"""Standard deviation [m], [rad] of a sighting without a stored covariance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,20 +28,20 @@ class Sightings:
     rotation: np.ndarray
     """Rotation from the fingertip's frame to the world's [1], shape (p, 3, 3)."""
     covariance: np.ndarray
-    """Of a small turn in the world [rad] and the position [m], shape (p, 6, 6)."""
+    """Covariance of a small rotation in the world [rad] and the position [m], shape (p, 6, 6)."""
     ambiguous: np.ndarray
-    """Whether a second pose explained the image about as well, shape (p,), bool."""
+    """Whether a second pose explains the image about as well, shape (p,), bool."""
     camera: tuple[str, ...]
-    """Camera of each."""
+    """Camera of each sighting."""
     ids: tuple[tuple[int, ...], ...]
-    """Tags of each, ascending."""
+    """Tags of each sighting, ascending."""
 
     def __len__(self) -> int:
         """Number of sightings."""
         return len(self.time_ns)
 
     def where(self, kept: np.ndarray) -> Sightings:
-        """Return some of them; ``kept`` has shape (p,), bool."""
+        """Return some of the sightings; ``kept`` has shape (p,), bool."""
         chosen = np.flatnonzero(kept)
         return Sightings(
             self.finger, self.time_ns[kept], self.position[kept], self.rotation[kept], self.covariance[kept],
@@ -54,13 +54,13 @@ def sightings_of(
 ) -> Sightings:
     """Return a finger's sightings from the streams of all cameras, in the rig's world.
 
-    A covariance knows the image's noise only; the cameras' own uncertainty, `FLOOR` and what a doubtful time means for
-    a finger that moves are added.
+    A stored covariance includes image noise only. Added are the camera's own uncertainty, `FLOOR`, and the finger's
+    speed times the uncertainty of the image's time.
 
     Args:
         finger: Name of the finger.
-        views: What the cameras saw.
-        rig: Where they stand.
+        views: Streams of the cameras.
+        rig: The rig, with the cameras' poses.
         timing: Camera -> standard uncertainty of its images' times [s].
     """
     parts = [_of_camera(view, rig, (timing or {}).get(view.camera, 0.0)) for view in views if view.finger == finger]
@@ -113,7 +113,8 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
 
 
 def _motion(time_ns: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Return v v^T of a path [m^2/s^2] in the lower right of (p, 6, 6): what a second of doubt about time would add.
+    """Return v v^T of a path [m^2/s^2] in the lower right of (p, 6, 6): the covariance per squared second of timing
+    error.
 
     The velocity is that of a straight line through five neighbours, so that noise hardly counts as motion.
     """

@@ -1,4 +1,4 @@
-"""From a recorded demonstration to fingertip paths on one grid, with everything that is wrong said in words."""
+"""Turns a recorded demonstration into fingertip paths on one grid, and reports what is wrong."""
 
 from __future__ import annotations
 
@@ -22,26 +22,28 @@ from tacdata.sensor import Sensor
 RATE = 30.0
 """Default rate of the grid [Hz]."""
 UNSEARCHED = "no image was searched for tags"
-"""How a remark on a stretch without images begins."""
+"""Beginning of a remark on a stretch without images."""
 FEWEST = 5
-"""Sightings below which a finger has no path."""
+"""Minimum number of sightings for a path."""
 
 
 @dataclass(frozen=True)
 class Estimator:
-    """A trained network, as this room knows it."""
+    """A trained network, as this room uses it."""
 
     identity: dict[str, Any]
-    """hash, network, epoch, lookahead [frames], sensor hash."""
+    """Identity: hash, network, epoch, lookahead [frames], sensor hash."""
     sensor: Sensor
     maps: Callable[[np.ndarray], np.ndarray]
-    """Tared readings of successive frames [counts], shape (m, taxels) -> depth [mm], shape (m, pixels_x, pixels_y)."""
+    """Function from tared readings of successive frames [counts], shape (m, taxels), to depth [mm], shape (m, pixels_x,
+    pixels_y).
+    """
     novelty: Callable[[np.ndarray], np.ndarray] | None = None
-    """Tared readings -> how far they are from all that was learnt from [1], shape (m,); None if that is not known."""
+    """Function from tared readings to their novelty [1], shape (m,); None if it is not known."""
 
 
 def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | None = None) -> Demonstration:
-    """Smooth every finger's path, put the readings beside it, and say what is wrong.
+    """Smooth every finger's path, put the readings beside it, and report what is wrong.
 
     Args:
         recording: A demonstration.
@@ -101,9 +103,9 @@ def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | N
 def _path(
     seen: Sightings, times: np.ndarray, looked: np.ndarray
 ) -> tuple[Sightings, Smoothed, dict[str, Any], list[str]]:
-    """Smooth one finger, with the times of all images searched [ns], shape (p,).
+    """Smooth one finger, given the times of all searched images [ns], shape (p,).
 
-    A tag that contradicts the others whenever it is alone is left out and named.
+    A tag that contradicts the others whenever it is seen alone is left out and named.
     """
     words: list[str] = []
     wander = choose(seen)
@@ -124,14 +126,14 @@ def _path(
         when = f"from {first:.1f} to {last:.1f} s ({last - first:.1f} s)"
         if ((looked > a) & (looked < b)).any():
             words.append(f"{seen.finger}: no tag that fits {when}")
-        else:  # whoever records must not look for a hidden tag
+        else:  # the recording person need not look for a hidden tag
             words.append(f"{UNSEARCHED} {when}: a camera or the host did not keep up")
     chosen = {"velocity_density": wander.velocity, "turning_density": wander.turning}
     return seen, path, {**chosen, "left_out_tags": list(wrong)}, words
 
 
 def _wrong_words(seen: Sightings, wrong: dict[int, float], rivals: tuple[int, ...]) -> list[str]:
-    """Say which tags are left out, and whether it may as well be the others that are wrong."""
+    """Describe which tags are left out, and whether the others may be wrong instead."""
     words = []
     for tag, angle in wrong.items():
         count, off = seen.ids.count((tag,)), f"{np.degrees(angle):.0f} deg"

@@ -1,4 +1,4 @@
-"""A worked-up demonstration as a file: Parquet, one row a grid time (`schemas/finger_tracks.schema.json`)."""
+"""A processed demonstration as a file: Parquet, one row per grid time (`schemas/finger_tracks.schema.json`)."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ REMEDY = "run `tacdata track` again: the recording holds everything"
 
 
 def path_of(recording: Path) -> Path:
-    """Return where the tracks of a recording lie: beside it."""
+    """Return the path of a recording's tracks: beside the recording."""
     return recording.with_name(recording.name.removesuffix(".mcap") + ENDING)
 
 
 def write_tracks(path: Path, made: Demonstration) -> None:
-    """Write a worked-up demonstration; a crash leaves the old file or the new one.
+    """Write a processed demonstration; a crash leaves the old file or the new one.
 
     Raises:
         FormatError: If it contradicts the schema.
@@ -67,7 +67,7 @@ def write_tracks(path: Path, made: Demonstration) -> None:
 
 
 def read_tracks(path: Path) -> Demonstration:
-    """Read a worked-up demonstration.
+    """Read a processed demonstration.
 
     Raises:
         UsageError: If it does not exist.

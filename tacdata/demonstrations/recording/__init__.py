@@ -1,1 +1,1 @@
-"""Demonstrations by hand, recorded."""
+"""Records demonstrations by hand."""

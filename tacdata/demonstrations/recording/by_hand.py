@@ -1,4 +1,4 @@
-"""Recording demonstrations as a person at a terminal does it: Enter begins one, Enter ends it."""
+"""Records demonstrations from a terminal: Enter begins one, Enter ends it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tacdata.tags import look
 
 
 def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count: int, resume: bool) -> DemoSession:
-    """Record demonstrations into a folder, and say meanwhile what a person should know.
+    """Record demonstrations into a folder; print what a person should know.
 
     Args:
         rig: Demo rig file.
         out: Folder to create, or to add to with ``resume``.
-        task: What is demonstrated.
+        task: Name of the task.
         seconds: Length of each demonstration [s of the rig's clock]; None: until Enter or Ctrl-C.
-        count: How many; with ``seconds`` they follow each other without being asked.
+        count: Number of demonstrations; with ``seconds`` they follow each other without being asked.
         resume: Add to an existing folder.
 
     Raises:
@@ -62,7 +62,7 @@ def _enter() -> bool:
 
 
 def _forget_if_empty(out: Path, resume: bool) -> None:
-    """Take a new folder without any recording away again, so that the same command can be repeated."""
+    """Delete a new folder without any recording, so that the same command can be repeated."""
     if not resume and out.is_dir() and len(list(out.iterdir())) == 1:
         for path in out.iterdir():
             path.unlink()
@@ -70,7 +70,7 @@ def _forget_if_empty(out: Path, resume: bool) -> None:
 
 
 class _Stop:
-    """The first Ctrl-C ends the demonstration and keeps it whole; the second breaks it off."""
+    """The first Ctrl-C ends the demonstration and keeps it complete; the second interrupts it."""
 
     def __init__(self) -> None:
         self._asked = False

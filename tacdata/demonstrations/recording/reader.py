@@ -1,4 +1,4 @@
-"""A recorded demonstration as arrays, from a finished file or from what a crash left."""
+"""Reads a recorded demonstration as arrays, from a finished or a damaged file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tacdata.recording.files.camera_arrays import finger_streams
 from tacdata.recording.files.mcap_records import Records, read_records
 
 UNTIMED = 0.02
-"""Standard uncertainty of an image's time without a clock model: a file that a crash cut off [s]."""
+"""Standard uncertainty of an image's time without a clock model, in a damaged file [s]."""
 
 
 @dataclass(frozen=True)
@@ -35,19 +35,19 @@ class DemoRecording:
     taxels: dict[str, TaxelStream]
     """Finger -> its board's raw readings; fingers without board are missing."""
     views: tuple[TagStream, ...]
-    """Poses of fingertips in the cameras' frames, one stream for each camera and finger."""
+    """Poses of fingertips in the cameras' frames, one stream per camera and finger."""
     complete: bool
     """False if the recording was interrupted or salvaged."""
     notes: tuple[str, ...]
-    """What was noted while recording, and what could not be read, in words."""
+    """Remarks of the recorder and of the reader, as sentences."""
     timing: dict[str, float] = field(default_factory=dict)
-    """Camera -> standard uncertainty of when each of its images was taken [s]."""
+    """Camera -> standard uncertainty of its image times [s]."""
     searched: str = "images that the recorder had time for"
     """Which images were searched for tags, in words."""
 
     @property
     def span_ns(self) -> tuple[int, int]:
-        """First and last time of anything [ns]."""
+        """First and last time of any data [ns]."""
         times = [s.sample_ns for s in (*self.taxels.values(), *self.views) if len(s.sample_ns)]
         return (min(int(t[0]) for t in times), max(int(t[-1]) for t in times)) if times else (0, 0)
 
@@ -57,7 +57,7 @@ def read_demo(path: Path) -> DemoRecording:
 
     Raises:
         UsageError: If there is no such file.
-        FormatError: If it is foreign, no demonstration, or broke off before its attachments.
+        FormatError: If it is not a demonstration, or was cut off before its attachments.
     """
     records = read_records(Path(path), images=False)
     try:
@@ -92,7 +92,7 @@ def _recording(records: Records) -> DemoRecording:
 
 
 def _timing(clock: ClockModel | None) -> float:
-    """Return how surely a camera's images are timed [s]: by their clock, or by arrivals where that is not steady."""
+    """Return the uncertainty of a camera's image times [s]: by its clock, or by arrivals where that is not steady."""
     if clock is None:
         return UNTIMED
     latency = clock.latency.uncertainty_ns if clock.latency else 0

@@ -1,4 +1,4 @@
-"""Records demonstrations: boards on fingers and cameras on their cubes, nothing moved by a machine."""
+"""Records demonstrations: boards on fingers and cameras on their cubes; no machine moves anything."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.detection_process import Detect
 
 FIRST_FRAME = 5.0
-"""How long the streams may take to begin [s of real time]."""
+"""Time allowed for the streams to begin [s of real time]."""
 FIRST_SEARCH = 20.0
-"""How long the recording waits for the tag detector to load [s of real time]; then it goes on without."""
+"""Time that the recording waits for the tag detector to load [s of real time]; then it starts without."""
 WATCH = 0.05
-"""How often the recorder looks whether it is to end [s of real time]."""
+"""Interval at which the recorder checks whether it should end [s of real time]."""
 
 
 @dataclass(frozen=True)
 class DemoHeader:
-    """What is attached to every demonstration."""
+    """Documents that are attached to every demonstration."""
 
     rig: dict[str, Any]
     """The demo rig's document with everything in it."""
@@ -55,10 +55,10 @@ class DemoRecorder:
         """Build the drivers; nothing is opened yet.
 
         Args:
-            session: The folder that recordings go to.
-            rig: The rig as it is now; its ports may be others than when the folder was begun.
+            session: The folder for the recordings.
+            rig: The rig as it is now; its ports may have changed since the folder was created.
             detect: Searches an image for the cubes; without it images are only stored.
-            say: Is told in words what a person should know meanwhile.
+            say: Called with messages for a person.
         """
         self.session, self.rig, self._detect, self._say = session, rig, detect, say or (lambda words: None)
         self._boards: dict[str, TaxelBoard] = {n: create(e, TaxelBoard, rig.clock) for n, e in rig.boards.items()}
@@ -67,7 +67,7 @@ class DemoRecorder:
         self._streams: DemoStreams | None = None
 
     def __enter__(self) -> DemoRecorder:
-        """Open boards and cameras and wait until all of them speak.
+        """Open boards and cameras and wait until all of them deliver.
 
         Raises:
             DeviceError: If one of them is missing or silent, naming the finger or the camera.
@@ -93,10 +93,10 @@ class DemoRecorder:
         self._stack.close()
 
     def record(self, ended: Callable[[], bool], seconds: float | None = None) -> Path:
-        """Record one demonstration until ``ended()``, or for so long [s of the rig's clock].
+        """Record one demonstration until ``ended()``, or for ``seconds`` [s of the rig's clock].
 
         Raises:
-            DeviceError: If writing fails, or no stream speaks any more; what was written is kept.
+            DeviceError: If writing fails, or every stream is silent; what was written is kept.
             KeyboardInterrupt: On Ctrl-C; what was recorded so far is kept as an interrupted recording.
         """
         if self._streams is None:
@@ -110,7 +110,7 @@ class DemoRecorder:
         try:
             while not ended() and (seconds is None or self.rig.clock.now_ns() - begun < seconds * 1e9):
                 if writer.failure is not None:
-                    break  # closing says what the disk refused
+                    break  # closing reports what the disk refused
                 if len(self._streams.silent) == len(self._boards) + len(self._cameras):
                     reason = "; ".join(f"{k}: {v}" for k, v in self._streams.silent.items())
                     given = f"every stream fell silent ({reason})"

@@ -17,7 +17,7 @@ from tacdata.sensor import Sensor, default_sensor
 from tacdata.tags.fingers import Finger, fingers_of
 
 CAMERA_FRAME = "camera "
-"""What the name of a frame begins with that is a camera's own, because no camera was calibrated to a world."""
+"""Prefix of the frame name of a camera that was not calibrated to a world."""
 
 
 @dataclass(frozen=True)
@@ -28,17 +28,17 @@ class DemoRig:
     boards: dict[str, dict[str, Any]]
     """Finger -> driver and settings of its board."""
     sensors: dict[str, Sensor]
-    """Finger -> the skin that it wears."""
+    """Finger -> the sensor that it wears."""
     cameras: dict[str, dict[str, Any]]
     """Camera -> driver, settings, intrinsics."""
     worlds: dict[str, CameraWorld]
-    """Camera -> where it stands; cameras that were not calibrated are missing."""
+    """Camera -> its pose in the world; cameras that were not calibrated are missing."""
     fingers: dict[str, Finger]
     latencies: dict[str, StreamLatency]
-    """Stream ("camera NAME", "taxels FINGER") -> its constant delay, where it was measured."""
+    """Stream ("camera NAME", "taxels FINGER") -> its constant latency, where it was measured."""
     clock: Clock
     document: dict[str, Any]
-    """The file's document with everything that it names inside, as attached to every recording."""
+    """The file's document including all files that it names, as attached to every recording."""
 
     @property
     def frame(self) -> str:
@@ -46,14 +46,14 @@ class DemoRig:
         return next(iter(self.worlds.values())).frame if self.worlds else CAMERA_FRAME + next(iter(self.cameras))
 
     def camera_pose(self, camera: str) -> np.ndarray | None:
-        """Return a camera's frame in `frame`, homogeneous, shape (4, 4) [m]; None if its place is not known."""
+        """Return a camera's pose in `frame`, homogeneous, shape (4, 4) [m]; None if it is unknown."""
         if camera in self.worlds:
             return self.worlds[camera].matrix
         return np.eye(4) if self.frame == CAMERA_FRAME + camera else None
 
 
 def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
-    """Build a demo rig from a parsed file; files that it names are looked for beside ``origin``.
+    """Build a demo rig from a parsed file; files that it names are searched beside ``origin``.
 
     Raises:
         UsageError: If a file that it names does not exist.
@@ -90,7 +90,7 @@ def read_demo_rig(path: Path) -> DemoRig:
 
 
 def _inside(given: str | dict[str, Any], schema: str, folder: Path, origin: str) -> dict[str, Any]:
-    """Return a document that is named or given, checked."""
+    """Return a checked document that is either given or named."""
     if isinstance(given, str):
         return documents.read(folder / given, schema)
     documents.check(given, schema, origin)

@@ -18,20 +18,20 @@ FILE = "demonstrations.json"
 
 @dataclass(frozen=True)
 class DemoSession:
-    """The folder as it stands."""
+    """A folder of demonstrations: its recordings and its document."""
 
     folder: Path
     episodes: tuple[Path, ...]
     """Finished recordings, by number."""
     unfinished: tuple[Path, ...]
-    """Recordings that were broken off; readable."""
+    """Recordings that were interrupted; readable."""
     rig: DemoRig
     document: dict[str, Any]
     """Content of `FILE` (`schemas/demo_session.schema.json`)."""
 
     @property
     def task(self) -> str:
-        """What is demonstrated, in words."""
+        """Name of the task."""
         return self.document["task"]
 
     @property
@@ -61,7 +61,7 @@ def read_demo_session(folder: Path) -> DemoSession:
 
 
 def open_demo_session(folder: Path, rig: DemoRig, task: str, resume: bool) -> DemoSession:
-    """Create a folder for demonstrations, or take up an existing one again.
+    """Create a folder for demonstrations, or continue an existing one.
 
     Raises:
         UsageError: If it exists (does not exist, resuming), or holds another task or rig's demonstrations.
@@ -69,7 +69,7 @@ def open_demo_session(folder: Path, rig: DemoRig, task: str, resume: bool) -> De
     """
     if resume:
         session = read_demo_session(folder)
-        # A clock and ports are new whenever a virtual rig starts; they decide nothing about the recordings.
+        # A virtual rig has a new clock and new ports at every start; they do not matter for the recordings.
         for what in ("fingers", "sensors"):
             if session.document["rig"][what] != rig.document[what]:
                 raise UsageError(
@@ -90,7 +90,7 @@ def open_demo_session(folder: Path, rig: DemoRig, task: str, resume: bool) -> De
 
 
 def refresh(session: DemoSession) -> DemoSession:
-    """Bring the document up to the folder's finished recordings and return the folder as it stands."""
+    """Update the document to the finished recordings of the folder; return the session."""
     known = {entry["number"]: entry for entry in session.document["episodes"]}
     episodes = [
         known.get(number, {"number": number, "file": path.name, "code_version": provenance.code_version()})

@@ -1,4 +1,4 @@
-"""Streams of a demonstration: one that falls silent is said aloud and never costs the others."""
+"""Streams of a demonstration: a silent one is reported and does not stop the others."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tacdata.recording.live.device_streams import DeviceStreams
 
 
 class DemoStreams(DeviceStreams):
-    """Runs as a context; what arrives goes into the open recording."""
+    """A context that writes what arrives to the open recording."""
 
     silence = 1.5
 
@@ -31,8 +31,8 @@ class DemoStreams(DeviceStreams):
             entries: The rig file's camera entries.
             fingers: The fingers' document.
             detect: Searches an image for the cubes; without it images are only stored.
-            say: Is told when a stream falls silent or speaks again.
-            latencies: Constant delay of each stream, where it is known.
+            say: Called when a stream falls silent or delivers again.
+            latencies: Constant latency of each stream, where it is known.
         """
         super().__init__(boards, cameras, entries, fingers, detect)
         self._say = say
@@ -47,16 +47,16 @@ class DemoStreams(DeviceStreams):
 
     @property
     def silent(self) -> dict[str, str]:
-        """Stream -> why nothing comes from it at the moment, in words."""
+        """Stream -> why it delivers nothing at the moment, as a sentence."""
         return dict(self._why)
 
     @property
     def heard(self) -> frozenset[str]:
-        """The streams from which anything has come since the start."""
+        """The streams that have delivered anything since the start."""
         return frozenset(self._heard)
 
     def record_into(self, sink: EpisodeWriter | None) -> None:
-        """Send everything that arrives from now on into a recording, or nowhere."""
+        """Send all arrivals from now on to a recording, or to none."""
         super().record_into(sink)
         for name, why in self.silent.items():
             if sink:

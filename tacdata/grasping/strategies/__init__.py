@@ -1,1 +1,1 @@
-"""What a hand goes by when it decides where an object lies between its fingertips: one file each."""
+"""Strategies that locate an object between a hand's fingertips, one per file."""

@@ -1,4 +1,4 @@
-"""Contact only: any valid contact is taken for central, and the object is lifted at once (paper, Exp. 3)."""
+"""Contact only: any valid contact counts as central, and the object is lifted at once (paper, Exp. 3)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tacdata.grasping.strategies.strategy import Strategy
 
 
 class ContactOnly(Strategy):
-    """Knows whether, not where."""
+    """Uses whether there is contact, not where."""
 
     adjusts = False
 

@@ -9,7 +9,7 @@ from tacdata.grasping.strategies.strategy import Strategy
 
 
 class DenseDepth(Strategy):
-    """Goes by the trained network."""
+    """Uses the trained network's map."""
 
     def centre(self, frames: np.ndarray) -> np.ndarray | None:
         """Return the centroid of the averaged map's deep pixels."""

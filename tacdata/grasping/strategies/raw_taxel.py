@@ -9,7 +9,7 @@ from tacdata.grasping.strategies.strategy import Strategy
 
 
 class RawTaxel(Strategy):
-    """Goes by the taxels themselves."""
+    """Uses the taxels' readings."""
 
     def centre(self, frames: np.ndarray) -> np.ndarray | None:
         """Return the centroid of the averaged readings."""

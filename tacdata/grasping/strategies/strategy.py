@@ -1,7 +1,7 @@
-"""What a strategy's file holds.
+"""Base class of a strategy.
 
-``tacdata/grasping/strategies/my_way.py`` defines one class derived from `Strategy`; ``tacdata grasp-study`` lets it
-meet the same oranges, fingertips and noise as all others in this folder. It is given readings alone, never the truth.
+``tacdata/grasping/strategies/my_way.py`` defines one class derived from `Strategy`. ``tacdata grasp-study`` gives it
+the same oranges, fingertips and noise as all others in this folder. It gets readings only, never the truth.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ ROOM, BASE = "tacdata.grasping.strategies", "strategy"
 
 
 class Strategy(ABC):
-    """Where one fingertip believes the contact to be."""
+    """Base class: estimates where one fingertip touches."""
 
     adjusts = True
-    """Whether what it believes depends on where the contact is; without that the arm never moves."""
+    """Whether the estimate depends on where the contact is; without that the arm never moves."""
 
     def __init__(self, sensor: Sensor, maps: Maps) -> None:
-        """Keep the fingertip's sensor, and the network that turns its readings into depth maps."""
+        """Keep the fingertip's sensor, and the network that estimates depth maps from its readings."""
         self.sensor, self.maps = sensor, maps
 
     @abstractmethod
@@ -42,7 +42,7 @@ def names() -> list[str]:
 
 
 def create(name: str, sensor: Sensor, maps: Maps) -> Strategy:
-    """Return a strategy.
+    """Return a strategy by name.
 
     Raises:
         UsageError: If there is no such file.

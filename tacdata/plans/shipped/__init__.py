@@ -1,1 +1,1 @@
-"""Plans that come with tacdata, one file each; `tacdata plan NAME` writes them out."""
+"""Plans that come with tacdata, one per file; `tacdata plan NAME` writes them."""

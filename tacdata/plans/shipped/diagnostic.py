@@ -41,7 +41,7 @@ HOLD, RECOVERY = 60.0, 60.0
 ONSET_SPEED = 0.1
 """Speed of the slow first contacts [mm/s]."""
 CLEARANCE = 0.5
-"""Least distance of an indenter at full depth from the skin's rim [mm]."""
+"""Minimum distance of an indenter at full depth from the skin's rim [mm]."""
 MOTION = {
     "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.5,
     "hold": 1.0, "rest": 1.0, "run_up": 1.0,

@@ -1,9 +1,11 @@
 """The paper's evaluation: 78 depth trials and 40 contact-position trials.
 
-Liu et al., TacPrint, section "Simulation-Generated Depth Labels" and Exp. 1: the depth at the contact centre is
-compared over 78 trials, the centroid of the region above a threshold over 40, three of which are cut by the sensing
-boundary. The paper prints neither depths, places nor indenters; what stands here is an assumption that gives the
-same numbers of trials: 13 depths at 6 places, and 37 places spread over the interior with 3 at the edge.
+Liu et al., TacPrint, section "Simulation-Generated Depth Labels" and Exp. 1. The depth at the contact centre is
+compared over 78 trials. The centroid of the region above a threshold is compared over 40, three of which are cut by the
+sensing boundary.
+
+The paper prints neither depths, places nor indenters. The values here are assumptions with the same numbers of trials:
+13 depths at 6 places, and 37 places spread over the interior with 3 at the edge.
 """
 
 from __future__ import annotations
@@ -24,11 +26,11 @@ DEPTHS = [round(0.3 + 0.1 * k, 1) for k in range(13)]
 PLACES = 6
 """Places at which each depth is pressed."""
 INTERIOR, EDGE = 37, 3
-"""Position trials whose contact region lies within the sensing area, and those that its boundary cuts."""
+"""Number of position trials whose contact lies within the sensing area, and of those that its boundary cuts."""
 POSITION_DEPTH = 0.8
 """Depth of the position trials [mm]."""
 CLEARANCE = 0.1
-"""Least distance of the indenter at full depth from the skin's rim [mm]; more would keep every region whole."""
+"""Minimum distance of the indenter at full depth from the skin's rim [mm]; more would keep every contact whole."""
 MOTION = {
     "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.7,
     "hold": 1.0, "rest": 1.0,
@@ -41,7 +43,7 @@ class Evaluation(ShippedPlan):
     usual = ("sphere_4",)
 
     def document(self, sensor: Sensor, wishes: PlanOptions) -> dict[str, Any]:
-        """Return the plan; ``purpose`` of each press says which kind of trial it is."""
+        """Return the plan; each press's ``purpose`` names its kind of trial."""
         names = self.specimen_names(wishes)
         if len(names) != 1:
             raise UsageError(
@@ -71,7 +73,7 @@ class Evaluation(ShippedPlan):
 
 
 def _margin(half: np.ndarray) -> np.ndarray:
-    """Return how far interior places stay inside the array's box [mm], shape (2,): a fifth of its half sides."""
+    """Return the margin of interior places inside the array's box [mm], shape (2,): a fifth of its half sizes."""
     return 0.2 * half
 
 

@@ -1,7 +1,7 @@
-"""What a shipped plan's file holds.
+"""Base class of a shipped plan.
 
 ``tacdata/plans/shipped/my_plan.py`` defines one class derived from `ShippedPlan`. Its name is the file's name, and
-`tacdata plan my_plan` writes it out for a sensor. Most are easiest said as a recipe (`tacdata.plans.recipe`).
+`tacdata plan my_plan` writes it for a sensor. Most are written most easily as a recipe (`tacdata.plans.recipe`).
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ ROOM, BASE = "tacdata.plans.shipped", "shipped_plan"
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """What the person asked for; None where they left it open."""
+    """Options of a person; None where they are left open."""
 
     presses: int | None = None
-    """How many presses [count]."""
+    """Number of presses."""
     indenters: tuple[str, ...] | None = None
     """Names in `tacdata.plans.specimens.STANDARD`."""
     seed: int = 0
@@ -30,10 +30,10 @@ class PlanOptions:
 
 
 class ShippedPlan(ABC):
-    """A plan that can be written out for any sensor."""
+    """Base class: a plan that can be written for any sensor."""
 
     usual: ClassVar[tuple[str, ...]]
-    """Specimens that are used if none are wished for."""
+    """Default specimens."""
     adjustable: ClassVar[bool] = False
     """Whether the number of presses may be chosen."""
 
@@ -42,7 +42,7 @@ class ShippedPlan(ABC):
         """Return the plan's document (`schemas/plan.schema.json`).
 
         Raises:
-            UsageError: If a wish cannot be met.
+            UsageError: If an option cannot be met.
             FormatError: If the sensor is too small or too thin for the plan.
         """
 
@@ -55,7 +55,7 @@ def shipped_plan(name: str, sensor: Sensor, wishes: PlanOptions | None = None) -
     """Return the document of a shipped plan.
 
     Raises:
-        UsageError: If there is none of that name, or a wish cannot be met.
+        UsageError: If there is none of that name, or an option cannot be met.
     """
     kind: type[Any] = registry.load(ROOM, BASE, name, ShippedPlan)
     plan: ShippedPlan = kind()

@@ -1,4 +1,4 @@
-"""A plan to train on: random sites, depths and speeds, spread evenly over indenters and kinds of site."""
+"""A training plan: random sites, depths and speeds, spread evenly over indenters and kinds of site."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
 
 USUAL = ("sphere_2", "sphere_4", "punch", "pin", "ellipsoid")
-"""Those of a plan that names none."""
+"""Default indenters of a plan."""
 YAWS: dict[str, tuple[float, ...]] = {
     "cylinder": (0.0, 60.0), "ellipsoid": (0.0, 60.0), "prism": (0.0, 60.0), "square_punch": (0.0, 45.0),
 }  # fmt: skip
-"""Mounting angles of shapes that are not round [deg]; each costs a change of indenter."""
+"""Mounting angles of shapes that are not round [deg]; each needs a change of indenter."""
 DEPTHS = (0.3, 1.2)
 """Shallowest and deepest press [mm]."""
 SPEEDS = (0.5, 1.0)
@@ -27,7 +27,7 @@ SPEEDS = (0.5, 1.0)
 HOLDS = (0.5, 1.0)
 """Shortest and longest hold [s]."""
 CLEARANCE = 0.5
-"""Least distance of an indenter at full depth from the skin's rim, which is held by the frame [mm]."""
+"""Minimum distance of an indenter at full depth from the skin's rim, which the frame holds [mm]."""
 KINDS = ("taxel", "between", "anywhere", "edge")
 MOTION = {
     "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.7,
@@ -36,13 +36,13 @@ MOTION = {
 
 
 class Training(ShippedPlan):
-    """The standard plan to train on."""
+    """The standard training plan."""
 
     usual = USUAL
     adjustable = True
 
     def document(self, sensor: Sensor, wishes: PlanOptions) -> dict[str, Any]:
-        """Return the plan; 24 presses if no number is wished for."""
+        """Return the plan; by default 24 presses."""
         return training_plan(
             sensor, 24 if wishes.presses is None else wishes.presses, wishes.seed, self.specimen_names(wishes)
         )
@@ -53,13 +53,13 @@ def training_plan(
 ) -> dict[str, Any]:
     """Return a plan's document (`schemas/plan.schema.json`).
 
-    Sites take turns among: on a taxel, half way between taxels, anywhere on the array, and at its edge.
-    Depths are stratified: one in each of ``presses`` equal parts of `DEPTHS`. Presses are ordered by
-    mounting, so that each indenter is mounted once per angle; within a mounting the order is random.
+    Sites take turns among: on a taxel, half way between taxels, anywhere on the array, and at its edge. Depths are
+    stratified: one in each of ``presses`` equal parts of `DEPTHS`. Presses are ordered by mounting, so that each
+    indenter is mounted once per angle; within a mounting the order is random.
 
     Args:
         sensor: The skin that will be pressed.
-        presses: How many [count].
+        presses: Number of presses.
         seed: Same seed, same plan.
         indenters: Names in `tacdata.plans.specimens.STANDARD`.
 
@@ -72,7 +72,7 @@ def training_plan(
     rng = np.random.default_rng(seed)
     mountings = [(name, yaw) for name in indenters for yaw in YAWS.get(shapes[name]["shape"], (0.0,))]
     depths = rng.permutation(DEPTHS[0] + (DEPTHS[1] - DEPTHS[0]) * (np.arange(presses) + rng.random(presses)) / presses)
-    # Depth and kind of site must not follow the mounting: both are dealt out in random order.
+    # Depth and kind of site must not depend on the mounting: both are dealt out in random order.
     kinds = rng.permutation([KINDS[k % len(KINDS)] for k in range(presses)])
     entries = []
     for k in range(presses):
@@ -105,7 +105,7 @@ def training_plan(
 
 
 def _site(sensor: Sensor, kind: str, rng: np.random.Generator, footprint: tuple[float, float]) -> tuple[float, float]:
-    """Return a site [mm, sensor frame] at which the whole footprint [mm] lies inside the skin's rim by `CLEARANCE`."""
+    """Return a site [mm, sensor frame] whose whole footprint [mm] keeps `CLEARANCE` from the skin's rim."""
     taxels, centers = sensor.taxels, sensor.taxels.centers
     half = np.array([taxels.pitch_x * (taxels.columns - 1), taxels.pitch_y * (taxels.rows - 1)]) / 2
     pitch = np.array([taxels.pitch_x, taxels.pitch_y])

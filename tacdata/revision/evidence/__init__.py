@@ -1,1 +1,1 @@
-"""What shows that a revised model is better: gap, curves, table, card."""
+"""Evidence that a revised model is better: gap, curves, table, card."""

@@ -1,4 +1,4 @@
-"""The evidence card: one page of HTML with everything in it that a person needs to believe a verdict, or not to."""
+"""The evidence card: one page of HTML with everything that a person needs to judge a verdict."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from tacdata.revision.evidence.table import in_words
 
 CHANNELS = 6
-"""Channels that are listed, the worst first."""
+"""Number of channels listed, the worst first."""
 STYLE = """
 body{font:15px/1.45 system-ui,sans-serif;max-width:60rem;margin:1.5rem auto;padding:0 1rem;color:#1a1a1a}
 h1{font-size:1.5rem;margin:.2rem 0}h2{font-size:1.05rem;margin:1.4rem 0 .3rem;border-bottom:1px solid #ddd}
@@ -30,7 +30,7 @@ def card(revision: dict[str, Any], verdict: dict[str, Any], picture: Path | None
     Args:
         revision: `schemas/revision.schema.json`.
         verdict: `schemas/verdict.schema.json`.
-        picture: A PNG to put into it; None for none.
+        picture: A PNG to include, or None.
     """
     status, answer = verdict["status"], verdict["effects"]
     title = " and ".join(e["title"] for e in answer) or "No effect"

@@ -1,4 +1,4 @@
-"""Readings of a few telling episodes, measured and as the model says them before and after."""
+"""Measured readings of a few episodes, and those that the model predicts before and after."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tacdata.revision.comparison import Comparison
 
 @dataclass(frozen=True)
 class EpisodeCurves:
-    """One episode, rows that were read only."""
+    """Readings of one episode; rows without a reading are left out."""
 
     name: str
     time: np.ndarray
@@ -21,9 +21,11 @@ class EpisodeCurves:
     depth: np.ndarray
     """Commanded depth [mm], shape (n,)."""
     measured: np.ndarray
-    """[the source's unit], shape (n, channels)."""
+    """Measured readings [the source's unit], shape (n, channels)."""
     before: np.ndarray
-    """Predicted, moved by a constant to the episode's measured mean [the source's unit], shape (n, channels)."""
+    """Predicted readings, shifted by a constant to the episode's measured mean [the source's unit], shape (n,
+    channels).
+    """
     after: np.ndarray
     """The same with the effects [the source's unit], shape (n, channels)."""
     noise: np.ndarray
@@ -33,7 +35,7 @@ class EpisodeCurves:
 
     @property
     def channel_name(self) -> str:
-        """What that channel is called."""
+        """Name of that channel."""
         return self.channels[self.channel]
 
     @property
@@ -42,12 +44,12 @@ class EpisodeCurves:
         return int(np.argmax(np.square(self.after - self.before).mean(axis=0) / self.noise**2))
 
     def off(self, said: np.ndarray) -> float:
-        """Return the root mean square difference from what was measured [the source's unit]."""
+        """Return the root mean square difference from the measurement [the source's unit]."""
         return float(np.sqrt(np.mean(np.square(said - self.measured))))
 
 
 def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, most: int = 3) -> list[EpisodeCurves]:
-    """Return the episodes among some in which the effects change most, that most first."""
+    """Return the episodes in which the effects change most, largest change first."""
     after = held.after(placed)
     before_said = held.said(held.before.response, [])
     after_said = held.said(after.response, after.placed)

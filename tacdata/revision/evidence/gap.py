@@ -1,4 +1,4 @@
-"""The gap between model and measurement, before and after, on episodes that the numbers were not fitted to."""
+"""The gap between model and measurement, before and after, on episodes that were not fitted to."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from tacdata.revision.comparison import Comparison
 from tacdata.revision.episodes import Sealed, groups
 
 DRAWS = 2000
-"""Resamples of the episodes behind an interval."""
+"""Bootstrap resamples of the episodes for an interval."""
 
 
 @dataclass(frozen=True)
 class ResidualChange:
-    """One set of episodes, before and after."""
+    """Mean squares of one set of episodes, before and after."""
 
     name: str
     episodes: int
-    """How many."""
+    """Number of episodes."""
     before: float
     """Mean square of the whitened residual [1]; 1 is the noise floor."""
     after: float
@@ -29,27 +29,27 @@ class ResidualChange:
 
     @property
     def closed(self) -> float:
-        """Share of what stood above the noise floor that is gone [1]; NaN where nothing did."""
+        """Share of the mean square above the noise floor that is gone [1]; NaN where there was none."""
         above = self.before - 1.0
         return (self.before - self.after) / above if above > 1e-3 else float("nan")
 
 
 @dataclass(frozen=True)
 class GapReduction:
-    """How much smaller the gap is, and where it is not."""
+    """How much smaller the gap is, overall and by group."""
 
     whole: ResidualChange
-    """On the sealed episodes."""
+    """Gap of the sealed episodes."""
     interval: tuple[float, float]
-    """90 % interval of the share closed, over resampled sealed episodes [1]."""
+    """90 % bootstrap interval of the share closed, over sealed episodes [1]."""
     unseen: bool
     """Whether the verdict itself was reached without the sealed episodes."""
     worst: ResidualChange
-    """The sealed episode that is worst after."""
+    """The sealed episode with the largest gap after."""
     elsewhere: tuple[ResidualChange, ...]
-    """Groups whose episodes the effects' numbers were not fitted to: another rate, depth, indenter."""
+    """Groups that the effects' parameters were not fitted to: another rate, depth, indenter."""
     fitted: tuple[Placed, ...]
-    """The effects with numbers fitted without the sealed episodes."""
+    """The effects with parameters fitted without the sealed episodes."""
 
 
 def gap(
@@ -60,8 +60,8 @@ def gap(
     Args:
         held: Recordings and the model before.
         placed: The effects to add.
-        chosen: Episodes that the effects' numbers are not fitted to.
-        note: Is told what is left out.
+        chosen: Episodes that the effects' parameters are not fitted to.
+        note: Called with a line for each group that is left out.
     """
     numbers = chosen.numbers
     fitted = held.fitted_without(placed, numbers)

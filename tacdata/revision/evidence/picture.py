@@ -12,7 +12,7 @@ from tacdata.revision.evidence.curves import EpisodeCurves
 from tacdata.revision.evidence.gap import GapReduction, ResidualChange
 
 BEFORE, AFTER, MEASURED = "#d55e00", "#0072b2", "#000000"
-"""Okabe and Ito's vermilion and blue, which all eyes tell apart."""
+"""Okabe and Ito's vermilion and blue, which colour-blind people can tell apart."""
 
 
 def draw(
@@ -21,7 +21,7 @@ def draw(
     """Draw the page into a PNG file.
 
     Args:
-        title: What it says.
+        title: Its title.
         shown: Episodes, at most three.
         found: The gap.
         path: File to write.
@@ -87,7 +87,7 @@ def _groups(axis: Any, found: GapReduction) -> None:
     low = min(0.8, *(c.after for c in rows))
     axis.set(xscale="log", xlim=(0.8 * low, None), xlabel="mean square of the residual; 1 is the noise floor",
              title="the gap, where the numbers were not fitted")  # fmt: skip
-    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8)  # clear of every bar
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8)  # above every bar
 
 
 def _networks(axis: Any, metrics: Sequence[dict[str, Any]]) -> None:

@@ -10,7 +10,7 @@ HEAD = ("where", "episodes", "before", "after", "share closed")
 
 
 def rows(revision: dict[str, Any]) -> list[tuple[str, int, float, float, float | None]]:
-    """Return the lines: sealed episodes, the worst of them, every group that was left out."""
+    """Return the rows: sealed episodes, the worst of them, every group that was left out."""
     gap = revision["gap"]
     if gap is None:
         return []
@@ -26,7 +26,7 @@ def _closed(change: dict[str, Any]) -> float | None:
 
 
 def markdown(revision: dict[str, Any]) -> str:
-    """Return the table in Markdown; mean squares over the noise floor."""
+    """Return the table in Markdown; mean squares in units of the noise floor."""
     lines = [f"| {' | '.join(HEAD)} |", "|---|---:|---:|---:|---:|"]
     for name, count, before, after, closed in rows(revision):
         lines.append(f"| {name} | {count} | {before:.4g} | {after:.4g} | {'' if closed is None else f'{closed:.3f}'} |")
@@ -59,7 +59,7 @@ def _networks(revision: dict[str, Any]) -> list[str]:
 
 
 def in_words(trained: dict[str, Any]) -> str:
-    """Return what two networks learnt from and were scored on."""
+    """Describe the data on which two networks were trained and scored."""
     learnt = {
         "labels": "both learnt from the readings measured, with labels of either model; scored on labels of the model "
         "after, which is right as far as the effect is",

@@ -1,4 +1,4 @@
-"""Where the gap on sealed episodes lives before and after: what became better, what is worst now."""
+"""Slices of the sealed episodes with the largest gap, before and after."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from tacdata.revision.comparison import Comparison
 from tacdata.revision.evidence.gap import ResidualChange
 
 FEW = 20
-"""Readings below which a slice tells nothing."""
+"""Minimum number of readings in a slice."""
 THIRDS = [0, 1 / 3, 2 / 3, 1]
 
 
 def sealed_slices(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray) -> list[ResidualChange]:
-    """Return the mean square by phase, depth, rate and channel, over the noise; an offset an episode is taken off.
+    """Return the mean square by phase, depth, rate and channel, over the noise; each episode's offset is subtracted.
 
     Args:
         held: Recordings and the model before.
-        placed: The effects, their numbers fitted without these episodes.
+        placed: The effects, their parameters fitted without these episodes.
         episodes: The sealed ones.
     """
     course, noise = held.course.reduced, held.frame.noise

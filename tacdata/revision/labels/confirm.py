@@ -1,4 +1,4 @@
-"""Real finite-element presses where a revised model moves the loads most: does the table say the same there."""
+"""Solves presses with finite elements where a revised model changes the loads most, and compares with the table."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ from tacdata.transduction import Loads, Transducer
 
 @dataclass(frozen=True)
 class Confirmed:
-    """One press solved again."""
+    """One press, solved again."""
 
     tool: str
     place: tuple[float, float]
     """x and y [mm]."""
     depth: float
-    """Where the revised model has the tip [mm]."""
+    """Depth of the tip by the revised model [mm]."""
     change: float
     """Largest change of a load by the revision, over the largest load [1]."""
     difference: float
     """Root mean square difference of surrogate and finite elements over the channels, over the largest load [1]."""
     most: float
-    """The largest of them [1]."""
+    """Largest difference over the channels, over the largest load [1]."""
     solved: bool
     """Whether an equilibrium was found; without one the figures are NaN."""
 
 
 def touches_fem(placed: Sequence[Placed]) -> bool:
-    """Return whether effects change what finite elements were asked: where the tip is, or how thick the skin is."""
+    """Return whether effects change the input of the finite elements: the tip's position, or the skin's thickness."""
     return any(p.stage == "kinematics" or p.effect.name == THICKNESS for p in placed)
 
 
@@ -58,9 +58,9 @@ def confirm(
         placed: The effects that were added.
         sensor: The sensor.
         reaches: The tools by name.
-        count: How many presses.
+        count: Number of presses.
         mesh: The mesh that the table was made on.
-        progress: Told how many are done, of how many, and the seconds left.
+        progress: Called with the presses done, their total, and the seconds left.
     """
     response = held.setting.response
     if not isinstance(response, TableResponse) or not touches_fem(placed) or count < 1:
@@ -95,7 +95,7 @@ def confirm(
 
 
 def _factor(held: Comparison, effect: Placed, pose: np.ndarray) -> np.ndarray:
-    """Return by what a mechanical effect multiplies the loads of every row, shape (rows,)."""
+    """Return the factor of a mechanical effect on the loads of every row, shape (rows,)."""
     from tacdata.chain.state import State
 
     ones = np.ones((len(pose), 1))

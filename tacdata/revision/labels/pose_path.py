@@ -1,4 +1,4 @@
-"""Where the tip truly was in every recorded episode, by a model's kinematic effects: what labels belong to."""
+"""The tip's true path in every recorded episode by a model's kinematic effects; labels belong to it."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from tacdata.effects import Placed
 from tacdata.recording import Episode
 
 BETWEEN = 0.02
-"""Longest way between points of a path [mm]."""
+"""Largest distance between points of a path [mm]."""
 LATE = "latency"
-"""The effect by which a reading belongs to where the tip was before."""
+"""The effect by which a reading belongs to an earlier position of the tip."""
 
 
 def moved_episodes(episodes: Sequence[Episode], placed: Sequence[Placed]) -> list[Episode]:
-    """Return the episodes with the tip's path as kinematic effects make it, in the order of their time.
+    """Return the episodes with the tip's path under the kinematic effects, in the order of their time.
 
-    Effects with memory see the whole session, turning points included: rows are the commanded profile's own points, and
-    points between them, since what follows a straight way need not be straight. Where readings come late the path comes
-    late with them: a label is paired with a reading by its time.
+    Effects with memory see the whole session with its turning points. Rows are the commanded profile's own points, and
+    points between them, since the path under an effect need not be straight. Where readings come late the path is
+    delayed with them, because a label is paired with a reading by its time.
 
     Args:
-        episodes: Of one session.
-        placed: The model's effects; other ones than kinematic ones and a constant delay are passed over.
+        episodes: The episodes of one session.
+        placed: The model's effects; all but kinematic ones and a constant delay are ignored.
     """
     late = round(1e9 * sum(float(p.values["L"]) for p in placed if p.effect.name == LATE))
     return [replace(e, tip_ns=e.tip_ns + late) for e in _placed_elsewhere(episodes, placed)]
@@ -51,7 +51,7 @@ def _placed_elsewhere(episodes: Sequence[Episode], placed: Sequence[Placed]) -> 
 
 
 def _dense(episode: Episode) -> Episode:
-    """Return an episode whose path has points no farther apart than `BETWEEN`."""
+    """Return an episode whose path has no points farther apart than `BETWEEN`."""
     if len(episode.tip_ns) < 2:
         return episode
     way = np.linalg.norm(np.diff(episode.tip, axis=0), axis=1)

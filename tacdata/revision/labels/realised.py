@@ -1,4 +1,4 @@
-"""How far the tip was off where it was told to be, by a second observation or a known truth: before and after."""
+"""Tip error before and after, against a second observation or a known truth."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from tacdata.revision.labels.pose_path import moved_episodes
 COLUMNS = ("time_ns", "x", "y", "depth")
 """Columns of a file with the tip's true path: the recording's time [ns], then mm in the sensor's frame."""
 FEWEST = 5
-"""Points of an episode in contact below which nothing is said of it."""
+"""Minimum number of points of an episode in contact."""
 BETTER = 0.9
-"""An episode got better, or worse, if its error changed by such a factor [1]."""
+"""Factor of the error by which an episode counts as better or worse [1]."""
 
 
 @dataclass(frozen=True)
 class TipError:
-    """How far labels' tips are from where the tip truly was."""
+    """Distance of the labels' tip positions from the true ones."""
 
     against: str
-    """What it was held against: a file's name, or "tag"."""
+    """Reference: a file's name, or "tag"."""
     episodes: int
-    """How many could be compared."""
+    """Episodes that could be compared."""
     before: float
-    """Root mean square distance in contact, the commanded path, without the session's constant part [mm]."""
+    """Root mean square error of the commanded path in contact, without the session's constant part [mm]."""
     after: float
     """The same with the model's effects [mm]."""
     most_before: float
@@ -40,20 +40,20 @@ class TipError:
     most_after: float
     """The same with the effects [mm]."""
     better: int
-    """Episodes whose tip came nearer."""
+    """Episodes whose error became smaller."""
     worse: int
-    """Episodes whose tip went farther away."""
+    """Episodes whose error became larger."""
     constant_before: float
-    """The constant part: an error of the registration, mostly [mm]; 0 against a tag, which cannot tell of it."""
+    """Constant part of the error [mm], mostly an error of the registration; 0 against a tag, which cannot show it."""
     constant_after: float
     """The same with the effects [mm]."""
 
 
 def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None) -> TipError | None:
-    """Return how far the tip is off before and after, or None where nobody saw it.
+    """Return the tip error before and after, or None where there is no reference.
 
-    Each session's median is taken out of both, as the registration is off by a constant too, and told apart. A tag does
-    not see what bends behind it: only effects that it sees are held against it.
+    Each session's median is subtracted from both, because the registration has a constant error too; it is reported
+    separately. A tag does not see what bends behind it, so only effects that it can see are compared with it.
 
     Args:
         session: Folder of recordings.
@@ -88,7 +88,7 @@ def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None
 
 
 def _apart(before: Episode, after: Episode, time_ns: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what the tip is off before and after where it touches [mm], each of shape (n, 3)."""
+    """Return the tip error before and after while it touches [mm], each of shape (n, 3)."""
     told, revised = before.tip_at(time_ns), after.tip_at(time_ns)
     good = (told[:, 2] > 0) & np.isfinite(seen[:, 2])
     good &= (time_ns >= before.tip_ns[0] - NEAR) & (time_ns <= before.tip_ns[-1] + NEAR)

@@ -1,4 +1,4 @@
-"""Labels made again under a revised model: only what its effects change, beside the old ones."""
+"""Makes labels again under a revised model, beside the old ones: only those that its effects change."""
 
 from __future__ import annotations
 
@@ -17,46 +17,46 @@ from tacdata.revision.labels.pose_path import LATE, moved_episodes
 from tacdata.sensor import Sensor
 
 THICKNESS = "thickness"
-"""The effect that changes the sensor's skin itself."""
+"""The effect that changes the skin itself."""
 
 
 @dataclass(frozen=True)
 class Moved:
-    """What a revised model does to labels."""
+    """How a revised model changes labels."""
 
     episodes: int
     """Episodes with contact."""
     paths: int
-    """Episodes whose tip goes elsewhere by more than `LEAST`."""
+    """Episodes whose tip moves by more than `LEAST`."""
     path_rms: float
-    """How far the tip moves, root mean square in contact [mm]."""
+    """Shift of the tip, root mean square in contact [mm]."""
     path_most: float
-    """The same, at most [mm]."""
+    """Largest shift of the tip [mm]."""
     labels: int = 0
-    """Labels compared, old with new."""
+    """Labels compared with the old ones."""
     rms: float = float("nan")
-    """Root mean square change of depth over pixels dented in either [mm]; NaN where none was compared."""
+    """Root mean square change of depth over pixels dented in either [mm]; NaN if none was compared."""
     most: float = float("nan")
     """Largest change of a pixel [mm]."""
     solved: int = 0
-    """Paths that had to be solved anew."""
+    """Paths that were solved."""
     found: int = 0
-    """Paths that were there already."""
+    """Paths that were found in the store."""
     failed: dict[int, str] = field(default_factory=dict)
     """Episode -> why it has no new label."""
 
 
 LEAST = 0.001
-"""A tip that moves less leaves a label as it is [mm]."""
+"""Shift of the tip below which a label is kept [mm]."""
 
 
 def moves_labels(placed: Sequence[Placed]) -> bool:
-    """Return whether effects change labels: the tip's path, when it was read, or the skin's thickness."""
+    """Return whether effects change labels: the tip's path, its timing, or the skin's thickness."""
     return any(p.stage == "kinematics" or p.effect.name in (THICKNESS, LATE) for p in placed)
 
 
 def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:
-    """Return how far a model's effects move the tip in a session, without making any label."""
+    """Return how a model's effects shift the tip in a session, without making labels."""
     old = [read_episode(path) for path in read_session(session).episodes]
     new = {e.number: e for e in moved_episodes(old, placed)}
     squares, most, paths, touching = [], 0.0, 0, 0
@@ -85,10 +85,10 @@ def relabelled(
     Args:
         session: The session's folder.
         placed: The model's effects.
-        folder: Where the new labels go; the session's own stay as they are.
+        folder: Folder of the new labels; the session's own are kept.
         settings: How to label; the same as for the old labels, or all of them are new.
-        store: Where solved paths lie; the session's own if not given.
-        progress: Told how far it is.
+        store: Store of solved paths; by default the session's own.
+        progress: Called with the progress.
     """
     recorded = read_session(session)
     moved = {e.number: e for e in moved_episodes([read_episode(p) for p in recorded.episodes], placed)}
@@ -100,7 +100,7 @@ def relabelled(
 
 
 def changed_skin(sensor: Sensor, placed: Sequence[Placed]) -> Sensor | None:
-    """Return the sensor with the thickness that effects give it; None if they leave it alone."""
+    """Return the sensor with the thickness that effects give it; None if they do not change it."""
     factor = float(np.prod([1 + float(p.values["e"]) for p in placed if p.effect.name == THICKNESS]))
     if factor == 1.0:
         return None

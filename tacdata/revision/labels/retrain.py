@@ -1,4 +1,4 @@
-"""What a revised model does to a network: trained on data as they were, and on data as the model has them."""
+"""Trains a network on data before and after a revision, and compares their scores."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from training.frames.frames import Frames
 
 FEWEST = 5
-"""Episodes with labels that a network needs: some to learn from, one to stop by, one to be scored on."""
+"""Minimum number of episodes with labels: for training, for early stopping, for scoring."""
 LABELS, READINGS = "labels", "readings"
-"""What the revision changes of what networks learn from."""
+"""What the revision changes in the training data: labels or readings."""
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,16 @@ class Retrained:
     """Two networks that differ in the model alone."""
 
     by: str
-    """`LABELS`: both learn from the readings measured, with labels of either model. `READINGS`: both learn from
-    readings that either model says, with the same labels, and are scored on those measured."""
+    """`LABELS`: both networks learn from measured readings, with labels of either model. `READINGS`: both learn from
+    readings that either model predicts, with the same labels, and are scored on measured ones.
+    """
     episodes: int
-    """Scored ones, which neither network saw."""
+    """Scored episodes, which neither network saw."""
     frames: int
     """Scored frames in contact."""
     epochs: int
     metrics: tuple[dict[str, Any], ...]
-    """name, title, unit, before, after; None where undefined."""
+    """Name, title, unit, before, after; None where undefined."""
 
 
 def retrained(
@@ -60,13 +61,13 @@ def retrained(
     """Pack, train and score twice.
 
     Args:
-        sessions: Folders of recordings, in the order that the verdict had them.
-        labels: Session -> folder of its labels under the revised model; without entries labels stay as they are.
+        sessions: Folders of recordings, in the order of the verdict.
+        labels: Session -> folder of its labels under the revised model; without entries labels are kept.
         held: Recordings and the model before.
         placed: The effects that were added.
-        folder: Where both datasets and networks go.
+        folder: Folder of both datasets and networks.
         recipe: How to train.
-        note: Is told what is being done.
+        note: Called with a line of progress.
 
     Raises:
         UsageError: If too few episodes have labels.
@@ -98,7 +99,7 @@ def retrained(
 
 @dataclass(frozen=True)
 class _Pair:
-    """One recording as either model has it."""
+    """One recording under both models."""
 
     before: Episode
     after: Episode
@@ -129,7 +130,7 @@ def _pairs(sessions: Sequence[Path], labels: dict[Path, Path], placed: Sequence[
 
 
 class _Simulated:
-    """What a model says of a recording's readings, with the noise that the recordings have."""
+    """A model's predicted readings of a recording, with noise like the recording's."""
 
     def __init__(self, held: Comparison) -> None:
         self._held = held
@@ -165,7 +166,7 @@ def _frames(folder: Path, episodes: list[Episode], labels: list[Label]) -> Frame
 
 
 def _scored(frames: Frames, judge: Frames, folder: Path, recipe: Recipe, note: Callable[[str], None]) -> dict[str, Any]:
-    """Return the scores of a network on the episodes of another dataset that are its test episodes in its own."""
+    """Return the scores of a network on the episodes of another dataset that are its own test episodes."""
     from training.scoring.evaluate import evaluate
     from training.settings import TrainingSettings
     from training.train import train
@@ -181,7 +182,7 @@ def _scored(frames: Frames, judge: Frames, folder: Path, recipe: Recipe, note: C
 
 
 def _part(frames: Frames, numbers: tuple[int, ...]) -> Frames:
-    """Return a dataset of some episodes alone; it is another one than those that networks were trained on."""
+    """Return a dataset of some episodes, marked as another one than the training data."""
     spans, rows, at = [], [], 0
     for span in frames.spans(numbers):
         own = np.arange(span.start, span.stop)

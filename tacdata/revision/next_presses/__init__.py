@@ -1,1 +1,1 @@
-"""The presses that would tell rivals apart."""
+"""Plans the presses that would tell rivals apart."""

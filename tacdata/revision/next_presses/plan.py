@@ -1,10 +1,12 @@
-"""The presses that would best tell rivals apart, as a plan that `tacdata record` runs.
+"""Plans the presses that best tell rivals apart; `tacdata record` runs the plan.
 
-Box and Hill (Technometrics 9 (1967) 57) choose the experiment whose outcome is expected to move the rivals'
-probabilities most. For Gaussian readings of one covariance S under every rival it is the largest sum over pairs of
-pi_i pi_j d_ij' S^-1 d_ij, d_ij the difference of what they say. What calibration leaves open is no evidence: every
-channel's offset and one error of the press's depth are projected out of d_ij first. Presses are taken one after
-another; a pair that is told apart already counts by the logarithm of what it has, so that every pair gets its press.
+Box and Hill (Technometrics 9 (1967) 57) choose the experiment with the largest expected change of the rivals'
+probabilities. For Gaussian readings with the same covariance S under every rival, it has the largest sum over pairs of
+pi_i pi_j d_ij' S^-1 d_ij, with d_ij the difference of their predictions.
+
+What calibration leaves open is no evidence: every channel's offset and one error of the press's depth are projected out
+of d_ij first. Presses are chosen one after another. A pair counts by the logarithm of its evidence so far, so that
+every pair gets its press.
 """
 
 from __future__ import annotations
@@ -22,18 +24,18 @@ from tacdata.revision.next_presses.rivals import Rival
 from tacdata.revision.next_presses.trial import CandidatePress, elsewhere, foretold, laid_out, trials
 
 PRESSES, REPEATS = 4, 3
-"""Different presses, and how often each is done: an episode is the unit of all statistics."""
+"""Number of different presses, and repeats of each: the episode is the unit of all statistics."""
 JITTER = 0.01
-"""Error of a press's depth that is expected [mm]."""
+"""Expected error of a press's depth [mm]."""
 STEP = 0.01
 """Step of the derivative with respect to depth [mm]."""
 NOISY = 1.0
-"""Whitened distance of two rivals [nats] below which a press tells nothing."""
+"""Whitened distance of two rivals [nats] below which a press is not informative."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """One press and what it is for."""
+    """One press and its purpose."""
 
     trial: CandidatePress
     nats: dict[tuple[str, str], float]
@@ -41,13 +43,13 @@ class Choice:
 
 
 def choose(held: Comparison, found: list[Rival], plan: Plan, presses: int = PRESSES) -> list[Choice]:
-    """Return the presses that tell most, the best first; fewer where nothing tells the rivals apart.
+    """Return the most informative presses, the best first; fewer if no press tells the rivals apart.
 
     Args:
         held: Recordings and model.
         found: The rivals, fitted.
         plan: The plan of one of the sessions.
-        presses: How many different presses.
+        presses: Number of different presses.
     """
     scored = [Choice(t, _distances(held, found, t)) for t in trials(held.course, plan)]
     weight = _probabilities(found)
@@ -77,8 +79,8 @@ def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repea
         chosen: The presses.
         held: Recordings and model.
         plan: The plan of one of the sessions: indenters and motion are taken over.
-        name: Of the new plan.
-        repeats: How often each press is done.
+        name: Name of the new plan.
+        repeats: Repeats of each press.
     """
     document = plan.document or {}
     used = {held.course.tools[c.trial.tool].name for c in chosen}
@@ -101,7 +103,7 @@ def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repea
 
 
 def _probabilities(found: list[Rival]) -> dict[str, float]:
-    """Return each rival's share, flat enough that none is out: they are rivals because none is."""
+    """Return each rival's probability, flattened so that none is excluded: they are rivals because none is."""
     energy = np.array([r.model.energy.sum() for r in found])
     weight = np.exp(-np.minimum(energy - energy.min(), 3.0))
     return {r.mechanism: float(w) for r, w in zip(found, weight / weight.sum(), strict=True)}
@@ -115,7 +117,8 @@ def _distances(held: Comparison, found: list[Rival], trial: CandidatePress) -> d
         said.append(signal / noise.scale[: course.channels])
     own = laid_out(course, trial)
     slope = _slope(held, found[0], trial) / noise.scale[: course.channels]
-    # Correlated noise carries less: an AR(1) of correlation m tells (1 - m) / (1 + m) as much of slow differences.
+    # Correlated noise is less informative: AR(1) noise of correlation m has (1 - m) / (1 + m) of the information on
+    # slow differences.
     worth = (1 - noise.memory) / (1 + noise.memory)
     nats = {}
     for i, a in enumerate(found):
@@ -131,7 +134,7 @@ def _distances(held: Comparison, found: list[Rival], trial: CandidatePress) -> d
 
 
 def _slope(held: Comparison, rival: Rival, trial: CandidatePress) -> np.ndarray:
-    """Return how readings change with the press's depth [counts/mm], each channel's mean taken out."""
+    """Return the derivative of readings by the press's depth [counts/mm], each channel's mean subtracted."""
     own = laid_out(held.course, trial)
     response = elsewhere(rival.model.response, held.course, own, trial)
     deeper = replace(own, tip=np.where(own.tip[:, 2:] > 0, own.tip + np.array([0.0, 0.0, STEP]), own.tip))

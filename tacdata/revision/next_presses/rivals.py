@@ -1,4 +1,4 @@
-"""Every reading of an ambiguous verdict, each fitted to the same episodes."""
+"""Every explanation of an ambiguous verdict, each fitted to the same episodes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tacdata.revision.comparison import Comparison
 
 @dataclass(frozen=True)
 class Rival:
-    """One reading of the verdict."""
+    """One explanation of the verdict."""
 
     mechanism: str
     placed: tuple[Placed, ...]
@@ -26,7 +26,7 @@ class Rival:
 
 
 def named(verdict: dict[str, Any]) -> list[Placed]:
-    """Return the effects of a verdict with their numbers."""
+    """Return the effects of a verdict with their parameters."""
     return [
         Placed(load(e["effect"]), {n: np.array(p["value"], dtype=float) for n, p in e["parameters"].items()})
         for e in verdict["effects"]
@@ -36,13 +36,13 @@ def named(verdict: dict[str, Any]) -> list[Placed]:
 def rivals(
     held: Comparison, verdict: dict[str, Any], most: int = 6, note: Callable[[str], None] = lambda text: None
 ) -> list[Rival]:
-    """Return the verdict's own answer and what would do as well in the place of its first undecided effect.
+    """Return the verdict's own answer, and the alternatives to its first undecided effect.
 
     Args:
         held: Recordings and model.
         verdict: An ambiguous verdict.
-        most: Most rivals.
-        note: Is told which is fitted.
+        most: Largest number of rivals.
+        note: Called with the rival that is fitted.
     """
     own = named(verdict)
     at = next((k for k, e in enumerate(verdict["effects"]) if e["alternatives"]), None)

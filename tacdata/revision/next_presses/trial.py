@@ -1,4 +1,4 @@
-"""Presses that could be recorded next, and what a model would say of them."""
+"""Presses that could be recorded next, and their predicted readings."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from tacdata.plans import Plan
 RATES, HOLDS = (0.15, 0.5, 2.0, 6.0), (0.0, 2.0, 20.0)
 """Speeds [mm/s] and times at full depth [s] to choose from."""
 DEPTHS, OVERSHOOT = (0.5, 1.0), 0.8
-"""Shares of the deepest press recorded; presses that come back up go to all of it and stay at this share."""
+"""Depths as shares of the deepest recorded press; presses with overshoot go to its full depth and stay at this share.
+"""
 RECOVERY = 10.0
 """Time after the release that may be recorded [s]."""
 FRAME = 1 / 30
-"""Time between readings, if nothing is known of it [s]."""
+"""Time between readings if it is unknown [s]."""
 PLACES = 2
-"""Places tried for each tool, those that say most first."""
+"""Places tried for each tool, the most informative first."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +51,11 @@ class CandidatePress:
 
     @property
     def seconds(self) -> float:
-        """About how long it takes [s]."""
+        """Expected duration [s]."""
         return 4.0 + 2 * (self.depth + self.overshoot + 0.3) / self.speed + self.hold + self.recovery
 
     def in_words(self, indenter: str) -> str:
-        """Return it in words."""
+        """Describe it."""
         told = f"{indenter} at ({self.x:.2f}, {self.y:.2f}) mm, {self.depth:.2f} mm deep at {self.speed:g} mm/s"
         told += f", from {self.overshoot:.2f} mm below" if self.overshoot else ""
         told += f", hold {self.hold:g} s" if self.hold else ""
@@ -74,10 +75,10 @@ class CandidatePress:
 
 
 def trials(course: Course, plan: Plan) -> list[CandidatePress]:
-    """Return presses within what was recorded: its places, its tools, nowhere deeper; no faster than the guide moves.
+    """Return presses within what was recorded: its places, tools and depths, no faster than the guide travels.
 
     Args:
-        course: What was recorded.
+        course: The recordings.
         plan: The plan of one of its sessions: its travel speed is the guide's.
     """
     top = plan.motion.travel_speed
@@ -104,7 +105,7 @@ def trials(course: Course, plan: Plan) -> list[CandidatePress]:
 
 
 def _telling(course: Course, episodes: np.ndarray) -> list[int]:
-    """Return the places of some episodes, those whose readings vary most first."""
+    """Return the places of some episodes, the most variable readings first."""
     spread = {}
     for e in episodes:
         rows = (course.episode == e) & (course.averaged > 0)
@@ -140,13 +141,13 @@ def laid_out(course: Course, trial: CandidatePress) -> Course:
 def foretold(
     course: Course, response: Response, placed: Sequence[Placed], trial: CandidatePress
 ) -> tuple[Course, np.ndarray]:
-    """Return the trial's course and the readings that a model says of it, shape (rows, channels)."""
+    """Return the trial's course and its predicted readings, shape (rows, channels)."""
     own = laid_out(course, trial)
     return own, predict(own, elsewhere(response, course, own, trial), placed).signal
 
 
 def elsewhere(response: Response, course: Course, own: Course, trial: CandidatePress) -> Response:
-    """Return a response for another course at a place and tool that it knows."""
+    """Return a response for another course, at a known place and tool."""
     if not isinstance(response, FittedResponse):
         return response
     alike = np.flatnonzero((course.row_site == trial.site) & (course.tool == trial.tool))

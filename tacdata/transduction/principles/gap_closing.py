@@ -28,7 +28,7 @@ class GapClosing(Principle):
     """Thickness that keeps the plates apart when they meet [mm]."""
 
     def complaint(self) -> str:
-        """Return what is wrong with the numbers."""
+        """Return what is wrong with the parameters."""
         if words := self.not_positive("electrode_area", "gap", "permittivity", "closure_share", "insulation"):
             return words
         if np.any(np.asarray(self.insulation) >= self.gap):
@@ -51,7 +51,7 @@ class GapClosing(Principle):
         return np.asarray(self.gap - self.closure_share * loads.closure <= self.insulation)
 
     def inverse(self, capacitance: np.ndarray, area: np.ndarray) -> Loads:
-        """Return the closure; nothing where the plates have met or the parasitic alone is larger."""
+        """Return the closure; NaN where the plates have met or the parasitic capacitance alone is larger."""
         nothing = np.full(np.shape(capacitance), np.nan)
         own = capacitance - self.parasitic
         within = (own > 0) & (own * self.insulation < self._scale)

@@ -1,4 +1,4 @@
-"""Capacitance in proportion to force and closure: the baseline that others are held against."""
+"""Capacitance in proportion to force and closure: the baseline for comparisons."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Linear(Principle):
         return np.zeros(np.shape(loads.force), dtype=bool)
 
     def inverse(self, capacitance: np.ndarray, area: np.ndarray) -> Loads:
-        """Return the force where only force counts, the closure where only closure counts, else nothing."""
+        """Return the force if only force counts, the closure if only closure counts, else NaN."""
         change, nothing = capacitance - self.rest, np.full(np.shape(capacitance), np.nan)
         a = np.broadcast_to(np.asarray(self.per_newton, dtype=float), nothing.shape)
         b = np.broadcast_to(np.asarray(self.per_millimetre, dtype=float), nothing.shape)

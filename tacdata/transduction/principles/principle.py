@@ -1,7 +1,7 @@
-"""What a principle's file holds.
+"""Base class of a transduction principle.
 
-``tacdata/transduction/principles/my_principle.py`` defines one frozen dataclass derived from `Principle`. A sensor
-file names it by its file's name under ``transduction/principle``. Its fields are its numbers, each with a default: one
+``tacdata/transduction/principles/my_principle.py`` defines one frozen dataclass derived from `Principle`. A sensor file
+names it by its file's name under ``transduction/principle``. Its fields are its parameters, each with a default: one
 number for all taxels, or one for each.
 """
 
@@ -18,7 +18,7 @@ from tacdata.transduction.loads import Loads
 
 ROOM, BASE = "tacdata.transduction.principles", "principle"
 PERMITTIVITY = 8.8541878188e-3
-"""Of vacuum [pF/mm] (CODATA 2022)."""
+"""Vacuum permittivity [pF/mm] (CODATA 2022)."""
 
 type Number = float | np.ndarray
 """One value for all taxels, or shape (taxels,)."""
@@ -26,7 +26,7 @@ type Number = float | np.ndarray
 
 @dataclass(frozen=True)
 class Principle(ABC):
-    """Capacitance [pF] of each taxel as a function of its own loads."""
+    """Base class: capacitance [pF] of each taxel as a function of its own loads."""
 
     @classmethod
     def from_numbers(cls, values: dict[str, Any]) -> Self:
@@ -52,11 +52,11 @@ class Principle(ABC):
         return result
 
     def complaint(self) -> str:
-        """Return in words what is wrong with the numbers; empty if nothing is."""
+        """Return what is wrong with the parameters, as a sentence; empty if nothing is."""
         return ""
 
     def not_positive(self, *names: str) -> str:
-        """Return in words which of the named numbers are not above 0; empty if all are."""
+        """Return which of the named parameters are not above 0, as a sentence; empty if all are."""
         wrong = [n for n in names if np.min(getattr(self, n)) <= 0]
         return f"{', '.join(f'{n} = {np.min(getattr(self, n)):g}' for n in wrong)}; allowed is above 0" if wrong else ""
 
@@ -70,11 +70,11 @@ class Principle(ABC):
 
     @abstractmethod
     def saturated(self, loads: Loads) -> np.ndarray:
-        """Return where more load changes nothing any more, shape (n, taxels), bool."""
+        """Return where a larger load no longer changes the reading, shape (n, taxels), bool."""
 
     @abstractmethod
     def inverse(self, capacitance: np.ndarray, area: np.ndarray) -> Loads:
-        """Return the loads that a capacitance [pF] tells of, NaN where it tells nothing; all of shape (n, taxels).
+        """Return the loads for a capacitance [pF], NaN where it is not invertible; all of shape (n, taxels).
 
         Args:
             capacitance: Readings [pF].

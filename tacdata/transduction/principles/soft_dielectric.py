@@ -1,10 +1,12 @@
 """A soft layer between the plates that a protrusion squeezes: the reading follows pressure, so force and area.
 
 The layer yields under the loaded part A_l of the electrode by the strain force / (A_l E_d); the rest keeps its
-thickness. Plates in parallel: C = eps0 eps / d0 (A + A_l strain / (1 - strain)) + C_p. A_l is the disc of the contact
-area, its radius enlarged by ``spread`` layer thicknesses, at most the electrode. A wide spread makes A_l the electrode:
-C = eps0 eps A / (d0 (1 - p / E_d)) + C_p with p = force / A. The layer's own yielding is taken as small against the
-protrusion's: it does not move the board.
+thickness. Plates in parallel: C = eps0 eps / d0 (A + A_l strain / (1 - strain)) + C_p.
+
+A_l is the disc of the contact area, its radius enlarged by ``spread`` layer thicknesses, at most the electrode. With a
+wide spread A_l is the electrode: C = eps0 eps A / (d0 (1 - p / E_d)) + C_p with p = force / A.
+
+The layer's own deformation is neglected against the protrusion's: it does not move the board.
 """
 
 from __future__ import annotations
@@ -34,10 +36,10 @@ class SoftDielectric(Principle):
     parasitic: Number = 1.0
     """C_p of traces and fringes [pF]."""
     largest_strain: Number = 0.9
-    """Strain at which the layer is crushed and yields no more [1]."""
+    """Strain at which the layer is crushed and stops yielding [1]."""
 
     def complaint(self) -> str:
-        """Return what is wrong with the numbers."""
+        """Return what is wrong with the parameters."""
         if words := self.not_positive("electrode_area", "thickness", "permittivity", "modulus", "largest_strain"):
             return words
         if np.max(self.largest_strain) >= 1:
@@ -65,7 +67,7 @@ class SoftDielectric(Principle):
         return np.asarray(self._strain(loads) >= self.largest_strain)
 
     def inverse(self, capacitance: np.ndarray, area: np.ndarray) -> Loads:
-        """Return the force, given the contact area; nothing where the layer is crushed."""
+        """Return the force for a contact area; NaN where the layer is crushed."""
         loaded, _ = self._loaded(area)
         nothing = np.full(np.shape(capacitance), np.nan)
         # strain / (1 - strain)
