@@ -166,10 +166,10 @@ class MotionController(Device):
         """After a feed hold: drop the queued motion, so that a retract can be sent.
 
         Returns:
-            Machine position at rest [mm], read after the machine had stopped.
+            Machine position at rest [mm], read after the machine stopped.
 
         Raises:
-            DeviceError: If the machine does not come to rest, or its position is not known any more.
+            DeviceError: If the machine does not come to rest, or its position is unknown.
         """
 
 

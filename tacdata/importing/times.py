@@ -31,7 +31,7 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
     Args:
         table: The file.
         clock: ``time`` of the mapping.
-        where: Names the place in the mapping in errors.
+        where: Place in the mapping, for errors.
 
     Returns:
         Times [ns], shape (rows,), int64, with the smallest int64 where a row has none; and "unix", "shared" or "own".

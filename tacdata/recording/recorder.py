@@ -94,7 +94,7 @@ class Recorder:
         """Check, ask for confirmation, then record every remaining press.
 
         Args:
-            confirm: Is shown the preflight summary before the first move; False ends the session without one.
+            confirm: Called with the preflight summary before the first move; False ends the session.
 
         Returns:
             The session as it stands on disk.
@@ -102,7 +102,7 @@ class Recorder:
         Raises:
             UsageError: If the folder exists (or, resuming, does not), or the summary was refused.
             FormatError: If a press would leave the envelope or the skin.
-            DeviceError: On a fault; the motion was stopped, the recording closed, and --resume continues.
+            DeviceError: On a fault. The motion is stopped and the recording closed; --resume continues.
             KeyboardInterrupt: On Ctrl-C, after the same.
         """
         self.plan.check_against(self.sensor)

@@ -34,7 +34,7 @@ class Chosen:
 
 
 def chosen_registration(rig: Rig, rig_path: Path, path: Path | None, sensor: Sensor) -> Chosen:
-    """Return the rig with a measured registration: the file that is named, or the one beside the rig file.
+    """Return the rig with a measured registration: the named file, or the one beside the rig file.
 
     Args:
         rig: The rig, with the registration of its own file.

@@ -60,7 +60,8 @@ class Comparison:
     def fitted_without(self, placed: Sequence[Placed], left_out: np.ndarray) -> tuple[Placed, ...]:
         """Return effects with parameters fitted to all episodes except some.
 
-        Those episodes still inform the skin's response where a place or tool was pressed in no other.
+        The motion of the excluded episodes stays in the course, since it shaped the skin's state; only their readings
+        are removed. If a place or tool occurs in no other episode, they are removed altogether.
         """
         kept = np.setdiff1d(np.arange(self.course.episodes), left_out)
         if set(self._contexts[left_out]) <= set(self._contexts[kept]):

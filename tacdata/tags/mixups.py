@@ -75,7 +75,7 @@ def exchanged(before: dict[str, CubePose], now: dict[str, CubePose]) -> tuple[st
 
     Args:
         before: Poses of the cubes in an image, by finger.
-        now: The same soon afterwards.
+        now: The same in a later image.
     """
     remarks = []
     for one, other in combinations(sorted(set(before) & set(now)), 2):

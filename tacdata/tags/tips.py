@@ -58,10 +58,10 @@ def detect_fingers(
         image: Grey (height, width) or BGR (height, width, 3), uint8.
         intrinsics: A rig file's ``intrinsics`` [px].
         fingers: The fingers, from `read_fingers`.
-        hints: Poses of the cubes just before, by finger; decide only where the image does not.
+        hints: Previous poses of the cubes, by finger; decide only between ambiguous poses.
 
     Raises:
-        UsageError: If the image is no image or of another size than the intrinsics.
+        UsageError: If the image is invalid or of another size than the intrinsics.
         FormatError: If the intrinsics contradict themselves.
     """
     grey, camera = to_grey(image), PinholeCamera.from_document(intrinsics)

@@ -35,9 +35,9 @@ def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | Non
     Args:
         port: Path, ``COM`` name or pyserial URL.
         baud: Bits per second.
-        device: What is meant to be there, for the error.
-        timeout: Longest wait of one read [s, real time].
-        dtr: State of the DTR line after opening; None leaves it raised, as the system does.
+        device: What should be there, for errors.
+        timeout: Timeout of one read [s, real time].
+        dtr: State of the DTR line after opening; None leaves it raised, as the system sets it.
 
     Raises:
         DeviceError: If the port is missing, busy, forbidden or no serial port.

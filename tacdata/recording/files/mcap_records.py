@@ -214,7 +214,7 @@ def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterato
     """Yield the content of one record; a chunk as a whole (`ChunkContent`), its checksum verified.
 
     Raises:
-        Exception: Whatever the parser of mcap stumbles over.
+        Exception: Any error of mcap's parser.
     """
     data = ReadDataStream(BytesIO(body))
     match opcode:

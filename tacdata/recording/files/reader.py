@@ -62,7 +62,7 @@ def read_episode(path: Path) -> Episode:
 
     Raises:
         UsageError: If there is no such file.
-        FormatError: If it is foreign, or broke off before its attachments.
+        FormatError: If it is not a recording, or was cut off before its attachments.
     """
     return read_recording(path).episode
 

@@ -60,7 +60,7 @@ def _columns(flat: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Decode messages of one length, shape (n, bytes), by the layout of the first.
 
     Returns:
-        Which messages are laid out like it, shape (n,), bool; field name -> values, shape (n,) or (n, channels).
+        Which messages share that layout, shape (n,), bool; field name -> values, shape (n,) or (n, channels).
     """
     alike, columns = np.ones(len(flat), dtype=bool), {}
     first, place = flat[0], 0

@@ -40,7 +40,7 @@ class Interruption:
             signal.signal(number, handler)
 
     def check(self) -> None:
-        """Answer what was asked for meanwhile.
+        """Raise what was signalled in the meantime.
 
         Raises:
             KeyboardInterrupt: If a signal came that was not raised yet.

@@ -38,10 +38,10 @@ def find_board(image: np.ndarray, board: Board, name: str = "") -> BoardView | N
     Args:
         image: Grey (height, width) or BGR (height, width, 3), uint8.
         board: The board.
-        name: What to call the view.
+        name: Name of the view.
 
     Raises:
-        UsageError: If this is no such image.
+        UsageError: If the image has another shape or type.
     """
     import cv2
 

@@ -66,7 +66,7 @@ class _Step:
 def align(
     start: Alignment, seen: set[str], cube: Cube, matrix: np.ndarray, grey: np.ndarray, steps: int = STEPS
 ) -> Alignment:
-    """Return the pose at which drawing and image agree best near ``start``.
+    """Return the pose at which rendering and image agree best near ``start``.
 
     Args:
         start: First pose, within about half a cell of the truth.

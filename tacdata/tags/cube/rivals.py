@@ -82,7 +82,7 @@ def best_rival(
         grey: The image, uint8, shape (height, width).
         cube: The cube.
         camera: The camera.
-        before: How it stood just before, if known; decides between two equals.
+        before: The previous pose, if known; decides between equal ones.
     """
     while tags:
         starts = candidates(tags, cube, camera)

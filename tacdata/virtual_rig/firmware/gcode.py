@@ -85,7 +85,7 @@ def interpret(line: str, modal: Modal, position: np.ndarray, offset: np.ndarray,
 
     Args:
         line: The line.
-        modal: Modal state; changed only if the line is accepted and no jog.
+        modal: Modal state; changed only if the line is accepted and is no jog.
         position: Machine position where the motion so far will end [mm], shape (3,).
         offset: Work coordinate offset [mm], shape (3,).
         jog: True for the part after ``$J=``.

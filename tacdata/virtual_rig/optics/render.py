@@ -78,7 +78,7 @@ def render_scene(
 def expose(
     image: np.ndarray, boxes: list[tuple[int, int, int, int]], look: Look, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return what a sensor makes of a sharp scene, uint8.
+    """Turn a sharp scene into a camera's image, uint8: blur, light, noise.
 
     Args:
         image: The scene's grey values, float32, shape (height, width).

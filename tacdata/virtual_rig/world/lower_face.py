@@ -42,8 +42,8 @@ class LowerFace:
         Args:
             indenter: The shape.
             yaw: Rotation about its own axis [deg].
-            tilt_x: How far that axis then leans about x [deg], after it leaned about y.
-            tilt_y: How far it leans about y [deg].
+            tilt_x: Tilt of that axis about x [deg], applied after `tilt_y`.
+            tilt_y: Tilt about y [deg].
         """
         surface = indenter.surface()
         turn = Rotation.from_euler("XYZ", [tilt_x, tilt_y, yaw], degrees=True)

@@ -77,7 +77,7 @@ def put_down(seed: int, nominal: Registration) -> Registration:
 
 
 def draw(seed: int, sensor: Sensor, nominal: Registration, rough: bool = False) -> Truth:
-    """Draw a world around a nominal registration, off by as little as a good lab would be.
+    """Draw a world around a nominal registration, with the small errors of a good lab.
 
     Args:
         seed: Same seed, same world.

@@ -29,7 +29,7 @@ LOST = ("Sleep",)
 
 
 def what_is_wrong(report: StatusReport, held: bool, homing: bool) -> tuple[Words | None, bool]:
-    """Return what a report says is wrong, or None, and whether that is for good.
+    """Return what is wrong by a report, or None, and whether that is permanent.
 
     Args:
         report: A report of a machine that was opened and made ready.
