@@ -130,6 +130,16 @@ class MotionController(Device):
         """What a person should know about its settings before the first move."""
         return ()
 
+    @property
+    def position_lost(self) -> str:
+        """Why the position is not known, in words; empty while it is. Still answered after `close`."""
+        return ""
+
+    @property
+    def moved(self) -> bool:
+        """Whether anything was told to move since this was made, homing at opening included."""
+        return False
+
     @abstractmethod
     def move(self, position: tuple[float, float, float], speed: float) -> Motion:
         """Queue a straight move to a machine position [mm] at ``speed`` [mm/s]; returns once it is acknowledged."""

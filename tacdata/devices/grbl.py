@@ -10,9 +10,10 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, Motion, MotionController
 from tacdata.errors import DeviceError, UsageError
-from tacdata.wire.grbl.lines import MOVING, OPENED_AGAIN
+from tacdata.wire.grbl.lines import BRAKING, MOVING, OPENED_AGAIN
 from tacdata.wire.grbl.link import GrblLink
-from tacdata.wire.grbl.opening import ANSWER, clear, greet, locked
+from tacdata.wire.grbl.opening import ANSWER, clear, greet, locked, straighten
+from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.settings import GrblSettings
 from tacdata.wire.serial_port import open_port
 
@@ -20,6 +21,8 @@ HOMING = 600.0
 """Longest homing cycle [s of the clock]: 1.5 times the travel of two cycles at a slow seek rate."""
 COMING_TO_REST = 30.0
 """Longest deceleration of a feed hold [s of the clock]."""
+LATE = (1.5, 15.0)
+"""Motion that takes longer than this many times what it should, and so much more [s of the clock], is a fault."""
 
 
 class Grbl(MotionController):
@@ -51,6 +54,11 @@ class Grbl(MotionController):
         self._link: GrblLink | None = None
         self._answers = GrblSettings({})
         self._found: dict[str, str] = {}
+        self._cautions: tuple[str, ...] = ()
+        self._lost, self._moved = "", False
+        self._target: np.ndarray | None = None  # where the queued motion ends [mm]
+        self._held_ns = clock.now_ns()
+        self._ends_ns = 0  # when it has ended at the latest
 
     def describe(self) -> dict[str, Any]:
         """Return what the status reports hold."""
@@ -78,6 +86,8 @@ class Grbl(MotionController):
                     raise locked(link, self._answers)
                 self.home()
                 self._read(link)
+            self._cautions = straighten(link)
+            self._found_at_opening(link)
             self._found = {
                 "banner": link.welcome or f"none, the board was not reset by opening; $I says {self._version}",
                 "reset_at_opening": "yes" if link.resets else "no",
@@ -96,10 +106,12 @@ class Grbl(MotionController):
             return
         with suppress(DeviceError):
             if link.homing:
+                link.lost = link.lost or "homing was broken off"
                 link.realtime(b"\x18")  # homing heeds nothing else
             elif not link.fault and (not link.at_rest if link.polled else _moves(link)):
                 link.realtime(b"!")
         link.stop()
+        self._lost = link.lost or self._lost
 
     def settings(self) -> dict[str, str]:
         """Return ``banner``, the ``$n`` settings, and ``$G``, ``$#``, ``$I`` by their tags."""
@@ -107,12 +119,19 @@ class Grbl(MotionController):
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What a person should know about the settings before the first move."""
-        found = self._answers.cautions
-        if self._found.get("reset_at_opening") == "yes" and not self._answers.homing:
-            lost = "the controller was reset and its position counts from where it stands now: touch off before moving"
-            found = (lost, *found)
-        return found
+        """What a person should know before the first move."""
+        lost = (f"{self._lost}: touch off before moving",) if self._lost and self._link is not None else ()
+        return (*lost, *self._answers.cautions, *self._cautions)
+
+    @property
+    def position_lost(self) -> str:
+        """Why the position is not known, in words; empty while it is."""
+        return (self._link.lost if self._link is not None else "") or self._lost
+
+    @property
+    def moved(self) -> bool:
+        """Whether a move or a homing cycle was sent since this was made."""
+        return self._moved
 
     @property
     def travel(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -138,18 +157,22 @@ class Grbl(MotionController):
                 "correct the plan",
             )
         x, y, z = position
+        self._queue(self._duration(np.array(position), speed))
+        self._target, self._moved = np.array(position), True
         return self._send(f"G53G90G94G21G1X{x:.4f}Y{y:.4f}Z{z:.4f}F{60 * speed:.3f}")
 
     def dwell(self, seconds: float) -> Motion:
         """Pause [s]; GRBL answers only when the planner is empty and the pause is over."""
+        self._queue(max(seconds, 0.0))
         return self._send(f"G4P{max(seconds, 0.0):.3f}")
 
     def wait_idle(self, timeout: float) -> None:
         """Return when the planner is empty (``G4 P0.01`` answered) and a fresh report says Idle."""
         link = self._opened()
-        link.command("G4P0.01", timeout)
+        link.command("G4P0.01", timeout, min(self._remaining, timeout))
         while link.fresh_status(timeout).state != "Idle":
-            link.wait(lambda: link.last is not None and link.last.state == "Idle", timeout, "the machine to be idle")
+            idle = Owed("the machine to be idle", timeout)
+            link.wait(lambda: link.last is not None and link.last.state == "Idle", idle)
 
     def statuses(self) -> list[CncStatus]:
         """Return the reports received since the last call; those before a fault too."""
@@ -168,12 +191,14 @@ class Grbl(MotionController):
         # A broken line is a fault that every other call raises; a signal handler must not raise.
         with suppress(DeviceError):
             if self._link is not None:
+                self._held_ns = self.clock.now_ns()
                 self._link.hold()
 
     def resume(self) -> None:
         """Send ``~``."""
         link = self._opened()
         link.rearm()
+        self._ends_ns += self.clock.now_ns() - self._held_ns
         link.realtime(b"~")
 
     def abandon(self) -> tuple[float, float, float]:
@@ -186,12 +211,19 @@ class Grbl(MotionController):
             DeviceError: If the machine does not come to rest, or does not come back from the reset.
         """
         link = self._opened()
+        self._target, self._ends_ns = None, 0
         status = self._rest(link)
+        if link.pendant:
+            raise DeviceError(
+                "a pendant has control of the machine", "one master",
+                "give control back at the pendant and look where the tip stands",
+            )  # fmt: skip
         if status.state.startswith("Door") and status.state not in OPENED_AGAIN:
             raise DeviceError("the safety door is open", "a closed door", "close it; --resume lifts the tip first")
         link.soft_reset(ANSWER)
         link.rearm()
         link.command("", ANSWER)  # after refusing a line, grblHAL refuses every line until an empty one
+        straighten(link)
         x, y, z = link.fresh_status(ANSWER).position.tolist()
         return x, y, z
 
@@ -202,9 +234,10 @@ class Grbl(MotionController):
             DeviceError: If homing is switched off or fails.
         """
         link = self._opened()
-        link.homing = True  # Grbl answers nothing while homing
+        link.homing = self._moved = True  # Grbl answers nothing while homing
         try:
             link.command("$H", timeout)
+            link.lost = self._lost = ""
         finally:
             link.homing = link.waiting  # a timed-out homing still moves
 
@@ -218,8 +251,25 @@ class Grbl(MotionController):
         return self._link
 
     def _send(self, line: str) -> Motion:
-        _, sent_ns, acknowledged_ns = self._opened().command(line, None)
+        motion = self._remaining
+        _, sent_ns, acknowledged_ns = self._opened().command(line, LATE[0] * motion + LATE[1], motion)
         return Motion(line, sent_ns, acknowledged_ns)
+
+    @property
+    def _remaining(self) -> float:
+        """What the queued motion and pauses may still take [s of the clock]."""
+        return max(self._ends_ns - self.clock.now_ns(), 0) * 1e-9
+
+    def _queue(self, seconds: float) -> None:
+        self._ends_ns = max(self._ends_ns, self.clock.now_ns()) + round(seconds * 1e9)
+
+    def _duration(self, position: np.ndarray, speed: float) -> float:
+        """Return what a move from where the queued ones end takes at most [s]: no axis faster than its own limits."""
+        last = self._opened().last
+        start = self._target if self._target is not None else last.position if last else position
+        length = float(np.linalg.norm(position - start))
+        slowest = min(speed, float(self.max_rate.min()))
+        return length / slowest + slowest / float(self.acceleration.min()) if length else 0.0
 
     def _make_ready(self, link: GrblLink) -> str:
         """End a standing hold, read the settings, and return the state that was found."""
@@ -246,6 +296,11 @@ class Grbl(MotionController):
         answers.limits("$12", 1.0, self.port)
         answers.limits("$11", 60.0, self.port)
 
+    def _found_at_opening(self, link: GrblLink) -> None:
+        """Remember if the position counts from an unknown place: a board without homing that has just been reset."""
+        if link.resets and not self._answers.homing:
+            self._lost = "the controller was reset when its port was opened, so it counts from where it stands now"
+
     def _rest(self, link: GrblLink) -> CncStatus:
         """Return a report of the machine at rest; a moving machine gets a feed hold.
 
@@ -253,7 +308,7 @@ class Grbl(MotionController):
             DeviceError: On a fault, or if it goes on moving.
         """
         end = self.clock.now_ns() + round(COMING_TO_REST * 1e9)
-        while (status := link.fresh_status(ANSWER)).state.split(":")[0] in MOVING or status.state == "Hold:1":
+        while (status := link.fresh_status(ANSWER)).state.split(":")[0] in MOVING or status.state in BRAKING:
             if status.state.split(":")[0] in MOVING:
                 link.realtime(b"!")
             if self.clock.now_ns() > end:

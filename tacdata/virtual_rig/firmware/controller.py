@@ -20,6 +20,8 @@ REALTIME = b"?!~\x18"
 """Bytes that never reach the receive buffer; nor does any above 0x7F."""
 BYTE_SECONDS = 10 / 115200
 NS = 1_000_000_000
+Wire = Callable[[str], str | None]
+"""What happens to a line on its way: what arrives, or None if nothing does."""
 
 
 class Controller:
@@ -48,6 +50,8 @@ class Controller:
         self.heard: list[tuple[int, int]] = []
         """Real-time bytes other than ``?`` and when they came [ns]."""
         self._fresh, self._muted = fresh, False
+        self._to_controller: Wire = lambda line: line
+        self._to_host: Wire = lambda line: line
         self._lines: deque[tuple[int, str]] = deque()
         self._received = bytearray()
         self._out: deque[tuple[int, str]] = deque()
@@ -92,6 +96,19 @@ class Controller:
     def inject_bytes(self, data: bytes) -> None:
         """Fault: bytes appear on the line."""
         self._faults.put(lambda now: self.port.write(data))
+
+    def inject_wire(self, to_controller: Wire | None = None, to_host: Wire | None = None) -> None:
+        """Fault: lines, or answers and reports, are changed or lost on their way from now on."""
+
+        def lay(now: int) -> None:
+            self._to_controller = to_controller or self._to_controller
+            self._to_host = to_host or self._to_host
+
+        self._faults.put(lay)
+
+    def inject_pendant(self) -> None:
+        """Fault: a pendant takes control; lines of the host are ignored and reports say so (grblHAL's ``MPG``)."""
+        self.inject_wire(lambda line: None, lambda text: text.replace(">", "|MPG:1>") if text[:1] == "<" else text)
 
     def inject_door(self, is_open: bool) -> None:
         """Fault: the safety door opens or closes."""
@@ -153,7 +170,9 @@ class Controller:
             return  # what does not fit is lost, as in the firmware's ring buffer
         elif byte in (0x0A, 0x0D):
             due = now + int((len(self._received) + 1) * BYTE_SECONDS * NS)
-            self._lines.append((due, self._received.decode("ascii", "replace")))
+            line = self._to_controller(self._received.decode("ascii", "replace"))
+            if line is not None:
+                self._lines.append((due, line))
             self._received.clear()
         else:
             self._received.append(byte)
@@ -186,8 +205,8 @@ class Controller:
         if self.port.waiting:
             self.port.write(b"")
         while self._out and self._out[0][0] <= now:
-            text = self._out.popleft()[1]
-            if not self._muted:
+            text = self._to_host(self._out.popleft()[1])
+            if not self._muted and text is not None:
                 self.port.write(text.encode("ascii") + b"\r\n")
 
     def _say(self, now: int, text: str, lag: float | None = None) -> None:

@@ -29,6 +29,8 @@ class Firmware:
     """Whether a refused G-code line makes it refuse all others until an empty or ``$`` line."""
     alarm_substate: bool
     """Whether the state reads ``Alarm:N``."""
+    scales: bool = False
+    """Whether it knows G51, which scales the coordinates of G53 lines, too."""
     changed: dict[str, str] = field(default_factory=dict)
     """Settings whose defaults differ."""
 
@@ -49,7 +51,7 @@ GRBLHAL = Firmware(
         "[PLUGIN:another v0.2]",
     ),
     planner_blocks=100, rx_bytes=1024, line_bytes=256, dwell_step=0.001, alarm_pause=0.1,
-    answers_in_critical_alarm=True, refuses_after_error=True, alarm_substate=True,
+    answers_in_critical_alarm=True, refuses_after_error=True, alarm_substate=True, scales=True,
     changed={"$10": "511", "$22": "1", "$481": "0"},
 )  # fmt: skip
 """grblHAL (`report.c`, `protocol.c` of its core)."""

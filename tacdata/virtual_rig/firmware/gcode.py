@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,7 +11,8 @@ AXES = "XYZ"
 GROUPS = {
     "motion": ("G0", "G1", "G80"), "plane": ("G17", "G18", "G19"), "units": ("G20", "G21"),
     "distance": ("G90", "G91"), "feed": ("G93", "G94"), "offset": ("G54", "G55", "G56", "G57", "G58", "G59"),
-    "cutter": ("G40",), "length": ("G49",), "path": ("G61",), "once": ("G4", "G53"),
+    "cutter": ("G40",), "length": ("G49", "G43.1"), "path": ("G61",), "once": ("G4", "G53", "G92", "G92.1"),
+    "scaling": ("G50", "G51"),
     "stop": ("M0", "M2", "M30"), "spindle": ("M3", "M4", "M5"), "coolant": ("M7", "M8", "M9"),
 }  # fmt: skip
 """Modal group -> the words that the emulator accepts; ``once`` stands for GRBL's non-modal group."""
@@ -42,6 +43,18 @@ class Modal:
     """Group -> active word."""
     feed: float = 0.0
     """Programmed feed [mm/min]."""
+    scale: np.ndarray = field(default_factory=lambda: np.ones(3))
+    """Factors of G51 [1], shape (3,); they bend G53 lines too."""
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    """Offset of G92 [mm], shape (3,)."""
+    length: float = 0.0
+    """Tool length offset of G43.1 along z [mm]."""
+
+    @property
+    def said(self) -> str:
+        """The active words as ``$G`` says them."""
+        bent = [self.words[group] for group in ("scaling", "length") if self.words.get(group) in ("G51", "G43.1")]
+        return " ".join([*(self.words[group] for group in POWER_ON), *bent])
 
     @property
     def unit(self) -> float:
@@ -95,7 +108,7 @@ def interpret(line: str, modal: Modal, position: np.ndarray, offset: np.ndarray,
     """
     commands, values = _sort(split(line))
     words = {**modal.words, **{g: w for g, w in commands.items() if g != "once"}}
-    state = Modal(words, modal.feed)
+    state = replace(modal, words=words)
     once = commands.get("once")
     if jog and (set(commands) - {"units", "distance", "once"} or once == "G4" or "F" not in values):
         raise Refused(22 if "F" not in values else 16)
@@ -105,7 +118,9 @@ def interpret(line: str, modal: Modal, position: np.ndarray, offset: np.ndarray,
         state.feed = values["F"] * state.unit
     axes = [a for a in AXES if a in values]
     action = Action()
-    if once == "G4":
+    if _takes_axes(state, commands, values, position, offset):
+        axes = []
+    elif once == "G4":
         if "P" not in values:
             raise Refused(28)
         if axes:
@@ -114,8 +129,30 @@ def interpret(line: str, modal: Modal, position: np.ndarray, offset: np.ndarray,
     elif axes:
         action = _motion(state, values, position, offset, once == "G53", jog)
     if not jog:
-        modal.words, modal.feed = state.words, state.feed
+        vars(modal).update(vars(state))
     return action
+
+
+def _takes_axes(
+    state: Modal, commands: dict[str, str], values: dict[str, float], position: np.ndarray, offset: np.ndarray
+) -> bool:
+    """Carry out scaling, G92 and the tool's length; return whether the line's axis words belong to one of them."""
+    if commands.get("once") == "G92.1":
+        state.shift = np.zeros(3)
+    if commands.get("once") == "G92":
+        told = [p - o - values[a] * state.unit if a in values else s
+                for a, p, o, s in zip(AXES, position, offset, state.shift, strict=True)]  # fmt: skip
+        state.shift = np.array(told)
+    elif commands.get("scaling") == "G51":
+        state.scale = np.array([values.get(axis, 1.0) for axis in AXES])
+    elif commands.get("length") == "G43.1":
+        state.length = values.get("Z", 0.0) * state.unit
+    else:
+        if commands.get("scaling") == "G50":
+            state.scale = np.ones(3)
+        state.length = 0.0 if commands.get("length") == "G49" else state.length
+        return False
+    return True
 
 
 def _sort(words: list[tuple[str, float]]) -> tuple[dict[str, str], dict[str, float]]:
@@ -152,7 +189,8 @@ def _motion(
         if axis in values:
             length = values[axis] * state.unit
             if machine:
-                target[i] = length
+                target[i] = length * state.scale[i]
             else:
-                target[i] = length + (offset[i] if state.words["distance"] == "G90" else position[i])
+                zero = offset[i] + state.shift[i] + (state.length if axis == "Z" else 0.0)
+                target[i] = length * state.scale[i] + (zero if state.words["distance"] == "G90" else position[i])
     return Action(target=target, rapid=motion == "G0")

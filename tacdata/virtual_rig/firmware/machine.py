@@ -276,6 +276,8 @@ class Machine:
 
     def _act(self, line: str, now: int) -> bool:
         """Carry out G-code; return False if its answer comes later or never."""
+        if "G51" in line.upper() and not self.firmware.scales:
+            raise gcode.Refused(20)
         action = gcode.interpret(line, self.modal, self.planner.target - self.error, self.offset)
         if action.target is not None and self._outside(action.target):
             self._hold(now)
@@ -313,8 +315,7 @@ class Machine:
         if line.startswith("$J="):
             self._jog(line[3:], now)
         elif line == "$G":
-            words = " ".join(self.modal.words.values())
-            self._answer(now, [f"[GC:{words} T0 F{self.modal.feed:g} S0]"])
+            self._answer(now, [f"[GC:{self.modal.said} T0 F{self.modal.feed:g} S0]"])
         elif line in ("$", "$$", "$#", "$I", "$N", "$C", "$H", "$X", "$SLP") or "=" in line:
             if state not in ("Idle", "Alarm", "Check"):
                 raise gcode.Refused(8)
@@ -323,7 +324,8 @@ class Machine:
             raise gcode.Refused(3)
 
     def _idle_command(self, line: str, now: int) -> None:
-        told = texts.information(line, self.firmware, self.settings, self.offset, self.startup)
+        bent = self.modal.shift, self.modal.length
+        told = texts.information(line, self.firmware, self.settings, self.offset, self.startup, *bent)
         if told is not None:
             self._answer(now, ["error:7"] if line == "$#" and self.unreadable else told)
         elif line == "$X":

@@ -34,16 +34,21 @@ def triple(values: np.ndarray, digits: int = 3) -> str:
 
 
 def information(
-    command: str, firmware: Firmware, settings: Mapping[str, str], offset: np.ndarray, startup: list[str]
-) -> list[str] | None:
-    """Return the answer to a ``$`` command that asks for information; None for other commands."""
+    command: str, firmware: Firmware, settings: Mapping[str, str], offset: np.ndarray, startup: list[str],
+    shift: np.ndarray | None = None, length: float = 0.0,
+) -> list[str] | None:  # fmt: skip
+    """Return the answer to a ``$`` command that asks for information; None for other commands.
+
+    ``offset`` [mm], shape (3,), is the G54; ``shift`` [mm], shape (3,), the G92; ``length`` [mm] the tool's.
+    """
     inches = settings["$13"] == "1"
     unit, digits = (25.4, 4) if inches else (1.0, 3)
     zero = triple(np.zeros(3), digits)
-    tags = [f"[G{n}:{triple(offset / unit, digits) if n == 54 else zero}]" for n in (*range(54, 60), 28, 30, 92)]
+    told = {54: offset, 92: np.zeros(3) if shift is None else shift}
+    tags = [f"[G{n}:{triple(told.get(n, np.zeros(3)) / unit, digits)}]" for n in (*range(54, 60), 28, 30, 92)]
     return {
         "$$": [f"{name}={value}" for name, value in settings.items()],
-        "$#": [*tags, f"[TLO:{0:.{digits}f}]", f"[PRB:{zero}:0]"],
+        "$#": [*tags, f"[TLO:{length / unit:.{digits}f}]", f"[PRB:{zero}:0]"],
         "$I": list(firmware.information),
         "$N": [f"$N{n}={line}" for n, line in enumerate(startup)],
         "$": ["[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]"],

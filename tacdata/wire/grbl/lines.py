@@ -9,8 +9,10 @@ import numpy as np
 
 MM_PER_INCH = 25.4
 
-RESPONSE = re.compile(r"^(?:ok|error:(\d+))$")
-ALARM = re.compile(r"^ALARM:(\d+)$")
+RESPONSE = re.compile(r"^(?:ok|error:\s*(?:\D*?(\d+)|(\S.*)))$")
+"""An answer; group 1: the error's number, group 2: its text where a firmware writes texts without one."""
+ALARM = re.compile(r"^ALARM:\s*(?:(\d+)|(\S.*))$")
+"""An alarm; group 1: its number, group 2: its text where a firmware writes texts."""
 WELCOME = re.compile(r"grbl(?:hal)? v?(\d+)\.(\d+)\S* \[", re.IGNORECASE)
 SETTING = re.compile(r"^(\$[A-Z0-9]+)=([^\s(]*)")
 STARTUP = re.compile(r"^\$N\d+=(.*)$")
@@ -20,6 +22,8 @@ OPENED_AGAIN = ("Hold:0", "Door:0")
 """States of a machine at rest that waits for a cycle start."""
 MOVING = ("Run", "Jog", "Home")
 """States, without their substate, in which something moves."""
+BRAKING = ("Hold:1", "Door:2", "Door:3")
+"""States that end by themselves, in which a reset would lose steps: braking for a hold or a door, or going on."""
 
 
 @dataclass(frozen=True)
@@ -40,18 +44,23 @@ class StatusReport:
     """Feed override [%], if the report has one."""
     pins: str = ""
     """Letters of the active inputs, for example ``Z`` for its limit switch, ``D`` for the door."""
+    pendant: bool | None = None
+    """Whether a pendant has control (grblHAL's ``MPG``), if the report says so."""
+    scaled: str = ""
+    """Letters of the axes that G51 scales (grblHAL's ``Sc``)."""
 
 
 def parse_status(line: str) -> StatusReport | None:
     """Parse ``<State|MPos:x,y,z|...>``; None if the line is damaged.
 
-    After the first two fields others may follow in any order or be absent; unknown ones are ignored.
+    After the first two fields others may follow in any order or be absent; unknown ones are ignored. A report that
+    was cut off and begun anew counts from its last beginning. A position that is no number is no position.
     """
     if not (line.startswith("<") and line.endswith(">")):
         return None
-    state, *fields = line[1:-1].split("|")
+    state, *fields = line[line.rfind("<") + 1 : -1].split("|")
     values: dict[str, list[float]] = {}
-    pins = ""
+    texts: dict[str, str] = {}
     for field in fields:
         name, _, text = field.partition(":")
         if name in ("MPos", "WPos", "WCO", "FS", "F", "Ov"):
@@ -59,8 +68,10 @@ def parse_status(line: str) -> StatusReport | None:
                 values[name] = [float(number) for number in text.split(",")]
             except ValueError:
                 return None
-        elif name == "Pn":
-            pins = text
+            if not np.all(np.isfinite(values[name])):
+                return None
+        else:
+            texts[name] = text
     kind = "MPos" if "MPos" in values else "WPos"
     position, offset = values.get(kind, []), values.get("WCO")
     if not re.fullmatch(r"[A-Za-z]+(:\d+)?", state) or len(position) < 3 or (offset and len(offset) < 3):
@@ -72,5 +83,7 @@ def parse_status(line: str) -> StatusReport | None:
         np.array(offset[:3]) if offset else None,
         (values.get("FS") or values.get("F") or [float("nan")])[0],
         (values.get("Ov") or [None])[0],
-        pins,
+        texts.get("Pn", ""),
+        {"1": True, "0": False}.get(texts.get("MPG", "")),
+        texts.get("Sc", ""),
     )

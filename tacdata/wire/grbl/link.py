@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -15,12 +14,12 @@ from tacdata.errors import DeviceError
 from tacdata.wire.delivered import CncStatus
 from tacdata.wire.grbl import codes
 from tacdata.wire.grbl.lines import ALARM, RESPONSE, WELCOME, StatusReport, parse_status
+from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.statuses import Statuses
 from tacdata.wire.grbl.watch import WELCOME_IN_MID_STREAM, what_is_wrong
+from tacdata.wire.patience import Patience
 from tacdata.wire.serial_port import read_available
 
-REAL_FLOOR = 1.0
-"""Shortest timeout of any wait for the controller [s, real time], however fast the clock runs."""
 SILENCE = 3.0
 """Time without an answer after which the controller counts as gone [s of the clock, and of real time, since an emulator
 on a fast clock stalls with its host].
@@ -31,11 +30,6 @@ RX_BYTES = 128
 """Size of the receive buffer until the controller states its own [bytes]; Grbl 1.1's."""
 READ_FAILED = "error:7"
 """Sent by ``$#`` and ``$N`` for each entry that cannot be read, before their own answer."""
-
-
-def deadline(clock: Clock, seconds: float) -> float:
-    """Return the `time.monotonic` value at which a wait of ``seconds`` [s of the clock] ends."""
-    return time.monotonic() + max(seconds / clock.rate, REAL_FLOOR)
 
 
 @dataclass
@@ -64,6 +58,10 @@ class GrblLink:
         self.resets = 0  # welcomes that answer no soft reset of ours
         self.rx_bytes = RX_BYTES
         self.fault: DeviceError | None = None
+        self.lost = ""
+        """Why the position is not known any more, in words; empty while it is."""
+        self.pendant = False
+        """Whether a pendant has control, as far as a report has said."""
         self.interruption: DeviceError | None = None
         self.notes: list[str] = []
         self.seen = bytearray()  # first bytes ever received, for a person who has to guess the baud rate
@@ -71,7 +69,10 @@ class GrblLink:
         self.homing = False
         self._held = False
         self._unanswered: deque[_Line] = deque()
-        self._received_at, self._commanded_ns = time.monotonic(), clock.now_ns()
+        # It is looked at once a poll.
+        self._silence = Patience(SILENCE, clock.rate, floor=SILENCE, step=max(0.25, 2.0 / (poll_rate * clock.rate)))
+        self._unread = ""  # the latest report that could not be read, since one that could
+        self._commanded_ns = clock.now_ns()
         self._welcome_expected, self._reset_asked = True, False
         self.polled = False
         self._stopped = threading.Event()
@@ -104,7 +105,7 @@ class GrblLink:
     def poll(self) -> None:
         """Start to poll the status and to watch for silence; from now on a welcome means a lost position."""
         self._welcome_expected, self.polled = False, True
-        self._received_at = time.monotonic()
+        self._silence.restart()
         self._begin(self._ask_regularly, "grbl-poll")
 
     def stop(self) -> None:
@@ -143,19 +144,20 @@ class GrblLink:
         if wanted:
             self._write(b"?")
 
-    def command(self, line: str, timeout: float | None) -> tuple[list[str], int, int]:
+    def command(self, line: str, limit: float, motion: float = 0.0) -> tuple[list[str], int, int]:
         """Send a line and wait for its answer.
 
         Args:
             line: One line without its end.
-            timeout: Longest wait [s of the clock]; None waits as long as the controller lives, since a full planner or
-                a dwell delays the answer.
+            limit: Longest wait [s of the clock].
+            motion: What the motion and pauses that hold the answer back may take [s of the clock]; an idle controller
+                that owes the answer after that ends the wait (`Owed`).
 
         Returns:
             The lines pushed meanwhile, and the times of sending and of the answer [ns].
 
         Raises:
-            DeviceError: If the line is too long, refused, dropped or not answered, on a hold or a fault.
+            DeviceError: If the line is too long, refused or not answered, on a fault, an interruption or a hold.
         """
         data = line.encode("ascii") + b"\n"
         if len(data) > min(LINE_BYTES + 1, self.rx_bytes):
@@ -166,32 +168,35 @@ class GrblLink:
             )
         entry = _Line(line)
         with self._turn:
-            self.wait(lambda: self._room() >= len(data), timeout, "room in the controller's receive buffer")
+            room = Owed("room in the controller's receive buffer", limit, motion)
+            self.wait(lambda: self._room() >= len(data), room)
             with self._changed:
                 self._unanswered.append(entry)
             sent_ns = self._commanded_ns = self.clock.now_ns()
             self._write(data)
-        self.wait(lambda: entry.answer is not None, timeout, f"an answer to {line!r}")
+        heard = () if line.startswith("$") else entry.pushed
+        self.wait(lambda: entry.answer is not None, Owed(f"an answer to {line!r}", limit, motion, heard, True))
         answered_ns = self.clock.now_ns()
         self._raise_if_refused(entry)
         return entry.pushed, sent_ns, answered_ns
 
-    def wait(self, reached: Callable[[], bool], timeout: float | None, what: str, through_hold: bool = False) -> None:
-        """Wait until ``reached()``, ``timeout`` [s of the clock] at most; None: without limit.
-
-        With ``through_hold`` only a fault ends the wait, no hold and no interruption.
+    def wait(self, reached: Callable[[], bool], owed: Owed, through_hold: bool = False) -> None:
+        """Wait until ``reached()``; with ``through_hold`` no hold and no interruption ends the wait, only a fault.
 
         Raises:
-            DeviceError: On a fault, an interruption or a hold, or when the time is over.
+            DeviceError: On a fault, an interruption or a hold, or when what is owed cannot come any more.
         """
-        end = None if timeout is None else deadline(self.clock, timeout)
-        with self._changed:
-            self.check(through_hold)
-            while not reached():
-                if end is not None and time.monotonic() > end:
-                    raise self._too_late(timeout or 0.0, what)
-                self._changed.wait(0.05)
+        watch = owed.watch(self.clock)
+        while True:
+            with self._changed:
                 self.check(through_hold)
+                if reached():
+                    return
+                if overdue := watch.ending(self.last):
+                    raise overdue
+                self._changed.wait(0.05)
+            if not self.polled:
+                self.ask()
 
     def take_statuses(self) -> list[CncStatus]:
         """Return the reports received since the last call."""
@@ -204,15 +209,15 @@ class GrblLink:
         Raises:
             DeviceError: On a fault, or when the time is over.
         """
-        begun, end = self.clock.now_ns(), deadline(self.clock, timeout)
+        begun, watch = self.clock.now_ns(), Owed("a status report", timeout).watch(self.clock)
         while True:
             self.ask()
             with self._changed:
                 self.check(through_hold=True)
                 if self.last and self.last.sent_ns >= begun:
                     return self.last
-                if time.monotonic() > end:
-                    raise self._too_late(timeout, "a status report")
+                if overdue := watch.ending(self.last):
+                    raise overdue
                 if self.statuses.asked_ns is not None or self.statuses.automatic:
                     self._changed.wait(0.05)
 
@@ -222,14 +227,16 @@ class GrblLink:
             self._welcome_expected, self._reset_asked, self.welcome = True, True, ""
         self._write(b"\x18")
         try:
-            self.wait(lambda: bool(self.welcome), timeout, "the welcome after a soft reset", through_hold=True)
+            self.wait(lambda: bool(self.welcome), Owed("the welcome after a soft reset", timeout), through_hold=True)
         finally:
             self._welcome_expected, self._reset_asked = not self.polled, False
 
     def hear(self, seconds: float) -> bool:
         """Wait at most ``seconds`` [s, real time] for a welcome or a status report; return whether one came."""
         with self._changed:
-            return self._changed.wait_for(lambda: bool(self.welcome or self.last or self.fault), seconds)
+            return self._changed.wait_for(
+                lambda: any((self.welcome, self.last, self.statuses.unplaced, self.fault)), seconds
+            )
 
     def check(self, through_hold: bool = False) -> None:
         """Raise the fault, the interruption or the hold, if there is one; ``through_hold``: only the fault."""
@@ -239,27 +246,26 @@ class GrblLink:
         if self._held and not through_hold:
             raise DeviceError("the motion was stopped by a feed hold", "a running machine", "continue with --resume")
 
-    def _too_late(self, timeout: float, what: str) -> DeviceError:
-        state = self.last.state if self.last else "unknown"
-        return DeviceError(
-            f"waited {timeout:g} s for {what}; the controller's last state is {state}",
-            "a controller that answers in time",
-            "look at the machine; reset it if it hangs, and record again",
-        )
-
     def _room(self) -> int:
         return self.rx_bytes - sum(len(line.text) + 1 for line in self._unanswered)
 
     def _raise_if_refused(self, entry: _Line) -> None:
-        if entry.answer == "ok":
+        answer = entry.answer or ""
+        if answer == "ok":
             return
-        code = RESPONSE.match(entry.answer or "")
+        if not (code := RESPONSE.match(answer)):
+            raise DeviceError(
+                f"the line {entry.text!r} was thrown away by a reset", "a line that it accepts in its present state",
+                "send it again when the machine is idle",
+            )  # fmt: skip
+        why = codes.error_in_words(int(code[1])) if code[1] else answer
+        damaged = code[1] and int(code[1]) in codes.DAMAGED_LINE
         raise DeviceError(
-            f"the controller refused {entry.text!r}: {codes.error_in_words(int(code[1]))}"
-            if code
-            else f"the line {entry.text!r} was thrown away by a reset",
+            f"the controller refused {entry.text!r}: {why}",
             "a line that it accepts in its present state",
-            "correct the plan or the controller's settings" if code else "send it again when the machine is idle",
+            "it was well formed: bytes of it were lost or changed on their way, so check cable, ground and baud rate"
+            if damaged and not entry.text.startswith("$")
+            else "correct the controller's settings",
         )
 
     def _begin(self, work: Callable[[], None], name: str) -> None:
@@ -283,22 +289,31 @@ class GrblLink:
         )
 
     def _break(self, error: Exception) -> None:
-        self._fail(*self._broken(error))
+        self._fail(*self._broken(error), lost=True)
 
-    def _fail(self, given: str, allowed: str, remedy: str) -> None:
+    def _fail(self, given: str, allowed: str, remedy: str, lost: bool = False) -> None:
+        """Keep the first fault; ``lost``: after it the position is not known."""
         with self._changed:
-            self.fault = self.fault or DeviceError(given, allowed, remedy)
+            if self.fault is None:
+                self.fault = DeviceError(given, allowed, remedy)
+            if lost and not self._stopped.is_set():
+                self.lost = self.lost or given
             self._changed.notify_all()
 
     def _ask_regularly(self) -> None:
         while not self._stopped.wait(1.0 / (self.poll_rate * self.clock.rate)):
-            waited = time.monotonic() - self._received_at
-            # A homing controller (Grbl 1.1) answers nothing; homing has its own timeout.
-            if not self.homing and waited > max(SILENCE / self.clock.rate, SILENCE):
+            # A homing controller (Grbl 1.1) answers nothing; its own time-out minds it.
+            if self.homing:
+                self._silence.restart()
+            elif self._silence.over():
+                unread = f"; it sends reports that cannot be read: {self._unread!r}" if self._unread else ""
                 self._fail(
-                    f"the controller on {self.port.port} is silent for {waited * self.clock.rate:.1f} s",
+                    f"the controller on {self.port.port} said nothing of use for {SILENCE:g} s{unread}"
+                    if unread
+                    else f"the controller on {self.port.port} is silent: no answer to ? for {SILENCE:g} s",
                     f"an answer to ? within {SILENCE:g} s",
                     "check power and cable; the position is unknown, home or touch off again",
+                    lost=True,
                 )
             if self.fault is None:
                 try:
@@ -334,14 +349,17 @@ class GrblLink:
                 if report:
                     self._take_status(report, arrival_ns)
                 else:
+                    self._unread = line
                     self.notes.append(f"damaged status report: {line!r}")
             elif RESPONSE.match(line):
                 self._take_response(line)
             elif alarm := ALARM.match(line):
+                kept = alarm[1] and int(alarm[1]) in codes.POSITION_KEPT
                 self._fail(
-                    f"the controller stopped with {codes.alarm_in_words(int(alarm[1]))}",
+                    f"the controller stopped with {codes.alarm_in_words(int(alarm[1])) if alarm[1] else line}",
                     "motion without an alarm",
-                    "free the machine by hand if need be, then home or unlock it and record again",
+                    "free the machine by hand if need be, then home it and start again",
+                    lost=not kept,
                 )
             elif WELCOME.search(line):
                 self._take_welcome(line)
@@ -367,15 +385,18 @@ class GrblLink:
         while self._unanswered:
             self._unanswered.popleft().answer = "reset"
         if not self._welcome_expected:
-            given, *rest = WELCOME_IN_MID_STREAM
-            self._fail(given.format(line), *rest)
+            given, allowed, remedy = WELCOME_IN_MID_STREAM
+            self._fail(given.format(line), allowed, remedy, lost=True)
 
     def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
-        self._received_at = time.monotonic()
+        self._silence.restart()
+        self._unread = ""
+        self.pendant = self.pendant if report.pendant is None else report.pendant
         self.statuses.take(report, arrival_ns)
         if self.polled and not self._welcome_expected:
             wrong, for_good = what_is_wrong(report, self._held, self.homing)
             if wrong and for_good:
-                self._fail(*wrong)
+                known = self.fault is not None  # an alarm whose own line came first has said what is lost
+                self._fail(*wrong, lost=not known)
             elif wrong and self.interruption is None:
                 self.interruption = DeviceError(*wrong)

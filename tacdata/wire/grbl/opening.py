@@ -5,7 +5,7 @@ from __future__ import annotations
 from tacdata.errors import DeviceError
 from tacdata.wire.grbl.lines import OPENED_AGAIN, WELCOME
 from tacdata.wire.grbl.link import GrblLink
-from tacdata.wire.grbl.settings import GrblSettings
+from tacdata.wire.grbl.settings import STATE, UNDONE_BY, GrblSettings
 
 GREETING = 15.0
 """Timeout for the first answer [s, real time]: a boot loader takes 1-2 s, a simulated board more."""
@@ -45,9 +45,45 @@ def greet(link: GrblLink, baud: int) -> None:
         if link.hear(FIRST_QUERY):
             link.check()
             _refuse_old(link)
+            _place(link)
             return
         link.ask()
     raise _silent(link, baud)
+
+
+def _place(link: GrblLink) -> None:
+    """Ask for the offset of work positions where the reports never say it (grblHAL with ``$10=0``)."""
+    if link.statuses.unplaced:
+        link.statuses.offset = GrblSettings.read(link, ANSWER, STATE).work_offset
+        if link.statuses.offset is None:
+            raise DeviceError(
+                f"the controller on {link.port.port} reports work positions and does not say their offset",
+                "machine positions, or work positions with WCO",
+                "set $10=1 (machine positions) in a terminal",
+            )
+
+
+def straighten(link: GrblLink) -> tuple[str, ...]:
+    """End what bends coordinates (scaling, rotation, G92, tool length, inches); return what that was, in words.
+
+    Raises:
+        DeviceError: If it cannot be ended.
+    """
+    bent = GrblSettings.read(link, ANSWER, STATE).bent_by
+    for word in dict.fromkeys(UNDONE_BY[found][0] for found in bent):
+        link.command(word, ANSWER)
+    left = GrblSettings.read(link, ANSWER, STATE).bent_by if bent else ()
+    if left:
+        raise DeviceError(
+            f"the controller on {link.port.port} bends coordinates and does not end it: {_named(left)}",
+            "machine coordinates as they are",
+            "end it in a terminal; see its start-up lines ($N) and macros",
+        )
+    return tuple(f"{_named((word,))} was active and was ended ({UNDONE_BY[word][0]})" for word in bent)
+
+
+def _named(words: tuple[str, ...]) -> str:
+    return ", ".join(f"{word} ({UNDONE_BY[word][1]})" for word in words)
 
 
 def clear(link: GrblLink) -> str:

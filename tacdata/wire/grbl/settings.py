@@ -16,6 +16,16 @@ QUESTIONS = ("$I", "$$", "$#", "$G", "$N")
 ALWAYS_ON = 255
 """``$1`` that keeps the motors powered."""
 AXIS_WORD = re.compile(r"[XYZ]")
+STATE = ("$G", "$#")
+"""What is asked for the modal state alone."""
+UNDONE_BY = {
+    "G51": ("G50", "scaling of the axes"), "G68": ("G69", "rotation of the axes"),
+    "G43": ("G49", "tool length offset"), "G43.1": ("G49", "tool length offset"),
+    "G43.2": ("G49", "tool length offset"), "G92": ("G92.1", "offset of the axes"), "G20": ("G21", "inches"),
+    "G91": ("G90", "relative positions"), "G93": ("G94", "inverse time feed"), "G95": ("G94", "feed per turn"),
+}  # fmt: skip
+"""Modal state that bends coordinates or speeds -> the word that ends it, and what it is. Every move says G53, G90, G21
+and G94 itself, but grblHAL scales and rotates G53 lines too."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +36,14 @@ class GrblSettings:
     """Settings and start-up lines by name (``$110``, ``$N0``), other answers by tag (``VER``, ``G54``)."""
 
     @classmethod
-    def read(cls, link: GrblLink, timeout: float) -> GrblSettings:
-        """Send all queries; each answer may take ``timeout`` [s of the clock].
+    def read(cls, link: GrblLink, timeout: float, questions: tuple[str, ...] = QUESTIONS) -> GrblSettings:
+        """Ask, each answer awaited for ``timeout`` [s of the clock].
 
         Raises:
             DeviceError: If a question is refused or not answered.
         """
         said: dict[str, str] = {}
-        for question in QUESTIONS:
+        for question in questions:
             for pushed in link.command(question, timeout)[0]:
                 if line := STARTUP.match(pushed):
                     said[pushed.partition("=")[0]] = line[1]
@@ -76,6 +86,15 @@ class GrblSettings:
             return None
         length = np.array(tool[:3]) if len(tool) >= 3 else np.array([0.0, 0.0, tool[0]])
         return np.sum([*parts, length], axis=0)
+
+    @property
+    def bent_by(self) -> tuple[str, ...]:
+        """What bends coordinates, by its G word (`UNDONE_BY`)."""
+        words = [word for word in self.said.get("GC", "").split() if word in UNDONE_BY]
+        for tag, word in (("G92", "G92"), ("TLO", "G43.1")):
+            if any(_numbers(self.said.get(tag, ""))) and not any(UNDONE_BY[w][0] == UNDONE_BY[word][0] for w in words):
+                words.append(word)
+        return tuple(words)
 
     @property
     def travel(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -146,3 +165,10 @@ class GrblSettings:
 
     def _triple(self, name: str) -> np.ndarray:
         return np.array([float(value) for value in self.said[name].split(",")[:3]])
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(value) for value in text.split(",") if value]
+    except ValueError:
+        return []

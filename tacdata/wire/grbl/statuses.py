@@ -38,7 +38,9 @@ class Statuses:
         self.automatic = False
         """Whether the controller reports by itself; it then leaves ``?`` unanswered (grblHAL, ``$481``)."""
         self.last: CncStatus | None = None
-        self._queries: deque[int] = deque()  # when the queries went out that may still be unanswered [ns]
+        self.unplaced = False
+        """Whether work positions came before their offset was known."""
+        self._queries: deque[int] = deque()  # when those went out that may not be answered yet [ns]
         self._asked_at = self._answered_at = 0.0
         self._answered = False  # whether a report has come since the latest query
         self._waiting: list[CncStatus] = []
@@ -69,8 +71,9 @@ class Statuses:
         self._answered_at, self._answered = time.monotonic(), True
         if report.offset is not None:
             self.offset = report.offset
-        if report.is_work and self.offset is None:
-            return None  # a work position without its offset gives no machine position
+        self.unplaced = report.is_work and self.offset is None
+        if self.unplaced:
+            return None  # a work position without its offset is no machine position
         if sent_ns is None or self.automatic:
             sent_ns = (self.last.arrival_ns if self.last else arrival_ns) - REPORT_LAG_NS
         position = report.position + self.offset if report.is_work and self.offset is not None else report.position

@@ -13,10 +13,11 @@ WELCOME_IN_MID_STREAM: Words = (
     "one welcome, when the port is opened",
     "check its power supply and cable (a brown-out does this); home or touch off again",
 )
-RESUME = "see why, put it right, then continue with --resume"
+AGAIN = "start again; a session goes on with --resume"
+RESUME = f"see why, put it right, then {AGAIN}"
 UNASKED = {
     "Hold": ("someone held the motion (a button, or another program)", "no hold", RESUME),
-    "Door": ("the safety door was opened", "a closed door", "close it, then continue with --resume"),
+    "Door": ("the safety door was opened", "a closed door", f"close it, then {AGAIN}"),
     "Jog": ("someone jogs the machine", "one master", "leave the machine alone while it records"),
     "Home": ("someone homes the machine", "one master", "leave the machine alone while it records"),
     "Check": ("the controller is in check mode and moves nothing", "Idle or Run", "switch it off ($C)"),
@@ -24,6 +25,16 @@ UNASKED = {
     "Tool": ("the controller waits for a tool change", "no tool change", RESUME),
 }
 """State -> text; none of these follows from what a recording sends."""
+PENDANT: Words = (
+    "a pendant has taken control of the machine (MPG:1): lines from here are ignored",
+    "one master",
+    f"give control back at the pendant, see where the tip stands, then {AGAIN}",
+)
+SCALED: Words = (
+    "the controller scales its axes (G51): every move goes elsewhere than commanded",
+    "no scaling",
+    "switch it off (G50) in a terminal; opening the controller does it too",
+)
 LOST = ("Sleep",)
 """States after which the position is unknown."""
 
@@ -49,6 +60,10 @@ def what_is_wrong(report: StatusReport, held: bool, homing: bool) -> tuple[Words
     ours = (state == "Hold" and (held or substate != "0")) or (state == "Home" and homing)
     if state in UNASKED and not ours:
         return UNASKED[state], state in LOST
+    if report.pendant:
+        return PENDANT, False
+    if report.scaled:
+        return SCALED, False
     if report.feed_override is not None and report.feed_override != 100:
         words = (
             f"the feed override stands at {report.feed_override:g} %: moves do not run as commanded",
