@@ -91,7 +91,7 @@ def test_a_line_damaged_on_its_way_is_no_fault_of_the_plan(rig):
     _, controller, driver = rig
     with driver:
         controller.inject_wire(to_controller=lambda line: line.replace("G90", "G9?"))
-        with pytest.raises(DeviceError, match=r"(?s)refused.*lost or changed on their way: check cable"):
+        with pytest.raises(DeviceError, match=r"(?s)refused.*lost or changed on their way, so check cable"):
             driver.move((-50.0, -50.0, -24.0), 4.0)
 
 

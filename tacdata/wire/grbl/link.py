@@ -234,9 +234,8 @@ class GrblLink:
     def hear(self, seconds: float) -> bool:
         """Wait at most ``seconds`` [s, real time] for a welcome or a status report; return whether one came."""
         with self._changed:
-            return self._changed.wait_for(
-                lambda: any((self.welcome, self.last, self.statuses.unplaced, self.fault)), seconds
-            )
+            signs = lambda: self.welcome or self.last or self.statuses.unplaced or self.fault  # noqa: E731
+            return bool(self._changed.wait_for(signs, seconds))
 
     def check(self, through_hold: bool = False) -> None:
         """Raise the fault, the interruption or the hold, if there is one; ``through_hold``: only the fault."""
@@ -253,16 +252,15 @@ class GrblLink:
         answer = entry.answer or ""
         if answer == "ok":
             return
+        accepted = "a line that it accepts in its present state"
         if not (code := RESPONSE.match(answer)):
-            raise DeviceError(
-                f"the line {entry.text!r} was thrown away by a reset", "a line that it accepts in its present state",
-                "send it again when the machine is idle",
-            )  # fmt: skip
+            lost = f"the line {entry.text!r} was thrown away by a reset"
+            raise DeviceError(lost, accepted, "send it again when the machine is idle")
         why = codes.error_in_words(int(code[1])) if code[1] else answer
         damaged = code[1] and int(code[1]) in codes.DAMAGED_LINE
         raise DeviceError(
             f"the controller refused {entry.text!r}: {why}",
-            "a line that it accepts in its present state",
+            accepted,
             "it was well formed: bytes of it were lost or changed on their way, so check cable, ground and baud rate"
             if damaged and not entry.text.startswith("$")
             else "correct the controller's settings",
