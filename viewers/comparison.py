@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
+from tacdata.labels import file_names
 from tacdata.sensor import Sensor
 from viewers.kinds.session import episode_of, spans
 from viewers.parts import signals
@@ -28,13 +29,13 @@ def labels_at(path: Path, folders: Sequence[Path], episode: int | None) -> Scene
     from tacdata.recording.files.reader import read_episode
 
     if path.is_file():
-        recording, own = path, path.parent / "labels"
+        recording, own = path, file_names.folder(path.parent)
     else:
-        recording, own = episode_of(path, episode), path / "labels"
+        recording, own = episode_of(path, episode), file_names.folder(path)
     folders = _two([own, *folders] if len(folders) == 1 else folders, "labels")
     recorded, sides = read_episode(recording), []
     for name, folder in zip(telling_names(folders), folders, strict=True):
-        file = folder / f"{recording.stem}.parquet"
+        file = file_names.label(folder, recording)
         if not file.is_file():
             raise UsageError(f"no label {file}", f"a label of {recording.stem} in each folder", "run `tacdata label`")
         label = shown_label(file)
@@ -91,7 +92,7 @@ def _labelled(
         episode = first_predicted(folders[0], spans(path))
     recording = path if path.is_file() else episode_of(path, episode)
     recorded = read_episode(recording)
-    file = recording.parent / "labels" / f"{recording.stem}.parquet"
+    file = file_names.label(file_names.folder(recording.parent), recording)
     label = None
     if file.is_file():
         own = shown_label(file)

@@ -15,7 +15,7 @@ from tacdata.dataset.format import folder, metadata
 from tacdata.dataset.pack import append_episode
 from tacdata.dataset.writer import DatasetWriter
 from tacdata.errors import UsageError
-from tacdata.labels import read_label, table
+from tacdata.labels import file_names, read_label, table
 from tacdata.recording.files.reader import read_episode
 from tacdata.sensor import Sensor
 
@@ -44,7 +44,7 @@ class DatasetFlow:
         """
         if out.exists() and not ((out / folder.INFO).exists() or (out / metadata.MAIN).exists()):
             raise UsageError(f"{out} is no dataset of tacdata", "a dataset, or a new folder", "name another folder")
-        self._out, self._sensor, self._labels = out, sensor, labels or session / "labels"
+        self._out, self._sensor, self._labels = out, sensor, labels or file_names.folder(session)
         self._recordings = {int(path.stem[-6:]): path for path in recordings}
         self._state = label_states.LabelledSession(session.name, tuple(path.name for path in recordings))
         self._writer: DatasetWriter | None = None
@@ -80,7 +80,7 @@ class DatasetFlow:
 
     def _append(self, path: Path) -> str:
         """Append an episode; return why it cannot be packed, or ""."""
-        label_path = self._labels / f"{path.stem}.parquet"
+        label_path = file_names.label(self._labels, path)
         header = table.read_header(label_path)["provenance"]["parents"]
         writer = self._current_writer(header["sensor"])
         self._models[header["sensor"]] = header["model"]

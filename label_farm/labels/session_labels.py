@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
+from typing import Self
 
 from label_farm.labels.make_label import make_label, parents
 from label_farm.labels.request import LabelRequest, Planned
@@ -14,7 +16,7 @@ from label_farm.store.failure import Failure
 from label_farm.store.store import STALE_SECONDS
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
-from tacdata.labels import Label, PathSolution, read_label, table, write_label
+from tacdata.labels import Label, PathSolution, file_names, read_label, table, write_label
 
 
 class SessionLabels:
@@ -25,6 +27,21 @@ class SessionLabels:
         self.folder = folder
         self._parents: dict[int, dict[str, str] | None] = {}
 
+    @classmethod
+    def of(cls, session: Path) -> Self:
+        """Return a session's own labels."""
+        return cls(file_names.folder(session))
+
+    @property
+    def labelled(self) -> list[int]:
+        """Episodes that have a label."""
+        return [*file_names.present(self.folder)]
+
+    @property
+    def failed(self) -> list[int]:
+        """Episodes of which it is written why they have no label."""
+        return [*file_names.present(self.folder, file_names.FAILURE)]
+
     def sweep(self) -> None:
         """Remove what killed writers left; a young file may belong to a living one."""
         for path in self.folder.glob(".episode-*"):
@@ -34,24 +51,18 @@ class SessionLabels:
 
     def path(self, episode: int) -> Path:
         """Return where an episode's label lies, or would lie."""
-        return self.folder / f"episode-{episode:06d}.parquet"
+        return file_names.label(self.folder, episode)
 
     def failure_path(self, episode: int) -> Path:
         """Return where the reason lies if an episode has no label."""
-        return self.folder / f"episode-{episode:06d}.failure.json"
-
-    def numbers(self, ending: str) -> list[int]:
-        """Return the episodes that have a file of an ending, ``.parquet`` or ``.failure.json``."""
-        return sorted(
-            int(path.name[8:14]) for path in self.folder.glob(f"episode-[0-9][0-9][0-9][0-9][0-9][0-9]{ending}")
-        )
+        return file_names.failure(self.folder, episode)
 
     def failures(self, most: int) -> dict[str, str]:
         """Return the reasons of up to ``most`` episodes that have no label, by episode number."""
         found = {}
-        for path in sorted(self.folder.glob("episode-*.failure.json"))[:most]:
+        for number, path in islice(file_names.present(self.folder, file_names.FAILURE).items(), most):
             with suppress(FormatError):
-                found[str(int(path.name[8:14]))] = Failure.read(path).reason
+                found[str(number)] = Failure.read(path).reason
         return found
 
     def parents(self, episode: int) -> dict[str, str] | None:

@@ -11,7 +11,6 @@ from typing import Any
 
 from label_farm.labels.session_labels import SessionLabels
 from label_farm.remote.client import Client
-from label_farm.service.run import LABELS
 from tacdata import documents, provenance
 from tacdata.errors import DeviceError, UsageError
 from tacdata.labels import Label, read_label
@@ -49,7 +48,7 @@ class Fetch:
         """
         self._client, self._path, self._redo = client, client.submission(number), redo
         self._recordings = {int(path.stem[-6:]): path for path in read_session(session).episodes}
-        self._labels = SessionLabels(session / LABELS)
+        self._labels = SessionLabels.of(session)
         self._labels.sweep()
         self.fetched = Fetched()
 

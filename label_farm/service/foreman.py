@@ -16,7 +16,7 @@ from label_farm.labels.session_labels import SessionLabels
 from label_farm.ledger.ledger import Ledger
 from label_farm.ledger.roster import Roster, WorkerRow
 from label_farm.presses.model import Version
-from label_farm.service.run import LABELS, RECENT, Run
+from label_farm.service.run import RECENT, Run
 from label_farm.service.submission import OPEN, Submission, Submissions
 from label_farm.settings import FarmSettings
 from label_farm.store.store import Store
@@ -153,8 +153,8 @@ class Foreman:
         run = self._with_results(number)
         if run is not None:
             return run.labelled, sorted(run.failures)
-        labels = SessionLabels(self.session(number) / LABELS)
-        return labels.numbers(".parquet"), labels.numbers(".failure.json")
+        labels = SessionLabels.of(self.session(number))
+        return labels.labelled, labels.failed
 
     def finished(self, number: str) -> tuple[list[int], dict[str, str]]:
         """Return what came of a submission, to be shown: some labelled episodes, the last first, and some failures.
@@ -169,9 +169,9 @@ class Foreman:
         if number not in self._finished:
             submission, found = self.submissions.get(number), ([], {})
             with suppress(UsageError):  # its folder may be gone by now
-                labels = SessionLabels(self.session(number) / LABELS)
+                labels = SessionLabels.of(self.session(number))
                 if submission.state == "done":
-                    found = labels.numbers(".parquet")[-RECENT:][::-1], labels.failures(MOST_SHOWN)
+                    found = labels.labelled[-RECENT:][::-1], labels.failures(MOST_SHOWN)
             self._finished[number] = found
         return self._finished[number]
 
@@ -180,7 +180,7 @@ class Foreman:
         run = self._with_results(number)
         if run is not None:
             return run.is_labelled(episode)
-        return SessionLabels(self.session(number) / LABELS).path(episode).exists()
+        return SessionLabels.of(self.session(number)).path(episode).exists()
 
     def _with_results(self, number: str) -> Run | None:
         """Return the run of a submission that has results; None if it is done and its run is not kept any more."""

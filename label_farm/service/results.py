@@ -9,7 +9,6 @@ from fastapi import FastAPI, Request, Response
 
 from label_farm.labels.session_labels import SessionLabels
 from label_farm.service.foreman import Foreman
-from label_farm.service.run import LABELS
 from tacdata import documents
 from tacdata.errors import UsageError
 
@@ -53,4 +52,4 @@ def add_results(api: FastAPI, foreman: Foreman) -> None:
 
 
 def _labels(foreman: Foreman, number: str) -> SessionLabels:
-    return SessionLabels(foreman.session(number) / LABELS)
+    return SessionLabels.of(foreman.session(number))

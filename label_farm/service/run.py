@@ -19,8 +19,8 @@ from label_farm.service.submission import Submission, now
 from label_farm.settings import FarmSettings
 from label_farm.store.store import Store
 from tacdata.errors import TacdataError, UsageError
+from tacdata.labels import file_names
 
-LABELS = "labels"
 RECENT = 24
 """How many of the episodes labelled last are remembered."""
 MOST_ATTEMPTS = 20
@@ -116,7 +116,7 @@ class Run:
         )  # fmt: skip
         name = f"submission {wish.id}"
         self.labelling = Labelling(
-            session / LABELS, self._store, settings, self._progress, self._deliver, name, self._versions
+            file_names.folder(session), self._store, settings, self._progress, self._deliver, name, self._versions
         )
         self._since = self.labelling.plan(recordings, sensor, paths)
 

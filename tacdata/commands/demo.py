@@ -102,9 +102,11 @@ class _Place:
 
     @property
     def products(self) -> dict[str, Path]:
+        from tacdata.labels import file_names
+
         return {
             "recordings": self.session,
-            "labels": self.session / "labels",
+            "labels": file_names.folder(self.session),
             "dataset": self.dataset,
             "checkpoint": self.network / "best.safetensors",
             "score table": self.network / "scores" / "scores.md",

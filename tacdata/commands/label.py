@@ -64,6 +64,7 @@ def run(
     from label_farm.store.store import Store
     from label_farm.workers.dask_pool import dask_engine
     from label_farm.workers.pool import Pool
+    from tacdata.labels import file_names
     from tacdata.recording.files.reader import read_episode
     from tacdata.recording.session import read_session
     from tacdata.sensor import read_sensor
@@ -85,13 +86,13 @@ def run(
     if hint := "" if dask else idle_cards(device or ()):
         print(hint)
     skin = read_sensor(sensor) if sensor else None
-    labels = session / "labels"
+    labels = file_names.folder(session)
     paths = {int(path.stem[-6:]): path for path in recorded.episodes}
     recordings = {number: partial(read_episode, path) for number, path in paths.items()}
     flow = DatasetFlow(into, session, recorded.episodes, skin) if into else None
     deliver = flow.deliver if flow else lambda *_: None
     with _Bars() as bars:
-        labelling = Labelling(labels, Store(store or labels / "store"), settings, bars.show, deliver)
+        labelling = Labelling(labels, Store(store or file_names.store(labels)), settings, bars.show, deliver)
         try:
             summary = labelling.run(recordings, skin, paths)
         finally:

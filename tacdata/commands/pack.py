@@ -29,6 +29,7 @@ def run(
     from tacdata.dataset.flags import carry_flags
     from tacdata.dataset.format.features import asked_for
     from tacdata.dataset.pack import LabelFiles, pack, refuse_existing
+    from tacdata.labels import file_names
     from tacdata.recording.files.reader import read_episode
     from tacdata.recording.session import read_session
     from tacdata.sensor import read_sensor
@@ -36,7 +37,7 @@ def run(
     extra = asked_for(column or [])
     refuse_existing(out, append)
     found = read_session(session)
-    files = LabelFiles(labels or session / "labels")
+    files = LabelFiles(labels or file_names.folder(session))
     skin = read_sensor(sensor) if sensor else None
     files.check(found.episodes, skin, model)
     episodes = (read_episode(path) for path in found.episodes)

@@ -11,7 +11,7 @@ from tacdata.dataset import frames
 from tacdata.dataset.format import features
 from tacdata.dataset.writer import DatasetWriter
 from tacdata.errors import FormatError, UsageError
-from tacdata.labels import Label, read_label, table
+from tacdata.labels import Label, file_names, read_label, table
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
 
@@ -121,7 +121,7 @@ def refuse_existing(out: Path, append: bool) -> None:
 
 
 class LabelFiles:
-    """A session's folder of labels: ``episode-000000.parquet`` is the label of ``episode-000000.mcap``."""
+    """A session's folder of labels, to be read."""
 
     def __init__(self, folder: Path) -> None:
         """Name the folder.
@@ -137,7 +137,7 @@ class LabelFiles:
 
     def path(self, recording: Path) -> Path:
         """Return where the label of a recording lies, or would lie."""
-        return self.folder / f"{recording.stem}.parquet"
+        return file_names.label(self.folder, recording)
 
     def __call__(self, episode: Episode) -> Label | None:
         """Return an episode's label, or None if it has none."""
@@ -146,7 +146,7 @@ class LabelFiles:
 
     def failure(self, recording: Path) -> str:
         """Return why the recording has no label, in words; "" if nothing says so."""
-        path = self.folder / f"{recording.stem}.failure.json"
+        path = file_names.failure(self.folder, recording)
         return documents.read(path, "label_failure")["reason"] if path.is_file() else ""
 
     def check(self, recordings: Iterable[Path], sensor: Sensor | None = None, model: str | None = None) -> None:

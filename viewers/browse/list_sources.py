@@ -14,6 +14,7 @@ from tacdata.dataset import label_states
 from tacdata.dataset.flags import read_flags
 from tacdata.dataset.format import features, folder, metadata
 from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.labels import file_names as label_names
 from tacdata.recording.files import file_names
 from tacdata.recording.session import read_session
 from training.inference.prediction import PredictedMaps, read_prediction
@@ -38,7 +39,7 @@ def episodes_at(path: Path, labels: Path | None = None, predictions: Path | None
         return _dataset(path, predictions)
     if not path.is_dir():
         raise UsageError(f"{path} is no folder", "a session or dataset folder", "check the path")
-    return _session(path, labels or path / "labels", predictions)
+    return _session(path, labels or label_names.folder(path), predictions)
 
 
 def _session(root: Path, labels: Path, predictions: Path | None) -> EpisodeList:
@@ -48,7 +49,7 @@ def _session(root: Path, labels: Path, predictions: Path | None) -> EpisodeList:
     entries = []
     for number, path in file_names.finished(root).items():
         entry = of_press(number, path.name, presses.get(number))
-        entries.append(replace(entry, label=_label_state(labels, path.stem), quality=checked.get(path.name)))
+        entries.append(replace(entry, label=_label_state(labels, path), quality=checked.get(path.name)))
     found = with_flags(tuple(entries), read_flags(root))
     if predictions is not None:
         found = _with_session_errors(found, labels, predictions)
@@ -74,17 +75,17 @@ def _checked(root: Path) -> tuple[dict[str, float], list[str]]:
     return shares, []
 
 
-def _label_state(labels: Path, stem: str) -> str:
-    if (labels / f"{stem}.parquet").is_file():
+def _label_state(labels: Path, recording: Path) -> str:
+    if label_names.label(labels, recording).is_file():
         return "complete"
-    return "failed" if (labels / f"{stem}.failure.json").is_file() else "none"
+    return "failed" if label_names.failure(labels, recording).is_file() else "none"
 
 
 def _with_session_errors(entries: tuple[Entry, ...], labels: Path, predictions: Path) -> tuple[Entry, ...]:
     known = {int(p.time_ns[0]): p for p in map(read_prediction, prediction_paths(predictions))}
     result = []
     for entry in entries:
-        path = labels / f"{Path(entry.file).stem}.parquet"
+        path = label_names.label(labels, Path(entry.file))
         label = shown_label(path) if entry.label == "complete" else None
         own = next((p for t, p in known.items() if label is not None and t in label.time_ns), None)
         error = None

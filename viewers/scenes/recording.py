@@ -13,6 +13,7 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.errors import UsageError
+from tacdata.labels import file_names as label_names
 from tacdata.recording.files import file_names
 from training.inference.prediction import PredictedMaps
 from viewers.parts.label import ShownLabel, shown_label
@@ -91,8 +92,8 @@ def find_label(recording: Path, labels: Path | None, most: int | None = None) ->
     """
     if labels is not None and not labels.is_dir():
         raise UsageError(f"no folder {labels}", "the folder that `tacdata label` wrote", "run `tacdata label` first")
-    folder = labels or recording.parent / "labels"
-    path, failure = folder / f"{recording.stem}.parquet", folder / f"{recording.stem}.failure.json"
+    folder = labels or label_names.folder(recording.parent)
+    path, failure = label_names.label(folder, recording), label_names.failure(folder, recording)
     if path.is_file():
         return shown_label(path, most), []
     if failure.is_file():

@@ -11,7 +11,7 @@ import numpy as np
 from label_farm.labelling import FarmSettings, Labelling, LabellingSummary
 from label_farm.store.store import Store
 from tacdata.effects import Placed
-from tacdata.labels import read_label
+from tacdata.labels import file_names, read_label
 from tacdata.recording import read_episode, read_session
 from tacdata.revision.labels.pose_path import LATE, moved_episodes
 from tacdata.sensor import Sensor
@@ -93,10 +93,10 @@ def relabelled(
     recorded = read_session(session)
     moved = {e.number: e for e in moved_episodes([read_episode(p) for p in recorded.episodes], placed)}
     skin = changed_skin(recorded.sensor, placed)
-    labelling = Labelling(folder, Store(store or session / "labels" / "store"), settings, progress)
+    labelling = Labelling(folder, Store(store or file_names.store(file_names.folder(session))), settings, progress)
     readers = {number: (lambda e=episode: e) for number, episode in moved.items()}
     summary = labelling.run(readers, skin)
-    return _compared(paths_moved(session, placed), session / "labels", folder, summary)
+    return _compared(paths_moved(session, placed), file_names.folder(session), folder, summary)
 
 
 def changed_skin(sensor: Sensor, placed: Sequence[Placed]) -> Sensor | None:
@@ -109,7 +109,7 @@ def changed_skin(sensor: Sensor, placed: Sequence[Placed]) -> Sensor | None:
 
 def _compared(moved: Moved, before: Path, after: Path, summary: LabellingSummary) -> Moved:
     squares, count, most, labels = 0.0, 0, 0.0, 0
-    for path in sorted(after.glob("episode-*.parquet")):
+    for path in file_names.present(after).values():
         if not (before / path.name).is_file():
             continue
         old, new = read_label(before / path.name), read_label(path)

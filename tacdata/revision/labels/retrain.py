@@ -13,7 +13,7 @@ import numpy as np
 from tacdata.dataset.pack import LabelFiles, pack
 from tacdata.effects import Placed
 from tacdata.errors import UsageError
-from tacdata.labels import Label
+from tacdata.labels import Label, file_names
 from tacdata.recording import Episode, read_episode, read_session
 from tacdata.revision.comparison import Comparison
 from tacdata.revision.labels.pose_path import moved_episodes
@@ -115,10 +115,10 @@ class _Pair:
 def _pairs(sessions: Sequence[Path], labels: dict[Path, Path], placed: Sequence[Placed]) -> list[_Pair]:
     found = []
     for session in sessions:
-        if not (session / "labels").is_dir():
+        if not file_names.folder(session).is_dir():
             raise UsageError(f"{session} has no labels", "a labelled session", f"run `tacdata label {session}` first")
         episodes = [read_episode(path) for path in read_session(session).episodes]
-        old = LabelFiles(session / "labels")
+        old = LabelFiles(file_names.folder(session))
         new, moved = old, {e.path: e for e in episodes}
         if session in labels:
             new, moved = LabelFiles(labels[session]), {e.path: e for e in moved_episodes(episodes, placed)}
