@@ -21,6 +21,13 @@ def read(path: Path, schema: str) -> dict[str, Any]:
     Raises:
         UsageError: If there is no such file.
         FormatError: If it is not YAML/JSON, has another major version, or breaks the schema.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata import documents
+        >>> case = documents.read(Path("examples/cases/sphere_on_slab.yaml"), "case")
+        >>> case["indenter"]
+        {'shape': 'sphere', 'radius': 4.0}
     """
     if not path.is_file():
         raise UsageError(f"no file {path}", f"a {schema} file (YAML or JSON)", "check the path")

@@ -16,6 +16,11 @@ def names(room: str, base: str) -> list[str]:
     Args:
         room: Dotted package name, for example ``"tacdata.indenters"``.
         base: File name of the room's base class, which is no member.
+
+    Example:
+        >>> from tacdata import registry
+        >>> registry.names("tacdata.indenters", "indenter")[:3]
+        ['cone', 'cylinder', 'ellipsoid']
     """
     package = importlib.import_module(room)
     return sorted(m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in (base, "__init__"))

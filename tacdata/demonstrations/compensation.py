@@ -84,6 +84,13 @@ def compensate(position: np.ndarray, normal: np.ndarray, depth: np.ndarray, gain
 
     Raises:
         UsageError: If the gain is negative or not finite, or if shapes or normals do not fit.
+
+    Example:
+        >>> import numpy as np
+        >>> from tacdata.demonstrations.compensation import compensate
+        >>> seen, normal = np.array([[0.0, 0.0, 0.1]]), np.array([[0.0, 0.0, 1.0]])
+        >>> compensate(seen, normal, depth=np.array([2.0]), gain=0.001)  # 2 mm felt, 1 mm per mm
+        array([[0.   , 0.   , 0.102]])
     """
     if not np.isfinite(gain) or gain < 0:
         raise UsageError(f"a gain of {gain} m/mm", "0 or more", "correct the gains file")

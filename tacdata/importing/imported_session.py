@@ -51,6 +51,15 @@ def import_session(
     Raises:
         UsageError: If ``out`` exists, or a file is missing.
         FormatError: If nothing could be imported, with the first reason.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.importing.imported_session import import_session
+        >>> made = import_session(Path("source"), Path("examples/import_foreign.yaml"), Path("imported"))
+        >>> made.recordings
+        3
+        >>> made.refused
+        ()
     """
     document = documents.read(mapping, "import_mapping")
     if out.exists():

@@ -211,6 +211,18 @@ def from_document(document: dict[str, Any], origin: str = "indenter", folder: Pa
     Raises:
         UsageError: If no such shape is known.
         FormatError: If a parameter is missing, unknown or not positive.
+
+    Example:
+        >>> from tacdata.indenters import from_document
+        >>> cone = from_document({"shape": "cone", "half_angle": 45.0, "tip_radius": 0.5, "radius": 3.0})
+        >>> cone.extent  # mm
+        3.0
+        >>> from_document({"shape": "cube"})
+        Traceback (most recent call last):
+            ...
+        tacdata.errors.UsageError: 'cube' is not among the indenters
+          allowed: cone, cylinder, ellipsoid, flat_punch, mesh, prism, ring, sphere, square_punch
+          next:    choose one, or add tacdata/indenters/cube.py
     """
     values = dict(document)
     shape = values.pop("shape", None)

@@ -17,7 +17,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sphere(Indenter):
-    """A sphere that touches with its lowest point."""
+    """A sphere that touches with its lowest point.
+
+    Example:
+        >>> from tacdata.indenters.sphere import Sphere
+        >>> ball = Sphere(radius=4.0)
+        >>> ball.document
+        {'shape': 'sphere', 'radius': 4.0}
+        >>> round(float(ball.profile(1.0, 0.0)), 3)  # height of its surface 1 mm beside the axis, mm
+        0.127
+    """
 
     radius: float
     """Radius [mm]."""

@@ -14,7 +14,18 @@ from tacdata.sensor import Sensor
 
 @dataclass(frozen=True)
 class Press:
-    """One press: contact configuration and motion, in the sensor frame."""
+    """One press: contact configuration and motion, in the sensor frame.
+
+    Example:
+        >>> from tacdata.indenters.sphere import Sphere
+        >>> from tacdata.plans import Press
+        >>> press = Press(
+        ...     index=0, indenter=Sphere(4.0), indenter_name="sphere_4",
+        ...     x=2.0, y=0.0, yaw=0.0, depth=0.8, speed=1.0, hold=0.5,
+        ... )
+        >>> press.deepest  # mm
+        0.8
+    """
 
     index: int
     """Number in the plan, from 0; also the episode's number."""
@@ -111,7 +122,18 @@ class MotionSettings:
 
 @dataclass(frozen=True)
 class Plan:
-    """A named list of presses, with their indenters and motion settings."""
+    """A named list of presses, with their indenters and motion settings.
+
+    Example:
+        >>> from tacdata.plans import Plan
+        >>> from tacdata.plans.shipped.shipped_plan import PlanOptions, shipped_plan
+        >>> from tacdata.sensor import default_sensor
+        >>> document = shipped_plan("training", default_sensor(), PlanOptions(presses=6, seed=1))
+        >>> plan = Plan.from_document(document, "training")
+        >>> len(plan.presses)
+        6
+        >>> plan.check_against(default_sensor())  # raises FormatError if a press misses the skin
+    """
 
     name: str
     motion: MotionSettings

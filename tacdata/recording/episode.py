@@ -103,7 +103,19 @@ PHASES = ("rest", "approach", "press", "hold", "release")
 
 @dataclass(frozen=True)
 class Episode:
-    """One recorded press: taxel readings, tip path, tags and everything that is attached to them."""
+    """One recorded press: taxel readings, tip path, tags and everything that is attached to them.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.recording import PHASES, read_episode
+        >>> episode = read_episode(Path("session/episode-000000.mcap"))
+        >>> times = episode.taxels.sample_ns
+        >>> round(float(episode.tip_at(times)[:, 2].max()), 3)  # largest depth, mm
+        0.8
+        >>> held = episode.phase_at(times) == PHASES.index("hold")
+        >>> episode.taxels.counts[held].mean(axis=0).shape  # mean reading of each taxel during the hold
+        (24,)
+    """
 
     path: Path
     """The MCAP file."""

@@ -51,6 +51,15 @@ def read_session(folder: Path) -> Session:
     Raises:
         UsageError: If the folder is no session.
         FormatError: If its document is damaged or names recordings that are missing.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.recording import read_session
+        >>> session = read_session(Path("session"))
+        >>> [path.name for path in session.episodes]
+        ['episode-000000.mcap', 'episode-000001.mcap']
+        >>> session.remaining  # presses of the plan that are not recorded yet
+        ()
     """
     folder = Path(folder)
     if not (folder / FILE).is_file():

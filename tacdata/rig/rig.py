@@ -19,6 +19,13 @@ class Registration:
 
     Depth is counted along the guide's z from the tilted outer face. Terms of second order in the tilt are neglected
     (0.15 % of a length at 3 deg).
+
+    Example:
+        >>> import numpy as np
+        >>> from tacdata.rig import Registration
+        >>> registration = Registration(origin=(40.0, 25.0, 12.0), yaw=90.0)
+        >>> registration.to_sensor(np.array([[40.0, 26.0, 11.5]])).round(3)  # x, y, depth [mm]
+        array([[1. , 0. , 0.5]])
     """
 
     origin: tuple[float, float, float]

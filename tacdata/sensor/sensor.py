@@ -112,7 +112,17 @@ class DepthMap:
 
 @dataclass(frozen=True)
 class Sensor:
-    """One taxel skin. Frame: x along columns, y along rows, z outward, origin at the array's centre on z = 0."""
+    """One taxel skin. Frame: x along columns, y along rows, z outward, origin at the array's centre on z = 0.
+
+    Example:
+        >>> from tacdata.sensor import Sensor, default_sensor
+        >>> sensor = default_sensor()
+        >>> document = sensor.document
+        >>> document["skin"]["thickness"] = 3.0
+        >>> thinner = Sensor.from_document(document, "my sensor")
+        >>> thinner.content_hash == sensor.content_hash  # its labels are other ones
+        False
+    """
 
     name: str
     taxels: Taxels
@@ -241,11 +251,31 @@ def read_sensor(path: Path) -> Sensor:
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged or contradicts itself.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.sensor import read_sensor
+        >>> sensor = read_sensor(Path("examples/own_sensor.yaml"))
+        >>> sensor.name, sensor.taxels.columns, sensor.taxels.rows
+        ('flat_pad', 4, 4)
+        >>> sensor.taxels.centers[0]  # of the first taxel, mm
+        array([-7.5, -7.5])
     """
     return Sensor.from_document(documents.read(path, "sensor"), str(path), path.parent)
 
 
 def default_sensor() -> Sensor:
-    """Return the sensor of the paper (`tacdata/sensor/tacprint.yaml`)."""
+    """Return the sensor of the paper (`tacdata/sensor/tacprint.yaml`).
+
+    Example:
+        >>> from tacdata.sensor import default_sensor
+        >>> sensor = default_sensor()
+        >>> sensor.taxels.count, sensor.map.shape
+        (24, (35, 26))
+        >>> sensor.skin.thickness  # mm
+        3.3
+        >>> round(sensor.material.shear_modulus, 3)  # MPa
+        0.102
+    """
     text = (files("tacdata.sensor") / "tacprint.yaml").read_text()
     return Sensor.from_document(yaml.safe_load(text), "tacprint.yaml")

@@ -13,7 +13,16 @@ from tacdata.errors import FormatError, UsageError
 
 @dataclass(frozen=True, eq=False)
 class PinholeCamera:
-    """A pinhole camera with OpenCV's distortion. Frame: x right, y down, z forward; whole pixels at pixel centres."""
+    """A pinhole camera with OpenCV's distortion. Frame: x right, y down, z forward; whole pixels at pixel centres.
+
+    Example:
+        >>> import numpy as np
+        >>> from tacdata.tags.camera import PinholeCamera
+        >>> intrinsics = {"width": 640, "height": 480, "fx": 600.0, "fy": 600.0, "cx": 320.0, "cy": 240.0}
+        >>> camera = PinholeCamera.from_document(intrinsics, "my camera")
+        >>> camera.project(np.array([[0.01, 0.0, 0.2]])).round(1)  # pixels of a point 0.2 m away
+        array([[350., 240.]])
+    """
 
     width: int
     """Image width [px]."""

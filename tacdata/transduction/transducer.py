@@ -33,6 +33,17 @@ class Transducer:
     """A sensor's taxels: principle, gain, offset and range.
 
     counts = offset + gain (C - C without load).
+
+    Example:
+        >>> import numpy as np
+        >>> from tacdata.sensor import default_sensor
+        >>> from tacdata.transduction import Loads, Transducer
+        >>> transducer = Transducer.of(default_sensor())
+        >>> force = np.zeros((1, 24))
+        >>> force[0, 10] = 0.1  # N on one protrusion
+        >>> readings = transducer.read(Loads(force, 0.5 * force, 0 * force))
+        >>> int((readings.counts[0] - transducer.offset).argmax())
+        10
     """
 
     principle: Principle

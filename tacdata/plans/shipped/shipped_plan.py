@@ -56,6 +56,15 @@ def shipped_plan(name: str, sensor: Sensor, wishes: PlanOptions | None = None) -
 
     Raises:
         UsageError: If there is none of that name, or an option cannot be met.
+
+    Example:
+        >>> from tacdata.plans.shipped.shipped_plan import PlanOptions, shipped_plan
+        >>> from tacdata.sensor import default_sensor
+        >>> document = shipped_plan("training", default_sensor(), PlanOptions(presses=6, seed=1))
+        >>> len(document["presses"])
+        6
+        >>> list(document["indenters"])
+        ['sphere_2', 'sphere_4', 'punch', 'pin', 'ellipsoid']
     """
     kind: type[Any] = registry.load(ROOM, BASE, name, ShippedPlan)
     plan: ShippedPlan = kind()

@@ -62,6 +62,18 @@ def check(path: Path) -> Report:
     Raises:
         UsageError: If it is neither.
         FormatError: If a single recording cannot be read, or the session's document is damaged.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.recording.check.report import check
+        >>> report = check(Path("session"))
+        >>> report.usable
+        True
+        >>> print(report.text)
+        session: 2 recordings
+          taxels  30.00 Hz, 340 frames, 0 lost, ...
+        ...
+        usable
     """
     path = Path(path)
     if path.is_file():

@@ -63,6 +63,15 @@ def read_episode(path: Path) -> Episode:
     Raises:
         UsageError: If there is no such file.
         FormatError: If it is not a recording, or was cut off before its attachments.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.recording import read_episode
+        >>> episode = read_episode(Path("session/episode-000000.mcap"))
+        >>> episode.taxels.counts.shape  # frames, taxels
+        (170, 24)
+        >>> episode.press.indenter
+        Sphere(radius=3.0)
     """
     return read_recording(path).episode
 

@@ -33,7 +33,17 @@ CORNERS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 
 @dataclass(frozen=True)
 class Cube:
-    """A cube's measures and tags."""
+    """A cube's measures and tags.
+
+    Example:
+        >>> from tacdata.tags import Cube
+        >>> document = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+z": 4}}
+        >>> cube = Cube.from_document(document, "my cube")
+        >>> cube.faces
+        {0: '+x', 1: '-x', 4: '+z'}
+        >>> cube.corners("+z")[0]  # right-top corner of the tag, m
+        array([0.008, 0.008, 0.01 ])
+    """
 
     side: float
     """Edge of the cube [mm]."""

@@ -71,6 +71,23 @@ def detect_cube(
     Raises:
         UsageError: If the image is invalid or of another size than the intrinsics.
         FormatError: If intrinsics or cube contradict themselves.
+
+    Example:
+        >>> import numpy as np
+        >>> from scipy.spatial.transform import Rotation
+        >>> from tacdata.tags import detect_cube
+        >>> from tacdata.virtual_rig.optics.render import render_cube
+        >>> intrinsics = {"width": 640, "height": 480, "fx": 600.0, "fy": 600.0, "cx": 320.0, "cy": 240.0}
+        >>> cube = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}
+        >>> true = np.eye(4)  # a cube 0.2 m away
+        >>> true[:3, :3] = Rotation.from_euler("xyz", [150, 20, 10], degrees=True).as_matrix()
+        >>> true[:3, 3] = [0.01, 0.0, 0.2]
+        >>> image = render_cube(true, intrinsics, cube, np.random.default_rng(0))
+        >>> pose = detect_cube(image, intrinsics, cube)
+        >>> pose.ids, pose.ambiguous
+        ((3, 4), False)
+        >>> bool(np.linalg.norm(pose.position - true[:3, 3]) < 1e-4)  # m
+        True
     """
     grey, camera, known = to_grey(image), PinholeCamera.from_document(intrinsics), Cube.from_document(cube)
     camera.check(grey)

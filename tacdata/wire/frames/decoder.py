@@ -16,6 +16,18 @@ class Decoder:
     """Decodes one board's stream; keeps incomplete frames between calls and never invents a reading.
 
     ``counts`` holds frames received, lost (by the counter), repeated (and dropped) and corrupt, and bytes skipped.
+
+    Example:
+        >>> import numpy as np
+        >>> from tacdata.wire.frames.decoder import Decoder
+        >>> from tacdata.wire.frames.encoder import Encoder
+        >>> from tacdata.wire.frames.frame_format import default_format
+        >>> board = Encoder(default_format())
+        >>> sent = [board.encode(np.arange(24.0), counter=k, ticks=0) for k in (7, 8, 10)]
+        >>> decoder = Decoder(default_format())
+        >>> frames = decoder.feed(b"".join(sent), arrival_ns=0)
+        >>> [frame.counter for frame in frames], decoder.counts.lost
+        ([7, 8, 10], 1)
     """
 
     def __init__(self, layout: FrameFormat) -> None:
