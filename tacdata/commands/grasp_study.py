@@ -41,7 +41,6 @@ def run(
     from tacdata.grasping.study import Setup
     from training.inference import checkpoint
     from training.inference.sequence import identity, sequence_maps
-    from training.scoring.wilson import interval
 
     for name in (RESULT, PICTURE):
         if (out / name).exists():
@@ -51,7 +50,7 @@ def run(
     trained.check_sensor(sensor, "the study's fingertip")
     found = result.result(
         Setup(repeats=repeats, seed=seed), read_presses(FOLDER / "orange.npz", sensor), sensor,
-        lambda readings: sequence_maps(trained, readings), identity(trained), interval, _told,
+        lambda readings: sequence_maps(trained, readings), identity(trained), _told,
     )  # fmt: skip
     documents.write(out / RESULT, found, "grasp_study")
     picture.save(found, out / PICTURE)

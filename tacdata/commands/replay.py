@@ -42,7 +42,6 @@ def run(
     from tacdata.errors import UsageError
     from tacdata.replay.scene import scene_of
     from tacdata.replay.trials import Trials, result
-    from training.scoring.wilson import interval
 
     for file in (out, view, video):
         if file is not None and file.exists():
@@ -77,7 +76,7 @@ def run(
             print(f"note: {one.recording}: {words}")
     if view is not None or video is not None:
         _save(view, video, tried[0], scene)
-    document = result(tried, seeds, interval, scene, chosen)
+    document = result(tried, seeds, scene, chosen)
     for kind in tried[0].paths:
         rate = document[kind]
         low, high = rate["wilson_95"]

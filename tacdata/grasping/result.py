@@ -18,7 +18,6 @@ from tacdata.grasping.study import (
     MARGIN,
     OTHER_MARGINS,
     PUBLISHED,
-    Interval,
     Setup,
     configured,
     lifted,
@@ -33,7 +32,7 @@ FINENESS = 0.25
 
 
 def result(
-    setup: Setup, presses: PressSet, sensor: Sensor, maps: Maps, network: dict[str, Any], interval: Interval,
+    setup: Setup, presses: PressSet, sensor: Sensor, maps: Maps, network: dict[str, Any],
     told: Callable[[int, int], None] = lambda done, of: None,
 ) -> dict[str, Any]:  # fmt: skip
     """Run a study.
@@ -44,7 +43,6 @@ def result(
         sensor: The fingertip's sensor.
         maps: The trained network.
         network: Its identity.
-        interval: Successes and trials -> an interval of the proportion.
         told: Called with the number of trials done and in total.
     """
     touch, own = OrangeTouch(presses, sensor), configured(setup)
@@ -53,12 +51,12 @@ def result(
     for margin in OTHER_MARGINS:
         other = configured(setup, margin)
         again = [replace(trial, held=lifted(trial, other.grip)) for trial in found]
-        others.append({"margin": margin, **_lifting(other.grip), "rates": rates(again, interval)})
+        others.append({"margin": margin, **_lifting(other.grip), "rates": rates(again)})
     parents = {"sensor": sensor.content_hash, "checkpoint": str(network["hash"]),
                "presses": provenance.content_hash(presses.provenance["parents"])}  # fmt: skip
     return {
         "version": schemas.version("grasp_study"), "sensor": sensor.name, "network": network,
-        "setup": own.document, "lifting": {"margin": MARGIN, **_lifting(own.grip)}, "rates": rates(found, interval),
+        "setup": own.document, "lifting": {"margin": MARGIN, **_lifting(own.grip)}, "rates": rates(found),
         "published": PUBLISHED, "other_lifting": others,
         "bias": bias(touch, presses, maps, setup.protocol.force, setup.protocol.band),
         "trials": [trial.document for trial in found],

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from tacdata.grasping.centre import Maps
 from tacdata.grasping.lift import Grip, lift, lifting_grip
@@ -36,9 +37,6 @@ def strategy_names() -> list[str]:
     """Return all strategies, those of the paper first, in its order."""
     known, published = strategies.names(), list(PUBLISHED["overall"])
     return [*(name for name in published if name in known), *(name for name in known if name not in published)]
-
-
-Interval = Callable[[int, int], tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -148,25 +146,26 @@ def configured(setup: Setup, margin: float = MARGIN) -> Setup:
     return replace(setup, grip=lifting_grip(setup.grip, (setup.protocol.band + margin) / 1000))
 
 
-def rates(found: list[GraspTrial], interval: Interval) -> dict[str, Any]:
+def rates(found: list[GraspTrial]) -> dict[str, Any]:
     """Return success and adjustments of every strategy: overall, at the edge and at each position."""
-    return {name: _rates([t for t in found if t.strategy == name], interval) for name in strategy_names()}
+    return {name: _rates([t for t in found if t.strategy == name]) for name in strategy_names()}
 
 
-def _rates(found: list[GraspTrial], interval: Interval) -> dict[str, Any]:
+def _rates(found: list[GraspTrial]) -> dict[str, Any]:
     edge = [t for t in found if t.position in EDGE]
     positions = sorted({t.position for t in found})
     return {
-        "overall": _share(found, interval), "edge": _share(edge, interval),
-        "by_position": {str(p): _share([t for t in found if t.position == p], interval) for p in positions},
+        "overall": _share(found), "edge": _share(edge),
+        "by_position": {str(p): _share([t for t in found if t.position == p]) for p in positions},
         "adjustments": _moves(found), "edge_adjustments": _moves(edge),
         "safety_stops": sum("safety" in t.approach.stopped for t in found),
     }  # fmt: skip
 
 
-def _share(found: list[GraspTrial], interval: Interval) -> dict[str, Any]:
+def _share(found: list[GraspTrial]) -> dict[str, Any]:
     held = sum(t.held for t in found)
-    return {"held": held, "of": len(found), "wilson_95": list(interval(held, len(found)))}
+    interval = binomtest(held, len(found)).proportion_ci(method="wilson")
+    return {"held": held, "of": len(found), "wilson_95": list(interval)}
 
 
 def _moves(found: list[GraspTrial]) -> dict[str, Any]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
+
+from scipy.stats import binomtest
 
 import schemas
 from tacdata import provenance
@@ -15,7 +17,6 @@ from tacdata.replay.scene import ReplayScene, drawn
 from tacdata.replay.targets import FingertipTargets, targets_of
 
 DIRECT = "direct"
-Interval = Callable[[int, int], tuple[float, float]]
 
 
 class Trials:
@@ -73,14 +74,13 @@ class Trials:
 
 
 def result(
-    tried: Sequence[Trials], seeds: int, interval: Interval, scene: ReplayScene, chosen: dict[str, Any] | None = None
+    tried: Sequence[Trials], seeds: int, scene: ReplayScene, chosen: dict[str, Any] | None = None
 ) -> dict[str, Any]:
     """Return the result over recordings and seeds (`schemas/replay_result.schema.json`).
 
     Args:
         tried: One or more demonstrations.
         seeds: Trials of each kind and demonstration.
-        interval: Successes and trials -> an interval of the proportion.
         scene: The undisturbed scene.
         chosen: Recording and depth for which the gain of the kind "chosen" was found.
     """
@@ -92,11 +92,11 @@ def result(
         "version": schemas.version("replay_result"), "recording": first.made.recording, "task": first.made.task,
         "gains": gains["compensated"],
         "scene": {**scene.document, "spreads": " ".join((drawn.__doc__ or "").split())},
-        **{kind: rate([t for t in found if t["kind"] == kind], interval) for kind in kinds},
+        **{kind: rate([t for t in found if t["kind"] == kind]) for kind in kinds},
         "recordings": [
             {"name": one.made.recording, "hash": one.made.recording_hash,
              "rates": {
-                 kind: rate([t for t in trials if t["kind"] == kind], interval) for kind in kinds
+                 kind: rate([t for t in trials if t["kind"] == kind]) for kind in kinds
              }}
             for k, one in enumerate(tried) for trials in (found[k * seeds * len(kinds) : (k + 1) * seeds * len(kinds)],)
         ],
@@ -105,7 +105,8 @@ def result(
     }  # fmt: skip
 
 
-def rate(trials: Sequence[dict[str, Any]], interval: Interval) -> dict[str, Any]:
-    """Return the number of successes and trials, and the interval of the proportion."""
+def rate(trials: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the number of successes and trials, and Wilson's interval of the proportion, 95 %."""
     held = sum(trial["held"] for trial in trials)
-    return {"held": held, "of": len(trials), "wilson_95": list(interval(held, len(trials)))}
+    interval = binomtest(held, len(trials)).proportion_ci(method="wilson")
+    return {"held": held, "of": len(trials), "wilson_95": list(interval)}

@@ -41,6 +41,15 @@ def test_the_papers_counts_give_the_papers_rates():
     assert set(published.SUCCESS) == {"contact only", "raw taxels", "dense depth"}
 
 
+def test_intervals_are_wilsons():
+    """Worked out with a pocket calculator from the quadratic, z^2 = 3.841459, to four digits."""
+    wanted = [(0.2422, 0.5297), (0.0807, 0.416), (0.5202, 0.7992), (0.2582, 0.6579), (0.7389, 0.9454), (0.6396, 0.9476)]
+    for rate, interval in zip(published_rates(), wanted, strict=True):
+        assert rate.interval == pytest.approx(interval, abs=6e-5)
+    assert counted("none=0/10").interval == pytest.approx((0.0, 3.841459 / (10 + 3.841459)), abs=1e-6)
+    assert counted("all=10/10").interval[1] == 1.0
+
+
 def test_counts_typed_in():
     assert counted("dense=35/40").interval == pytest.approx((0.7389, 0.9454), abs=6e-5)
     for text in ("dense=35", "dense=a/b", "dense=41/40", "dense=0/0"):

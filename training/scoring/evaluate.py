@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 import schemas
 from tacdata import provenance
@@ -20,7 +21,7 @@ from training.inference.predictor import milliseconds_per_frame, predict
 from training.metrics import depth_maps, physical, spread
 from training.metrics.depth_maps import FrameScores
 from training.metrics.physical import PressScore
-from training.scoring import baselines, published, wilson
+from training.scoring import baselines, published
 
 DEPTHS = (0.2, 0.3, 0.5, 0.8)
 """Borders of the largest labelled depth by which frames are told apart [mm]."""
@@ -284,11 +285,11 @@ def _table(scores: FrameScores) -> dict[str, Any]:
 
 
 def _proportion(definition: str, successes: int, trials: int) -> dict[str, Any]:
-    low, high = wilson.interval(successes, trials) if trials else (None, None)
+    interval = binomtest(successes, trials).proportion_ci(method="wilson") if trials else (None, None)
     return {
         "definition": definition,
         "count": successes,
         "of": trials,
         "proportion": successes / trials if trials else None,
-        "wilson_95": [low, high],
+        "wilson_95": list(interval),
     }

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import binomtest
 
 from tacdata.errors import FormatError, UsageError
-from training.scoring import published, wilson
+from training.scoring import published
 
 TRUE, FALSE = {"1", "true", "yes", "success"}, {"0", "false", "no", "failure"}
 
@@ -53,7 +54,7 @@ def rate(condition: str, group: str, attempts: list[Attempt]) -> Rate:
     counted = np.array([a.adjustments for a in won if a.adjustments is not None], dtype=float)
     spread = float(counted.std(ddof=1)) if len(counted) > 1 else None
     return Rate(
-        condition, group, len(won), len(attempts), wilson.interval(len(won), len(attempts)),
+        condition, group, len(won), len(attempts), _wilson(len(won), len(attempts)),
         (float(counted.mean()), spread) if len(counted) else None,
     )  # fmt: skip
 
@@ -120,7 +121,7 @@ def counted(text: str) -> Rate:
     if not (successes.strip().isdecimal() and trials.strip().isdecimal()):
         raise UsageError(f"{text!r}", "NAME=SUCCESSES/TRIALS, for example dense=35/40", "correct it")
     won, of = int(successes), int(trials)
-    return Rate(name or text, "all", won, of, wilson.interval(won, of))
+    return Rate(name or text, "all", won, of, _wilson(won, of))
 
 
 def markdown(found: list[Rate]) -> str:
@@ -160,5 +161,14 @@ def published_rates() -> list[Rate]:
     for condition, entry in published.SUCCESS.items():
         for group, moves in (("all", "adjustments"), ("edge", "adjustments_edge")):
             won, of = entry[group]
-            found.append(Rate(condition, group, won, of, wilson.interval(won, of), entry.get(moves)))
+            found.append(Rate(condition, group, won, of, _wilson(won, of), entry.get(moves)))
     return found
+
+
+def _wilson(successes: int, trials: int) -> tuple[float, float]:
+    if not 0 <= successes <= trials or trials < 1:
+        raise UsageError(
+            f"{successes} successes in {trials} trials", "0 <= successes <= trials, trials >= 1", "count again"
+        )
+    low, high = binomtest(successes, trials).proportion_ci(method="wilson")
+    return float(low), float(high)
