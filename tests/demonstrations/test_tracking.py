@@ -8,8 +8,9 @@ import pytest
 from demo_examples import START, changed, recording, rig, taxels, truth_at, view
 from scipy.spatial.transform import Rotation
 
+from tacdata.demonstrations.paths.acquisition import acquire
 from tacdata.demonstrations.paths.motion_density import choose
-from tacdata.demonstrations.paths.motion_filter import exponential, logarithm, smooth
+from tacdata.demonstrations.paths.motion_filter import ProcessNoise, exponential, logarithm, smooth
 from tacdata.demonstrations.paths.sightings import sightings_of
 from tacdata.demonstrations.paths.tracking import Estimator, track
 from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks, write_tracks
@@ -60,6 +61,48 @@ def test_the_backward_pass_makes_the_past_surer():
     assert (np.trace(both.covariance, axis1=1, axis2=2) <= np.trace(forth.covariance, axis1=1, axis2=2)).all()
     truth = truth_at("index", times)[:, :3, 3]
     assert np.linalg.norm(both.position - truth) < np.linalg.norm(forth.position - truth)
+
+
+def test_process_noise_is_that_of_the_whole_recording():
+    """Rest at the beginning says nothing of the hurry that follows: what it alone asks for loses a sixth of all."""
+    seen = sightings_of("index", (view("index", seconds=34.0, rate=40.0),), rig())
+    kept = np.zeros(len(seen), bool)
+    kept[:30] = True  # before the hand closes
+    assert choose(seen).velocity > choose(seen.where(kept)).velocity
+    assert smooth(seen, seen.time_ns[:1], choose(seen)).accepted.mean() > 0.995
+
+
+def test_a_track_that_was_lost_is_taken_up_again():
+    seen = sightings_of("index", (view("index"),), rig())
+    stiff = ProcessNoise(1e-4, 1e-2)  # a tenth of what the whole path asks for
+    lost, found = smooth(seen, seen.time_ns, stiff), acquire(seen, seen.time_ns, stiff)
+    truth = truth_at("index", seen.time_ns)[:, :3, 3]
+    assert lost.accepted.mean() < 0.5 and found.accepted.mean() > 0.99
+    off = [1000 * np.linalg.norm(path.position - truth, axis=1).max() for path in (lost, found)]
+    assert off[0] > 50 and off[1] < 3
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_cameras_constant_error_is_not_averaged_away(seed):
+    """Two cameras, each where its file does not quite say: the truth lies within three stated standard deviations."""
+    rng, views = np.random.default_rng(seed), []
+    shift, turn = 0.0005, np.radians(0.1)
+    cameras = ("eye", "other")
+    bench = rig(cameras=cameras)
+    worlds = {name: replace(world, spread=(shift, turn)) for name, world in bench.worlds.items()}
+    for k, camera in enumerate(cameras):
+        off, turned = rng.normal(0, shift, 3), Rotation.from_rotvec(rng.normal(0, turn, 3))
+        whole = view("index", camera=camera, seed=10 * seed + k)
+        moved = turned.apply(whole.position) + off
+        quaternion = (turned * Rotation.from_quat(whole.quaternion)).as_quat()
+        views.append(replace(whole, position=moved, quaternion=quaternion))
+    seen = sightings_of("index", views, replace(bench, worlds=worlds))
+    path = acquire(seen, seen.time_ns, choose(seen))
+    away = path.position - truth_at("index", seen.time_ns)[:, :3, 3]
+    stated = np.sqrt(path.covariance[:, range(3, 6), range(3, 6)])
+    assert (np.abs(away) < 3 * stated).all(axis=1).mean() > 0.99
+    # Two cameras are off by less than one, and 400 images by no less.
+    assert 0.5 * shift < np.median(stated) < 1.1 * shift
 
 
 def test_no_tag_for_a_second_is_a_gap_with_growing_doubt(tmp_path):

@@ -13,21 +13,35 @@ VELOCITIES = (0.0001, 0.001, 0.01, 0.1, 1.0, 10.0, 100.0)
 """Spectral densities of the acceleration in the search grid [(m/s^2)^2 s]."""
 TURNINGS = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)
 """Spectral densities of the angular acceleration in the search grid [(rad/s^2)^2 s]."""
-ENOUGH = 250
-"""Minimum number of sightings for the choice."""
+BLOCKS, BLOCK = 8, 100
+"""Of a long recording so many stretches, of so many sightings each, are looked at: a hand rests and hurries in turn."""
 
 
 def choose(seen: Sightings) -> ProcessNoise:
-    """Return the densities, out of `VELOCITIES` and `TURNINGS`, with the largest likelihood."""
-    kept = np.zeros(len(seen), bool)
-    kept[:ENOUGH] = True
-    part, nothing = seen.where(kept), np.zeros(0, np.int64)
+    """Return the densities, out of `VELOCITIES` and `TURNINGS`, under which the sightings are likeliest.
+
+    Stretches from the whole recording count: what its beginning alone asks for rejects the hurry that follows.
+    """
+    parts, nothing = _stretches(seen), np.zeros(0, np.int64)
 
     def likelihood(velocity: float, turning: float) -> float:
-        return smooth(part, nothing, ProcessNoise(velocity, turning), back=False).log_likelihood
+        noise = ProcessNoise(velocity, turning)
+        return sum(smooth(part, nothing, noise, back=False).log_likelihood for part in parts)
 
     velocity = _climb(VELOCITIES, lambda value: likelihood(value, TURNINGS[len(TURNINGS) // 2]))
     return ProcessNoise(velocity, _climb(TURNINGS, lambda value: likelihood(velocity, value)))
+
+
+def _stretches(seen: Sightings) -> list[Sightings]:
+    """Return stretches of sightings spread evenly over all, or all of a short recording."""
+    if len(seen) <= BLOCKS * BLOCK:
+        return [seen]
+    made = []
+    for begin in np.linspace(0, len(seen) - BLOCK, BLOCKS).astype(int):
+        kept = np.zeros(len(seen), bool)
+        kept[begin : begin + BLOCK] = True
+        made.append(seen.where(kept))
+    return made
 
 
 def _climb(values: Sequence[float], worth: Callable[[float], float]) -> float:

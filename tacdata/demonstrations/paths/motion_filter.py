@@ -1,16 +1,19 @@
 """Fixed-interval smoothing of a pose: an error-state Kalman filter forward, Rauch-Tung-Striebel backward.
 
-State: position p [m], rotation R, velocity v [m/s], angular velocity w [rad/s, world]. Between two times p' = p + v dt
-and R' = exp(w dt) R; v and w are integrated white noise (a constant-velocity model, Bar-Shalom, Li and Kirubarajan,
-Estimation with Applications to Tracking and Navigation, section 6.2).
+State: position p [m], rotation R, velocity v [m/s], turn rate w [rad/s, world]. Between two times p' = p + v dt,
+R' = exp(w dt) R. v and w change as integrated white noise: a constant-velocity model (Bar-Shalom, Li and
+Kirubarajan, Estimation with Applications to Tracking and Navigation, section 6.2). Errors are a small turn in the
+world, dp, dw, dv in this order. So a rotation never leaves SO(3), and a sighting's covariance is used as it is.
 
-The error state is a small rotation in the world, dp, dw, dv in this order. So a rotation never leaves SO(3), and a
-sighting's covariance is used unchanged. The backward pass is H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3
-(1965) 1445, on those errors.
+Where a camera's own place is known with a standard deviation, its error is a state too: a turn and a shift, constant
+in time. Averaging many sightings does not make it smaller, as it would if it were noise of each sighting.
+
+The backward pass is H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965) 1445, on those errors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +23,9 @@ from tacdata.demonstrations.paths.sightings import Sightings
 GATE = 27.9
 """Gate: squared Mahalanobis distance in six dimensions beyond which a sighting is an outlier (chi-squared, 0.9999)."""
 FIRST_SPEED = 1.0, 10.0
-"""Prior standard deviation of the velocity [m/s] and angular velocity [rad/s]."""
+"""Standard deviation of the velocity [m/s] and turn rate [rad/s] before anything is known of them."""
+MOTION = 12
+"""States of the motion itself; those of the cameras follow [1]."""
 NS = 1e-9
 
 
@@ -32,6 +37,10 @@ class ProcessNoise:
     """Spectral density of the white acceleration [(m/s^2)^2 s]."""
     turning: float
     """Spectral density of the white angular acceleration [(rad/s^2)^2 s]."""
+
+
+MANOEUVRE = ProcessNoise(100.0, 10_000.0)
+"""Process noise of the most abrupt motion that a hand makes: for the step before a track is taken up again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,31 +80,37 @@ class _State:
     position: np.ndarray
     turning: np.ndarray
     velocity: np.ndarray
+    cameras: np.ndarray
+    """Turn [rad] and shift [m] of each camera against its file, shape (6 k,)."""
 
     def plus(self, error: np.ndarray) -> _State:
         return _State(
             exponential(error[:3]) @ self.rotation, self.position + error[3:6], self.turning + error[6:9],
-            self.velocity + error[9:],
+            self.velocity + error[9:MOTION], self.cameras + error[MOTION:],
         )  # fmt: skip
 
     def minus(self, other: _State) -> np.ndarray:
         turn = logarithm(self.rotation @ other.rotation.T)
         rest = self.position - other.position, self.turning - other.turning, self.velocity - other.velocity
-        return np.concatenate([turn, *rest])
+        return np.concatenate([turn, *rest, self.cameras - other.cameras])
 
 
-def smooth(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise, back: bool = True) -> Smoothed:
+def smooth(
+    seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise, back: bool = True, reacquired: Sequence[int] = ()
+) -> Smoothed:
     """Return the pose at given times.
 
     Args:
         seen: At least two sightings.
         times_ns: Times [ns], shape (n,), ascending; poses outside the sightings' span are NaN.
-        wander: The process noise.
-        back: Whether to smooth backward; without it poses depend on the past only.
+        wander: Process noise: how freely the finger moves.
+        back: Whether to go back too; without it poses rest on the past alone.
+        reacquired: Sightings before which the finger may have moved as in `MANOEUVRE`.
 
     Returns:
         Poses, and which sightings were used.
     """
+    again = set(reacquired)
     first = _beginning(seen)
     inside = (times_ns >= seen.time_ns[first]) & (times_ns <= seen.time_ns[-1])
     moments = np.concatenate([seen.time_ns[first:], times_ns[inside]])
@@ -104,7 +119,8 @@ def smooth(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise, back: bo
     accepted, distance, likelihood, nodes = np.zeros(len(seen), bool), np.full(len(seen), np.nan), 0.0, []
     state, known, now = _first(seen, first)
     for k in order:
-        expected, spread, step = _predicted(state, known, float(moments[k] - now) * NS, wander)
+        freely = MANOEUVRE if int(which[k]) in again else wander
+        expected, spread, step = _predicted(state, known, float(moments[k] - now) * NS, freely)
         state, known, now = expected, spread, moments[k]
         if which[k] >= 0:
             n = int(which[k])
@@ -146,43 +162,68 @@ def _beginning(seen: Sightings) -> int:
 
 
 def _first(seen: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
-    known = np.zeros((12, 12))
-    known[:6, :6] = 100 * seen.covariance[k]  # its own sighting is processed next and must not count twice
-    known[6:9, 6:9], known[9:, 9:] = FIRST_SPEED[1] ** 2 * np.eye(3), FIRST_SPEED[0] ** 2 * np.eye(3)
-    return _State(seen.rotation[k], seen.position[k], np.zeros(3), np.zeros(3)), known, int(seen.time_ns[k])
+    errors = [error.spread for error in seen.cameras.values()]
+    size = MOTION + 6 * len(errors)
+    known = np.zeros((size, size))
+    known[:6, :6] = 100 * seen.covariance[k]  # its own sighting comes next and must not count twice
+    known[6:9, 6:9], known[9:MOTION, 9:MOTION] = FIRST_SPEED[1] ** 2 * np.eye(3), FIRST_SPEED[0] ** 2 * np.eye(3)
+    for number, (position, rotation) in enumerate(errors):
+        at = MOTION + 6 * number
+        known[at : at + 3, at : at + 3] = rotation**2 * np.eye(3)
+        known[at + 3 : at + 6, at + 3 : at + 6] = position**2 * np.eye(3)
+        # The first pose errs with the camera that saw it.
+        known[:6, :6] += np.diag([rotation**2] * 3 + [position**2] * 3)
+    first = _State(seen.rotation[k], seen.position[k], np.zeros(3), np.zeros(3), np.zeros(size - MOTION))
+    return first, known, int(seen.time_ns[k])
 
 
 def _predicted(
     state: _State, known: np.ndarray, dt: float, wander: ProcessNoise
 ) -> tuple[_State, np.ndarray, np.ndarray]:
     turn = exponential(state.turning * dt)
-    step = np.eye(12)
+    step = np.eye(len(known))
     step[:3, :3] = turn
-    step[:3, 6:9] = step[3:6, 9:] = dt * np.eye(3)
-    noise = np.zeros((12, 12))
+    step[:3, 6:9] = step[3:6, 9:MOTION] = dt * np.eye(3)
+    noise = np.zeros_like(known)
     for begin, density in ((0, wander.turning), (3, wander.velocity)):
         at, rate = slice(begin, begin + 3), slice(begin + 6, begin + 9)
         noise[at, at] = density * dt**3 / 3 * np.eye(3)
         noise[at, rate] = noise[rate, at] = density * dt**2 / 2 * np.eye(3)
         noise[rate, rate] = density * dt * np.eye(3)
-    expected = _State(turn @ state.rotation, state.position + state.velocity * dt, state.turning, state.velocity)
+    place = state.position + state.velocity * dt
+    expected = _State(turn @ state.rotation, place, state.turning, state.velocity, state.cameras)
     return expected, step @ known @ step.T + noise, step
 
 
 def _updated(expected: _State, spread: np.ndarray, seen: Sightings, n: int) -> tuple[_State, np.ndarray, float, float]:
-    """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes neither."""
+    """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes none."""
+    seen_as = _observed(expected, seen, n)
     surprise = np.concatenate([
         logarithm(seen.rotation[n] @ expected.rotation.T), seen.position[n] - expected.position
-    ])  # fmt: skip
-    total = spread[:6, :6] + seen.covariance[n]
+    ]) - seen_as[:, MOTION:] @ expected.cameras  # fmt: skip
+    across = spread @ seen_as.T
+    total = seen_as @ across + seen.covariance[n]
     inverse = np.linalg.inv(total)
     distance = float(surprise @ inverse @ surprise)
     gained = -0.5 * (min(distance, GATE) + np.linalg.slogdet(total)[1])
     if distance >= GATE:
         return expected, spread, distance, gained
-    gain = spread[:, :6] @ inverse
-    known = spread - gain @ spread[:6]
+    gain = across @ inverse
+    known = spread - gain @ across.T
     return expected.plus(gain @ surprise), (known + known.T) / 2, distance, gained
+
+
+def _observed(expected: _State, seen: Sightings, n: int) -> np.ndarray:
+    """Return how a sighting's turn and position depend on the state's errors, shape (6, 12 + 6 k)."""
+    result = np.zeros((6, MOTION + 6 * len(seen.cameras)))
+    result[:, :6] = np.eye(6)
+    if seen.camera[n] in seen.cameras:
+        at = MOTION + 6 * list(seen.cameras).index(seen.camera[n])
+        x, y, z = expected.position - seen.cameras[seen.camera[n]].place
+        result[:, at : at + 6] = np.eye(6)
+        # A turn of the camera by e moves what it sees by e x r.
+        result[3:, at : at + 3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    return result
 
 
 def _go_back(nodes: list[_Node]) -> None:

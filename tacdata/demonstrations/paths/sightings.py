@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,16 @@ FLOOR = 0.0002, float(np.radians(0.2))
 """Standard deviation [m], [rad] of every sighting beyond its image noise: print, mounting, calibration."""
 UNKNOWN = 0.002, float(np.radians(3.0))
 """Standard deviation [m], [rad] of a sighting without a stored covariance."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraError:
+    """How far a camera may stand from where its file says: the same for all of its sightings."""
+
+    place: np.ndarray
+    """Where the camera stands in the world [m], shape (3,): a turn of the camera moves what it sees about it."""
+    spread: tuple[float, float]
+    """Standard deviation of its place [m] and rotation [rad], an axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +44,9 @@ class Sightings:
     camera: tuple[str, ...]
     """Camera of each sighting."""
     ids: tuple[tuple[int, ...], ...]
-    """Tags of each sighting, ascending."""
+    """Tags of each, ascending."""
+    cameras: dict[str, CameraError] = field(default_factory=dict)
+    """Camera -> what all of its sightings err by alike; without an entry nothing is known of that."""
 
     def __len__(self) -> int:
         """Number of sightings."""
@@ -46,6 +58,7 @@ class Sightings:
         return Sightings(
             self.finger, self.time_ns[kept], self.position[kept], self.rotation[kept], self.covariance[kept],
             self.ambiguous[kept], tuple(self.camera[k] for k in chosen), tuple(self.ids[k] for k in chosen),
+            self.cameras,
         )  # fmt: skip
 
 
@@ -81,7 +94,14 @@ def sightings_of(
     return Sightings(
         finger, time_ns[order], joined("position"), joined("rotation"), joined("covariance"), joined("ambiguous"),
         tuple(cameras[k] for k in order), tuple(ids[k] for k in order),
+        {name: error for name in rig.worlds if (error := _error_of(name, rig)) is not None},
     )  # fmt: skip
+
+
+def _error_of(camera: str, rig: DemoRig) -> CameraError | None:
+    """Return what all sightings of a camera err by alike; None if its file does not say how well its place is known."""
+    world = rig.worlds[camera]
+    return None if world.spread is None else CameraError(world.matrix[:3, 3], world.spread)
 
 
 def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
@@ -99,9 +119,6 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     covariance = both @ covariance @ both.T
     lost = ~np.isfinite(covariance).all(axis=(1, 2))
     covariance[lost] = _diagonal(*UNKNOWN)
-    world = rig.worlds.get(view.camera)
-    if world is not None and world.spread is not None:
-        covariance = covariance + _diagonal(*world.spread)
     covariance = covariance + timing**2 * _motion(view.sample_ns[seen], view.position[seen] @ turn.T)
     ambiguous = np.zeros(len(seen), bool) if view.ambiguous is None else view.ambiguous
     ids: list[tuple[int, ...]] = list(view.ids) if view.ids else [()] * len(seen)

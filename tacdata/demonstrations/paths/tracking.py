@@ -12,8 +12,9 @@ from tacdata import provenance
 from tacdata.demonstrations import touch
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.demonstrations.paths import path_faults
+from tacdata.demonstrations.paths.acquisition import acquire
 from tacdata.demonstrations.paths.motion_density import choose
-from tacdata.demonstrations.paths.motion_filter import GATE, Smoothed, smooth
+from tacdata.demonstrations.paths.motion_filter import GATE, Smoothed
 from tacdata.demonstrations.paths.sightings import FLOOR, Sightings, sightings_of
 from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.errors import FormatError, UsageError
@@ -109,7 +110,7 @@ def _path(
     """
     words: list[str] = []
     wander = choose(seen)
-    path = smooth(seen, times, wander)
+    path = acquire(seen, times, wander)
     wrong, rivals = path_faults.wrong_tags(seen, path, times)
     if wrong:
         words += _wrong_words(seen, wrong, rivals)
@@ -117,7 +118,7 @@ def _path(
         if kept.sum() >= FEWEST:
             seen = seen.where(kept)
             wander = choose(seen)
-            path = smooth(seen, times, wander)
+            path = acquire(seen, times, wander)
     angle = path_faults.turn_against(seen, path, times)
     words += path_faults.flips(seen, path.accepted, angle, seen.finger)
     begin = int(times[0])

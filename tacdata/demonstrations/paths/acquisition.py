@@ -1,0 +1,73 @@
+"""A finger's track, taken up again where the filter lost it: rejected sightings that agree among themselves are right.
+
+A filter whose process noise is too small for a sudden motion rejects every sighting after it. Such a run of rejections
+is told from mirrored poses and exchanged tags by two things: its members fit one motion, and the whole track becomes
+likelier if the finger may have moved abruptly before the first of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.demonstrations.paths.motion_filter import ProcessNoise, Smoothed, smooth
+from tacdata.demonstrations.paths.sightings import Sightings
+
+LEAST_RUN = 4
+"""Rejected sightings in a row from which the track may be taken up again [1]: fewer are mirrored poses."""
+LOOKED_AT = 8
+"""Of a run so many sightings at most, its first ones, must fit one motion [1]: later the finger may turn round."""
+AGREEING = 0.8
+"""Share of a run that must fit one motion of its own [1]."""
+PRIOR = 10.0
+"""By how much log-likelihood the track must gain [nats]: abrupt motions are rare beforehand."""
+MOST = 20
+"""Most places at which a track is taken up again [1]."""
+
+
+def acquire(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise) -> Smoothed:
+    """Return a finger's smoothed path, as `smooth` does, with its track taken up again where it was lost.
+
+    Args:
+        seen: At least two sightings.
+        times_ns: Times [ns], shape (n,), ascending.
+        wander: Process noise.
+    """
+    nothing = np.zeros(0, np.int64)
+    taken: list[int] = []
+    best = smooth(seen, nothing, wander, back=False)
+    refused: set[int] = set()
+    while len(taken) < MOST:
+        run = next((r for r in _runs(best.accepted) if r[0] not in refused), None)
+        if run is None:
+            break
+        refused.add(run[0])
+        if not _agree(seen, run, wander):
+            continue
+        tried = smooth(seen, nothing, wander, back=False, reacquired=[*taken, run[0]])
+        if tried.log_likelihood > best.log_likelihood + PRIOR:
+            taken.append(run[0])
+            best = tried
+    return smooth(seen, times_ns, wander, reacquired=taken)
+
+
+def _runs(accepted: np.ndarray) -> list[tuple[int, int]]:
+    """Return first and end of every run of at least `LEAST_RUN` rejected sightings; accepted ones may stand between.
+
+    Two cameras of which only one is believed alternate. So a run goes on over single accepted sightings.
+    """
+    runs: list[tuple[int, int]] = []
+    rejected = np.flatnonzero(~accepted)
+    for first in rejected:
+        if runs and first - runs[-1][1] <= 1:
+            runs[-1] = runs[-1][0], int(first) + 1
+        else:
+            runs.append((int(first), int(first) + 1))
+    return [run for run in runs if (~accepted[run[0] : run[1]]).sum() >= LEAST_RUN]
+
+
+def _agree(seen: Sightings, run: tuple[int, int], wander: ProcessNoise) -> bool:
+    """Return whether the sightings of a run fit one motion."""
+    kept = np.zeros(len(seen), bool)
+    kept[run[0] : min(run[1], run[0] + LOOKED_AT)] = True
+    part = seen.where(kept)
+    return float(smooth(part, np.zeros(0, np.int64), wander, back=False).accepted.mean()) >= AGREEING
