@@ -177,10 +177,6 @@ class Ledger:
         work = [(rank, version) for version, rank, expired in rows if rank is not None or expired]
         return [version for _, version in sorted(work, key=lambda entry: (entry[0] is None, entry[0] or 0))]
 
-    def withhold(self, version: str) -> None:
-        """Offer a model's jobs no more; they stay in the queue."""
-        self._db.execute("DELETE FROM model WHERE version = ?", (version,))
-
     def enqueue(self, jobs: Iterable[Job], priority: int = 0, run: str = "") -> None:
         """Ask for jobs whose results are missing; one that is already waiting or worked on stays as it is.
 

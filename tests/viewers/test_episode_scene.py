@@ -5,7 +5,6 @@ import pytest
 
 from tacdata.errors import FormatError
 from tacdata.recording.episode import CncStream, TaxelStream
-from viewers.null_backend import NullBackend
 from viewers.pictures.backend import PictureBackend
 from viewers.rerun.backend import RerunBackend
 from viewers.scenes.episode import episode_scene
@@ -23,21 +22,12 @@ def curve(scene, name):
 
 
 def test_every_part_has_the_rows_it_should(scene):
-    backend = NullBackend()
-    backend.draw(scene)
-    rows = {(kind, name): count for kind, name, count in backend.calls}
-    assert rows["map", "label"] == 120
-    assert rows["map", "prediction"] == rows["map", "error"] == 118
-    assert rows["surface", "label"] == 120
-    assert rows["body", "indenter"] == 120
-    assert rows["images", "top"] == rows["cube", "top"] == 30
-    assert [name for kind, name, _ in backend.calls if kind == "phase"] == [
-        "rest",
-        "approach",
-        "press",
-        "hold",
-        "release",
-    ]
+    maps = {part.name: len(part.time_ns) for part in scene.maps}
+    assert (maps["label"], maps["prediction"], maps["error"]) == (120, 118, 118)
+    assert {part.name: len(part.time_ns) for part in scene.surfaces}["label"] == 120
+    assert {part.name: len(part.time_ns) for part in scene.bodies} == {"indenter": 120}
+    assert [(camera.name, len(camera.image_ns), len(camera.cube_ns)) for camera in scene.cameras] == [("top", 30, 30)]
+    assert [phase.name for phase in scene.phases] == ["rest", "approach", "press", "hold", "release"]
 
 
 def test_the_signal_is_zero_at_rest_and_strongest_under_the_tip(scene):

@@ -44,6 +44,3 @@ SUCCESS = {
     "dense depth": {"all": (35, 40), "edge": (17, 20), "adjustments": (2.14, 1.24), "adjustments_edge": (2.71, 1.21)},
 }
 """Exp. 3: successes of trials; adjustments of successful trials, mean and deviation."""
-
-REPLAY = {"apple": 0.95, "mango": 1.00, "peach": 0.80, "fruit, overall": 0.9167, "whiteboard": 0.90}
-"""Exp. 2 with compensation: success rates [1]; without it 0. The paper prints no counts."""
