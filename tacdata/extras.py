@@ -12,7 +12,7 @@ IMPORTED_AS = {"rerun": "rerun-sdk", "warp": "warp-lang"}
 """What is imported by another name than it is installed by."""
 ALL = "all"
 """The extra that brings everything: never the least that is needed."""
-ROOMS = {"training": "learn"}
+ROOMS = {"training": "learn", "viewers": "view"}
 """Who asks decides, where two extras bring the same package: torch solves for `fem` and trains for `learn`."""
 
 

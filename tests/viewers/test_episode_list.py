@@ -13,7 +13,7 @@ from tacdata.errors import UsageError
 from viewers.browse.episode_list import Entry, EpisodeList, errors_of
 from viewers.browse.flagging import flag_episode, unflag_episode
 from viewers.browse.list_table import list_table
-from viewers.browse.server import Pages, _handler
+from viewers.browse.server import Pages, serving
 
 ENTRIES = (
     Entry(0, "episode-000000.mcap", "ball", "sphere", 0, 0, 0.4, 1.0, 1.0, "complete", "test", 0.01),
@@ -82,23 +82,14 @@ def test_errors_are_of_the_frames_that_both_hold():
 @pytest.fixture
 def served(listed, tmp_path):
     """The page without Rerun's viewer beside it."""
-    from http.server import ThreadingHTTPServer
-    from threading import Thread
-
     pages = Pages(listed, None, None, tmp_path, "http://127.0.0.1:9")
-    server = ThreadingHTTPServer(("127.0.0.1", 0), _handler(pages))
-    thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
-    thread.start()
-    pages.address = f"http://127.0.0.1:{server.server_port}/{pages.token}"
-    yield pages
-    server.shutdown()
-    server.server_close()
-    thread.join()
+    with serving(pages, 0):
+        yield pages
 
 
 def get(address, body=None, **headers):
     data = None if body is None else json.dumps(body).encode()
-    with urlopen(Request(address, data=data, headers=headers)) as answer:
+    with urlopen(Request(address, data=data, headers={"Content-Type": "application/json", **headers})) as answer:
         return answer.read()
 
 
@@ -136,3 +127,14 @@ def test_what_cannot_be_shown_is_said(served):
         assert caught.value.code == 422
         assert "next" in json.loads(caught.value.read())["error"]
         caught.value.close()
+    for wish, words in (({"number": 1}, "reason: "), ({"number": "no", "reason": "x"}, "number: ")):
+        with pytest.raises(HTTPError) as caught:
+            get(served.address + "/flag", wish)
+        assert caught.value.code == 422 and json.loads(caught.value.read())["error"].startswith(words)
+        caught.value.close()
+
+
+def test_answers_may_be_read_by_the_viewers_page_and_are_not_kept(served):
+    with urlopen(served.address + "/list") as answer:
+        assert answer.headers["Access-Control-Allow-Origin"] == served.viewer
+        assert answer.headers["Cache-Control"] == "no-store"

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import secrets
+import socket
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote
+
+import uvicorn
+from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
+from pydantic import BaseModel, Field
 
 from tacdata.dataset.flags import read_flags
 from tacdata.errors import TacdataError
@@ -24,8 +29,8 @@ from viewers.rerun.window import GRPC_PORT, LOOPBACK, WEB_PORT, free_port, quiet
 
 PORT = 9095
 """Where the page is offered; another where it is in use."""
-LONGEST = 10_000
-"""Bytes of a request that are read."""
+LONGEST = 1000
+"""Characters of a reason at most."""
 
 
 @contextmanager
@@ -46,18 +51,8 @@ def browse_server(listed: EpisodeList, labels: Path | None, predictions: Path | 
     with tempfile.TemporaryDirectory(prefix="tacdata-browse-") as folder, quiet_environment() as environment:
         viewer = ["--serve-web", "--bind", LOOPBACK, "--port", str(free_port(GRPC_PORT)), "--web-viewer-port", str(web)]
         pages = Pages(listed, labels, predictions, Path(folder), f"http://{LOOPBACK}:{web}")
-        server = ThreadingHTTPServer((LOOPBACK, free_port(PORT)), _handler(pages))
-        server.daemon_threads = True
-        pages.address = f"http://{LOOPBACK}:{server.server_port}/{pages.token}"
-        with running(viewer, environment):
-            thread = Thread(target=server.serve_forever, daemon=True)
-            thread.start()
-            try:
-                yield f"{pages.address}/"
-            finally:
-                server.shutdown()
-                server.server_close()
-                thread.join()
+        with running(viewer, environment), serving(pages, free_port(PORT)):
+            yield f"{pages.address}/"
 
 
 class Pages:
@@ -78,20 +73,19 @@ class Pages:
         self.listed, self.viewer, self.token, self.address = listed, viewer, secrets.token_urlsafe(16), ""
         self._labels, self._predictions, self._folder, self._drawing = labels, predictions, folder, Lock()
 
-    def page(self) -> bytes:
+    def page(self) -> str:
         """Return the page."""
-        return files("viewers.browse").joinpath("page.html").read_bytes()
+        return files("viewers.browse").joinpath("page.html").read_text()
 
-    def entries(self) -> bytes:
-        """Return the list as JSON, with the flags as they are now."""
+    def entries(self) -> dict[str, Any]:
+        """Return the list, with the flags as they are now."""
         rows = [asdict(entry) for entry in with_flags(self.listed.entries, read_flags(self.listed.root))]
-        document = {
+        return {
             "root": str(self.listed.root), "units": UNITS, "episodes": rows, "remarks": self.listed.remarks,
             "viewer": self.viewer + "/?hide_welcome_screen&url=" + quote(self.address + "/episode/", safe=""),
         }  # fmt: skip
-        return json.dumps(document).encode()
 
-    def episode(self, number: int) -> bytes:
+    def episode(self, number: int) -> Path:
         """Return an episode's Rerun file, drawn when it is first asked for. Raises as `viewers.source.scene_at`."""
         from viewers.rerun.backend import RerunBackend
         from viewers.source import scene_at
@@ -101,7 +95,7 @@ class Pages:
         with self._drawing:
             if not file.is_file():
                 RerunBackend(file).draw(scene_at(self.listed.root, self._labels, self._predictions, number))
-        return file.read_bytes()
+        return file
 
     def flag(self, number: int, reason: str) -> str:
         """Set an episode aside for a reason, or take it back where there is none; return what was done."""
@@ -110,58 +104,70 @@ class Pages:
         return f"taken back: {unflag_episode(self.listed, number)}"
 
 
-def _handler(pages: Pages) -> type[BaseHTTPRequestHandler]:
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            parts = self._parts()
-            try:
-                match parts:
-                    case []:
-                        self._send(pages.page(), "text/html; charset=utf-8")
-                    case ["list"]:
-                        self._send(pages.entries(), "application/json")
-                    case ["episode", name] if name.removesuffix(".rrd").isdecimal():
-                        self._send(pages.episode(int(name.removesuffix(".rrd"))), "application/octet-stream")
-                    case _:
-                        self._refuse(HTTPStatus.NOT_FOUND, "no such page")
-            except TacdataError as error:
-                self._refuse(HTTPStatus.UNPROCESSABLE_ENTITY, str(error))
+class Wish(BaseModel):
+    """What the page asks for when a person sets an episode aside or takes it back."""
 
-        def do_POST(self) -> None:
-            length = int(self.headers.get("Content-Length") or 0)
-            if self._parts() != ["flag"] or not 0 < length <= LONGEST:
-                self._refuse(HTTPStatus.NOT_FOUND, "no such page")
-                return
-            try:
-                asked = json.loads(self.rfile.read(length))
-                said = pages.flag(int(asked["number"]), str(asked["reason"]))
-                self._send(json.dumps({"said": said}).encode(), "application/json")
-            except (ValueError, KeyError, TypeError):
-                self._refuse(HTTPStatus.BAD_REQUEST, "a number and a reason are wanted")
-            except TacdataError as error:
-                self._refuse(HTTPStatus.UNPROCESSABLE_ENTITY, str(error))
+    number: int
+    reason: str = Field(max_length=LONGEST)
 
-        def _parts(self) -> list[str] | None:
-            """Return the path behind the token; None for whoever does not know it or comes under another name."""
-            host = (self.headers.get("Host") or "").rsplit(":", 1)[0]
-            token, *rest = urlsplit(self.path).path.strip("/").split("/")
-            known = secrets.compare_digest(token.encode(), pages.token.encode())
-            return [part for part in rest if part] if known and host in (LOOPBACK, "localhost") else None
 
-        def _send(self, body: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
-            self.send_response(status)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-            self.send_header("Cache-Control", "no-store")
-            self.send_header("Access-Control-Allow-Origin", pages.viewer)
-            with suppress(ConnectionError):  # whoever asked went on to the next episode
-                self.end_headers()
-                self.wfile.write(body)
+def application(pages: Pages) -> FastAPI:
+    """Return the application that answers the page's requests under its address."""
+    api = FastAPI(openapi_url=None)
+    routes = APIRouter(prefix=f"/{pages.token}")
 
-        def _refuse(self, status: HTTPStatus, words: str) -> None:
-            self._send(json.dumps({"error": words}).encode(), "application/json", status)
+    @api.middleware("http")
+    async def guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
+        """Answer only whoever knows the address and comes under this machine's own name."""
+        token = request.url.path.strip("/").split("/")[0]
+        if request.url.hostname not in (LOOPBACK, "localhost") or not secrets.compare_digest(
+            token.encode(), pages.token.encode()
+        ):
+            return JSONResponse({"error": "no such page"}, HTTPStatus.NOT_FOUND)
+        found = await answer(request)
+        found.headers.update({"Cache-Control": "no-store", "Access-Control-Allow-Origin": pages.viewer})
+        return found
 
-        def log_message(self, format: str, *args: Any) -> None:
-            """Say nothing: the terminal belongs to the person."""
+    @api.exception_handler(TacdataError)
+    async def in_words(_: Request, error: TacdataError) -> JSONResponse:
+        return JSONResponse({"error": str(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
-    return Handler
+    @api.exception_handler(RequestValidationError)
+    async def unfit(_: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        return JSONResponse({"error": f"{first['loc'][-1]}: {first['msg']}"}, HTTPStatus.UNPROCESSABLE_ENTITY)
+
+    @routes.get("/")
+    def page() -> HTMLResponse:
+        return HTMLResponse(pages.page())
+
+    @routes.get("/list")
+    def entries() -> dict[str, Any]:
+        return pages.entries()
+
+    @routes.get("/episode/{number}.rrd")
+    def episode(number: int) -> FileResponse:
+        return FileResponse(pages.episode(number), media_type="application/octet-stream")
+
+    @routes.post("/flag")
+    def flag(asked: Wish) -> dict[str, str]:
+        return {"said": pages.flag(asked.number, asked.reason)}
+
+    api.include_router(routes)
+    return api
+
+
+@contextmanager
+def serving(pages: Pages, port: int) -> Iterator[None]:
+    """Answer requests on a port of the loopback while the context lasts; 0 takes any that is free."""
+    with socket.create_server((LOOPBACK, port)) as listener:  # before the address is said: whoever comes early waits
+        pages.address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/{pages.token}"
+        config = uvicorn.Config(application(pages), log_config=None, lifespan="off", timeout_graceful_shutdown=1)
+        server = uvicorn.Server(config)
+        thread = Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            server.should_exit = True
+            thread.join()
