@@ -80,11 +80,20 @@ def in_words(path: JointPath, targets: FingertipTargets, turned: bool = True) ->
         share = f"{len(rows)} of {len(seconds)} targets ({_when(rows, seconds)})"
         off = f"{worst[0]:.1f} mm" + (f", {worst[1]:.0f} deg" if turned else "")
         said.append(f"{name} does not reach {share}, off by up to {off}")
+    if path.uncoupled:
+        share = f"{len(path.uncoupled)} of {len(seconds)} targets ({_when(path.uncoupled, seconds)})"
+        said.append(f"{share} would need mimic joints ({', '.join(path.mimics)}) to part from those that they follow")
+    if path.other_posture:
+        share = f"{len(path.other_posture)} of {len(seconds)} targets ({_when(path.other_posture, seconds)})"
+        said.append(f"{share} are left out: only another posture reaches them, which the joints cannot take up in time")
     for name, rows in path.outside_workspace.items():
         said.append(f"{name}: {len(rows)} targets lie outside the workspace ({_when(rows, seconds)})")
     for name, rows in path.too_fast.items():
         when = _when(rows, seconds)
         said.append(f"joint {name} would have to be faster than its limit at {len(rows)} times ({when})")
+    for name, rows in path.too_abrupt.items():
+        when = _when(rows, seconds)
+        said.append(f"joint {name} would have to accelerate more than its limit at {len(rows)} times ({when})")
     return said
 
 
@@ -104,6 +113,8 @@ def _header(targets: FingertipTargets, path: JointPath, robot: Robot, columns: d
         "tolerance": {"position": robot.tolerance[0], "rotation": robot.tolerance[1]}, "frames": len(path.values),
         "unreached": {name: list(rows) for name, rows in path.unreached.items()},
         "too_fast": {name: list(rows) for name, rows in path.too_fast.items()},
+        "too_abrupt": {name: list(rows) for name, rows in path.too_abrupt.items()},
+        "uncoupled": list(path.uncoupled), "other_posture": list(path.other_posture),
         "outside_workspace": {name: list(rows) for name, rows in path.outside_workspace.items()},
         "errors": {"position": largest[0], "rotation": largest[1]},
         "provenance": provenance.stamp("tacdata export", parents, {"robot": robot.name}),

@@ -1,18 +1,21 @@
 """Joint values that bring a robot's fingertips to their targets, by mink on MuJoCo's kinematics (decision 0011).
 
 Each time is solved from the one before, and the resulting fingertip positions are checked. Where they miss their
-targets, other starts are tried: the last success, the home position, some at random. Targets out of reach are named,
-and their joint values are NaN.
+targets, other starts are tried: the last success, the home position, some at random. Where that path jumps, postures
+are chosen along the whole of it (`tacdata.replay.posture_path`). Targets out of reach are named, and their joint values
+are NaN.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from tacdata.replay.kinematic_search import OTHERS, STEPS, KinematicSearch
 from tacdata.replay.kinematics import Joint, Kinematics
+from tacdata.replay.posture_path import without_jumps
 from tacdata.replay.robot import Robot
 from tacdata.replay.targets import FingertipTargets
 
@@ -41,6 +44,14 @@ class JointPath:
     """Finger -> rows whose target lies outside the robot's workspace."""
     too_fast: dict[str, tuple[int, ...]]
     """Joint -> rows that need more speed than the joint's limit."""
+    too_abrupt: dict[str, tuple[int, ...]]
+    """Joint -> rows that need more acceleration than the joint's limit."""
+    mimics: tuple[str, ...]
+    """Joints that follow others by the URDF."""
+    uncoupled: tuple[int, ...]
+    """Rows whose targets no coupled (mimic) joints reach together."""
+    other_posture: tuple[int, ...]
+    """Rows that are reached only in a posture that the joints cannot take up in time."""
 
 
 def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinematics]:
@@ -57,25 +68,42 @@ def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinemati
     places = targets.position @ inverse[:3, :3].T + inverse[:3, 3]
     turns = inverse[:3, :3] @ Rotation.from_quat(targets.quaternion.reshape(-1, 4)).as_matrix()
     turns = turns.reshape(*places.shape[:2], 3, 3)
-    values, errors, angles = _search(model, places, turns)
+    search = KinematicSearch(model)
+    values, errors, angles, off = _search(search, places, turns)
     far = np.asarray(errors > robot.tolerance[0])
     if robot.tolerance[1] is not None:
         far |= angles > robot.tolerance[1]
+    uncoupled = off > COUPLED
+    reached = ~far.any(axis=1) & ~uncoupled
+    values, served = without_jumps(
+        search, lambda row: search.aim(places[row], turns[row]), partial(_reached, search), values, reached,
+        targets.time_ns,
+    )  # fmt: skip
+    for row in np.flatnonzero(served):
+        search.aim(places[row], turns[row])
+        errors[row], angles[row], _ = search.errors(values[row])
+    far[served], uncoupled[served] = False, False
     outside = np.zeros_like(far)
     if robot.workspace is not None:
         outside = np.any((places < robot.workspace[0]) | (places > robot.workspace[1]), axis=-1)
-    values[(far | outside).any(axis=1)] = np.nan
+    values[outside.any(axis=1)] = np.nan
     return JointPath(
         model.joints, targets.time_ns, values, errors, angles, _rows(far, targets.fingers),
-        _rows(outside, targets.fingers), _too_fast(model.joints, values, targets.time_ns),
+        _rows(outside, targets.fingers), *_limits(model.joints, values, targets.time_ns),
+        model.mimics, tuple(np.flatnonzero(uncoupled).tolist()), tuple(np.flatnonzero(reached & ~served).tolist()),
     ), model  # fmt: skip
 
 
-def _search(model: Kinematics, places: np.ndarray, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return joint values, shape (n, joints), and the errors of each target: [m] and [rad], shape (n, f)."""
-    search, count = KinematicSearch(model), len(places)
+def _search(
+    search: KinematicSearch, places: np.ndarray, turns: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return joint values, shape (n, joints), the errors of each target, [m] and [rad], shape (n, f), and of couplings.
+
+    The deviation of mimic joints [rad or m] has shape (n,).
+    """
+    model, count = search.model, len(places)
     values, errors = np.empty((count, len(model.joints))), np.empty(places.shape[:2])
-    angles = np.empty_like(errors)
+    angles, coupling = np.empty_like(errors), np.zeros(count)
     start, good, missed = model.home, model.home, 0
     for row, (place, turn) in enumerate(zip(places, turns, strict=True)):
         search.aim(place, turn)
@@ -86,11 +114,9 @@ def _search(model: Kinematics, places: np.ndarray, turns: np.ndarray) -> tuple[n
                 other, left = search.settle(begin)
                 start, cost = (other, left) if left < cost else (start, cost)
         values[row] = start
-        errors[row], angles[row], off = search.errors(start)
-        if off > COUPLED:
-            errors[row] = np.inf
+        errors[row], angles[row], coupling[row] = search.errors(start)
         good, missed = (start, 0) if _reached(search, start) else (good, missed + 1)
-    return values, errors, angles
+    return values, errors, angles, coupling
 
 
 def _reached(search: KinematicSearch, values: np.ndarray) -> bool:
@@ -104,10 +130,19 @@ def _rows(found: np.ndarray, fingers: tuple[str, ...]) -> dict[str, tuple[int, .
     return {name: rows for name, rows in named.items() if rows}
 
 
-def _too_fast(joints: tuple[Joint, ...], values: np.ndarray, time_ns: np.ndarray) -> dict[str, tuple[int, ...]]:
-    speed = np.abs(np.diff(values, axis=0)) / (np.diff(time_ns) * 1e-9)[:, None]
-    found = {
-        joint.name: tuple((1 + np.flatnonzero(speed[:, k] > joint.velocity * (1 + 1e-6))).tolist())
-        for k, joint in enumerate(joints) if joint.velocity is not None
-    }  # fmt: skip
-    return {name: rows for name, rows in found.items() if rows}
+def _limits(
+    joints: tuple[Joint, ...], values: np.ndarray, time_ns: np.ndarray
+) -> tuple[dict[str, tuple[int, ...]], dict[str, tuple[int, ...]]]:
+    """Return the rows that need more speed, and those that need more acceleration, than each joint has."""
+    step = (np.diff(time_ns) * 1e-9)[:, None]
+    speed = np.diff(values, axis=0) / step
+    acceleration = np.diff(speed, axis=0) / ((step[1:] + step[:-1]) / 2)
+    fast, abrupt = {}, {}
+    for k, joint in enumerate(joints):
+        if joint.velocity is not None:
+            over = np.abs(speed[:, k]) > joint.velocity * (1 + 1e-6)
+            fast[joint.name] = tuple((1 + np.flatnonzero(over)).tolist())
+        if joint.acceleration is not None:
+            over = np.abs(acceleration[:, k]) > joint.acceleration * (1 + 1e-6)
+            abrupt[joint.name] = tuple((1 + np.flatnonzero(over)).tolist())
+    return {name: rows for name, rows in fast.items() if rows}, {name: rows for name, rows in abrupt.items() if rows}

@@ -25,6 +25,8 @@ class Joint:
     """Upper limit [rad or m]."""
     velocity: float | None
     """Largest speed [rad/s or m/s]."""
+    acceleration: float | None = None
+    """Largest acceleration [rad/s^2 or m/s^2]."""
 
 
 class Kinematics:
@@ -78,7 +80,7 @@ class Kinematics:
         low, high = self.model.jnt_range[k] if self.model.jnt_limited[k] else (None, None)
         unit = "rad" if kind == engine.mjtJoint.mjJNT_HINGE else "m"
         ends = (None if low is None else float(low), None if high is None else float(high))
-        return Joint(name, unit, *ends, self.robot.velocity.get(name))
+        return Joint(name, unit, *ends, self.robot.velocity.get(name), self.robot.acceleration.get(name))
 
     @property
     def moving(self) -> list[int]:
@@ -90,6 +92,11 @@ class Kinematics:
                 bodies.add(body)
                 body = int(self.model.body_parentid[body])
         return [k for k in range(self.model.njnt) if int(self.model.jnt_bodyid[k]) in bodies]
+
+    @property
+    def mimics(self) -> tuple[str, ...]:
+        """Names of the joints that follow others by the URDF."""
+        return tuple(self.model.joint(int(k)).name for k in self.model.eq_obj1id[: self.model.neq])
 
     @property
     def home(self) -> np.ndarray:

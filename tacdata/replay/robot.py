@@ -46,6 +46,8 @@ class Robot:
     """Tolerance of position [m] and rotation [rad]; None: rotations are not checked."""
     velocity: dict[str, float]
     """Joint -> largest speed [rad/s or m/s]: the robot file's, else the URDF's; joints without limit are missing."""
+    acceleration: dict[str, float]
+    """Joint -> largest acceleration [rad/s^2 or m/s^2], where the robot file gives one."""
     workspace: tuple[np.ndarray, np.ndarray] | None
     """Lower and upper corner of the box that targets must lie in, root frame [m], shape (3,) each."""
     document: dict[str, Any]
@@ -63,8 +65,8 @@ def read_robot(path: Path) -> Robot:
     if not urdf.is_file():
         raise UsageError(f"{path}: no URDF {urdf}", "a file named relative to the robot file", "correct urdf")
     try:
-        root = ET.fromstring(urdf.read_text())
-    except (ET.ParseError, UnicodeDecodeError) as error:
+        root = ET.fromstring(urdf.read_bytes())  # in the encoding that its first line names, or UTF-8
+    except (ET.ParseError, LookupError, ValueError) as error:
         raise FormatError(f"{urdf} is no XML: {error}", "a URDF", "export it again from the CAD or xacro") from None
     links = {link.get("name") for link in root.iter("link")}
     joints = {str(joint.get("name")): joint for joint in root.iter("joint") if joint.get("type") is not None}
@@ -72,7 +74,7 @@ def read_robot(path: Path) -> Robot:
         raise FormatError(f"{urdf}: <{root.tag}> with {len(links)} links", "<robot> with links", "give a URDF")
     for what, given, known in (
         ("link", [entry["link"] for entry in document["fingers"].values()], links),
-        ("joint", [*document.get("home", {}), *document.get("velocity", {})], set(joints)),
+        ("joint", [n for key in ("home", "velocity", "acceleration") for n in document.get(key, {})], set(joints)),
     ):
         unknown = sorted(set(given) - known)
         if unknown:
@@ -97,7 +99,7 @@ def read_robot(path: Path) -> Robot:
         document["name"], _without_shapes(root), provenance.file_hash(urdf),
         pose_matrix(document.get("base", HERE), f"{path}: base"), tips, document.get("home", {}),
         float(document.get("orientation_weight", ORIENTATION_WEIGHT)), tolerance, velocity,
-        _workspace(document, str(path)), document,
+        document.get("acceleration", {}), _workspace(document, str(path)), document,
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from tacdata import registry
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import BASE, ROOM, exporter
-from tacdata.exporters.joints import read_joints
+from tacdata.exporters.joints import in_words, read_joints
 from tacdata.replay.inverse_kinematics import follow
 from tacdata.replay.kinematics import Kinematics
 from tacdata.replay.robot import read_robot
@@ -283,7 +283,77 @@ def test_a_mimic_joint_follows_or_the_target_is_not_reached(tmp_path):
     tied = fingers_urdf(mimic='<mimic joint="thumb_x" multiplier="1.0" offset="0.0"/>')
     path, model = follow(read_robot(robot(tmp_path, tied)), targets)
     assert model.model.neq == 1
-    assert set(path.unreached) & {"thumb", "index"}  # both cannot have the same x in the base's frame
+    # Both cannot have the same x in the base's frame: some target is missed, or the coupling is broken, and is named.
+    assert path.unreached or path.uncoupled
+    assert np.isfinite(path.position_error).all() and path.mimics == ("index_x",)
+    said = in_words(path, targets)
+    assert said and not any("inf" in words for words in said)
+    if path.uncoupled:
+        assert any("mimic joints (index_x)" in words for words in said)
+
+
+SPIN = ARM.replace('type="revolute"', 'type="continuous"', 2).replace('lower="-2.5" upper="2.5" ', "", 2)
+
+
+def circling(tmp_path, urdf, seconds, places, **more):
+    fingers = {"index": {"link": "tip"}}
+    more |= {"base": HOME, "fingers": fingers, "orientation_weight": 0, "tolerance": {"position": 0.001}}
+    described = read_robot(robot(tmp_path, urdf, **more))
+    made = demonstration(rows=len(seconds))
+    track = replace(
+        made.tracks["index"], position=places, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (len(seconds), 1)),
+        gap=np.zeros(len(seconds), bool),
+    )  # fmt: skip
+    return follow(described, targets_of(replace(made, tracks={"index": track}), None))[0]
+
+
+def test_a_joint_without_limits_stays_at_the_nearest_turn(tmp_path):
+    """Once around the base and back: the joint goes with it, and never stands a turn away."""
+    seconds = np.arange(120) / 30
+    angle = 2 * np.pi * np.sin(np.pi * seconds / 4) ** 2
+    places = 0.3 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    path = circling(tmp_path, SPIN, seconds, places, home={"shoulder": 0.0, "elbow": 1.0})
+    assert not path.unreached and not path.other_posture
+    assert np.abs(path.values[0]).max() < np.pi
+    steps = np.abs(np.diff(path.values, axis=0))
+    assert steps.max() < 0.2
+    assert np.ptp(path.values[:, 0]) == pytest.approx(2 * np.pi, abs=0.05)
+
+
+def arc(angle):
+    return 0.25 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+
+
+def test_one_posture_that_serves_the_whole_path_is_taken(tmp_path):
+    """Solved row by row the shoulder meets its limit of 2.5 rad in the ninth row, and the elbow flips over."""
+    seconds = np.arange(150) / 30
+    places = arc(1.6 + 0.42 * np.sin(np.pi * seconds / 5) ** 2)
+    path = circling(tmp_path, ARM, seconds, places, home={"shoulder": 2.3, "elbow": -1.0})
+    assert np.isfinite(path.values).all()
+    assert np.abs(np.diff(path.values, axis=0)).max() < 0.05
+
+
+def test_rows_that_only_another_posture_reaches_are_left_out_and_named(tmp_path):
+    """Either posture of the elbow meets the shoulder's limit at one end of the arc: no chain serves both ends."""
+    seconds = np.arange(150) / 30
+    angle = -1.9 * np.cos(np.pi * seconds / 5)
+    path = circling(tmp_path, ARM, seconds, arc(angle), home={"shoulder": -1.0, "elbow": -1.0})
+    served, bend = np.isfinite(path.values).all(axis=1), np.arccos(0.125 / 0.2)
+    assert abs(served.sum() - (angle < 2.5 - bend).sum()) <= 1
+    assert np.abs(np.diff(path.values[served], axis=0)).max() < 0.1
+    assert path.other_posture == tuple(np.flatnonzero(~served)) and not path.unreached
+    assert len(path.other_posture) > 20
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1"])
+def test_a_urdf_is_read_in_the_encoding_that_it_names(tmp_path, encoding):
+    path = robot(tmp_path)
+    text = f'<?xml version="1.0" encoding="{encoding}"?>' + fingers_urdf().replace('name="two"', 'name="Fühler"')
+    (tmp_path / "two.urdf").write_bytes(text.encode(encoding))
+    assert "Fühler" in read_robot(path).urdf
+    (tmp_path / "two.urdf").write_bytes(text.replace(encoding, "utf-8").encode("iso-8859-1"))
+    with pytest.raises(FormatError, match="no XML"):
+        read_robot(path)
 
 
 def test_a_robot_file_is_checked(tmp_path):
