@@ -18,6 +18,7 @@ from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 from tacdata.skin.adhesions import load_adhesion_law
+from tacdata.skin.code_version import code_versions
 from tacdata.skin.contact.adhesion import AdhesiveContact
 from tacdata.skin.contact.contact import Contact, board_distance
 from tacdata.skin.contact.first_touch import reach, rotation, touch
@@ -57,11 +58,6 @@ _LIFT = 0.5
 
 _JUMP = (200, 40)
 """Newton iterations per state, and without progress, that a jump into contact or off it may take."""
-
-_UNDECIDING = (
-    "tacdata.skin.derivatives", "tacdata.skin.mesh.generation", "tacdata.skin.mesh.build", "tacdata.skin.mesh.pin",
-)  # fmt: skip
-"""Code of the skin that the model's version leaves out: a press needs no derivatives, and a mesh has its own hash."""
 
 
 @dataclass(frozen=True)
@@ -162,8 +158,7 @@ class SkinModel:
             "mesh": self.mesh.content_hash,
             **coarse,
             "settings": provenance.content_hash(asdict(self.settings)),
-            "code": provenance.code_hash("tacdata.skin", without=_UNDECIDING),
-            "indenters": provenance.code_hash("tacdata.indenters"),
+            **code_versions(),
         }
 
     @property

@@ -104,7 +104,7 @@ class Pages:
         return f"taken back: {unflag_episode(self.listed, number)}"
 
 
-class Wish(BaseModel):
+class FlagRequest(BaseModel):
     """What the page asks for when a person sets an episode aside or takes it back."""
 
     number: int
@@ -150,7 +150,7 @@ def application(pages: Pages) -> FastAPI:
         return FileResponse(pages.episode(number), media_type="application/octet-stream")
 
     @routes.post("/flag")
-    def flag(asked: Wish) -> dict[str, str]:
+    def flag(asked: FlagRequest) -> dict[str, str]:
         return {"said": pages.flag(asked.number, asked.reason)}
 
     api.include_router(routes)
