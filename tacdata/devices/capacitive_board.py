@@ -24,8 +24,10 @@ FIRST_FRAME = 2.0
 class CapacitiveBoard(TaxelBoard):
     """A board that streams frames by itself.
 
-    Settings in the rig file: ``port``; ``baud`` (115200); ``format``: path of a frame format file or the
-    format itself (absent: tacdata/wire/cap24.yaml).
+    Settings in the rig file:
+
+    - ``port``, ``baud`` (115200);
+    - ``format``: path of a frame format file, or the format itself (default: tacdata/wire/cap24.yaml).
     """
 
     def __init__(

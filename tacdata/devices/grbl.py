@@ -28,10 +28,12 @@ LATE = (1.5, 15.0)
 class Grbl(MotionController):
     """A GRBL 1.1 or grblHAL controller, driven by the send-response protocol of its documentation.
 
-    Settings in the rig file: ``port``; ``baud`` (115200); ``poll_rate`` (8) queries a second; ``dtr`` (none:
-    as the system sets it; false for boards that are held in reset by it); ``home`` (false): run ``$H`` at
-    opening if the controller is locked. All moves are given in machine coordinates (G53), so work offsets do
-    not matter.
+    All moves are in machine coordinates (G53), so work offsets do not matter. Settings in the rig file:
+
+    - ``port``, ``baud`` (115200);
+    - ``poll_rate`` (8): status queries per second;
+    - ``dtr``: state of the DTR line (default: as the system sets it; false for boards that it holds in reset);
+    - ``home`` (false): run ``$H`` at opening if the controller is locked.
     """
 
     def __init__(

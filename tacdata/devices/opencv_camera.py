@@ -51,13 +51,17 @@ Grab = Callable[[], "_Grabbed | None"]
 
 
 class OpencvCamera(Camera):
-    """A thread grabs and stamps; `read` hands out.
+    """A camera or its substitute: a thread grabs and time-stamps images, `read` returns them.
 
-    Settings in the rig file: ``source``: index, URL, video file or image folder; ``rate`` [Hz]: asked of a
-    camera, and the pace of a file or folder (absent: the file's own, or 30); ``intrinsics``, whose size the
-    images must have; ``cube``, which the tag room reads; for a camera by index also ``fourcc`` (default MJPG:
-    without compression USB carries few images), ``exposure`` [ms] or auto, ``gain`` and ``backend``;
-    ``loop``: begin a file or folder again at its end.
+    Settings in the rig file:
+
+    - ``source``: index, URL, video file or image folder;
+    - ``rate`` [Hz]: requested from a camera; the pace of a file or folder (default: the file's own, or 30);
+    - ``intrinsics``: the camera's calibration; images must have its size;
+    - ``cube``: the tag cube to search for (`tacdata.tags`);
+    - ``loop``: begin a file or folder again at its end;
+    - by index only: ``fourcc`` (default MJPG, since USB carries few images without compression), ``exposure`` [ms] or
+      auto, ``gain``, ``backend``.
     """
 
     def __init__(

@@ -26,12 +26,14 @@ TIME = "tacdata.time_ns"
 
 
 class Lerobot(Exporter):
-    """One dataset of all demonstrations; opens in stock lerobot.
+    """One LeRobot dataset of all demonstrations; opens in stock lerobot. Its features:
 
-    ``action``: fingertip targets, ``observation.state``: fingertips as seen, both x y z [m] and qx qy qz qw a finger;
-    ``observation.tactile.FINGER`` [counts]; ``observation.predicted_depth.FINGER``: a network's estimate as a float32
-    depth image (metres in the file, millimetres in lerobot), with the checkpoint's hash in the feature's ``info``;
-    ``tacdata.predicted_novelty.FINGER``: above 1 the estimate is from readings unlike all that the network learnt from.
+    - ``action``: fingertip targets, x y z [m] and qx qy qz qw per finger;
+    - ``observation.state``: fingertips as seen, in the same form;
+    - ``observation.tactile.FINGER``: readings [counts];
+    - ``observation.predicted_depth.FINGER``: a network's estimate as a float32 depth image, metres in the file and
+      millimetres in lerobot; the feature's ``info`` holds the checkpoint's hash;
+    - ``tacdata.predicted_novelty.FINGER``: above 1 the readings are unlike all training readings.
     """
 
     def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
