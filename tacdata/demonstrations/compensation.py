@@ -98,7 +98,7 @@ def compensate(position: np.ndarray, normal: np.ndarray, depth: np.ndarray, gain
     if position.shape != normal.shape or len(depth) != len(position) or np.nanmax(np.abs(length - 1), initial=0) > 1e-3:
         raise UsageError(
             f"{len(position)} positions, {len(depth)} depths, normals of length {np.nanmin(length, initial=1):.3f}",
-            "as many of each, normals of length 1", "give fingertip poses with their depths",
+            "the same number of each, normals of length 1", "give fingertip poses with their depths",
         )  # fmt: skip
     return position + gain * np.nan_to_num(np.asarray(depth, float))[:, None] * normal
 
@@ -133,7 +133,7 @@ def smallest_gain(
     else:
         raise UsageError(
             f"a contact depth of {wanted:g} mm; the deepest reached is {best:.3g} mm",
-            f"a depth that gains up to {largest:g} m/mm reach", "want less, or allow a larger gain",
+            f"a depth that gains up to {largest:g} m/mm reach", "ask for a smaller depth, or allow a larger gain",
         )  # fmt: skip
     while high - low > tolerance:
         middle = (low + high) / 2

@@ -26,7 +26,9 @@ TIME = "tacdata.time_ns"
 
 
 class Lerobot(Exporter):
-    """One LeRobot dataset of all demonstrations; opens in stock lerobot. Its features:
+    """One LeRobot dataset of all demonstrations; opens in stock lerobot.
+
+    Its features:
 
     - ``action``: fingertip targets, x y z [m] and qx qy qz qw per finger;
     - ``observation.state``: fingertips as seen, in the same form;
@@ -44,7 +46,7 @@ class Lerobot(Exporter):
         columns = [_columns(targets) for targets in episodes]
         features = _features(episodes[0], columns[0])
         if any(set(other) != set(columns[0]) for other in columns):
-            raise UsageError("demonstrations with boards on other fingers", "the same in all", "export them apart")
+            raise UsageError("demonstrations with boards on other fingers", "the same in all", "export them separately")
         new_folder(out)
         info = folder.empty_info(features, rate, "fingertips " + " ".join(fingers))
         tasks, first, parts = list(dict.fromkeys(t.task for t in episodes)), 0, []
@@ -84,7 +86,7 @@ class Lerobot(Exporter):
         rows = folder.read_rows(Path(out), info)
         if len(entries) != len(rows):
             given = f"{out}: {len(rows)} episodes, {META} describes {len(entries)}"
-            raise FormatError(given, "one entry an episode", "export again")
+            raise FormatError(given, "one entry per episode", "export again")
         return [_read(Path(out), row, entry) for row, entry in zip(rows, entries, strict=True)]
 
 
@@ -92,7 +94,7 @@ def _same(values: Sequence[Any], what: str) -> Any:
     if not values:
         raise UsageError("no demonstrations", "one or more", "track demonstrations first")
     if any(value != values[0] for value in values):
-        raise UsageError(f"demonstrations of different {what}", "one dataset, one of each", "export them apart")
+        raise UsageError(f"demonstrations of different {what}", "one dataset, one of each", "export them separately")
     return values[0]
 
 

@@ -61,7 +61,7 @@ def presses_of(
     scheduled = read_schedule(mapping, tables, streams.taxels)
     if streams.position is None and not scheduled:
         raise FormatError(
-            "neither a position nor a press schedule", "one of them: without it nobody knows what was pressed",
+            "neither a position nor a press schedule", "one of them: without it the presses are unknown",
             "add position or schedule to the mapping; for a sensor left alone: position: {file: ..., depth: -1}",
         )  # fmt: skip
     shift = max(-min(int(stream.time_ns[0]) for stream in streams.all if len(stream.time_ns)), 0)

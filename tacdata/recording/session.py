@@ -67,7 +67,7 @@ def read_session(folder: Path) -> Session:
         raise UsageError(
             f"{folder} is no session: no {FILE} in it",
             "a folder written by tacdata record or tacdata import",
-            "demonstrations by hand lie in it: work them up with tacdata track"
+            "it holds demonstrations by hand: process them with tacdata track"
             if by_hand
             else "check the path; measured files of another rig come in by `tacdata import`",
         )

@@ -93,8 +93,8 @@ def _press(probe: Probe, place: np.ndarray, surface: float, depth: float) -> np.
 def _silent(taxel: int, answer: np.ndarray, noise: float) -> DeviceError:
     return DeviceError(
         f"taxel {taxel}: its largest answer to presses across it is {np.abs(answer).max():.1f} counts, "
-        f"its noise {noise:.1f} counts, and no centre can be told",
+        f"its noise {noise:.1f} counts, and it has no clear centre",
         "a taxel that answers most to presses over its own centre",
-        "is that channel dead or wired to another taxel? Choose others with --taxel, or check origin and yaw in the "
-        "rig file",
+        "check whether that channel is dead or wired to another taxel; choose others with --taxel, or check origin "
+        "and yaw in the rig file",
     )

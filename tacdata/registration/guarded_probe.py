@@ -88,7 +88,7 @@ class GuardedProbe(Probe):
         if not self._rig.envelope.contains(position):
             where = ", ".join(f"{value:.2f}" for value in position)
             raise FormatError(
-                f"the registration needs machine position ({where}) mm",
+                f"the registration needs the machine position ({where}) mm",
                 f"{self._rig.envelope.min} to {self._rig.envelope.max} mm (the rig's envelope)",
                 "correct registration/origin or the envelope in the rig file",
             )

@@ -146,7 +146,7 @@ def _check_plane(plane: Plane, touches: list[Touch], settings: RegistrationSetti
     if tilt > settings.most_tilt:
         raise DeviceError(
             f"the sensor is tilted by {tilt:.2f} deg against the guide", f"at most {settings.most_tilt:g} deg",
-            "mount it flatter, then register again",
+            "level its mount, then register again",
         )  # fmt: skip
     worst = int(np.argmax(np.abs(plane.residual)))
     if abs(plane.residual[worst]) > settings.flatness:
@@ -159,7 +159,8 @@ def _check_plane(plane: Plane, touches: list[Touch], settings: RegistrationSetti
     uncertainty = float(np.hypot(np.sqrt(plane.covariance[0, 0]), model))
     if uncertainty > settings.tolerance:
         raise DeviceError(
-            f"the skin's height is known to {1000 * uncertainty:.0f} um only", f"{1000 * settings.tolerance:g} um",
+            f"the skin's height has a standard uncertainty of {1000 * uncertainty:.0f} um",
+            f"at most {1000 * settings.tolerance:g} um",
             "reduce the noise, or touch more often with --repeats",
         )  # fmt: skip
 

@@ -91,7 +91,7 @@ def _approach(
         f"{site}: the answer between {heights[0]:.2f} and {heights[-1]:.2f} mm shows no clear onset "
         f"({answer[-1]:.0f} standard deviations at the lowest point)",
         "an answer that begins within the approach and rises well above the noise",
-        f"look for electrical noise (median {np.median(noise):.1f} counts) and a loose indenter, then register again",
+        f"check for electrical noise (median {np.median(noise):.1f} counts) and a loose indenter, then register again",
     )
 
 
@@ -121,5 +121,5 @@ def search(probe: Probe, site: str, place: tuple[float, float], top: float, lowe
         f"{site}: no channel answered down to machine height {height:.2f} mm, the limit",
         "a taxel that answers before the limit",
         "is the indenter mounted, the board connected, the place right? Correct registration/origin (z) in the "
-        "rig file, or allow more with --limit",
+        "rig file, or allow a deeper search with --limit",
     )

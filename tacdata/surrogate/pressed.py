@@ -57,7 +57,8 @@ def pressed(paths: list[Path]) -> Pressed:
                 "start from a fitted response (no --fem), or import with sensor file, indenter and height of contact",
             )  # fmt: skip
         if sensor is not None and episode.sensor.content_hash != sensor.content_hash:
-            raise FormatError(f"{file}: another sensor than the recordings before", "one sensor", "judge it alone")
+            given = f"{file}: another sensor than the recordings before"
+            raise FormatError(given, "recordings of one sensor", "run it alone")
         sensor = episode.sensor
         touching = episode.tip[episode.tip[:, 2] > 0]
         if len(touching):
@@ -75,7 +76,7 @@ def _reach(name: str, found: list[tuple[Episode, np.ndarray]]) -> Reach:
     if len(ways) > 1:
         raise FormatError(
             f"{name} mounted at {'; '.join(ways[way] for way in sorted(ways))}", "one way for each name",
-            "judge the ways one at a time, or give them names of their own in the plan",
+            "run them one at a time, or give each its own name in the plan",
         )  # fmt: skip
     [(yaw, *tilt)] = ways
     tips = np.concatenate([t for _, t in found])

@@ -32,7 +32,7 @@ class Loads:
                 raise FormatError(
                     f"loads: {name} has the shape {values.shape}",
                     f"(n, {taxels}), the same for force, closure and area",
-                    "give one row a state, one column a taxel",
+                    "give one row per state, one column per taxel",
                 )
             if not np.isfinite(values).all():
                 row, column = np.argwhere(~np.isfinite(values))[0]

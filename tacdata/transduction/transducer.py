@@ -66,7 +66,7 @@ class Transducer:
         given = sensor.transduction
         if given is None:
             raise FormatError(
-                f"sensor {sensor.name}: nothing is said of its transduction",
+                f"sensor {sensor.name}: it has no section transduction",
                 f"transduction: {{principle: {' | '.join(registry.names(ROOM, BASE))}}}",
                 "add the section to the sensor file, as in tacdata/sensor/tacprint.yaml",
             )
@@ -129,7 +129,9 @@ class Transducer:
         counts = np.asarray(counts, dtype=float)
         if counts.ndim != 2 or counts.shape[1] != self.taxels:
             raise FormatError(
-                f"readings of shape {counts.shape}", f"(n, {self.taxels})", "give one row a frame, one column a taxel"
+                f"readings of shape {counts.shape}",
+                f"(n, {self.taxels})",
+                "give one row per frame, one column per taxel",
             )
         if not self.gain.all():
             remedy = "a dead taxel has no inverse: leave it out"

@@ -193,7 +193,7 @@ def _claim(directory: Path, path: Path) -> IO[str]:
         lock.close()
         raise UsageError(
             f"a virtual rig is running in {directory}",
-            "one rig a directory",
+            "one rig per directory",
             "stop it or choose another directory",
         ) from None
     return lock

@@ -121,7 +121,7 @@ def documents_of(tmp_path, **changes):
 def test_a_demo_rig_is_checked(tmp_path):
     boards = rig().document["boards"]
     for changes, words in (
-        ({"boards": {"pinky": boards["thumb"]}}, "pinky, who carry no cube"),
+        ({"boards": {"pinky": boards["thumb"]}}, "pinky, which carry no cube"),
         ({"boards": {}, "sensors": {"thumb": rig().document["sensors"]["thumb"]}}, "a sensor but no board for thumb"),
         ({"latencies": {"ear": {"latency_ns": 1, "uncertainty_ns": 1, "source": "x"}}}, "a latency of ear"),
         ({"cameras": {}}, "cameras"),

@@ -97,7 +97,7 @@ def test_plates_that_meet_are_named():
     ("felt", "words"),
     [
         (Loads(*[np.zeros((2, COUNT - 1))] * 3), rf"\(n, {COUNT}\)"),
-        (Loads(*[np.zeros(COUNT)] * 3), "one row a state"),
+        (Loads(*[np.zeros(COUNT)] * 3), "one row per state"),
         (Loads(np.zeros((2, COUNT)), np.zeros((3, COUNT)), np.zeros((2, COUNT))), "closure has the shape"),
         (Loads(np.zeros((2, COUNT)), np.zeros((2, COUNT)), np.full((2, COUNT), np.nan)), "area of taxel 0 in state 0"),
     ],

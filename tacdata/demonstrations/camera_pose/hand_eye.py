@@ -39,7 +39,8 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
     """
     if len(grippers) != len(cubes) or len(grippers) < 3:
         given = f"{len(grippers)} gripper and {len(cubes)} cube poses"
-        raise UsageError(given, "as many of each, three or more", "take ten or more, turned about different axes")
+        allowed = "the same number of both, three or more"
+        raise UsageError(given, allowed, "take ten or more, with rotations about all axes")
     _check_turns(grippers)
     kept, remarks = np.ones(len(grippers), bool), []
     for _ in range(3):
@@ -56,7 +57,7 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
     turn, place = (float(np.sqrt((raw[:, part] ** 2).sum(axis=1).mean())) for part in (slice(0, 3), slice(3, 6)))
     if place > 0.02 or turn > 0.1:
         raise FormatError(
-            f"hand-eye pairs that leave {1000 * place:.1f} mm and {np.degrees(turn):.1f} deg",
+            f"hand-eye pairs with residuals of {1000 * place:.1f} mm and {np.degrees(turn):.1f} deg",
             "pairs of the same moments",
             "check the order of the pairs, the units (metres), xyzw, and that the cube sits firmly on the gripper",
         )  # fmt: skip
@@ -96,9 +97,9 @@ def _check_turns(grippers: np.ndarray) -> None:
     about = np.linalg.svd(turns, compute_uv=False)
     if len(about) < 2 or np.abs(turns).max() < LEAST_TURN or about[1] < LEAST_TURN:
         raise UsageError(
-            f"a gripper that turned by {np.degrees(np.linalg.norm(turns, axis=1).max()):.0f} deg, and by "
+            f"a gripper that rotated by {np.degrees(np.linalg.norm(turns, axis=1).max()):.0f} deg, and by "
             f"{np.degrees(about[1] if len(about) > 1 else 0):.0f} deg about a second axis",
-            f"{np.degrees(LEAST_TURN):.0f} deg or more about two axes", "take poses that are turned to all sides",
+            f"{np.degrees(LEAST_TURN):.0f} deg or more about two axes", "add poses that are rotated about all axes",
         )  # fmt: skip
 
 

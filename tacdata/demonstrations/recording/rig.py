@@ -102,7 +102,7 @@ def _agree(document: dict[str, Any], fingers: dict[str, Finger], worlds: dict[st
         strangers = sorted(set(document.get(what, {})) - set(fingers))
         if strangers:
             raise FormatError(
-                f"{origin}: {what} of {', '.join(strangers)}, who carry no cube",
+                f"{origin}: {what} of {', '.join(strangers)}, which carry no cube",
                 ", ".join(fingers), "name boards and cubes by the same fingers",
             )  # fmt: skip
     streams = {f"taxels {name}" for name in document["boards"]} | {f"camera {name}" for name in document["cameras"]}
@@ -123,7 +123,7 @@ def _agree(document: dict[str, Any], fingers: dict[str, Finger], worlds: dict[st
     lost = sorted(set(document["cameras"]) - set(worlds))
     if lost and (worlds or len(lost) > 1):
         raise FormatError(
-            f"{origin}: it is not said where camera {', '.join(lost)} stands",
+            f"{origin}: no pose is given for camera {', '.join(lost)}",
             "world for every camera, or one camera alone, whose frame is then the world",
             "run tacdata calibrate-world for it, and name the file as the camera's world",
         )

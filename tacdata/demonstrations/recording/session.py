@@ -76,7 +76,8 @@ def open_demo_session(folder: Path, rig: DemoRig, task: str, resume: bool) -> De
                     f"{folder} was begun with other {what}", f"the same {what}", "begin a new folder for this rig"
                 )
         if session.task != task:
-            raise UsageError(f"{folder} shows {session.task!r}, not {task!r}", "one task a folder", "choose --out anew")
+            given = f"{folder} holds demonstrations of {session.task!r}, not of {task!r}"
+            raise UsageError(given, "one task per folder", "choose another --out")
         return session
     if Path(folder).exists():
         raise UsageError(f"{folder} exists", "a new folder", "choose another --out, or add to it with --resume")

@@ -67,7 +67,7 @@ def training_plan(
         UsageError: If an indenter is unknown or there are no presses.
     """
     if presses < 1:
-        raise UsageError(f"{presses} presses", "1 or more", "ask for some")
+        raise UsageError(f"{presses} presses", "1 or more", "ask for one press or more")
     shapes = specimens(indenters)
     rng = np.random.default_rng(seed)
     mountings = [(name, yaw) for name in indenters for yaw in YAWS.get(shapes[name]["shape"], (0.0,))]

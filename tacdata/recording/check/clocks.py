@@ -66,7 +66,7 @@ def clock_doubts(clock: dict[str, Any] | None, rate_of_clock: float) -> list[str
             f"its clock stepped by {', '.join(f'{s:+.0f}' for s in steps)} ms: it restarted, or lost its count"
         )
     if clock["uncertainty"] / rate_of_clock > UNCERTAIN_MS:
-        found.append(f"its sample times are known to {clock['uncertainty']:.1f} ms only")
+        found.append(f"its sample times are uncertain by {clock['uncertainty']:.1f} ms")
     return found
 
 

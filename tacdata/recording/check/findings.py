@@ -158,7 +158,7 @@ def _cnc(figures: RecordingFigures) -> list[Judgement]:
         found.append((WARNING, "cnc", f"no status report for {values['longest_gap']:.0f} ms"))
     if figures.document["complete"] and values["depth_uncertainty"] > DEPTH_MM[0]:
         severity = UNUSABLE if values["depth_uncertainty"] > DEPTH_MM[1] else WARNING
-        text = f"the depth while pressing is known to {values['depth_uncertainty']:.3f} mm only"
+        text = f"the depth while pressing is uncertain by {values['depth_uncertainty']:.3f} mm"
         if values["contradiction"]:
             text += f": reports contradict the commanded profile by {values['contradiction']:.0f} ms"
         found.append((severity, "cnc", text))

@@ -168,7 +168,7 @@ def _recording(records: Records) -> Recording:
 def _attachment(records: Records, name: str) -> Any:
     if "demo_rig.json" in records.attachments:
         raise FormatError(
-            f"{records.path} is a demonstration by hand", "a recording of a press", "work it up with tacdata track"
+            f"{records.path} is a demonstration by hand", "a recording of a press", "process it with tacdata track"
         )
     if name not in records.attachments:
         raise FormatError(

@@ -65,7 +65,8 @@ class RigStreams(DeviceStreams):
         """The first error of a stream or of writing, or None."""
         failure = self._sink.failure if self._sink else None
         if self._fault is None and failure is not None:
-            self._fail(DeviceError(f"writing failed: {failure}", "a disk with room", "make room, then --resume"))
+            given = f"writing failed: {failure}"
+            self._fail(DeviceError(given, "a disk with free space", "free some space, then --resume"))
         return self._fault
 
     @property

@@ -105,7 +105,7 @@ def _true_views(path: Path, episodes: Sequence[Episode]) -> dict[int, tuple[np.n
                 found[k] = time[rows], tip[rows]
     if not found:
         raise UsageError(
-            f"{path} tells of none of the recordings' times", "the recordings' own clock, in ns",
+            f"{path} covers none of the recordings' times", "the recordings' own clock, in ns",
             "check its column time_ns",
         )  # fmt: skip
     return found

@@ -155,14 +155,14 @@ def _fitting(
         rms = _fit(kept, board, size, model).rms
         if np.median(rms) > BAD:
             raise FormatError(
-                f"corners are off by {np.median(rms):.1f} px",
+                f"the corners' reprojection error is {np.median(rms):.1f} px",
                 f"less than {BAD:g} px; a good calibration has 0.1 to 0.4 px",
                 "check columns, rows and legacy in the board file, and that the board is flat",
             )
         worst = int(np.argmax(rms))
         if rms[worst] <= max(OUTLIER * float(np.median(rms)), LEAST_OUTLIER):
             return kept, dropped
-        reason = f"its corners are off by {rms[worst]:.2f} px, those of the others by {np.median(rms):.2f} px"
+        reason = f"its corners' reprojection error is {rms[worst]:.2f} px, that of the others {np.median(rms):.2f} px"
         dropped.append(UsedView(kept.pop(worst), float(rms[worst]), None, reason))
         if len(dropped) > MOST_DROPPED * count:
             raise FormatError(
@@ -211,7 +211,7 @@ def _judged(
     unsure = float((fit.spread[:2] / np.diag(fit.matrix)[:2]).max())
     if tilt < LEAST_TILT or unsure > REFUSED:
         raise FormatError(
-            f"boards tilted by at most {tilt:.0f} deg against each other, focal length known to {unsure:.1%}",
+            f"boards tilted by at most {tilt:.0f} deg against each other, focal length uncertain by {unsure:.1%}",
             f"{LEAST_TILT:g} deg or more, {REFUSED:.0%} or better: from the front alone, distance and focal length "
             "cannot be told apart",
             "tilt the board by 30 to 45 degrees to all four sides",
@@ -220,7 +220,7 @@ def _judged(
     if share < GOOD_COVERAGE:
         remarks.append(f"corners in {share:.0%} of the image only: towards the empty parts distortion is a guess")
     if unsure > UNSURE:
-        remarks.append(f"focal length known to {unsure:.2%}: distances of tags are off by as much")
+        remarks.append(f"focal length uncertain by {unsure:.2%}, and so are distances of tags")
     used = [
         UsedView(view, float(rms), residuals) for view, rms, residuals in zip(kept, fit.rms, fit.residuals, strict=True)
     ]

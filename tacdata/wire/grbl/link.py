@@ -254,7 +254,7 @@ class GrblLink:
             return
         accepted = "a line that it accepts in its present state"
         if not (code := RESPONSE.match(answer)):
-            lost = f"the line {entry.text!r} was thrown away by a reset"
+            lost = f"the line {entry.text!r} was dropped by a reset"
             raise DeviceError(lost, accepted, "send it again when the machine is idle")
         why = codes.error_in_words(int(code[1])) if code[1] else answer
         damaged = code[1] and int(code[1]) in codes.DAMAGED_LINE
