@@ -29,13 +29,16 @@ def run(
     gains: Annotated[Path | None, typer.Option(help="Gains file (YAML); default: the paper's grasp and wipe.")] = None,
     finger: Annotated[list[str] | None, typer.Option(help="Which fingers, in this order; default: all.")] = None,
     robot: Annotated[Path | None, typer.Option(help="Robot file (YAML), for --format joints.")] = None,
+    with_guesses: Annotated[
+        bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
+    ] = False,
 ) -> None:
     """Write fingertip targets, direct or compensated by touch, in a format that a robot reads."""
     from tacdata.demonstrations.compensation import read_gains
     from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks
     from tacdata.demonstrations.recording.session import read_demo_session
     from tacdata.exporters.exporter import exporter
-    from tacdata.replay.targets import targets_of
+    from tacdata.replay.targets import check_guesses, doubts, targets_of
 
     writer = exporter(form, robot)
     files = [path_of(p) for p in read_demo_session(path).episodes] if path.is_dir() else [_tracks(path)]
@@ -44,13 +47,15 @@ def run(
         made = read_tracks(file)
         chosen = None if direct else read_gains(gains).of(task or made.task)
         episodes.append(targets_of(made, chosen, finger or ()))
+        if not with_guesses:
+            check_guesses(episodes[-1])
     limits = writer.write(episodes, out)
     for targets in episodes:
         moved = 1000 * abs(targets.position - targets.seen).max()
         kind = f"compensated by up to {moved:.1f} mm" if targets.kind == "compensated" else "direct"
         print(f"{targets.recording}: {len(targets.time_ns)} targets for {', '.join(targets.fingers)}, {kind}")
     for targets in episodes:
-        for words in _notes(targets):
+        for words in (*doubts(targets), *_notes(targets)):
             print(f"note: {targets.recording}: {words}")
     for words in limits:
         print(f"note: {words}")

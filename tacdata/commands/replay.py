@@ -34,6 +34,9 @@ def run(
     gain_from: Annotated[
         Path | None, typer.Option(help="With --find-gain: find it on this recording, and try it on the others.")
     ] = None,
+    with_guesses: Annotated[
+        bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
+    ] = False,
 ) -> None:
     """Replay demonstrated grasps or wipes directly and compensated in MuJoCo, over many seeds."""
     from tacdata import documents
@@ -41,6 +44,7 @@ def run(
     from tacdata.demonstrations.paths.tracks_file import read_tracks
     from tacdata.errors import UsageError
     from tacdata.replay.scene import scene_of
+    from tacdata.replay.targets import check_guesses, doubts
     from tacdata.replay.trials import Trials, result
 
     for file in (out, view, video):
@@ -71,9 +75,11 @@ def run(
         chosen = {"recording": source.recording, "hash": source.recording_hash, "depth": find_gain}
         known["chosen"] = dict.fromkeys(published, found)
     tried = [Trials(one, known, scene) for one in made]
-    for one in made:
-        for words in one.guesses():
-            print(f"note: {one.recording}: {words}")
+    for one in tried:
+        if not with_guesses:
+            check_guesses(one.seen)
+        for words in (*doubts(one.seen), *one.made.guesses()):
+            print(f"note: {one.made.recording}: {words}")
     if view is not None or video is not None:
         _save(view, video, tried[0], scene)
     document = result(tried, seeds, scene, chosen)

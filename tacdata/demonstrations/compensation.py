@@ -14,6 +14,8 @@ from tacdata.errors import FormatError, UsageError
 LARGEST = 10
 """Number of largest depths of a map whose mean is the scalar depth (paper)."""
 DEFAULT = Path(__file__).with_name("gains.yaml")
+MOST = 0.1
+"""Largest gain that can be meant [m/mm]: 10 cm of target for a millimetre felt; the paper's are near 0.01."""
 STEPS = 12
 """Gains tried between zero and the largest before the interval is bisected [count]."""
 
@@ -54,6 +56,12 @@ def read_gains(path: Path | None = None) -> Gains:
         if len(values) != len(order):
             given = f"{path or DEFAULT}: tasks/{task}: {len(values)} gains"
             raise FormatError(given, f"{len(order)}: {', '.join(order)}", "give every finger a gain, 0 for none")
+        if (largest := max(map(float, values))) > MOST:
+            raise FormatError(
+                f"{path or DEFAULT}: tasks/{task}: a gain of {largest:g} m/mm, {1000 * largest:g} mm a millimetre felt",
+                f"0 to {MOST:g} m/mm; the paper's are 0.004 to 0.012",
+                "gains are metres for each millimetre: divide by 1000 if these are mm for each mm",
+            )
     tasks = {task: dict(zip(order, map(float, values), strict=True)) for task, values in document["tasks"].items()}
     return Gains(tasks, str(path) if path else "the paper's gains")
 

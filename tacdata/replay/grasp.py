@@ -46,6 +46,7 @@ def first_grasp(targets: FingertipTargets) -> tuple[int, int, int]:
 
 def cut(targets: FingertipTargets, begin: int, end: int) -> FingertipTargets:
     """Return the targets of some rows."""
-    rows = slice(begin, end)
+    rows, first = slice(begin, end), targets.rows.start or 0
     arrays = ("time_ns", "position", "quaternion", "seen", "depth", "gap")
-    return replace(targets, **{name: getattr(targets, name)[rows] for name in arrays}, source=None, rows=rows)
+    kept = {name: getattr(targets, name)[rows] for name in arrays}
+    return replace(targets, **kept, rows=slice(first + begin, first + end))

@@ -53,7 +53,7 @@ def without_jumps(
     if reached.any() and len(jumps := _jumps(joints, found, seconds)):
         tracks = list(_tracks(search, aim, is_reached, found, jumps))
         found = _longest_chain(joints, np.stack(tracks, axis=1), seconds)
-    served = np.isfinite(found).all(axis=1)
+    served = np.asarray(np.isfinite(found).all(axis=1))
     return _nearest_turns(joints, found, search.model.home), served
 
 
@@ -65,7 +65,7 @@ def _difference(joints: tuple[Joint, ...], later: np.ndarray, earlier: np.ndarra
     """Return differences of joint values [rad or m]; of joints without limits by the nearest turn."""
     turning = np.array([joint.unit == "rad" and joint.lower is None for joint in joints])
     difference = later - earlier
-    return np.where(turning, (difference + np.pi) % (2 * np.pi) - np.pi, difference)
+    return np.asarray(np.where(turning, (difference + np.pi) % (2 * np.pi) - np.pi, difference))
 
 
 def _jumps(joints: tuple[Joint, ...], values: np.ndarray, seconds: np.ndarray) -> np.ndarray:
@@ -138,7 +138,7 @@ def _turned(joints: tuple[Joint, ...], track: np.ndarray) -> Iterator[np.ndarray
 def _longest_chain(joints: tuple[Joint, ...], tracks: np.ndarray, seconds: np.ndarray) -> np.ndarray:
     """Return the longest chain of rows that the joints can follow; ``tracks`` has shape (n, tracks, joints)."""
     count, width = tracks.shape[:2]
-    there, limits = np.isfinite(tracks).all(axis=2), _limits(joints)
+    there, limits = np.asarray(np.isfinite(tracks).all(axis=2)), _limits(joints)
     score, before = np.where(there, 1.0, -np.inf), np.full((count, width), -1)
     for row in range(1, count):
         first = max(row - WINDOW, 0)

@@ -14,6 +14,8 @@ from tacdata.demonstrations.compensation import compensate, contact_depth
 from tacdata.demonstrations.demonstration import Demonstration
 from tacdata.errors import UsageError
 
+GUESS = 0.003
+"""Standard deviation of an axis beyond which a target over a gap is a guess [m]: no grasp is that forgiving."""
 UNITS = {"time_ns": "ns", "position": "m", "quaternion": "1 (xyzw)", "seen": "m", "depth": "mm", "gap": "1"}
 
 
@@ -77,6 +79,9 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
         UsageError: If a finger has no path or no gain, no time has all of them, or there is no predicted depth.
     """
     names = tuple(fingers) or tuple(made.tracks)
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise UsageError(f"finger {twice} is named twice", "each finger once", "name every finger once with --finger")
     for what, known in (("path", made.tracks), *((("gain", gains),) if gains is not None else ())):
         missing = [name for name in names if name not in known]
         if missing:
@@ -113,6 +118,56 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
         np.stack(depths, axis=1)[rows], np.stack([t.gap for t in tracks], axis=1)[rows], made.network,
         tuple(remarks), provenance.stamp("tacdata export", parents, {"kind": kind, "gains": used}), made, rows,
     )  # fmt: skip
+
+
+def doubts(targets: FingertipTargets) -> list[str]:
+    """Return what is doubtful in a demonstration's targets, a line a finger: stretches without sightings.
+
+    A target over a gap is a guess where its standard deviation exceeds `GUESS`.
+    """
+    words = []
+    for name, bridged, spread in _bridged(targets):
+        if not bridged.any():
+            continue
+        rows = np.flatnonzero(bridged)
+        longest = max(np.split(rows, 1 + np.flatnonzero(np.diff(rows) > 1)), key=len)
+        begin = (targets.time_ns[longest[0]] - targets.time_ns[0]) * 1e-9
+        words.append(
+            f"{name}: {bridged.mean():.0%} of the targets bridge gaps without a sighting, the longest "
+            f"{len(longest) / targets.rate:.1f} s from {begin:.1f} s on, where they are known to "
+            f"{1000 * spread[rows].max():.1f} mm"
+        )
+    return words
+
+
+def check_guesses(targets: FingertipTargets) -> None:
+    """Refuse targets of which some are guesses.
+
+    Raises:
+        UsageError: Naming the finger, how much of the path, and how far it may be off.
+    """
+    for name, bridged, spread in _bridged(targets):
+        guess = bridged & (spread > GUESS)
+        if guess.any():
+            raise UsageError(
+                f"{targets.recording}: {name} was not seen for {guess.sum() / targets.rate:.1f} s; its targets there "
+                f"are guesses with a standard deviation of up to {1000 * spread[guess].max():.0f} mm",
+                f"targets known to {1000 * GUESS:g} mm, or a stretch without gaps",
+                "record again with the cubes in view, export fingers that were seen (--finger), or let them pass with "
+                "--with-guesses",
+            )
+
+
+def _bridged(targets: FingertipTargets) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Return for each finger where its targets bridge a gap, and their standard deviation [m]; shape (n,) both."""
+    if targets.source is None:
+        return []
+    found = []
+    for k, name in enumerate(targets.fingers):
+        covariance = targets.source.tracks[name].covariance[targets.rows]
+        spread = np.sqrt(np.max(np.diagonal(covariance[:, 3:, 3:], axis1=1, axis2=2), axis=1))
+        found.append((name, targets.gap[:, k], spread))
+    return found
 
 
 def _depth(maps: np.ndarray | None, count: int) -> np.ndarray:

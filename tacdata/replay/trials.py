@@ -36,6 +36,7 @@ class Trials:
         self.made, self._scene = made, scene
         whole = targets_of(made, next(iter(gains.values())) if gains else dict.fromkeys(made.tracks, 0.0))
         self._span = first_grasp(whole)
+        self.seen = cut(whole, self._span[0], self._span[2])
         self._centre = ball_centre(whole, self._span[1], scene.reach)
         self.paths = {DIRECT: self._cut(None), **{kind: self._cut(own) for kind, own in gains.items()}}
 

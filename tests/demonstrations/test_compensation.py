@@ -55,6 +55,12 @@ def test_a_gains_file_is_checked(tmp_path):
     path.write_text(yaml.safe_dump({**document, "tasks": {"turn": [0.001, -0.1]}}))
     with pytest.raises(FormatError, match="tasks/turn/1"):
         read_gains(path)
+    path.write_text(yaml.safe_dump({**document, "tasks": {"turn": [0.001, 5.0]}}))
+    with pytest.raises(FormatError, match="5000 mm a millimetre"):
+        read_gains(path)
+    path.write_text(yaml.safe_dump({**document, "fingers": ["thumb", "thumb"], "tasks": {"turn": [0.001, 0.01]}}))
+    with pytest.raises(FormatError, match="non-unique"):
+        read_gains(path)
 
 
 def test_the_smallest_gain_that_reaches_a_depth_is_found():

@@ -107,6 +107,14 @@ def test_a_board_on_the_table_gives_the_camera():
     place, turn = off(found.matrix, np.linalg.inv(truth))
     assert place < 0.002 and turn < 0.004 and found.poses == 3 and not found.remarks
     assert 1e-5 < spread < 0.003 and rms < 0.0003
+    moved = poses[1].copy()
+    moved[:3, 3] += [0.0, 0.28, 0.0]
+    with pytest.raises(FormatError, match=r"image 2 of 3: 280 mm"):
+        board_world("c", "board", [poses[0], moved, poses[2]], rms, spread)
+    nudged = poses[1].copy()
+    nudged[:3, 3] += [0.0, 0.004, 0.0]
+    shaken = board_world("c", "board", [poses[0], nudged, poses[2]], rms, spread)
+    assert found.spread and shaken.spread and shaken.spread[0] > 0.001 > 2 * found.spread[0]
     with pytest.raises(UsageError, match="no image shows the board"):
         board_poses([("empty", np.full((480, 640), 90, np.uint8))], board, intrinsics)
 

@@ -16,7 +16,7 @@ from tacdata.exporters.joints import in_words, read_joints
 from tacdata.replay.inverse_kinematics import follow
 from tacdata.replay.kinematics import Kinematics
 from tacdata.replay.robot import read_robot
-from tacdata.replay.targets import targets_of
+from tacdata.replay.targets import check_guesses, doubts, targets_of
 from tacdata.sensor import default_sensor
 
 GAINS = {"thumb": 0.004, "index": 0.010}
@@ -144,6 +144,23 @@ def test_what_cannot_be_made_is_refused():
         exporter("lerobt")
     with pytest.raises(UsageError, match="without a robot"):
         exporter("joints")
+
+
+def test_a_stretch_that_nobody_saw_is_said_and_refused_where_it_is_a_guess():
+    made = demonstration()
+    known = targets_of(made, None)
+    check_guesses(known)  # a bridge that is known to 0.1 mm
+    (words,) = doubts(known)
+    assert words.startswith("index: 11% of the targets") and "0.1 s from 0.3 s on" in words and "0.1 mm" in words
+    covariance = made.tracks["index"].covariance.copy()
+    covariance[11:13, 3:, 3:] = 0.08**2 * np.eye(3)
+    unsure = replace(made, tracks={**made.tracks, "index": replace(made.tracks["index"], covariance=covariance)})
+    with pytest.raises(UsageError, match=r"index was not seen for 0.1 s.*up to 80 mm") as caught:
+        check_guesses(targets_of(unsure, None))
+    assert "--with-guesses" in str(caught.value)
+    check_guesses(targets_of(unsure, None, ("thumb",)))
+    with pytest.raises(UsageError, match="thumb is named twice"):
+        targets_of(made, None, ("thumb", "index", "thumb"))
 
 
 def test_lerobots_info_calls_predictions_predictions(tmp_path):

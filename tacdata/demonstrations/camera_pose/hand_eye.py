@@ -20,6 +20,8 @@ WEIGHTS = 0.0003, float(np.radians(0.2))
 """Standard deviation of a tag cube's position [m] and rotation [rad], which weights the residuals."""
 LEAST_TURN = np.radians(15.0)
 """Minimum rotation of the gripper about two axes [rad]; with less the solution is not determined."""
+MOVED, TURNED = 0.02, float(np.radians(3.0))
+"""Share of the camera's distance [1], and angle [rad], by which images of a board at rest differ at most."""
 OUTLYING = 5.0
 """A pair is an outlier if its residual is this many times the median [1]."""
 
@@ -75,6 +77,9 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
         poses: Board in the camera, shape (4, 4) [m], one per image; the board and the camera were at rest.
         rms: Reprojection error at the board [m], root mean square.
         spread: Standard uncertainty of the camera's position from one image [m].
+
+    Raises:
+        FormatError: If the board stands elsewhere in some images: it, or the camera, moved.
     """
     from scipy.spatial.transform import Rotation
 
@@ -83,9 +88,21 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
     rotations = Rotation.from_matrix(inverse[:, :3, :3])
     mean[:3, :3], mean[:3, 3] = rotations.mean().as_matrix(), inverse[:, :3, 3].mean(axis=0)
     turns = (rotations * Rotation.from_matrix(mean[:3, :3]).inv()).magnitude()
-    remarks = () if turns.max() < 0.01 else (f"the images differ by up to {np.degrees(turns.max()):.1f} deg: it moved",)
     distance = max(float(np.linalg.norm(mean[:3, 3])), 0.1)
-    known = spread / np.sqrt(len(poses)), spread / distance / np.sqrt(len(poses))
+    places = np.array([pose[:3, 3] for pose in poses])
+    apart = np.linalg.norm(places - np.median(places, axis=0), axis=1)
+    if apart.max() > max(MOVED * distance, OUTLYING * spread) or turns.max() > TURNED:
+        worst = int(np.argmax(apart / (MOVED * distance) + turns / TURNED))
+        raise FormatError(
+            f"the board in image {worst + 1} of {len(poses)}: {1000 * apart[worst]:.0f} mm and "
+            f"{np.degrees(turns[worst]):.1f} deg from where it stands in the others",
+            "images of a board and a camera that both rest",
+            "leave that image out if the board was put elsewhere, or take the images again",
+        )
+    remarks = () if turns.max() < 0.01 else (f"the images differ by up to {np.degrees(turns.max()):.1f} deg: it moved",)
+    # What the images differ by is as much of the uncertainty as what one image tells.
+    once = max(spread, float(np.sqrt((apart**2).mean())))
+    known = once / np.sqrt(len(poses)), max(once / distance, float(np.sqrt((turns**2).mean()))) / np.sqrt(len(poses))
     residual = rms, float(np.sqrt((turns**2).mean()))
     return CameraWorld(camera, frame, mean, "board", len(poses), residual, known, None, remarks)
 
