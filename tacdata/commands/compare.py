@@ -81,7 +81,7 @@ def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:
             models = {f"without {effects}": bare, f"with {effects}": own}
     for name, spec in models.items():
         held = Comparison(course, spec)
-        own = held.said(held.before.response, [])[rows]
+        own = held.predicted(held.before.response, [])[rows]
         said[name] = own + (measured - own).mean(axis=0)  # the offset of a press says nothing of a model
     time = np.round(1e9 * (course.time[rows] - course.time[rows[0]])).astype(np.int64)
     title = f"{path.resolve().name}/{chosen}: model and measurement"

@@ -117,7 +117,7 @@ class Grbl(MotionController):
 
     def settings(self) -> dict[str, str]:
         """Return ``banner``, the ``$n`` settings, and ``$G``, ``$#``, ``$I`` by their tags."""
-        return {**self._found, **self._answers.said}
+        return {**self._found, **self._answers.answers}
 
     @property
     def cautions(self) -> tuple[str, ...]:
@@ -245,7 +245,7 @@ class Grbl(MotionController):
 
     @property
     def _version(self) -> str:
-        return self._answers.said.get("VER", "nothing")
+        return self._answers.answers.get("VER", "nothing")
 
     def _opened(self) -> GrblLink:
         if self._link is None:

@@ -33,7 +33,7 @@ FINENESS = 0.25
 
 def result(
     setup: Setup, presses: PressSet, sensor: Sensor, maps: Maps, network: dict[str, Any],
-    told: Callable[[int, int], None] = lambda done, of: None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> dict[str, Any]:  # fmt: skip
     """Run a study.
 
@@ -43,10 +43,10 @@ def result(
         sensor: The fingertip's sensor.
         maps: The trained network.
         network: Its identity.
-        told: Called with the number of trials done and in total.
+        progress: Called with the number of trials done and in total.
     """
     touch, own = OrangeTouch(presses, sensor), configured(setup)
-    found = trials(own, touch, maps, told)
+    found = trials(own, touch, maps, progress)
     others = []
     for margin in OTHER_MARGINS:
         other = configured(setup, margin)

@@ -101,7 +101,7 @@ class GraspTrial:
 
 
 def trials(
-    setup: Setup, touch: OrangeTouch, maps: Maps, told: Callable[[int, int], None] = lambda done, of: None
+    setup: Setup, touch: OrangeTouch, maps: Maps, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> list[GraspTrial]:
     """Run every trial; strategies meet the same oranges, fingertips and noise.
 
@@ -109,7 +109,7 @@ def trials(
         setup: The study; its grip is the lifting configuration.
         touch: The skin's answer to the orange.
         maps: The trained network.
-        told: Called with the number of trials done and in total.
+        progress: Called with the number of trials done and in total.
     """
     found: list[GraspTrial] = []
     names = strategy_names()
@@ -129,7 +129,7 @@ def trials(
                 way = approach(fingers, place + aside, up, strategy, setup.protocol, touch.sensor.taxels.rate, world)
                 trial = GraspTrial(name, position, repeat, friction, mass, up, way, False)
                 found.append(replace(trial, held=lifted(trial, setup.grip)))
-                told(len(found), total)
+                progress(len(found), total)
     return found
 
 

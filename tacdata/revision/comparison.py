@@ -83,7 +83,7 @@ class Comparison:
         """Return the mean square of the whitened residual over some episodes [1]; 1 is the noise floor."""
         return float(2 * model.energy[episodes].sum() / self.values[episodes].sum())
 
-    def said(self, response: Response, placed: Sequence[Placed]) -> np.ndarray:
+    def predicted(self, response: Response, placed: Sequence[Placed]) -> np.ndarray:
         """Return a model's predicted readings, shape (rows, channels)."""
         return predict(self.course, response, [*self.setting.given, *placed]).signal
 

@@ -59,7 +59,7 @@ def test_the_curves_go_into_a_rerun_file(right, tmp_path):
     from viewers.rerun.gap_recording import write
 
     # Of 80 ms 10 are left; the response itself took up nearly half of them before, as it cannot know the direction.
-    assert right.shown and all(own.off(own.after) < 0.25 * own.off(own.before) for own in right.shown)
+    assert right.shown and all(own.rms_error(own.after) < 0.25 * own.rms_error(own.before) for own in right.shown)
     write(right.shown, tmp_path / "gap.rrd", "named")
     assert (tmp_path / "gap.rrd").read_bytes()[:4] == b"RRF2" and (tmp_path / "gap.rrd").stat().st_size > 5_000
 

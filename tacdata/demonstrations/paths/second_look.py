@@ -18,12 +18,12 @@ from tacdata.tags.tips import TipPose
 from tacdata.tags.tracker import FingerTracker
 
 
-def look_again(recording: DemoRecording, told: Callable[[int], None] = lambda done: None) -> DemoRecording:
+def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambda done: None) -> DemoRecording:
     """Return a demonstration with the fingertips of all its images, in place of those found while recording.
 
     Args:
         recording: The demonstration.
-        told: Called with the number of images searched.
+        progress: Called with the number of images searched.
 
     Raises:
         UsageError: If the file is gone.
@@ -44,7 +44,7 @@ def look_again(recording: DemoRecording, told: Callable[[int], None] = lambda do
         view = None if image is None else trackers[name].update(image)
         seen[name].append(view.tips if view else {})
         remarks.extend(f"camera {name}: {words}" for words in (view.remarks if view else ()))
-        told(sum(map(len, seen.values())))
+        progress(sum(map(len, seen.values())))
 
     records = read_records(recording.path, images=False, digests=False, seen=search)
     views: list[TagStream] = []

@@ -62,7 +62,7 @@ class DemoStreams(DeviceStreams):
             if sink:
                 sink.note(f"{name}: {why}", "error")
 
-    def _spoke(self, name: str, count: int) -> None:
+    def _delivered(self, name: str, count: int) -> None:
         self._heard.add(name)
         if self._why.pop(name, None):
             self._tell(f"{name} speaks again", "warning")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tacdata.recording.check.clocks import clock_doubts
+from tacdata.recording.check.clocks import clock_warnings
 
 IMAGE_GAP_MS = 1000.0
 """Warning threshold: time without an image, or with a repeated one [ms of real time]; at least ten periods."""
@@ -18,7 +18,7 @@ the host renders the images and may be too slow.
 """
 
 
-def camera_doubts(entries: dict[str, Any], values: dict[str, Any], rate_of_clock: float) -> list[tuple[str, str]]:
+def camera_warnings(entries: dict[str, Any], values: dict[str, Any], rate_of_clock: float) -> list[tuple[str, str]]:
     """Return the warnings about the cameras as (stream, text).
 
     Args:
@@ -34,7 +34,7 @@ def camera_doubts(entries: dict[str, Any], values: dict[str, Any], rate_of_clock
             continue
         texts = [*_still(figures, rate_of_clock), *_losses(figures, rate_of_clock), *figures["notes"]]
         if figures["clock"] and figures["missed"] is not None:
-            texts += clock_doubts({**figures["clock"], "drift": None}, rate_of_clock)
+            texts += clock_warnings({**figures["clock"], "drift": None}, rate_of_clock)
         if "cube" in entry:
             texts += _view("tag", figures, figures["images"])
         for finger, seen in figures["fingers"].items():

@@ -49,7 +49,7 @@ def round_trip(recording: Recording) -> float | None:
     return None if said is None else _rounded(float(said) / 1e6)
 
 
-def clock_doubts(clock: dict[str, Any] | None, rate_of_clock: float) -> list[str]:
+def clock_warnings(clock: dict[str, Any] | None, rate_of_clock: float) -> list[str]:
     """Return the warnings about a stream's clock as text; ``rate_of_clock``: seconds shown per real second."""
     if clock is None or not clock["steady"]:
         return []

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.recording.check.camera_findings import camera_doubts
-from tacdata.recording.check.clocks import clock_doubts
+from tacdata.recording.check.camera_findings import camera_warnings
+from tacdata.recording.check.clocks import clock_warnings
 from tacdata.recording.check.figures import COUNTS, RecordingFigures
 from tacdata.recording.check.imported import imported_findings, is_imported
 
@@ -101,7 +101,7 @@ def _taxels(figures: RecordingFigures) -> list[Judgement]:
         text = f"{values['rate']:.2f} Hz, nominal {values['nominal_rate']:g} Hz"
         found.append((WARNING, "taxels", text))
     found += [(WARNING, "taxels", text) for text in _line(values["driver_counts"])]
-    found += [(WARNING, "taxels", text) for text in clock_doubts(values["clock"], _rate_of_clock(figures))]
+    found += [(WARNING, "taxels", text) for text in clock_warnings(values["clock"], _rate_of_clock(figures))]
     if figures.recording.episode.taxels.counter.min() < 0:
         text = "the board sends no counter: lost frames cannot be seen, sample times are arrival times"
         found.append((WARNING, "taxels", text))
@@ -170,7 +170,7 @@ def _cnc(figures: RecordingFigures) -> list[Judgement]:
 
 def _cameras(figures: RecordingFigures) -> list[Judgement]:
     entries = figures.recording.episode.rig.get("cameras", {})
-    doubts = camera_doubts(entries, figures.document["cameras"], _rate_of_clock(figures))
+    doubts = camera_warnings(entries, figures.document["cameras"], _rate_of_clock(figures))
     return [(WARNING, stream, text) for stream, text in doubts]
 
 

@@ -113,7 +113,7 @@ class _Stretch:
     def established(self, rate: float) -> bool:
         return self.frames >= LASTING_FRAMES and self.last[1] - self.origin[1] >= LASTING_NS * rate
 
-    def swallow(self, other: _Stretch) -> None:
+    def merge(self, other: _Stretch) -> None:
         """Merge a later block that turned out to belong to this one, arriving late; only its hull matters."""
         for point in other.hull:
             self.add(point)
@@ -128,7 +128,7 @@ class _Stretch:
         """Time over which arrivals are kept [ns], at least 1."""
         return max(self.last[1] - self.blocks[0].begin_ns, 1) if self.blocks else 1
 
-    def doubt_ns(self) -> float:
+    def uncertainty_ns(self) -> float:
         """Return the uncertainty of the line within its span [ns], evaluated from time to time."""
         frames, doubt = self._doubt
         if self.frames >= frames + max(frames // 16, LASTING_FRAMES):
@@ -145,7 +145,7 @@ class _Stretch:
             return free
         slope = min(max(free[2], self.nominal_ns * (1 - CRYSTAL)), self.nominal_ns * (1 + CRYSTAL))
         off = abs(slope - free[2])
-        if off == 0 or off > self.nominal_ns * 2 * self.doubt_ns() / self.span_ns:
+        if off == 0 or off > self.nominal_ns * 2 * self.uncertainty_ns() / self.span_ns:
             return free  # what the arrivals prove outweighs the nominal rate
         x0, y0 = min(self.hull, key=lambda point: point[1] - self.origin[1] - slope * (point[0] - self.origin[0]))
         return x0, y0, slope
@@ -226,7 +226,7 @@ class EnvelopeFit:
             return
         error = arrival_ns - line[1] - line[2] * (counter - line[0])
         period = now.frame_ns()
-        doubt = now.doubt_ns() * (1 + 2 * (arrival_ns - now.last[1]) / now.span_ns)
+        doubt = now.uncertainty_ns() * (1 + 2 * (arrival_ns - now.last[1]) / now.span_ns)
         if error < -max(EARLY_NS * self._rate, 2.5 * period) - DRIFT * (arrival_ns - now.last[1]) - doubt:
             self._begin([(counter, arrival_ns)])
         elif error > max(LATE_NS * self._rate, 0.6 * period) + doubt:
@@ -252,7 +252,7 @@ class EnvelopeFit:
         error = point[1] - line[1] - line[2] * (point[0] - line[0])
         if abs(error) > max(LATE_NS * self._rate, 0.6 * before.frame_ns()):
             return False
-        before.swallow(self._stretch)
+        before.merge(self._stretch)
         late, self._late = self._late, []
         for kept in (*late, point):
             before.add(kept)

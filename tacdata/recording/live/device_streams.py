@@ -75,7 +75,7 @@ class DeviceStreams(ABC):
         """Called with the error that ended a stream's thread."""
 
     @abstractmethod
-    def _spoke(self, name: str, count: int) -> None:
+    def _delivered(self, name: str, count: int) -> None:
         """Called when a stream has delivered ``count`` frames, images or reports."""
 
     def __enter__(self) -> DeviceStreams:
@@ -146,7 +146,7 @@ class DeviceStreams(ABC):
             try:
                 if count := read():
                     heard = time.monotonic()
-                    self._spoke(name, count)
+                    self._delivered(name, count)
                 elif time.monotonic() - heard > self.silence:
                     self._silent(name)
             except TacdataError as error:

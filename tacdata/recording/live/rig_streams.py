@@ -82,7 +82,7 @@ class RigStreams(DeviceStreams):
             self._on_fault()
             self._fault = error
 
-    def _spoke(self, name: str, count: int) -> None:
+    def _delivered(self, name: str, count: int) -> None:
         if name == BOARD:
             self.frames += count
 

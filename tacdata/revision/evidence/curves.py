@@ -43,26 +43,26 @@ class EpisodeCurves:
         """The channel in which the effects change most."""
         return int(np.argmax(np.square(self.after - self.before).mean(axis=0) / self.noise**2))
 
-    def off(self, said: np.ndarray) -> float:
+    def rms_error(self, predicted: np.ndarray) -> float:
         """Return the root mean square difference from the measurement [the source's unit]."""
-        return float(np.sqrt(np.mean(np.square(said - self.measured))))
+        return float(np.sqrt(np.mean(np.square(predicted - self.measured))))
 
 
 def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, most: int = 3) -> list[EpisodeCurves]:
     """Return the episodes in which the effects change most, largest change first."""
     after = held.after(placed)
-    before_said = held.said(held.before.response, [])
-    after_said = held.said(after.response, after.placed)
+    predicted_before = held.predicted(held.before.response, [])
+    predicted_after = held.predicted(after.response, after.placed)
     course, scale = held.course, held.frame.noise.scale[: held.course.channels]
-    change = np.square((after_said - before_said) / scale).mean(axis=1)
+    change = np.square((predicted_after - predicted_before) / scale).mean(axis=1)
     order = sorted(episodes.tolist(), key=lambda e: -float(change[course.episode == e].mean()))[:most]
     found = []
     for e in order:
         rows = np.flatnonzero((course.episode == e) & (course.averaged > 0))
         measured = course.readings[rows]
 
-        def level(said: np.ndarray, rows: np.ndarray = rows, measured: np.ndarray = measured) -> np.ndarray:
-            own = said[rows]
+        def level(predicted: np.ndarray, rows: np.ndarray = rows, measured: np.ndarray = measured) -> np.ndarray:
+            own = predicted[rows]
             return own + (measured - own).mean(axis=0)
 
         time = course.time[rows] - course.time[rows[0]]
@@ -72,8 +72,8 @@ def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, mos
                 time,
                 course.tip[rows, 2],
                 measured,
-                level(before_said),
-                level(after_said),
+                level(predicted_before),
+                level(predicted_after),
                 scale,
                 course.channel_names,
             )

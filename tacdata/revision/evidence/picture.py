@@ -67,8 +67,8 @@ def _residuals(axis: Any, shown: Sequence[EpisodeCurves]) -> None:
     at = 0.0
     for k, own in enumerate(shown):
         c = own.channel
-        for said, color, name in ((own.before, BEFORE, "before"), (own.after, AFTER, "after")):
-            wrong = (own.measured[:, c] - said[:, c]) / own.noise[c]
+        for predicted, color, name in ((own.before, BEFORE, "before"), (own.after, AFTER, "after")):
+            wrong = (own.measured[:, c] - predicted[:, c]) / own.noise[c]
             axis.plot(own.time + at, wrong, color=color, lw=1.0, label=name if k == 0 else None)
         at += float(own.time[-1]) + 0.5
     axis.set(title="what the model leaves, in the same episodes", xlabel="time [s]", ylabel="residual / noise")

@@ -29,7 +29,7 @@ def sealed_slices(held: Comparison, placed: Sequence[Placed], episodes: np.ndarr
     scale = noise.scale[: course.channels] / np.sqrt(max(1 - noise.memory**2, 0.02))
     after = held.after(placed)
     square = [
-        _squares(course, held.said(response, own)[held.course.read], scale)
+        _squares(course, held.predicted(response, own)[held.course.read], scale)
         for response, own in ((held.before.response, []), (after.response, after.placed))
     ]
     there = np.isin(course.episode, episodes)
@@ -57,8 +57,8 @@ def _parts(course: Course, there: np.ndarray) -> list[tuple[str, np.ndarray]]:
     return parts
 
 
-def _squares(course: Course, said: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    left = (course.readings - said) / scale
+def _squares(course: Course, predicted: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    left = (course.readings - predicted) / scale
     for number in np.unique(course.episode):
         own = course.episode == number
         left[own] -= np.nanmedian(left[own], axis=0)

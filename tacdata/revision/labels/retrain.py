@@ -134,14 +134,14 @@ class _Simulated:
 
     def __init__(self, held: Comparison) -> None:
         self._held = held
-        self._said: dict[int, np.ndarray] = {}
+        self._predicted: dict[int, np.ndarray] = {}
         self._names = list(held.course.names)
 
     def __call__(self, episode: Episode, placed: Sequence[Placed]) -> np.ndarray:
         course, key = self._held.course, id(placed)
-        if key not in self._said:
+        if key not in self._predicted:
             model = self._held.after(placed) if placed else self._held.before
-            self._said[key] = self._held.said(model.response, list(model.placed))
+            self._predicted[key] = self._held.predicted(model.response, list(model.placed))
         counts = episode.taxels.counts.astype(float).copy()
         seconds = (episode.taxels.sample_ns - episode.taxels.sample_ns[0]) * 1e-9
         rng = np.random.default_rng(int.from_bytes(hashlib.sha256(episode.path.name.encode()).digest()[:8]))
@@ -149,10 +149,10 @@ class _Simulated:
         rows = np.flatnonzero(course.episode == k)
         read = rows[course.averaged[rows] > 0]
         when = course.time[rows] - course.time[read[0]]
-        level = np.nanmedian(course.readings[read] - self._said[key][read], axis=0)
+        level = np.nanmedian(course.readings[read] - self._predicted[key][read], axis=0)
         noise = self._held.frame.noise.scale
         for c, number in enumerate(course.numbers or range(course.channels)):
-            said = np.interp(seconds, when, self._said[key][rows, c]) + level[c]
+            said = np.interp(seconds, when, self._predicted[key][rows, c]) + level[c]
             counts[:, number] = said + noise[c] * rng.normal(size=len(seconds))
         return counts
 

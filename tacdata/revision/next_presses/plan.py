@@ -21,7 +21,7 @@ from tacdata.chain import predict
 from tacdata.plans import Plan
 from tacdata.revision.comparison import Comparison
 from tacdata.revision.next_presses.rivals import Rival
-from tacdata.revision.next_presses.trial import CandidatePress, elsewhere, foretold, laid_out, trials
+from tacdata.revision.next_presses.trial import CandidatePress, elsewhere, laid_out, predicted_readings, trials
 
 PRESSES, REPEATS = 4, 3
 """Number of different presses, and repeats of each: the episode is the unit of all statistics."""
@@ -111,10 +111,10 @@ def _probabilities(found: list[Rival]) -> dict[str, float]:
 
 def _distances(held: Comparison, found: list[Rival], trial: CandidatePress) -> dict[tuple[str, str], float]:
     course, noise = held.course, held.frame.noise
-    given, said = list(held.setting.given), []
+    given, predicted = list(held.setting.given), []
     for rival in found:
-        _, signal = foretold(course, rival.model.response, [*given, *rival.placed], trial)
-        said.append(signal / noise.scale[: course.channels])
+        _, signal = predicted_readings(course, rival.model.response, [*given, *rival.placed], trial)
+        predicted.append(signal / noise.scale[: course.channels])
     own = laid_out(course, trial)
     slope = _slope(held, found[0], trial) / noise.scale[: course.channels]
     # Correlated noise is less informative: AR(1) noise of correlation m has (1 - m) / (1 + m) of the information on
@@ -123,7 +123,7 @@ def _distances(held: Comparison, found: list[Rival], trial: CandidatePress) -> d
     nats = {}
     for i, a in enumerate(found):
         for j in range(i + 1, len(found)):
-            apart = said[i] - said[j]
+            apart = predicted[i] - predicted[j]
             apart = apart - apart.mean(axis=0)
             share = (apart * slope).sum() / ((slope**2).sum() + JITTER**-2)
             left = apart - share * slope

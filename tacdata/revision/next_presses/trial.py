@@ -86,7 +86,7 @@ def trials(course: Course, plan: Plan) -> list[CandidatePress]:
     found = []
     for tool in range(len(course.tools)):
         own = np.unique(course.episode[course.tool == tool])
-        for site in _telling(course, own)[:PLACES]:
+        for site in _most_variable(course, own)[:PLACES]:
             here = [e for e in own if course.site[e] == site]
             rows = np.isin(course.episode, here)
             at = course.tip[rows][np.argmax(course.tip[rows, 2])]
@@ -104,7 +104,7 @@ def trials(course: Course, plan: Plan) -> list[CandidatePress]:
     return found
 
 
-def _telling(course: Course, episodes: np.ndarray) -> list[int]:
+def _most_variable(course: Course, episodes: np.ndarray) -> list[int]:
     """Return the places of some episodes, the most variable readings first."""
     spread = {}
     for e in episodes:
@@ -138,7 +138,7 @@ def laid_out(course: Course, trial: CandidatePress) -> Course:
     )  # fmt: skip
 
 
-def foretold(
+def predicted_readings(
     course: Course, response: Response, placed: Sequence[Placed], trial: CandidatePress
 ) -> tuple[Course, np.ndarray]:
     """Return the trial's course and its predicted readings, shape (rows, channels)."""

@@ -32,7 +32,7 @@ and G94 itself, but grblHAL scales and rotates G53 lines too."""
 class GrblSettings:
     """The controller's answers at opening."""
 
-    said: dict[str, str]
+    answers: dict[str, str]
     """Settings and start-up lines by name (``$110``, ``$N0``), other answers by tag (``VER``, ``G54``)."""
 
     @classmethod
@@ -42,17 +42,17 @@ class GrblSettings:
         Raises:
             DeviceError: If a question is refused or not answered.
         """
-        said: dict[str, str] = {}
+        answers: dict[str, str] = {}
         for question in questions:
             for pushed in link.command(question, timeout)[0]:
                 if line := STARTUP.match(pushed):
-                    said[pushed.partition("=")[0]] = line[1]
+                    answers[pushed.partition("=")[0]] = line[1]
                 elif setting := SETTING.match(pushed):
-                    said[setting[1]] = setting[2]
+                    answers[setting[1]] = setting[2]
                 elif message := MESSAGE.match(pushed):
-                    before = f"{said[message[1]]}; " if message[1] in said else ""
-                    said[message[1]] = before + message[2]
-        return cls(said)
+                    before = f"{answers[message[1]]}; " if message[1] in answers else ""
+                    answers[message[1]] = before + message[2]
+        return cls(answers)
 
     @property
     def unit(self) -> float:
@@ -67,7 +67,7 @@ class GrblSettings:
     @property
     def rx_bytes(self) -> int | None:
         """Size of the receive buffer by ``[OPT:codes,blocks,bytes...]`` [bytes]; None if it is not stated."""
-        parts = self.said.get("OPT", "").split(",")
+        parts = self.answers.get("OPT", "").split(",")
         return int(parts[2]) if len(parts) > 2 and parts[2].isdigit() else None
 
     @property
@@ -78,10 +78,10 @@ class GrblSettings:
     @property
     def work_offset(self) -> np.ndarray | None:
         """Work coordinate offset [report units], shape (3,): the active G54 to G59.3, G92 and the tool's length."""
-        active = re.search(r"G5\d(?:\.\d)?", self.said.get("GC", ""))
+        active = re.search(r"G5\d(?:\.\d)?", self.answers.get("GC", ""))
         try:
             parts = [self._triple(active[0] if active else "G54"), self._triple("G92")]
-            tool = [float(value) for value in self.said.get("TLO", "0").split(",")]
+            tool = [float(value) for value in self.answers.get("TLO", "0").split(",")]
         except (KeyError, ValueError):
             return None
         length = np.array(tool[:3]) if len(tool) >= 3 else np.array([0.0, 0.0, tool[0]])
@@ -90,9 +90,10 @@ class GrblSettings:
     @property
     def bent_by(self) -> tuple[str, ...]:
         """What bends coordinates, by its G word (`UNDONE_BY`)."""
-        words = [word for word in self.said.get("GC", "").split() if word in UNDONE_BY]
+        words = [word for word in self.answers.get("GC", "").split() if word in UNDONE_BY]
         for tag, word in (("G92", "G92"), ("TLO", "G43.1")):
-            if any(_numbers(self.said.get(tag, ""))) and not any(UNDONE_BY[w][0] == UNDONE_BY[word][0] for w in words):
+            already = any(UNDONE_BY[w][0] == UNDONE_BY[word][0] for w in words)
+            if any(_numbers(self.answers.get(tag, ""))) and not already:
                 words.append(word)
         return tuple(words)
 
@@ -106,9 +107,9 @@ class GrblSettings:
         length = np.array([self.number(f"$13{axis}") for axis in range(3)])
         if not self.number("$20") or not np.all(length > 0):
             return None
-        codes = self.said.get("OPT", "").partition(",")[0]
-        at_switch = "grblHAL" not in self.said.get("FIRMWARE", "") and "Z" in codes
-        at_switch = at_switch or ("grblHAL" in self.said.get("FIRMWARE", "") and bool(int(self.number("$22")) & 8))
+        codes = self.answers.get("OPT", "").partition(",")[0]
+        at_switch = "grblHAL" not in self.answers.get("FIRMWARE", "") and "Z" in codes
+        at_switch = at_switch or ("grblHAL" in self.answers.get("FIRMWARE", "") and bool(int(self.number("$22")) & 8))
         upwards = np.array([bool(int(self.number("$23")) >> axis & 1) for axis in range(3)]) & at_switch
         return np.where(upwards, 0.0, -length), np.where(upwards, length, 0.0)
 
@@ -133,7 +134,7 @@ class GrblSettings:
         Raises:
             DeviceError: Naming the line.
         """
-        for name, line in self.said.items():
+        for name, line in self.answers.items():
             if name.startswith("$N") and AXIS_WORD.search(line.upper()):
                 raise DeviceError(
                     f"the controller on {port} runs {line!r} at every reset ({name})",
@@ -159,12 +160,12 @@ class GrblSettings:
     def number(self, name: str) -> float:
         """Return a setting as a number; 0 if it is absent or no number."""
         try:
-            return float(self.said.get(name, ""))
+            return float(self.answers.get(name, ""))
         except ValueError:
             return 0.0
 
     def _triple(self, name: str) -> np.ndarray:
-        return np.array([float(value) for value in self.said[name].split(",")[:3]])
+        return np.array([float(value) for value in self.answers[name].split(",")[:3]])
 
 
 def _numbers(text: str) -> list[float]:
