@@ -26,6 +26,11 @@ def names(room: str, base: str) -> list[str]:
     return sorted(m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in (base, "__init__"))
 
 
+def folders(room: str) -> tuple[str, ...]:
+    """Return the folders in which a room's members lie. Append to the package's ``__path__`` to add one."""
+    return tuple(importlib.import_module(room).__path__)
+
+
 def load_module(room: str, base: str, name: str) -> ModuleType:
     """Import one member of a room.
 

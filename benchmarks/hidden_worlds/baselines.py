@@ -20,7 +20,7 @@ MOST = 4
 def answered(setting, method):
     """Return a verdict's least fields, what the model says with and without what was found, and CPU seconds."""
     from tacdata.chain import predict
-    from tacdata.discrepancy.noise.null_model import frame
+    from tacdata.discrepancy.noise.null_model import null_model
     from tacdata.discrepancy.search.problem import prepare
 
     course, begin = setting.course, time.process_time()
@@ -30,8 +30,8 @@ def answered(setting, method):
         after = before.signal.copy()
         after[rows] += _ridge(course, before.signal)
     elif method in ("lasso", "bic", "nominal"):
-        problem = prepare(setting, frame(setting))
-        gram = problem.evidence.of(np.arange(course.episodes))
+        problem = prepare(setting, null_model(setting))
+        gram = problem.grams.of(np.arange(course.episodes))
         chosen = {"lasso": _lasso, "bic": _bic, "nominal": _nominal}[method](problem, gram)
         placed = [c.placed(values, course.channels) for c, values in chosen]
         now = predict(course, setting.response, placed)
@@ -54,7 +54,7 @@ def answered(setting, method):
 
 def _least(problem):
     """Return one candidate a mechanism: the shapes that do best alone."""
-    from tacdata.discrepancy.search.screen import best_shapes
+    from tacdata.discrepancy.search.fits import best_shapes
 
     return list(best_shapes(problem).values())
 
@@ -81,7 +81,7 @@ def _shared(chosen, values):
 
 def _bic(problem, gram):
     chosen, best = [], 0.5 * gram[0, 0]
-    rows = float(problem.evidence.rows.sum())
+    rows = float(problem.grams.rows.sum())
     while len(chosen) < MOST:
         tried = []
         for c in _least(problem):
@@ -107,7 +107,7 @@ def _lasso(problem, gram):
     chosen = _least(problem)
     columns = np.concatenate([c.columns for c in chosen]) + 1
     scale = np.sqrt(np.maximum(np.diag(gram)[columns], 1e-12))
-    every = problem.evidence.gram
+    every = problem.grams.gram
     half = np.arange(len(every)) % 5
     top = np.abs(gram[columns, 0] / scale).max()
     path = top * np.geomspace(1, 1e-3, 16)

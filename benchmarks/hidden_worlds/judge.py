@@ -92,19 +92,22 @@ def spec_of(folder):
 def answered(folder, without=(), **switches):
     """Return the verdict's document, what the model says with and without what was found, and CPU seconds."""
     from tacdata.chain import predict
-    from tacdata.discrepancy.judge import judged
-    from tacdata.discrepancy.search.judge import judge
-    from tacdata.discrepancy.verdict import document
-    from tacdata.discrepancy.verdict.residual_slices import residual, slices
+    from tacdata.discrepancy.data.checks import check
+    from tacdata.discrepancy.judge import judge
+    from tacdata.discrepancy.search.find import find
+    from tacdata.discrepancy.verdict.decide import decide
+    from tacdata.discrepancy.verdict.document import document
+    from tacdata.discrepancy.verdict.residual_slices import slices
 
     course = course_of(dict(np.load(folder / "recordings.npz")))
     begin = time.process_time()
     if switches:
-        found = judge(setting_of(folder, course, without, **switches))
-        answer = document.document(found, slices(found.problem, residual(found.problem)), {})
+        setting = setting_of(folder, course, without, **switches)
+        found, checks = find(setting), check(setting)
+        answer = document(decide(found, checks), found, checks, (slices(found.problem), slices(found.final)), {})
     else:
-        done = judged(course, spec_of(folder), without=tuple(without))
-        found, answer = done.found, done.verdict
+        verdict = judge(course, spec_of(folder), without=tuple(without))
+        found, answer = verdict.found, verdict.document
     seconds = time.process_time() - begin
     after = predict(course, found.final.setting.response, list(found.final.placed))
     before = predict(course, found.problem.setting.response, [])

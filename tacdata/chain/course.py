@@ -65,6 +65,8 @@ class Course:
     """Recording that each episode is a stroke of, from 0, shape (episodes,), int64; None: each is its own."""
     numbers: tuple[int, ...] = ()
     """Each channel's number in the recordings; empty: none was left out."""
+    apart: bool = False
+    """Whether episodes are so far apart that nothing is remembered from one to the next, whatever the clock says."""
 
     @property
     def rows(self) -> int:
@@ -106,14 +108,9 @@ class Course:
 
     @cached_property
     def step(self) -> np.ndarray:
-        """Time since the row before [s], shape (n,); the first is 0."""
-        return np.diff(self.time, prepend=self.time[:1])
-
-    def forgetting(self) -> Self:
-        """Return the course with such rests before its episodes that nothing is remembered; clocks go on as they do."""
-        made = replace(self)
-        made.__dict__["step"] = np.where(self.first, FORGOTTEN, self.step)
-        return made
+        """Time since the row before [s], shape (n,); the first is 0, unless episodes are `apart`."""
+        step = np.diff(self.time, prepend=self.time[:1])
+        return np.where(self.first, FORGOTTEN, step) if self.apart else step
 
     @cached_property
     def first(self) -> np.ndarray:
@@ -170,7 +167,3 @@ class Course:
         chosen = np.zeros(self.episodes, dtype=bool)
         chosen[episodes] = True
         return chosen[self.episode]
-
-    def with_readings(self, readings: np.ndarray) -> Self:
-        """Return the same course with other readings, shape (n, channels)."""
-        return replace(self, readings=readings)

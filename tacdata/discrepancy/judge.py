@@ -1,4 +1,4 @@
-"""From recordings, read already, and a spec to a verdict: some episodes sealed, the others judged, the gap shown."""
+"""From recordings and a model to a verdict: the workflow, in one direction."""
 
 from __future__ import annotations
 
@@ -7,34 +7,47 @@ from dataclasses import dataclass
 from typing import Any
 
 from tacdata.chain import Course
+from tacdata.discrepancy.data.checks import DataChecks, check
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
-from tacdata.discrepancy.search.findings import Judgement
-from tacdata.discrepancy.search.judge import judge
-from tacdata.discrepancy.verdict import document
-from tacdata.discrepancy.verdict.residual_slices import Slice, residual, slices
+from tacdata.discrepancy.search.find import find
+from tacdata.discrepancy.search.findings import Findings
+from tacdata.discrepancy.verdict.decide import Decision, decide
+from tacdata.discrepancy.verdict.document import document
+from tacdata.discrepancy.verdict.residual_slices import Slice, slices
 from tacdata.discrepancy.verdict.sealed import chosen, gap, without_readings
 from tacdata.effects import library
 
 
 @dataclass(frozen=True)
-class Judged:
+class Verdict:
     """A verdict and what it rests on."""
 
-    verdict: dict[str, Any]
+    document: dict[str, Any]
     """As in the file (`schemas/verdict.schema.json`)."""
-    found: Judgement
+    checks: DataChecks
+    """What the recordings can carry."""
+    found: Findings
+    """What the search found."""
+    decision: Decision
+    """What may be said of it."""
     before: list[Slice]
-    """Where the residual lives, in the episodes that were not sealed."""
+    """Where the residual lives, in the episodes that were not sealed; empty where the gate was the last step."""
     after: list[Slice]
     """The same with the effects in place."""
 
 
-def judged(
+def judge(
     course: Course, spec: Spec, note: Callable[[str], None] = lambda text: None,
-    parents: dict[str, str] | None = None, without: tuple[str, ...] = (), until: str = "decide", decoys: bool = True,
-) -> Judged:  # fmt: skip
-    """Judge recordings.
+    parents: dict[str, str] | None = None, without: tuple[str, ...] = (), until: str = "decide", correct_p: bool = True,
+) -> Verdict:  # fmt: skip
+    """Judge recordings: which effect does the model lack?
+
+    1. Seal some episodes: their readings are not looked at.
+    2. Check the data: wiring, units, what is missing.
+    3. Find: regressors, noise, gate, race, elimination, rivals, leftovers (`tacdata.discrepancy.search.find`).
+    4. Decide: named, ambiguous, unknown or none.
+    5. Show the gap on the sealed episodes, and write it all down.
 
     Args:
         course: The recordings.
@@ -42,20 +55,27 @@ def judged(
         note: Is told what is being done.
         parents: Name to content hash of what is judged.
         without: Mechanisms that are not tried.
-        until: The last step to make (`tacdata.discrepancy.search.judge.STEPS`).
-        decoys: Whether effects race with copies of all whose scores are chance.
+        until: The last step to make (`tacdata.discrepancy.search.findings.STEPS`).
+        correct_p: Whether p-values are corrected for the number of effects tried.
 
     Raises:
         FormatError: If recordings and spec do not fit together.
     """
     sealed = chosen(course)
-    open_ = without_readings(course, sealed)
-    response, placed = spec.response(open_), spec.effects()
-    left_out = {p.effect.called for p in placed} | set(without)
-    effects = [e for e in library() if e.called not in left_out]
-    found = judge(Setting(open_, response, effects, spec.nuisance, placed, decoys), note, until)
+    setting = _setting(without_readings(course, sealed), spec, without, correct_p)
+    checks = check(setting)
+    found = find(setting, note, until)
+    decision = decide(found, checks)
     note("the gap on sealed episodes")
-    before, after = slices(found.problem, residual(found.problem)), slices(found.final, residual(found.final))
-    shown = gap(course, response, found, sealed)
-    answer = document.document(found, before, parents or {}, shown)
-    return Judged(answer, found, before, after)
+    shown = gap(course, found, sealed)
+    before, after = ([], []) if until == "gate" else (slices(found.problem), slices(found.final))
+    written = document(decision, found, checks, (before, after), parents or {}, shown)
+    return Verdict(written, checks, found, decision, before, after)
+
+
+def _setting(course: Course, spec: Spec, without: tuple[str, ...], correct_p: bool) -> Setting:
+    """Return what is judged: all effects are tried that the model has not."""
+    response, given = spec.response(course), spec.effects()
+    left_out = {p.effect.called for p in given} | set(without)
+    effects = [e for e in library() if e.called not in left_out]
+    return Setting(course, response, effects, spec.nuisance, given, correct_p)

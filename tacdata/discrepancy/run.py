@@ -10,13 +10,12 @@ from typing import Any
 
 from tacdata import documents, provenance
 from tacdata.discrepancy.data.recordings import course_of
-from tacdata.discrepancy.judge import judged
+from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.spec import Spec
-from tacdata.discrepancy.search.judge import STEPS
-from tacdata.discrepancy.verdict import decide, residual_table
+from tacdata.discrepancy.search.findings import STEPS
+from tacdata.discrepancy.verdict import residual_table
 from tacdata.discrepancy.verdict.before_and_after import beside_model
 from tacdata.discrepancy.verdict.picture import draw
-from tacdata.discrepancy.verdict.residual_slices import beside
 from tacdata.discrepancy.verdict.sealed import chosen
 from tacdata.discrepancy.verdict.text import in_text
 from tacdata.errors import UsageError
@@ -44,7 +43,7 @@ def run(
         spec: The model.
         out: Folder to create.
         note: Is told what is being done.
-        until: The last step to make (`tacdata.discrepancy.search.judge.STEPS`).
+        until: The last step to make (`tacdata.discrepancy.search.findings.STEPS`).
 
     Raises:
         UsageError: If ``out`` exists, or there is nothing to read.
@@ -60,21 +59,19 @@ def run(
     names = [path.name if called[path.name] == 1 else str(path) for path in paths]
     hashes = {f"recording {name}": recording_hash(path) for name, path in zip(names, paths, strict=True)}
     parents = {"spec": spec.content_hash, **hashes}
-    done = judged(course, spec, note, parents, until=until)
-    found = done.found
-    answer = {**done.verdict, "slices": beside(done.before, done.after)}
+    verdict = judge(course, spec, note, parents, until=until)
     out.mkdir(parents=True)
-    documents.write(out / VERDICT, answer, "verdict")
-    text = in_text(answer)
+    documents.write(out / VERDICT, verdict.document, "verdict")
+    text = in_text(verdict.document)
     documents.write_text(out / TEXT, text)
-    draw(found, done.before, done.after, answer, out / PICTURE)
-    told = beside_model(course, found, chosen(course))
-    residual_table.write(out / residual_table.FILE, told, provenance.content_hash(answer))
-    if answer["status"] == "named":
-        members = decide.members(found)
-        following = spec.with_effects([m.placed for m in members], [m.error for m in members], VERDICT)
+    draw(verdict.found, verdict.before, verdict.after, verdict.document, out / PICTURE)
+    residuals = beside_model(course, verdict.found, chosen(course))
+    residual_table.write(out / residual_table.FILE, residuals, provenance.content_hash(verdict.document))
+    if verdict.decision.status == "named":
+        effects = [e.finding for e in verdict.decision.effects]
+        following = spec.with_effects([f.placed for f in effects], [f.error for f in effects], VERDICT)
         documents.write(out / SPEC, following, "model_spec")
-    return Written(answer, text, out)
+    return Written(verdict.document, text, out)
 
 
 def recording_hash(path: Path) -> str:

@@ -1,5 +1,21 @@
 """Physical effects that a model of a sensor may lack, one a file."""
 
-from tacdata.effects.effect import BASE, ROOM, Effect, Parameter, Placed, library, load
+from tacdata.effects.effect import (
+    BASE,
+    ROOM,
+    AtRest,
+    Effect,
+    GainKind,
+    Growth,
+    LikeGain,
+    Parameter,
+    Placed,
+    Scale,
+    library,
+    load,
+)
 
-__all__ = ["BASE", "ROOM", "Effect", "Parameter", "Placed", "library", "load"]
+__all__ = [
+    "BASE", "ROOM", "AtRest", "Effect", "GainKind", "Growth", "LikeGain", "Parameter", "Placed", "Scale", "library",
+    "load",
+]  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import dead_band
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class Backlash(Effect):
@@ -26,6 +26,7 @@ class Backlash(Effect):
         "and indenter; a tag sees it"
     )
     parameters = (Parameter("b", "mm", "play", 0.03, 0.0, 0.6),)
+    at_rest = AtRest.STAYS
     seen_by_tag = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import slipping
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class BoucWen(Effect):
@@ -26,6 +26,7 @@ class BoucWen(Effect):
         Parameter("a", "1", "lost share of load while unloading", 0.08, -0.95, 0.95),
         Parameter("w", "1", "way by which it turns, over the deepest press", 0.12, 0.01, 2.0, grid=(0.04, 0.12, 0.35)),
     )
+    at_rest = AtRest.STAYS
     mechanism = "hysteresis"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

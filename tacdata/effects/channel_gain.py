@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, GainKind, Parameter
 
 
 class ChannelGain(Effect):
@@ -23,6 +23,7 @@ class ChannelGain(Effect):
     experiment = "uniform pressure, or presses between taxels: a gain follows the channel, inhomogeneity the place"
     form_error = 0.02
     parameters = (Parameter("e", "1", "relative excess of the channel", 0.1, -0.95, 3.0, per_channel=True),)
+    gain = GainKind.PER_CHANNEL
     by_channel = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -24,9 +24,14 @@ class ClockSkew(Effect):
     experiment = "an early and a late sync event"
     form_error = 0.02
     parameters = (Parameter("r", "s", "delay gained over all recordings", 0.1, -5.0, 5.0),)
+    follows_clock = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         course = state.course
         late = float(values["r"]) * (course.time / max(float(course.time[-1]), 1e-9) - 0.5)
         return replace(state, signal=delayed(state.signal, course.time, course.episode, late))
+
+    def remark(self, values: dict[str, np.ndarray]) -> str:
+        """Return what a skew says of the clocks."""
+        return "the clocks of path and readings run apart: record both on one clock, or a tap early and late"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class Creep(Effect):
@@ -29,6 +29,7 @@ class Creep(Effect):
         Parameter("f", "1", "late share", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time constant", 2.0, 0.05, 500.0, grid=(0.4, 1.0, 2.5, 6.0, 16.0, 60.0)),
     )
+    at_rest = AtRest.GOES_ON
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

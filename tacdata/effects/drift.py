@@ -24,6 +24,7 @@ class Drift(Effect):
     parameters = (
         Parameter("r", "largest rise", "drift of the channel over all recordings", 0.02, -5.0, 5.0, per_channel=True),
     )
+    follows_clock = True
     by_channel = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -4,6 +4,9 @@ A file ``tacdata/effects/my_effect.py`` defines one class derived from `Effect`:
 `apply` does it to a `State` at its stage. At every amplitude's default it must change nothing. A parameter with a
 ``grid`` is a shape (a time constant, a width): it is tried at those values and refined later; any other is an
 amplitude, in which the effect is nearly linear around 0.
+
+What an effect is to the search for a missing one is class data, too (its traits): whether presses of one rate can tell
+it, whether it follows the clock, what it is without a force reading. No other file names effects.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from __future__ import annotations
 import functools
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import ClassVar
 
 import numpy as np
@@ -43,6 +47,54 @@ class Parameter:
     """Values to try of a shape parameter; empty for an amplitude."""
     per_channel: bool = False
     """Whether every channel has its own."""
+
+
+class AtRest(StrEnum):
+    """What becomes of an effect while the tip stands still. Presses of one rate tell it by nothing else."""
+
+    CATCHES_UP = "catches up"
+    """It is over soon: a delay, a filter."""
+    STAYS = "stays"
+    """It stays as it is: play, friction."""
+    GOES_ON = "goes on"
+    """It goes on slowly: creep."""
+    RELAXES = "relaxes"
+    """It goes on, and a hold as long as its time constant shows it: relaxation."""
+
+
+class Growth(StrEnum):
+    """What an effect grows with. Evenly spaced presses do not tell one from the other."""
+
+    PRESSES = "presses"
+    """The number of presses at a place."""
+    TIME = "time"
+    """The time since the beginning."""
+
+
+class GainKind(StrEnum):
+    """Which gain of the readings an effect is: calibration reads it off."""
+
+    COMMON = "common"
+    """One for all channels."""
+    PER_CHANNEL = "per channel"
+    """One for each channel."""
+
+
+class LikeGain(StrEnum):
+    """How like a common gain an effect is where no force is read."""
+
+    EQUAL = "equal"
+    """It is the same: calibration takes it up."""
+    SIMILAR = "similar"
+    """It is nearly the same: a common gain is not named beside it."""
+
+
+class Scale(StrEnum):
+    """Whose lengths an effect stretches. Without a third length, one of the two is not told from the other."""
+
+    DRIVE = "drive"
+    OBSERVER = "observer"
+    """A camera's or a gauge's, known by its calibration."""
 
 
 class Effect(ABC):
@@ -78,6 +130,22 @@ class Effect(ABC):
     there is a physical reason."""
     mechanism: ClassVar[str] = ""
     """The name it shares with other functional forms of the same thing; empty: its own."""
+    at_rest: ClassVar[AtRest | None] = None
+    """For memory of the rate, which needs two rates of pressing or a hold to be told; the same for all forms."""
+    grows_with: ClassVar[Growth | None] = None
+    """For what grows from press to press; needs unevenly spaced presses to be told."""
+    follows_clock: ClassVar[bool] = False
+    """Whether it is told by how episodes follow each other: drifting offsets look like it."""
+    gain: ClassVar[GainKind | None] = None
+    """For a gain of the readings."""
+    like_gain: ClassVar[LikeGain | None] = None
+    """For what needs a force reading to be told from a common gain."""
+    scale: ClassVar[Scale | None] = None
+    """For a scale of lengths."""
+    changes_skin: ClassVar[bool] = False
+    """Whether labels are solved anew with another skin (`thickness_factor`)."""
+    each_episode: ClassVar[bool] = False
+    """Whether every episode has a small amount of its own, as errors of place: a nuisance beside other effects."""
 
     @property
     def name(self) -> str:
@@ -110,6 +178,22 @@ class Effect(ABC):
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         """Return in words why such recordings cannot tell of it at all; empty if they may."""
+        return ""
+
+    def time_constant(self, values: dict[str, np.ndarray]) -> float:
+        """Return how long a tip must stand until it is over [s]; 0 if it has no time constant."""
+        return max((float(np.max(values[p.name])) for p in self.parameters if p.unit == "s"), default=0.0)
+
+    def delay(self, values: dict[str, np.ndarray]) -> float:
+        """Return by how much readings come later than what they belong to [s]; 0 for most effects."""
+        return 0.0
+
+    def thickness_factor(self, values: dict[str, np.ndarray]) -> float:
+        """Return the skin's thickness over the nominal one [1]; 1 for most effects."""
+        return 1.0
+
+    def remark(self, values: dict[str, np.ndarray]) -> str:
+        """Return what finding it says of the recordings, with the remedy; empty for most effects."""
         return ""
 
 
@@ -146,7 +230,12 @@ def load(name: str) -> Effect:
     return kind()
 
 
-@functools.cache
 def library() -> tuple[Effect, ...]:
     """Return every modelled effect, by name."""
+    return _library(registry.folders(ROOM))
+
+
+@functools.cache
+def _library(folders: tuple[str, ...]) -> tuple[Effect, ...]:
+    """Return the effects of some folders, read once."""
     return tuple(load(name) for name in registry.names(ROOM, BASE))

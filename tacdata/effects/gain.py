@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, GainKind, Parameter
 
 
 class Gain(Effect):
@@ -23,6 +23,7 @@ class Gain(Effect):
     experiment = "a reference capacitor; force"
     form_error = 0.02
     parameters = (Parameter("e", "1", "relative excess", 0.1, -0.9, 3.0),)
+    gain = GainKind.COMMON
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

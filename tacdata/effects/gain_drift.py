@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Growth, Parameter
 
 
 class GainDrift(Effect):
@@ -22,6 +22,8 @@ class GainDrift(Effect):
     source = "standard form"
     experiment = "the same reference press through the session; a reference capacitor"
     parameters = (Parameter("k", "1", "relative change over all recordings", 0.05, -1.5, 1.5),)
+    follows_clock = True
+    grows_with = Growth.TIME
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 THRESHOLDS = (0.25, 0.6, 1.0)
 """Of the elements that slip, over the largest of them [1]: about as many at any."""
@@ -35,6 +35,7 @@ class HysteresisRead(Effect):
         Parameter("w", "1", "largest half band over the largest load", 0.2, 0.005, 2.0, grid=(0.06, 0.15, 0.4)),
         Parameter("m", "1", "power of load by which readings grow", 1.0, 0.3, 4.0, grid=(1.0, 1.7)),
     )
+    at_rest = AtRest.STAYS
     mechanism = "hysteresis"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

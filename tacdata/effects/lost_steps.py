@@ -35,6 +35,7 @@ class LostSteps(Effect):
             grid=tuple(0.05 * k for k in range(1, 20)),
         ),
     )
+    follows_clock = True
     seen_by_tag = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

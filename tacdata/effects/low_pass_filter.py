@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class LowPassFilter(Effect):
@@ -23,6 +23,7 @@ class LowPassFilter(Effect):
     source = "standard form"
     experiment = "edges: a filter rounds them, a delay keeps their shape; spectrum of noise without contact"
     parameters = (Parameter("tau", "s", "time constant", 0.05, 0.0, 2.0),)
+    at_rest = AtRest.CATCHES_UP
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, LikeGain, Parameter
 
 
 class Modulus(Effect):
@@ -22,6 +22,7 @@ class Modulus(Effect):
     source = "linear elasticity: loads scale with the modulus"
     experiment = "a load cell or a kitchen scale under one press; a Shore coupon of the same batch"
     parameters = (Parameter("e", "1", "relative excess of the modulus", 0.1, -0.8, 3.0),)
+    like_gain = LikeGain.EQUAL
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

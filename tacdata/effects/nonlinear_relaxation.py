@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class NonlinearRelaxation(Effect):
@@ -26,6 +26,7 @@ class NonlinearRelaxation(Effect):
         Parameter("f", "1", "relaxed share at the deepest depth", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time constant", 2.0, 0.05, 500.0, grid=(0.4, 2.5, 16.0, 60.0)),
     )
+    at_rest = AtRest.RELAXES
     mechanism = "relaxation"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

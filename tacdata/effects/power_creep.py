@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_passes
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class PowerCreep(Effect):
@@ -29,6 +29,7 @@ class PowerCreep(Effect):
         Parameter("f", "1", "relaxed share over the decades", 0.15, 0.0, 0.95),
         Parameter("tau0", "s", "shortest time constant", 0.1, 0.01, 10.0, grid=(0.05, 0.3, 2.0)),
     )
+    at_rest = AtRest.RELAXES
     mechanism = "relaxation"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

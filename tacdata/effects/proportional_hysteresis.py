@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class ProportionalHysteresis(Effect):
@@ -26,6 +26,7 @@ class ProportionalHysteresis(Effect):
         Parameter("a", "1", "lost share of load while unloading", 0.08, -0.95, 0.95),
         Parameter("w", "1", "half the turning width over the largest force", 0.1, 0.005, 1.0, grid=(0.02, 0.07, 0.2)),
     )
+    at_rest = AtRest.STAYS
     mechanism = "hysteresis"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

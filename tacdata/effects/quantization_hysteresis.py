@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class QuantizationHysteresis(Effect):
@@ -23,6 +23,7 @@ class QuantizationHysteresis(Effect):
     source = "play operator; comparators with hysteresis"
     experiment = "histogram of first differences; loops of any size have the same width in counts"
     parameters = (Parameter("w", "largest rise", "half the dead band", 0.02, 0.0, 0.3),)
+    at_rest = AtRest.STAYS
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class Relaxation(Effect):
@@ -30,6 +30,7 @@ class Relaxation(Effect):
         Parameter("f", "1", "relaxed share", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time constant", 2.0, 0.05, 500.0, grid=(0.15, 0.4, 1.0, 2.5, 6.0, 16.0, 40.0, 120.0)),
     )
+    at_rest = AtRest.RELAXES
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

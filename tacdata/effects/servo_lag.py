@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Parameter
 
 
 class ServoLag(Effect):
@@ -23,6 +23,7 @@ class ServoLag(Effect):
     source = "standard form"
     experiment = "other accelerations at the same speed; a tag sees it"
     parameters = (Parameter("tau", "s", "time constant", 0.05, 0.0, 1.0),)
+    at_rest = AtRest.CATCHES_UP
     seen_by_tag = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

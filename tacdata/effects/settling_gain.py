@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Growth, Parameter
 
 
 class SettlingGain(Effect):
@@ -25,6 +25,8 @@ class SettlingGain(Effect):
         Parameter("k", "1", "relative change since the first recording", 0.05, -1.5, 1.5),
         Parameter("tau", "s", "time constant", 600.0, 20.0, 20000.0, grid=(200.0, 1500.0)),
     )
+    follows_clock = True
+    grows_with = Growth.TIME
     mechanism = "gain_drift"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

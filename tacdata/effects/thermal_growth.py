@@ -25,6 +25,7 @@ class ThermalGrowth(Effect):
         Parameter("dz", "mm", "final growth", 0.05, -1.0, 1.0),
         Parameter("tau", "s", "time constant", 600.0, 60.0, 20000.0, grid=(200.0, 800.0, 3000.0)),
     )
+    follows_clock = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

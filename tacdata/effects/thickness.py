@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, LikeGain, Parameter
 
 STEP = 0.05
 """Half the step of differences to the side [mm]."""
@@ -38,12 +38,18 @@ class Thickness(Effect):
     )
     experiment = "calliper; a flat punch touching off at the sensor's corners; neighbours over centre against depth"
     parameters = (Parameter("e", "1", "relative excess of thickness", 0.06, -0.5, 0.5),)
+    like_gain = LikeGain.SIMILAR
+    changes_skin = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         ease = 1 - 0.5 * values["e"] * (1 + np.clip(state.depth / state.course.span, 0.0, 1.0))
         spread = np.exp(np.clip(-values["e"] * (2 + falls(state)), -1.0, 1.0))
         return replace(state, load=state.load * ease[:, None] * spread, force=state.force * ease)
+
+    def thickness_factor(self, values: dict[str, np.ndarray]) -> float:
+        """Return the skin's thickness over the nominal one [1]."""
+        return 1 + float(values["e"])
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         """Return why such recordings cannot tell of it; empty if they may."""

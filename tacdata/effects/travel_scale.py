@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Parameter, Scale
 
 
 class TravelScale(Effect):
@@ -23,6 +23,7 @@ class TravelScale(Effect):
     experiment = "gauge block or tag over a long travel"
     form_error = 0.02
     parameters = (Parameter("k", "1", "relative error of travel", 0.02, -0.3, 0.3),)
+    scale = Scale.DRIVE
     seen_by_tag = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

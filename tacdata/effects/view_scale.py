@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Parameter, Scale
 
 
 class ViewScale(Effect):
@@ -24,6 +24,7 @@ class ViewScale(Effect):
     form_error = 0.02
     seen_by_tag = True
     parameters = (Parameter("s", "1", "relative error of lengths seen", 0.01, -0.3, 0.3),)
+    scale = Scale.OBSERVER
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -25,6 +25,7 @@ class WarmUpDrift(Effect):
         Parameter("a", "largest rise", "at power-on", 0.02, -5.0, 5.0),
         Parameter("tau", "s", "time constant", 300.0, 20.0, 20000.0, grid=(60.0, 300.0, 1500.0)),
     )
+    follows_clock = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

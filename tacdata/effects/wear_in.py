@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Growth, Parameter
 
 
 class WearIn(Effect):
@@ -25,6 +25,7 @@ class WearIn(Effect):
         Parameter("a", "1", "lost share after many presses", 0.05, -0.9, 0.9),
         Parameter("n", "1", "presses until most is lost", 3.0, 0.3, 100.0, grid=(1.0, 5.0, 25.0)),
     )
+    grows_with = Growth.PRESSES
     mechanism = "softening"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -29,6 +29,7 @@ class XyOffset(Effect):
         Parameter("dx", "mm", "shift along x", 0.1, -2.0, 2.0),
         Parameter("dy", "mm", "shift along y", 0.1, -2.0, 2.0),
     )
+    each_episode = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -12,7 +12,7 @@ from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
-from tacdata.discrepancy.noise.null_model import Frame, frame
+from tacdata.discrepancy.noise.null_model import NullModel, null_model
 from tacdata.discrepancy.search.gauss_newton import Refined, corrected, refine
 from tacdata.discrepancy.verdict.sealed import without_readings
 from tacdata.effects import Placed
@@ -37,15 +37,15 @@ class Comparison:
         return Setting(self.course, self.spec.response(self.course), [], self.spec.nuisance, self.spec.effects())
 
     @cached_property
-    def frame(self) -> Frame:
+    def null(self) -> NullModel:
         """Noise and nuisance parameters, the same before and after."""
         response = corrected(self.setting, self.answer)
-        return frame(replace(self.setting, response=response, given=(*self.setting.given, *self.answer)))
+        return null_model(replace(self.setting, response=response, given=(*self.setting.given, *self.answer)))
 
     @cached_property
     def before(self) -> Refined:
         """The model without further effects."""
-        return refine(self.setting, [], self.frame)
+        return refine(self.setting, [], self.null)
 
     @cached_property
     def values(self) -> np.ndarray:
@@ -55,7 +55,7 @@ class Comparison:
 
     def after(self, placed: Sequence[Placed]) -> Refined:
         """Return the model with effects of fixed parameters; a fitted response takes up the rest."""
-        return refine(self.setting, placed, self.frame, steps=0)
+        return refine(self.setting, placed, self.null, steps=0)
 
     def fitted_without(self, placed: Sequence[Placed], left_out: np.ndarray) -> tuple[Placed, ...]:
         """Return effects with parameters fitted to all episodes except some.
@@ -71,7 +71,7 @@ class Comparison:
         setting = Comparison(course, self.spec).setting
         rows = ~np.isin(self.course.reduced.episode, left_out)
         left = None if course.episodes == self.course.episodes else kept
-        return refine(setting, placed, _frame_of(self.frame, course, rows, left), STEPS).placed
+        return refine(setting, placed, _frame_of(self.null, course, rows, left), STEPS).placed
 
     @cached_property
     def _contexts(self) -> np.ndarray:
@@ -88,7 +88,7 @@ class Comparison:
         return predict(self.course, response, [*self.setting.given, *placed]).signal
 
 
-def _frame_of(whole: Frame, course: Course, rows: np.ndarray, episodes: np.ndarray | None) -> Frame:
+def _frame_of(whole: NullModel, course: Course, rows: np.ndarray, episodes: np.ndarray | None) -> NullModel:
     """Return the null model restricted to some rows.
 
     Their weights are still estimated from all rows; their readings are not used.
@@ -99,7 +99,7 @@ def _frame_of(whole: Frame, course: Course, rows: np.ndarray, episodes: np.ndarr
         rows: Rows that are kept, shape (m,), bool.
         episodes: The remaining episodes, if they are renumbered.
     """
-    return Frame.of(
+    return NullModel.of(
         course.reduced, whole.context[rows], None if whole.features is None else whole.features[rows],
         whole.errors[rows], whole.ridge, whole.beside[rows], whole.noise.of(rows, episodes), whole.folds,
         sizes=whole.sizes, spread=whole.spread,

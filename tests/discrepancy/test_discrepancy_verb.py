@@ -62,7 +62,7 @@ def test_imported_recordings_are_judged_into_a_folder(session, tmp_path):
     assert written.text.startswith(answer["status"].upper())
     told = read(tmp_path / "verdict" / "residuals.parquet")
     assert told.streams == ("channel 0", "channel 1") and told.measured.shape == (answer["data"]["rows"], 2)
-    left = [float(np.mean(np.square(told.off(said)))) for said in (told.before, told.after)]
+    left = [float(np.mean(np.square(told.standardized(predicted)))) for predicted in (told.before, told.after)]
     assert left[1] < 0.1 * left[0] and left[1] < 3, "what is left is about the noise"
     slices = {(s["by"], s["name"]): s for s in answer["slices"]}
     assert slices["phase", "loading"]["before"] > 10 * slices["phase", "loading"]["after"]

@@ -9,9 +9,9 @@ from pressing import course
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.nuisances import FITTED_GAIN, jitter
-from tacdata.discrepancy.noise.null_model import frame
-from tacdata.discrepancy.search import screen
+from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.problem import prepare
+from tacdata.discrepancy.search.score_tests import score_tests
 from tacdata.effects import load
 
 CLOCKED = ("wear_in", "gain_drift", "thermal_growth", "lost_steps", "softening", "permanent_set")
@@ -28,7 +28,7 @@ def set_of(made, effects=CLOCKED, knots=None):
 
 def told(setting):
     """Return what was told [mm, 1]: depth and gain of an episode."""
-    prior, found = jitter(setting, setting.given), frame(setting).errors
+    prior, found = jitter(setting, setting.given), null_model(setting).errors
     sizes = np.linalg.norm(found, axis=(0, 1)) / np.linalg.norm(prior, axis=(0, 1))
     return sizes * [0.01 * setting.course.stroke, FITTED_GAIN]
 
@@ -45,7 +45,7 @@ def test_an_episodes_own_gain_and_depth_are_told(gain):
 def test_own_gains_are_no_effect():
     made = course(episodes=48)
     setting = set_of(scaled(made, 1 + 0.02 * np.random.default_rng(3).normal(size=48)))
-    tested = screen.test(prepare(setting, frame(setting)))
+    tested = score_tests(prepare(setting, null_model(setting)))
     assert tested.p.min() > 0.01 and tested.p_generic > 0.01
 
 
@@ -57,7 +57,7 @@ def test_strokes_of_a_recording_share_its_set_up():
     least = []
     for recording in (None, which):
         setting = set_of(replace(apart, recording=recording))
-        least.append(screen.test(prepare(setting, frame(setting))).p.min())
+        least.append(score_tests(prepare(setting, null_model(setting))).p.min())
     assert least[0] <= 0.01 < least[1]
 
 
@@ -68,5 +68,5 @@ def test_how_a_skin_is_first_touched_is_no_adhesion(knots, seen):
     depth = np.maximum(made.tip[:, 2:], 0.0)
     noise = 0.3 * np.random.default_rng(5).normal(size=made.readings.shape)
     setting = set_of(replace(made, readings=5000 + 800 * depth * [1.0, 0.5, 0.2] + noise), ("adhesion",), knots)
-    problem = prepare(setting, frame(setting))
-    assert (screen.test(problem).z.max() > 3.0) == seen
+    problem = prepare(setting, null_model(setting))
+    assert (score_tests(problem).z.max() > 3.0) == seen

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.data.identifiability import inseparable
-from tacdata.discrepancy.data.sufficiency import amiss, one_rate
+from tacdata.discrepancy.data.identifiability import lookalikes
+from tacdata.discrepancy.data.sufficiency import one_rate, shortcomings
 from tacdata.discrepancy.data.tip_motion import longest_hold, speeds, stairs
+from tacdata.effects import load
 
 
 def test_two_rates_of_pressing_are_told_from_one():
     assert one_rate(course(rates=(1.0,)))
     assert not one_rate(course(rates=(0.5, 2.0)))
-    assert inseparable(course(rates=(0.5, 2.0)), "backlash") == ()
-    assert "latency" in inseparable(course(rates=(1.0,)), "backlash")
+    assert lookalikes(course(rates=(0.5, 2.0)), load("backlash"), {}) == ()
+    assert "latency" in lookalikes(course(rates=(1.0,)), load("backlash"), {})
 
 
 def test_the_way_to_the_skin_does_not_count_as_pressing():
@@ -47,16 +48,17 @@ def test_a_hold_is_told_from_a_path_with_noise():
     assert np.array_equal(measured(held).dithers[:2], [0, 0]), "each axis has its own"
     for made in (held, measured(held)):
         assert longest_hold(made) == pytest.approx(1.5, abs=0.1)
-        assert not any("no hold" in words for words in amiss(made))
+        assert not any("no hold" in words for words in shortcomings(made))
     for made in (course(hold=0.3, episodes=8), measured(course(hold=0.3, episodes=8))):
         assert longest_hold(made) < 0.4
-        assert any("no hold" in words for words in amiss(made))
+        assert any("no hold" in words for words in shortcomings(made))
     slow = course(rates=(0.002,), hold=0.0, episodes=1)
     assert longest_hold(slow) == 0 == longest_hold(measured(slow)), "who presses slowly does not stand"
-    assert "relaxation" not in inseparable(measured(course(rates=(1.0,), hold=1.5)), "backlash")
-    assert "relaxation" in inseparable(measured(course(rates=(1.0,), hold=0.1)), "backlash")
+    assert "relaxation" not in lookalikes(measured(course(rates=(1.0,), hold=1.5)), load("backlash"), {})
+    assert "relaxation" in lookalikes(measured(course(rates=(1.0,), hold=0.1)), load("backlash"), {})
     held = measured(course(rates=(1.0,), hold=1.5))
-    assert inseparable(held, "relaxation", 0.5) == () and "hysteresis" in inseparable(held, "relaxation", 4.0)
+    assert lookalikes(held, load("relaxation"), {"tau": 0.5}) == ()
+    assert "hysteresis" in lookalikes(held, load("relaxation"), {"tau": 4.0})
 
 
 def stepped(pressing, letting_go, hold=2.0):
@@ -94,11 +96,11 @@ def test_presses_spaced_evenly_do_not_tell_what_they_do_from_what_time_does():
     one = replace(made, site=np.zeros(made.episodes, dtype=int))
     begins = 50.0 * np.arange(made.episodes)
     even = replace(one, time=one.time - one.time[first][one.episode] + begins[one.episode])
-    assert inseparable(even, "softening", form="wear_in") == ("gain_drift",)
-    assert inseparable(even, "softening", form="softening") == ()
-    assert inseparable(even, "gain_drift", form="settling_gain") == ("softening",)
+    assert lookalikes(even, load("wear_in"), {}) == ("gain_drift",)
+    assert lookalikes(even, load("softening"), {}) == ()
+    assert lookalikes(even, load("settling_gain"), {}) == ("softening",)
     rested = replace(even, time=even.time + 2000.0 * (even.episode >= made.episodes // 2))
-    assert inseparable(rested, "softening", form="wear_in") == ()
+    assert lookalikes(rested, load("wear_in"), {}) == ()
 
 
 def staircase(stop):
@@ -121,8 +123,8 @@ def staircase(stop):
 def test_a_staircase_of_one_rate_tells_what_stays_from_what_catches_up():
     long, short = staircase(1.2), staircase(0.6)
     assert stairs(long) and stairs(short) and not stairs(course()) and not stairs(staircase(0.2))
-    assert inseparable(long, "hysteresis") == ()
-    assert set(inseparable(short, "hysteresis")) == {"creep", "relaxation"}
-    assert set(inseparable(long, "latency")) == {"low_pass_filter", "servo_lag"}
-    assert inseparable(long, "relaxation", 0.5) == ()
-    assert "hysteresis" in inseparable(long, "relaxation", 6.0)
+    assert lookalikes(long, load("hysteresis"), {}) == ()
+    assert set(lookalikes(short, load("hysteresis"), {})) == {"creep", "relaxation"}
+    assert set(lookalikes(long, load("latency"), {})) == {"low_pass_filter", "servo_lag"}
+    assert lookalikes(long, load("relaxation"), {"tau": 0.5}) == ()
+    assert "hysteresis" in lookalikes(long, load("relaxation"), {"tau": 6.0})

@@ -10,8 +10,8 @@ from tacdata.chain import predict
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, Sizes
-from tacdata.discrepancy.noise.null_model import as_large, frame
+from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, ErrorSizes
+from tacdata.discrepancy.noise.null_model import as_large, null_model
 from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.effects import Placed, load
 
@@ -110,11 +110,11 @@ def test_a_fitted_response_that_is_corrected_leaves_as_much(name, monkeypatch):
     """What splines can take up counts nowhere: a model's energy hardly depends on how far they have."""
     made = course(relaxed=0.1)
     setting = Setting(made, FittedResponse(made), [])
-    same, model = frame(setting), [placed(name, 0.3)]
-    bare = refine(setting, [], same, steps=0).energy.sum()
-    told = [refine(setting, model, same, steps=0).energy.sum()]
+    null, model = null_model(setting), [placed(name, 0.3)]
+    bare = refine(setting, [], null, steps=0).energy.sum()
+    told = [refine(setting, model, null, steps=0).energy.sum()]
     monkeypatch.setattr(FittedResponse, "correct", lambda *_: None)
-    told.append(refine(setting, model, same, steps=0).energy.sum())
+    told.append(refine(setting, model, null, steps=0).energy.sum())
     assert told[0] < 0.95 * bare
     assert told[0] == pytest.approx(told[1], abs=1e-3 * bare)
 
@@ -150,12 +150,12 @@ def test_an_effect_on_gains_is_allowed_no_other_errors_of_gain():
     """Where readings rise by half again, so would what one standard deviation of an own gain changes: it must not."""
     made = course(episodes=12)
     setting = Setting(made, FittedResponse(made), [])
-    same = frame(setting)
-    swing, errors = same.noise.swing, same.errors
-    assert swing is not None
+    null = null_model(setting)
+    gain_error, errors = null.noise.gain_error, null.errors
+    assert gain_error is not None
     episode = made.reduced.episode
     bent = (1 + made.reduced.tip[:, 2] + 0.5 * (episode > 5))[:, None]
-    for told in (swing, errors):
+    for told in (gain_error, errors):
         now = as_large(told * (bent if told.ndim == 2 else bent[:, :, None]), told, episode)
         assert not np.allclose(now, told)
         for k in range(made.episodes):
@@ -169,11 +169,12 @@ def test_errors_of_an_episode_hold_no_effect_of_another_model(monkeypatch):
     """Beside large errors of gain a model without relaxation must not take it for every episode's own error."""
     made = course(relaxed=0.15, hold=4.0, pulls=False)
     setting, effect = Setting(made, FittedResponse(made), []), load("relaxation_read")
-    monkeypatch.setattr(EpisodeErrors, "poses", lambda *_: Sizes(np.array([1.0, 10.0]), np.zeros(0, dtype=np.int64)))
-    first = frame(setting)
+    sizes = ErrorSizes(np.array([1.0, 10.0]), np.zeros(0, dtype=np.int64))
+    monkeypatch.setattr(EpisodeErrors, "poses", lambda *_: sizes)
+    first = null_model(setting)
     start = Placed(effect, {"f": np.array(0.1), "tau": np.array(2.0), "m": np.array(1.0)})
     model = refine(setting, [start], first)
-    again = frame(replace(setting, response=model.response, given=model.placed))
-    left = [refine(setting, [], same, steps=0).energy.sum() for same in (first, again)]
+    again = null_model(replace(setting, response=model.response, given=model.placed))
+    left = [refine(setting, [], null, steps=0).energy.sum() for null in (first, again)]
     assert model.energy.sum() < 0.2 * left[0]
     assert left[1] > 0.5 * left[0]

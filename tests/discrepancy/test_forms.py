@@ -10,10 +10,10 @@ from tacdata.chain import predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.null_model import frame
-from tacdata.discrepancy.regressors.model_error import forms, modulations, variants
-from tacdata.discrepancy.search import screen
+from tacdata.discrepancy.noise.null_model import null_model
+from tacdata.discrepancy.regressors.model_error import model_error_columns, modulations, variants
 from tacdata.discrepancy.search.problem import prepare
+from tacdata.discrepancy.search.score_tests import score_tests
 from tacdata.effects import Placed, load
 
 
@@ -36,10 +36,10 @@ def test_modulations_are_of_size_one_and_leave_the_contribution_itself(pressed):
 
 def test_columns_are_a_share_of_each_effect(pressed):
     made, response, late = pressed
-    assert forms(made, response, []).shape[2] == 0
-    one = forms(made, response, [late])
+    assert model_error_columns(made, response, []).shape[2] == 0
+    one = model_error_columns(made, response, [late])
     assert one.shape == (len(made.read), 3, 5 + 4), "modulations, and delays of other sizes"
-    twice = forms(made, response, [replace(late, values={"L": np.array(0.1)})])
+    twice = model_error_columns(made, response, [replace(late, values={"L": np.array(0.1)})])
     size = np.linalg.norm(twice, axis=(0, 1)) / np.linalg.norm(one, axis=(0, 1))
     assert np.all((size > 1.7) & (size < 2.1))
 
@@ -52,7 +52,7 @@ def test_a_clock_is_known_better_than_a_law_of_a_material(pressed):
         given = {p.name: np.array(p.default + p.typical) for p in effect.parameters} | value
         placed = Placed(effect, given)
         own = streams.predicted(predict(made, response, [placed])) - streams.predicted(predict(made, response, []))
-        by = np.linalg.norm(forms(made, response, [placed])[:, :, :5], axis=(0, 1)) / np.linalg.norm(own)
+        by = np.linalg.norm(model_error_columns(made, response, [placed])[:, :, :5], axis=(0, 1)) / np.linalg.norm(own)
         assert by == pytest.approx(np.full(5, share), rel=1e-3)
 
 
@@ -90,9 +90,9 @@ def test_what_a_wrong_form_leaves_is_no_second_effect(pressed, monkeypatch):
     wrong = replace(made, readings=readings)
     few = [load(name) for name in ("backlash", "relaxation", "proportional_hysteresis", "creep")]
     setting = Setting(wrong, response, few)
-    problem = prepare(setting, frame(replace(setting, given=(late,))), [late])
-    slack = screen.test(problem)
-    bare = screen.test(replace(problem, forms=np.zeros(0, dtype=int)))
+    problem = prepare(setting, null_model(replace(setting, given=(late,))), [late])
+    slack = score_tests(problem)
+    bare = score_tests(replace(problem, model_errors=np.zeros(0, dtype=int)))
     assert bare.gain.max() > 20
     assert slack.gain.max() < 0.3 * bare.gain.max()
 
@@ -112,9 +112,9 @@ def test_a_spectrum_of_time_constants_is_no_second_memory():
     readings[made.read] += apart[:, : made.channels]
     few = [load(name) for name in ("backlash", "creep", "baseline_tracking", "proportional_hysteresis")]
     setting = Setting(replace(made, readings=readings), response, few)
-    problem = prepare(setting, frame(replace(setting, given=(one,))), [one])
-    narrow = screen.test(replace(problem, forms=problem.forms[:5]))
-    spread = screen.test(problem)
+    problem = prepare(setting, null_model(replace(setting, given=(one,))), [one])
+    narrow = score_tests(replace(problem, model_errors=problem.model_errors[:5]))
+    spread = score_tests(problem)
     assert narrow.gain.max() > 20
     assert spread.gain.max() < 0.1 * narrow.gain.max()
 

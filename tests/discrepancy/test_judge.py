@@ -1,6 +1,6 @@
 """What is missing is named when it can be, and only then."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,13 +8,19 @@ import pytest
 from pressing import course
 
 from tacdata import documents
-from tacdata.discrepancy.data.sufficiency import amiss
+from tacdata.discrepancy.data.checks import DataChecks, check
+from tacdata.discrepancy.data.sufficiency import shortcomings
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.search.findings import Member
-from tacdata.discrepancy.search.judge import _without_minor, judge, out
-from tacdata.discrepancy.verdict import decide, document
-from tacdata.discrepancy.verdict.residual_slices import residual, slices
+from tacdata.discrepancy.search.find import find
+from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.race import without_minor
+from tacdata.discrepancy.search.rivals import required_margin
+from tacdata.discrepancy.verdict.calibration import BEYOND, gains_beyond_calibration
+from tacdata.discrepancy.verdict.decide import Decision, adequate, decide, settled
+from tacdata.discrepancy.verdict.document import document
+from tacdata.discrepancy.verdict.reasons import reason_in_words
+from tacdata.discrepancy.verdict.residual_slices import slices
 from tacdata.discrepancy.verdict.text import in_text
 from tacdata.effects import load
 
@@ -22,40 +28,56 @@ FEW = ("latency", "low_pass_filter", "relaxation", "backlash", "proportional_hys
 """Effects raced in these tests: enough to be confused, few enough to be quick."""
 
 
-def found(effects=FEW, **world):
-    made = course(**world)
-    return judge(Setting(made, FittedResponse(made), [load(name) for name in effects]))
+@dataclass(frozen=True)
+class Judged:
+    """What was found in presses, and what may be said of it."""
+
+    found: Findings
+    checks: DataChecks
+    decision: Decision
+
+    @property
+    def names(self):
+        return {e.finding.placed.effect.called for e in self.decision.effects}
+
+    @property
+    def written(self):
+        sliced = slices(self.found.problem), slices(self.found.final)
+        return document(self.decision, self.found, self.checks, sliced, {})
 
 
-def names(answer):
-    return {m.placed.effect.called for m in decide.members(answer)}
+def judged(effects=FEW, made=None, **world):
+    made = course(**world) if made is None else made
+    setting = Setting(made, FittedResponse(made), [load(name) for name in effects])
+    found, checks = find(setting), check(setting)
+    return Judged(found, checks, decide(found, checks))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_nothing_missing_is_none(seed):
-    assert decide.status(found(seed=seed)) == "none"
+    assert judged(seed=seed).decision.status == "none"
 
 
 def test_a_delay_is_named_and_measured():
-    answer = found(delay=0.05)
-    assert decide.status(answer) == "named"
-    assert names(answer) == {"latency"}
-    assert answer.members[0].placed.values["L"] == pytest.approx(0.05, abs=0.006)
+    answer = judged(delay=0.05)
+    assert answer.decision.status == "named"
+    assert answer.names == {"latency"}
+    assert answer.found.effects[0].placed.values["L"] == pytest.approx(0.05, abs=0.006)
 
 
 def test_relaxation_is_named_and_measured():
-    answer = found(relaxed=0.15, hold=4.0)
-    assert names(answer) == {"relaxation"}
-    assert decide.status(answer) == "named"
-    assert answer.members[0].placed.values["f"] == pytest.approx(0.15, rel=0.2)
+    answer = judged(relaxed=0.15, hold=4.0)
+    assert answer.names == {"relaxation"}
+    assert answer.decision.status == "named"
+    assert answer.found.effects[0].placed.values["f"] == pytest.approx(0.15, rel=0.2)
 
 
 @pytest.mark.parametrize("power", [1.0, 0.67])
 def test_relaxation_of_a_skin_that_the_tool_leaves_is_named_and_measured(power):
     """A free tool cannot pull, and readings need not be linear in load."""
-    answer = found(effects=(*FEW, "relaxation_read"), relaxed=0.15, hold=4.0, pulls=False, power=power)
-    assert names(answer) == {"relaxation"} and decide.status(answer) == "named"
-    placed = answer.members[0].placed
+    answer = judged(effects=(*FEW, "relaxation_read"), relaxed=0.15, hold=4.0, pulls=False, power=power)
+    assert answer.names == {"relaxation"} and answer.decision.status == "named"
+    placed = answer.found.effects[0].placed
     assert placed.effect.name == "relaxation_read"
     assert placed.values["f"] == pytest.approx(0.15, rel=0.1)
     assert placed.values["m"] == pytest.approx(power, abs=0.1)
@@ -64,28 +86,27 @@ def test_relaxation_of_a_skin_that_the_tool_leaves_is_named_and_measured(power):
 @pytest.mark.parametrize("power", [1.0, 1.5])
 def test_friction_of_a_skin_that_forgets_it_in_the_air_is_named(power):
     """Elements that slip beyond three loads, whatever the rate; readings need not be linear in load."""
-    answer = found(effects=(*FEW, "hysteresis", "hysteresis_read", "relaxation_read"), friction=0.2, power=power)
-    assert names(answer) == {"hysteresis"} and decide.status(answer) == "named"
+    answer = judged(effects=(*FEW, "hysteresis", "hysteresis_read", "relaxation_read"), friction=0.2, power=power)
+    assert answer.names == {"hysteresis"} and answer.decision.status == "named"
     # A power of load is told from friction in load: the form that has none fits far worse.
-    assert power == 1.0 or answer.members[0].placed.effect.name == "hysteresis_read"
+    assert power == 1.0 or answer.found.effects[0].placed.effect.name == "hysteresis_read"
 
 
 def test_one_rate_names_no_lag():
-    answer = found(delay=0.05, rates=(1.0,))
-    assert decide.status(answer) in ("ambiguous", "unknown")
-    assert "backlash" in decide.members(answer)[0].rivals
+    answer = judged(delay=0.05, rates=(1.0,))
+    assert answer.decision.status in ("ambiguous", "unknown")
+    assert "backlash" in answer.decision.effects[0].finding.rivals
 
 
 def test_an_effect_that_no_file_holds_is_not_named():
-    answer = found(effects=("drift", "backlash"), relaxed=0.2, hold=4.0)
-    assert answer.gap
-    assert decide.status(answer) != "named"
+    answer = judged(effects=("drift", "backlash"), relaxed=0.2, hold=4.0)
+    assert answer.found.gap
+    assert answer.decision.status != "named"
 
 
 def test_a_verdict_fits_its_schema_and_says_what_cannot_be_judged():
-    answer = found(effects=("latency", "gain", "backlash"), episodes=12, delay=0.05)
-    sliced = slices(answer.problem, residual(answer.problem))
-    written = document.document(answer, sliced, {})
+    answer = judged(effects=("latency", "gain", "backlash"), episodes=12, delay=0.05)
+    written = answer.written
     documents.check(written, "verdict", "verdict")
     assert "gain" in written["unjudgeable"]
     assert written["limits"]["latency"] is not None
@@ -98,29 +119,30 @@ def test_two_presses_unlike_all_others_are_no_effect_and_not_nothing():
     odd = np.isin(made.episode, (0, 1))
     readings[odd] = 5000 + 0.7 * (readings[odd] - 5000)
     wrong = replace(made, readings=readings)
-    answer = judge(Setting(wrong, FittedResponse(wrong), [load(name) for name in FEW]))
-    assert decide.status(answer) == "unknown"
-    told = document.why("unknown", answer, decide.members(answer), wrong)
-    assert answer.gap or "press 0, press 1" in told
+    answer = judged(made=wrong)
+    assert answer.decision.status == "unknown"
+    words = reason_in_words(answer.decision, answer.found, answer.checks)
+    assert answer.found.gap or "press 0, press 1" in words
 
 
 @pytest.mark.parametrize(("gain", "named"), [(0.14, None), (0.18, "named")])
 def test_a_channel_is_named_by_what_calibration_leaves_open(gain, named):
     """It was chosen among channels, not among all effects: three standard deviations of the prior are its bar."""
     gains = np.array([gain, -gain, *np.tile([0.12, -0.12], 11)])
-    setting = SimpleNamespace(nuisance={"channel_gain": 0.05}, course=SimpleNamespace(force=None))
-    made = decide.calibrated(SimpleNamespace(gains=gains, problem=SimpleNamespace(setting=setting)))
-    assert [decide.settled(m) for m in made] == ([named] if named else [])
-    assert all(m.needed == decide.BEYOND for m in made)
+    prior, own = {"channel_gain": 0.05}, load("channel_gain")
+    setting = SimpleNamespace(nuisance=prior, channel_gain=own, course=SimpleNamespace(force=None))
+    made = gains_beyond_calibration(SimpleNamespace(gains=gains, problem=SimpleNamespace(setting=setting)))
+    assert [settled(m) for m in made] == ([named] if named else [])
+    assert all(m.needed == BEYOND for m in made)
 
 
 @pytest.mark.parametrize(
-    ("necessity", "decoys", "named"),
+    ("necessity", "p", "named"),
     [(2.9, None, False), (3.1, None, True), (2.9, 0.002, True), (2.9, 0.004, False), (4, 0.04, True), (9, 0.06, False)],
 )
-def test_what_did_not_race_is_named_by_its_necessity_alone(necessity, decoys, named):
-    member = Member(None, {}, (), (), {}, necessity, decoys=decoys, needed=decide.BEYOND)
-    assert (decide.settled(member) == "named") == named
+def test_what_did_not_race_is_named_by_its_necessity_alone(necessity, p, named):
+    one = Finding(None, {}, (), (), {}, necessity, corrected_p=p, needed=BEYOND)
+    assert (settled(one) == "named") == named
 
 
 @pytest.mark.parametrize(
@@ -129,23 +151,22 @@ def test_what_did_not_race_is_named_by_its_necessity_alone(necessity, decoys, na
 )
 def test_a_single_effect_may_leave_more_where_every_rival_leaves_twice_as_much(share, rival, others, enough):
     left = SimpleNamespace(gain=10.0, t=4.0)
-    one = Member(None, {}, (), (), {}, 9.0, losses={"creep": rival})
-    told = decide.adequate(SimpleNamespace(left=left, share_left=share), [one] * (1 + others))
-    assert told == enough
+    one = Finding(None, {}, (), (), {}, 9.0, losses={"creep": rival})
+    assert adequate(SimpleNamespace(left=left, share_left=share), [one] * (1 + others)) == enough
 
 
 def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():
     common, rare = load("relaxation"), load("poroelasticity")
-    alike = out(common, load("creep"))
-    assert out(common, rare) < alike < out(rare, common)
-    assert out(common, rare) >= 1, "the episodes must be on its side, however rare the other is"
+    alike = required_margin(common, load("creep"))
+    assert required_margin(common, rare) < alike < required_margin(rare, common)
+    assert required_margin(common, rare) >= 1, "the episodes must be on its side, however rare the other is"
     # A standard error squared is two nats of likelihood: what is left of odds is the same.
-    assert np.exp(-(out(rare, common) ** 2) / 2) / rare.odds == pytest.approx(np.exp(-(alike**2) / 2))
+    assert np.exp(-(required_margin(rare, common) ** 2) / 2) / rare.odds == pytest.approx(np.exp(-(alike**2) / 2))
 
 
 def test_few_episodes_carry_no_verdict():
-    answer = found(effects=("latency", "backlash"), episodes=5, delay=0.05)
-    written = document.document(answer, [], {})
+    answer = judged(effects=("latency", "backlash"), episodes=5, delay=0.05)
+    written = answer.written
     assert written["status"] == "unknown"
     assert "5 episodes" in written["why"]
     assert {e["status"] for e in written["effects"]} <= {"suspected"}, "no name by the back door"
@@ -161,19 +182,19 @@ def test_a_fitted_response_cannot_learn_history():
 def test_what_is_of_another_unit_or_stuck_is_said():
     made = course(episodes=12)
     metres = replace(made, tip=made.tip / 1000)
-    assert any("is the depth in mm" in words for words in amiss(metres))
+    assert any("is the depth in mm" in words for words in shortcomings(metres))
     readings = made.readings.copy()
     readings[made.episode % 3 == 0, 1] = 5000
-    assert any("channel 1" in words and "stuck" in words for words in amiss(made.with_readings(readings)))
-    assert not any("stuck" in words or "in mm" in words for words in amiss(made))
+    assert any("channel 1" in words and "stuck" in words for words in shortcomings(replace(made, readings=readings)))
+    assert not any("stuck" in words or "in mm" in words for words in shortcomings(made))
 
 
 def test_what_one_rate_cannot_split_is_a_set_and_no_pair():
     effects = (*FEW, "servo_lag")
-    answer = found(effects=effects, rates=(1.0,), play=0.05, delay=0.1)
-    assert decide.status(answer) == "ambiguous" and len(answer.members) == 1
-    assert {"latency", "backlash"} <= {answer.members[0].placed.effect.called, *decide.members(answer)[0].rivals}
-    assert names(found(effects=effects, play=0.05, delay=0.1)) == {"latency", "backlash"}, "two rates split them"
+    answer = judged(effects=effects, rates=(1.0,), play=0.05, delay=0.1)
+    assert answer.decision.status == "ambiguous" and len(answer.found.effects) == 1
+    assert {"latency", "backlash"} <= {*answer.names, *answer.decision.effects[0].finding.rivals}
+    assert judged(effects=effects, play=0.05, delay=0.1).names == {"latency", "backlash"}, "two rates split them"
 
 
 def test_a_pairs_second_effect_is_held_to_what_the_firsts_equation_may_be_off_about():
@@ -182,16 +203,16 @@ def test_a_pairs_second_effect_is_held_to_what_the_firsts_equation_may_be_off_ab
     Three times as far where both are of one ambiguity group: 3.4 %.
     """
 
-    def refined(loss, *effects):
+    def model(loss, *effects):
         placed = [SimpleNamespace(effect=load(name)) for name in effects]
         return SimpleNamespace(loss=loss, placed=placed, response=SimpleNamespace(form_error=0.15))
 
-    nothing, alone = refined(1000.0), refined(500.0, "relaxation")
-    slight, sound = (refined(loss, "relaxation", "backlash") for loss in (496.0, 490.0))
-    assert _without_minor([slight, alone], nothing) is alone
-    assert _without_minor([sound, alone], nothing) is sound
-    assert _without_minor([alone], nothing) is alone
-    friction = refined(500.0, "hysteresis")
-    kin, sure = (refined(loss, "hysteresis", "backlash") for loss in (485.0, 480.0))
-    assert _without_minor([kin, friction], nothing) is friction
-    assert _without_minor([sure, friction], nothing) is sure
+    nothing, alone = model(1000.0), model(500.0, "relaxation")
+    slight, sound = (model(loss, "relaxation", "backlash") for loss in (496.0, 490.0))
+    assert without_minor([slight, alone], nothing) is alone
+    assert without_minor([sound, alone], nothing) is sound
+    assert without_minor([alone], nothing) is alone
+    friction = model(500.0, "hysteresis")
+    kin, sure = (model(loss, "hysteresis", "backlash") for loss in (485.0, 480.0))
+    assert without_minor([kin, friction], nothing) is friction
+    assert without_minor([sure, friction], nothing) is sure

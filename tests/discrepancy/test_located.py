@@ -6,7 +6,7 @@ import numpy as np
 from pressing import course
 
 from tacdata.discrepancy.data.clocks import shifted
-from tacdata.discrepancy.judge import judged
+from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.verdict.residual_slices import outstanding
 
@@ -26,9 +26,9 @@ def test_a_gauge_of_the_depth_alone_is_judged_with():
     """Its x and y are never seen: no noise of theirs can be told."""
     own = course(delay=0.05, episodes=12)
     tag = own.tip + np.array([np.nan, np.nan, 0.0]) + 0.002 * np.random.default_rng(1).normal(size=own.tip.shape)
-    made = judged(replace(own, tag=tag), read_spec(None), until="fit")
-    assert {m.placed.effect.name for m in made.found.members} & {"latency", "low_pass_filter"}
-    assert np.isfinite(made.found.problem.frame.noise.scale).all()
+    made = judge(replace(own, tag=tag), read_spec(None), until="fit")
+    assert {m.placed.effect.name for m in made.found.effects} & {"latency", "low_pass_filter"}
+    assert np.isfinite(made.found.problem.null.noise.scale).all()
 
 
 def test_clocks_that_were_not_one_are_told_of_with_what_to_do():
@@ -39,11 +39,11 @@ def test_clocks_that_were_not_one_are_told_of_with_what_to_do():
 
 
 def test_one_press_alone_is_answered_in_words():
-    made = judged(course(episodes=1), read_spec(None))
-    assert made.verdict["status"] == "unknown" and "1 episodes cannot carry" in made.verdict["why"]
+    made = judge(course(episodes=1), read_spec(None))
+    assert made.document["status"] == "unknown" and "1 episodes cannot carry" in made.document["why"]
 
 
 def test_units_that_cannot_be_right_give_no_name():
     own = course(delay=0.05, episodes=12)
-    made = judged(replace(own, tip=own.tip * 1e-3), read_spec(None), until="fit")
-    assert made.verdict["status"] == "unknown" and "is the depth in mm" in made.verdict["why"]
+    made = judge(replace(own, tip=own.tip * 1e-3), read_spec(None), until="fit")
+    assert made.document["status"] == "unknown" and "is the depth in mm" in made.document["why"]

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.noise.episode_gls import Factored, Own
+from tacdata.discrepancy.noise.episode_gls import EpisodeErrorModel, FactoredErrors
 
 STREAMS, LENGTHS, KINDS, FEATURES, WIDTH = 3, (7, 5, 9), 2, 4, 5
 
@@ -15,14 +15,14 @@ def made(rng):
     return {
         "columns": rng.normal(size=(STREAMS, count, WIDTH)),
         "offset": np.ones((STREAMS, count)),
-        "swing": 3 * rng.normal(size=(STREAMS, count)),
-        "moved": 2 * rng.normal(size=(STREAMS, count, KINDS)),
+        "gain_error": 3 * rng.normal(size=(STREAMS, count)),
+        "pose_errors": 2 * rng.normal(size=(STREAMS, count, KINDS)),
         "features": rng.normal(size=(STREAMS, count, FEATURES)),
         "random_walk": 0.8 * rng.normal(size=(STREAMS, count, 2)),
     }
 
 
-def dense(columns, spans, prior, offset, swing, moved, features, random_walk):
+def dense(columns, spans, prior, offset, gain_error, moved, features, random_walk):
     """Return the products of columns under the covariance written out, free directions taken out."""
     streams, count, width = columns.shape
     cov, free = np.eye(streams * count), []
@@ -33,7 +33,7 @@ def dense(columns, spans, prior, offset, swing, moved, features, random_walk):
         constant = 1e9 if np.isinf(prior) else prior**2
         power = np.zeros(streams)
         for s in range(streams):
-            one, gain, modes = offset[s, rows], swing[s, rows], random_walk[s, rows]
+            one, gain, modes = offset[s, rows], gain_error[s, rows], random_walk[s, rows]
             shaking = np.eye(len(one)) + constant * np.outer(one, one) + modes @ modes.T
             power[s] = gain @ np.linalg.solve(shaking, gain)
             for mode in modes.T:
@@ -49,7 +49,7 @@ def dense(columns, spans, prior, offset, swing, moved, features, random_walk):
         # Gains whose mean, weighted by what the streams tell of it, is 0.
         centred = np.eye(streams) - np.outer(np.ones(streams), power / power.sum())
         gains = np.zeros((streams, count, streams))
-        gains[:, rows] = swing[:, rows, None] * centred[:, None, :]
+        gains[:, rows] = gain_error[:, rows, None] * centred[:, None, :]
         cov += gains.reshape(-1, streams) @ gains.reshape(-1, streams).T
     for s in range(streams):
         for p in range(features.shape[2]):
@@ -73,15 +73,15 @@ def test_products_are_those_of_generalized_least_squares(prior, features, modes)
     given["features"], given["random_walk"] = given["features"][:, :, :features], given["random_walk"][:, :, :modes]
     edges = np.cumsum((0, *LENGTHS))
     spans = [np.arange(a, b) for a, b in pairwise(edges)]
-    expected = dense(given["columns"], spans, prior, given["offset"], given["swing"], given["moved"], given["features"],
-                     given["random_walk"])  # fmt: skip
-    own = Own(
-        given["offset"].astype(np.float32), np.full(len(spans), prior), given["swing"].astype(np.float32),
-        given["moved"].astype(np.float32),
+    parts = (given[name] for name in ("offset", "gain_error", "pose_errors", "features", "random_walk"))
+    expected = dense(given["columns"], spans, prior, *parts)
+    own = EpisodeErrorModel(
+        given["offset"].astype(np.float32), np.full(len(spans), prior), given["gain_error"].astype(np.float32),
+        given["pose_errors"].astype(np.float32),
         given["features"].astype(np.float32) if features else None,
         given["random_walk"].astype(np.float32) if modes else None,
     )  # fmt: skip
-    left = Factored(spans, own).without(given["columns"].astype(np.float32)).reshape(-1, WIDTH)
+    left = FactoredErrors(spans, own).without(given["columns"].astype(np.float32)).reshape(-1, WIDTH)
     assert left.T @ left == pytest.approx(expected, rel=2e-4, abs=2e-4 * np.abs(expected).max())
 
 
@@ -92,8 +92,8 @@ def test_freedom_is_what_features_take_of_noise():
     twice = np.concatenate([given["features"], given["features"][:, :, :1]], axis=2).astype(np.float32)
     offset, free = given["offset"].astype(np.float32), np.full(len(spans), np.inf)
     white = rng.normal(size=(STREAMS, count, 4000)).astype(np.float32)
-    without = Factored(spans, Own(offset, free))
-    beside = Factored(spans, Own(offset, free, features=twice))
+    without = FactoredErrors(spans, EpisodeErrorModel(offset, free))
+    beside = FactoredErrors(spans, EpisodeErrorModel(offset, free, features=twice))
     taken = np.square(without.without(white)).sum(axis=(0, 1)) - np.square(beside.without(white)).sum(axis=(0, 1))
     assert without.freedom == 0.0
     # What is there twice takes no more than once.
@@ -110,8 +110,8 @@ def test_freedom_is_the_rank_of_splines_that_are_nearly_alike():
         features[0, :, k] = features[0, :, 11 - k] + 2e-5 * rng.normal(size=rows)
     features = np.repeat(features, 24, axis=0).astype(np.float32)
     spans = np.split(np.arange(rows), 8)
-    own = Own(np.ones((24, rows), dtype=np.float32), np.full(8, np.inf), features=features)
-    freedom = Factored(spans, own).freedom
+    own = EpisodeErrorModel(np.ones((24, rows), dtype=np.float32), np.full(8, np.inf), features=features)
+    freedom = FactoredErrors(spans, own).freedom
     assert 24 * (width - 4) <= freedom <= 24 * (width - 4) + 2
 
 
@@ -121,14 +121,14 @@ def test_columns_in_one_stream_of_an_episode_are_told_like_any_others(free):
     rng = np.random.default_rng(0)
     parts = made(rng)
     spans = np.split(np.arange(sum(LENGTHS)), np.cumsum(LENGTHS)[:-1])
-    own = Own(
-        parts["offset"], np.array([np.inf, 0.5, np.inf]), moved=parts["moved"],
+    own = EpisodeErrorModel(
+        parts["offset"], np.array([np.inf, 0.5, np.inf]), pose_errors=parts["pose_errors"],
         features=parts["features"] if free else None,
     )  # fmt: skip
-    factored, alone = Factored(spans, own), parts["swing"]
+    factored, alone = FactoredErrors(spans, own), parts["gain_error"]
     left = factored.without(parts["columns"])[:, :, 0]
-    score, information = factored.told(left, alone)
-    joint = factored.moved(left, parts["columns"][:, :, :2])
+    score, information = factored.stream_scores(left, alone)
+    joint = factored.episode_scores(left, parts["columns"][:, :, :2])
     for e, rows in enumerate(spans):
         of_all = np.zeros((STREAMS, sum(LENGTHS), 2))
         of_all[:, rows] = parts["columns"][:, rows, :2]
@@ -148,16 +148,16 @@ def test_what_features_leave_of_noise_that_is_white_to_it():
     rng = np.random.default_rng(6)
     parts = made(rng)
     spans = np.split(np.arange(sum(LENGTHS)), np.cumsum(LENGTHS)[:-1])
-    named = {name: parts[name] for name in ("moved", "features", "random_walk")}
-    own = Own(parts["offset"], np.full(3, 0.7), **named)
-    factored, count, draws = Factored(spans, own), sum(LENGTHS), 20000
+    named = {name: parts[name] for name in ("pose_errors", "features", "random_walk")}
+    own = EpisodeErrorModel(parts["offset"], np.full(3, 0.7), **named)
+    factored, count, draws = FactoredErrors(spans, own), sum(LENGTHS), 20000
     white = rng.normal(size=(STREAMS, count, draws)).astype(np.float32)
-    shaken = white.copy()
+    projected_draws = white.copy()
     for rows in spans:
-        shaken[:, rows] += 0.7 * parts["offset"][:, rows, None] * rng.normal(size=(STREAMS, 1, draws))
-        shaken[:, rows] += parts["random_walk"][:, rows] @ rng.normal(size=(STREAMS, 2, draws))
-        shaken[:, rows] += parts["moved"][:, rows] @ rng.normal(size=(KINDS, draws))
-    projected, cleaned = (v.reshape(-1, draws) for v in (factored.projected(white), factored.without(shaken)))
+        projected_draws[:, rows] += 0.7 * parts["offset"][:, rows, None] * rng.normal(size=(STREAMS, 1, draws))
+        projected_draws[:, rows] += parts["random_walk"][:, rows] @ rng.normal(size=(STREAMS, 2, draws))
+        projected_draws[:, rows] += parts["pose_errors"][:, rows] @ rng.normal(size=(KINDS, draws))
+    projected, cleaned = (v.reshape(-1, draws) for v in (factored.projected(white), factored.without(projected_draws)))
     products = projected @ projected.T / draws
     assert cleaned @ cleaned.T / draws == pytest.approx(products, abs=0.06)
     assert np.trace(products) == pytest.approx(STREAMS * (count - FEATURES), rel=0.01)

@@ -8,9 +8,9 @@ from pressing import course
 
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.null_model import frame
+from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.noise.readings import spread_of
-from tacdata.discrepancy.search.j_test import Off, ahead
+from tacdata.discrepancy.search.j_test import ModelError, j_statistic
 from tacdata.effects import load
 
 EPISODES, ROWS = 48, 40
@@ -31,7 +31,8 @@ def model(left, *names):
     energy = 0.5 * np.bincount(episode, np.square(left).sum(axis=1))
     placed = tuple(SimpleNamespace(effect=load(name)) for name in names)
     return SimpleNamespace(
-        left=left, episode=episode, energy=energy, placed=placed, loss=energy.sum(), freedom=0.0, shaken=UNSHAKEN,
+        left=left, episode=episode, energy=energy, placed=placed, loss=energy.sum(), freedom=0.0,
+        projected_draws=UNSHAKEN,
         tangent=SimpleNamespace(knobs=[]), place=episode // 4,
     )  # fmt: skip
 
@@ -49,7 +50,7 @@ def test_few_presses_bear_an_effect_out_as_well_as_all(count):
     for seed in range(40):
         rng = np.random.default_rng(seed)
         noise, true = rng.normal(size=(EPISODES * ROWS, 1)), signal(9.0, np.linspace(0, 47, count, dtype=int), rng)
-        told.append(ahead(model(noise, "relaxation"), model(noise + true), Nothing()))
+        told.append(j_statistic(model(noise, "relaxation"), model(noise + true), Nothing()))
     assert np.median(told) == pytest.approx(6.0 if count == 48 else 3.3, abs=1.2)
     assert np.quantile(told, 0.1) > 2.4
     assert min(told) >= 0
@@ -60,17 +61,17 @@ def test_without_a_difference_nothing_is_borne_out():
     for seed in range(300):
         rng = np.random.default_rng(seed)
         noise, wrong = rng.normal(size=(EPISODES * ROWS, 1)), signal(3.0, np.arange(48), rng)
-        told.append(ahead(model(noise - wrong, "relaxation"), model(noise), Nothing()))
+        told.append(j_statistic(model(noise - wrong, "relaxation"), model(noise), Nothing()))
     # The first is wrong: only chance can bear it out, and seldom far.
     assert np.mean(np.array(told) > 2.33) < 0.02
-    assert ahead(model(noise), model(noise), Nothing()) == 0.0
+    assert j_statistic(model(noise), model(noise), Nothing()) == 0.0
 
 
 def test_order_only_changes_the_sign():
     rng = np.random.default_rng(1)
     noise, true = rng.normal(size=(EPISODES * ROWS, 1)), signal(6.0, np.arange(20), rng)
     first, second = model(noise, "creep"), model(noise + true, "drift")
-    assert ahead(first, second, Nothing()) == -ahead(second, first, Nothing())
+    assert j_statistic(first, second, Nothing()) == -j_statistic(second, first, Nothing())
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.003, 0.03])
@@ -95,9 +96,9 @@ def test_what_an_equation_may_be_off_about_is_nothing_against_it():
     )
 
     def against(column):
-        return ahead(first, second, Nothing(), Off(column[:, :, None], course, nothing))
+        return j_statistic(first, second, Nothing(), ModelError(column[:, :, None], course, nothing))
 
-    bare = ahead(first, second, Nothing())
+    bare = j_statistic(first, second, Nothing())
     assert bare > 4.5
     assert against(signal(30.0, np.arange(48), rng)) == pytest.approx(bare, abs=0.4), "off about another thing"
     assert against(3 * true) < 1.0, "it may be off by three times what it is"
@@ -114,8 +115,8 @@ def test_what_both_models_miss_is_nothing_to_either():
     nothing = SimpleNamespace(
         nuisances=np.zeros((len(noise), 1, 0)), inner=np.zeros((EPISODES, 0, 0)), ridge=np.zeros(0)
     )
-    off = Off(odd[:, :, None] + signal(2.0, np.arange(48), rng)[:, :, None], course, nothing)
-    assert ahead(first, second, Nothing(), off) > 0.8 * ahead(first, second, Nothing()) > 1.5
+    error = ModelError(odd[:, :, None] + signal(2.0, np.arange(48), rng)[:, :, None], course, nothing)
+    assert j_statistic(first, second, Nothing(), error) > 0.8 * j_statistic(first, second, Nothing()) > 1.5
 
 
 @pytest.mark.parametrize("turned", [1.0, 0.3])
@@ -140,15 +141,15 @@ def test_responses_that_follow_noise_differently_are_level(turned):
 
     def fitted_by(which, values, name):
         made = model(without(values, which), name)
-        made.shaken = without(draws, which)[:, None, :]
-        made.cleaner = SimpleNamespace(projected=lambda values: without(values[:, 0], which)[:, None])
+        made.projected_draws = without(draws, which)[:, None, :]
+        made.whitener = SimpleNamespace(projected=lambda values: without(values[:, 0], which)[:, None])
         made.freedom = float(sum(pair[which].shape[1] for pair in bases))
         made.loss = made.energy.sum() + 0.5 * made.freedom
         return made
 
     for _ in range(300):
         noise = rng.normal(size=(rows, 1))
-        told.append(ahead(fitted_by(0, noise, "backlash"), fitted_by(1, noise, "creep"), Nothing()))
+        told.append(j_statistic(fitted_by(0, noise, "backlash"), fitted_by(1, noise, "creep"), Nothing()))
     assert abs(np.mean(told)) < 0.25, "neither is ahead on average"
     assert np.mean(np.abs(told) > 2.33) < 0.05
     assert np.std(told) > 0.5, "they are compared, though"
@@ -174,9 +175,9 @@ def test_what_the_worse_response_may_take_up_is_no_evidence_of_single_presses():
         read = without((gains * shape + rng.normal(size=(EPISODES, ROWS, 1))).reshape(-1, 1))[:, :, 0]
         more = np.repeat(0.4 * rng.normal(size=(EPISODES // 4, 1, 1)), 4, axis=0) * shape
         first, second = model(read + more.reshape(-1, 1), "temperature_stiffness"), model(read + aside, "creep")
-        first.shaken = UNSHAKEN + 0.0
-        first.cleaner = second.cleaner = SimpleNamespace(projected=without)
-        told.append(ahead(first, second, Nothing()))
+        first.projected_draws = UNSHAKEN + 0.0
+        first.whitener = second.whitener = SimpleNamespace(projected=without)
+        told.append(j_statistic(first, second, Nothing()))
     assert np.median(told) == pytest.approx(4.0, abs=0.6)
 
 
@@ -190,7 +191,7 @@ def test_numbers_of_its_own_do_not_bring_a_model_ahead():
         noise = rng.normal(size=(rows, 1))
         richer = model(noise - basis @ (basis.T @ noise), "relaxation", "drift")
         richer.tangent = SimpleNamespace(knobs=knobs)
-        told.append(ahead(richer, model(noise, "relaxation"), Nothing()))
+        told.append(j_statistic(richer, model(noise, "relaxation"), Nothing()))
     assert np.mean(np.array(told) > 2.33) < 0.03, "by 3.5 on average if they are not counted"
     assert abs(np.mean(told)) < 0.7
 
@@ -198,11 +199,11 @@ def test_numbers_of_its_own_do_not_bring_a_model_ahead():
 def test_an_equation_is_off_by_a_few_standard_deviations_and_not_by_a_hundred():
     """However many readings there are: a scale was taken for a frame that gives way, 46,000 nats for 680,000."""
     made = course(episodes=12)
-    same = frame(Setting(made, FittedResponse(made), []))
+    null = null_model(Setting(made, FittedResponse(made), []))
     column = np.random.default_rng(0).normal(size=(made.reduced.rows, made.channels, 1)).astype(np.float32)
-    off = Off(column, made.reduced, same)
+    error = ModelError(column, made.reduced, null)
     for times, most in ((1.0, 1.0), (100.0, 0.1)):
         left = times * column[:, :, 0]
-        _, fallen = off.beside(left, left)
+        _, fallen = error.beside(left, left)
         assert fallen <= most * 0.5 * float(np.square(left).sum())
-    assert off.beside(column[:, :, 0], column[:, :, 0])[1] > 0.4 * float(np.square(column).sum())
+    assert error.beside(column[:, :, 0], column[:, :, 0])[1] > 0.4 * float(np.square(column).sum())

@@ -6,7 +6,7 @@ from pressing import course
 
 from tacdata.discrepancy.noise import offset_random_walk, readings
 from tacdata.discrepancy.noise.gram import Noise
-from tacdata.discrepancy.noise.whitener import Cleaner
+from tacdata.discrepancy.noise.whitener import Whitener
 
 RATE = 0.05  # noise scales squared a second
 
@@ -20,7 +20,7 @@ def brownian(reduced, rng, rate):
     return walk - walk[begin][np.cumsum(reduced.first) - 1]
 
 
-def shaken(seed, rate, episodes=60):
+def projected_draws(seed, rate, episodes=60):
     rng = np.random.default_rng(seed)
     reduced = course(seed=seed, episodes=episodes).reduced
     white = rng.normal(size=(reduced.rows, 3)) / np.sqrt(np.minimum(reduced.averaged, 4))[:, None]
@@ -28,21 +28,21 @@ def shaken(seed, rate, episodes=60):
 
 
 def test_the_rate_is_told_where_nothing_presses():
-    walks = (shaken(k, RATE) for k in range(4))
-    told = [offset_random_walk.told(rest, r, np.ones(3), 0.0, r.site) for r, rest in walks]
+    walks = (projected_draws(k, RATE) for k in range(4))
+    told = [offset_random_walk.walk_rate(rest, r, np.ones(3), 0.0, r.site) for r, rest in walks]
     assert np.mean(told) == pytest.approx(RATE, rel=0.3)
 
 
 def test_white_noise_does_not_wander():
-    reduced, rest = shaken(5, 0.0)
-    assert offset_random_walk.told(rest, reduced, np.ones(3), 0.0, reduced.site) < 0.1 * RATE
+    reduced, rest = projected_draws(5, 0.0)
+    assert offset_random_walk.walk_rate(rest, reduced, np.ones(3), 0.0, reduced.site) < 0.1 * RATE
 
 
 def test_modes_add_up_to_a_brownian_motion_about_its_mean():
     rng = np.random.default_rng(2)
-    reduced, rest = shaken(2, 3.0, 12)
+    reduced, rest = projected_draws(2, 3.0, 12)
     modes = offset_random_walk.modes(rest, reduced, np.ones(3), 0.0, reduced.site)
-    rate = offset_random_walk.told(rest, reduced, np.ones(3), 0.0, reduced.site)
+    rate = offset_random_walk.walk_rate(rest, reduced, np.ones(3), 0.0, reduced.site)
     rows = np.flatnonzero(reduced.episode == 0)
     # Evenly in time: the mean over an episode is one over time, not over rows.
     walk = np.cumsum(rng.normal(size=(4000, 400)) * np.sqrt(rate * np.ptp(reduced.time[rows]) / 400), axis=1)
@@ -55,21 +55,22 @@ def test_modes_add_up_to_a_brownian_motion_about_its_mean():
 @pytest.mark.parametrize("told", [True, False])
 def test_what_is_slow_within_a_press_scatters_as_the_noise_says(told):
     """A column that grows while pressed: its scores scatter by what they know, unless the wander is not told."""
-    reduced, rest = shaken(7, 0.5)
+    reduced, rest = projected_draws(7, 0.5)
     modes = offset_random_walk.modes(rest, reduced, np.ones(3), 0.0, reduced.site) if told else None
     none = np.zeros((reduced.rows, 1), dtype=np.int64)[:, 0]
-    cleaner = Cleaner(reduced, Noise(np.ones(3), 0.0, random_walk=modes), none, None, np.zeros((reduced.rows, 3, 1)))
+    whitener = Whitener(reduced, Noise(np.ones(3), 0.0, random_walk=modes), none, None, np.zeros((reduced.rows, 3, 1)))
     begin = reduced.time[np.flatnonzero(reduced.first)][np.cumsum(reduced.first) - 1]
     slow = np.broadcast_to((reduced.time - begin)[:, None, None], (reduced.rows, 3, 1))
-    gram = cleaner.collected(np.concatenate([rest[:, :, None], slow], axis=2)).gram
+    gram = whitener.episode_grams(np.concatenate([rest[:, :, None], slow], axis=2)).gram
     excess = np.mean(gram[:, 1, 0] ** 2 / gram[:, 1, 1])
     assert excess < 1.4 if told else excess > 5
 
 
 def test_means_of_a_hum_say_more_than_its_rows_let_one_think():
-    reduced, rest = shaken(8, RATE)
+    reduced, rest = projected_draws(8, RATE)
     rest = rest + 2 * np.sin(2 * np.pi * 6.7 * reduced.time)[:, None] / np.minimum(reduced.averaged, 4)[:, None]
-    assert 0.25 < offset_random_walk.told(rest, reduced, np.full(3, 1.7), 0.0, reduced.site) / (RATE / 1.7**2) < 1.6
+    rate = offset_random_walk.walk_rate(rest, reduced, np.full(3, 1.7), 0.0, reduced.site)
+    assert 0.25 < rate / (RATE / 1.7**2) < 1.6
 
 
 def test_noise_that_grows_with_the_load_is_told():

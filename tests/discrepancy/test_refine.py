@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.noise.gram import Evidence
+from tacdata.discrepancy.noise.gram import EpisodeGrams
 from tacdata.discrepancy.search.gauss_newton import _covariance
 
 Z90 = 1.645
@@ -19,7 +19,7 @@ def held(episodes, heavy, rng, draws=600, excess=2.0):
         # Episodes err by more than the noise that they were whitened by, and by themselves.
         residual = rng.normal(size=(episodes, 12)) + excess * rng.normal(size=(episodes, 1)) * columns[:, :, 0] / 4
         whole = np.concatenate([residual[:, :, None], columns], axis=2)
-        found = Evidence(np.einsum("eni,enj->eij", whole, whole), np.full(episodes, 12.0))
+        found = EpisodeGrams(np.einsum("eni,enj->eij", whole, whole), np.full(episodes, 12.0))
         total = found.gram.sum(axis=0)
         best = np.linalg.solve(total[1:, 1:], total[1:, 0])
         error = np.sqrt(_covariance(found, best, np.zeros(3), 1)[0, 0])
@@ -33,4 +33,4 @@ def test_intervals_hold_nine_in_ten(episodes, heavy):
 
 
 def test_nothing_placed_has_no_covariance():
-    assert _covariance(Evidence(np.zeros((4, 1, 1)), np.ones(4)), np.zeros(0), np.zeros(0), 0).shape == (0, 0)
+    assert _covariance(EpisodeGrams(np.zeros((4, 1, 1)), np.ones(4)), np.zeros(0), np.zeros(0), 0).shape == (0, 0)

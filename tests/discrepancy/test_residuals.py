@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.data.sufficiency import amiss
-from tacdata.discrepancy.judge import judged
+from tacdata.discrepancy.data.sufficiency import shortcomings
+from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.verdict.before_and_after import beside_model
 from tacdata.discrepancy.verdict.residual_table import read, write
@@ -20,28 +20,28 @@ from viewers.parts.residual_curves import residual_curves
 def late():
     """Presses whose readings come late, judged up to what fits best; channel 1 of the recordings was left out."""
     own = replace(course(delay=0.05), numbers=(0, 2, 3))
-    return own, judged(own, read_spec(None), until="fit").found
+    return own, judge(own, read_spec(None), until="fit").found
 
 
 def test_residuals_are_read_back_with_the_sealed_episodes(late, tmp_path):
     own, found = late
     sealed = chosen(own)
     write(tmp_path / "residuals.parquet", beside_model(own, found, sealed), "a" * 64)
-    told = read(tmp_path / "residuals.parquet")
-    assert told.streams == ("channel 0", "channel 2", "channel 3") and told.sealed == tuple(sealed) and len(sealed)
-    np.testing.assert_array_equal(told.measured, own.readings[own.read].astype(np.float32))
-    there = np.isin(told.episode, sealed)
-    left = [np.mean(np.square(told.off(said)[there])) for said in (told.before, told.after)]
+    table = read(tmp_path / "residuals.parquet")
+    assert table.streams == ("channel 0", "channel 2", "channel 3") and table.sealed == tuple(sealed) and len(sealed)
+    np.testing.assert_array_equal(table.measured, own.readings[own.read].astype(np.float32))
+    there = np.isin(table.episode, sealed)
+    left = [np.mean(np.square(table.standardized(predicted)[there])) for predicted in (table.before, table.after)]
     assert left[1] < 0.2 * left[0], "the effect helps in episodes that nobody saw"
-    deep = told.depth > 0.99 * told.depth.max()
-    assert set(told.phase) == {0, 1, 2, 3} and told.phases[np.bincount(told.phase[deep]).argmax()] == "hold"
+    deep = table.depth > 0.99 * table.depth.max()
+    assert set(table.phase) == {0, 1, 2, 3} and table.phases[np.bincount(table.phase[deep]).argmax()] == "hold"
 
 
 def test_the_file_stays_small_and_curves_do_not_run_from_press_to_press(late):
     own, found = late
-    told = beside_model(own, found, chosen(own), most=600)
-    assert told.measured.size <= 600 and told.every > 1
-    curves = {c.name: c for c in residual_curves(told)}
+    table = beside_model(own, found, chosen(own), most=600)
+    assert table.measured.size <= 600 and table.every > 1
+    curves = {c.name: c for c in residual_curves(table)}
     assert curves["readings/channel_2"].labels == ("measured", "before", "after")
     gaps = np.isnan(curves["readings/channel_2"].values).all(axis=1)
     assert gaps.sum() == own.episodes - 1 and (np.diff(curves["depth"].time_ns) >= 0).all()
@@ -59,5 +59,5 @@ def test_a_torn_file_is_named(late, tmp_path):
 def test_a_fast_way_to_the_skin_does_not_hide_the_rates_of_pressing():
     """Every episode comes to the skin at 5 mm/s; presses are of two rates, as many of the one as of the other."""
     own = course(episodes=12, rates=(0.5, 2.0))
-    assert not any("one rate only" in words for words in amiss(own))
-    assert any("one rate only" in words for words in amiss(course(episodes=12, rates=(1.0,))))
+    assert not any("one rate only" in words for words in shortcomings(own))
+    assert any("one rate only" in words for words in shortcomings(course(episodes=12, rates=(1.0,))))

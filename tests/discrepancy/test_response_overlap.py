@@ -6,12 +6,12 @@ from pressing import course
 
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.null_model import frame
+from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.regressors.candidates import StandIn
-from tacdata.discrepancy.search import judge
 from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.discrepancy.search.overlap import overlap
 from tacdata.discrepancy.search.problem import prepare
+from tacdata.discrepancy.search.race import model_error_energy
 from tacdata.effects import Placed, load
 
 
@@ -20,8 +20,8 @@ def late():
     made = course(delay=0.05)
     others = [load(name) for name in ("low_pass_filter", "relaxation", "gain_drift")]
     setting = Setting(made, FittedResponse(made), others)
-    model = refine(setting, [Placed(load("latency"), {"L": np.array(0.05)})], frame(setting))
-    return prepare(Setting(made, model.response, others), frame(setting), model.placed)
+    model = refine(setting, [Placed(load("latency"), {"L": np.array(0.05)})], null_model(setting))
+    return prepare(Setting(made, model.response, others), null_model(setting), model.placed)
 
 
 def of(problem, name):
@@ -40,7 +40,7 @@ def test_what_is_unlike_a_large_effect_needs_to_explain_less(late):
     """One part in a hundred of a large effect's energy was asked for, whatever that looked like."""
     there = [(load("latency"), 10000.0)]
     table, fitted = StandIn(False), late.setting.response
-    whole, alike = (judge._off(there, [load("gain_drift")], table, known) for known in (None, late))
+    whole, alike = (model_error_energy(there, [load("gain_drift")], table, known) for known in (None, late))
     assert alike == pytest.approx(whole * overlap(late, of(late, "gain_drift")))
     assert alike < 0.2 * whole
-    assert judge._off(there, [load("gain_drift")], fitted, late) > 200.0, "what a fitted response makes of it"
+    assert model_error_energy(there, [load("gain_drift")], fitted, late) > 200.0, "what a fitted response makes of it"

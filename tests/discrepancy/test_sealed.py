@@ -6,7 +6,7 @@ import numpy as np
 from pressing import course
 
 from tacdata import documents
-from tacdata.discrepancy.judge import judged
+from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.verdict.sealed import ENOUGH, chosen, without_readings
@@ -45,21 +45,21 @@ def test_sealed_readings_are_not_read_but_their_path_stays():
 
 def test_the_gap_on_sealed_episodes_closes_with_the_right_name():
     others = tuple(e.called for e in library() if e.name not in FEW)
-    done = judged(course(delay=0.05, episodes=24), read_spec(None), without=others)
-    documents.check(done.verdict, "verdict", "verdict")
-    shown = done.verdict["sealed"]
-    assert done.verdict["status"] == "named"
-    assert shown["episodes"] == len(done.verdict["data"]["sealed"]) == 4
+    done = judge(course(delay=0.05, episodes=24), read_spec(None), without=others)
+    documents.check(done.document, "verdict", "verdict")
+    shown = done.document["sealed"]
+    assert done.document["status"] == "named"
+    assert shown["episodes"] == len(done.document["data"]["sealed"]) == 4
     assert shown["after"] < 0.5 * shown["before"]
     assert shown["closed"] > 0.9
     assert shown["interval"][0] <= shown["closed"] + 1e-9
 
 
 def test_the_gate_can_be_had_alone():
-    done = judged(course(delay=0.05, episodes=12), read_spec(None), until="gate")
+    done = judge(course(delay=0.05, episodes=12), read_spec(None), until="gate")
     assert done.found.gap
-    assert not done.verdict["effects"]
-    assert "stopped after gate: a gap" in done.verdict["why"]
+    assert not done.document["effects"]
+    assert "stopped after gate: a gap" in done.document["why"]
 
 
 def test_a_fitted_response_says_nothing_new_of_the_air():

@@ -4,21 +4,21 @@ from pressing import course
 
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.null_model import frame
-from tacdata.discrepancy.search import screen
+from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.problem import prepare
-from tacdata.discrepancy.statistics.cluster_robust import clustered, lent
+from tacdata.discrepancy.search.score_tests import score_tests
+from tacdata.discrepancy.statistics.cluster_robust import clustered_score, pooled_excess
 from tacdata.discrepancy.statistics.gram_fit import eliminated
 from tacdata.effects import library
 
 
 def freedom_of(problem):
     """Return what effects lend each other when all count, whatever is there."""
-    gram, told = eliminated(problem.evidence.gram, problem.fixed, problem.fixed_ridge(0.0)), {}
+    gram, scores = eliminated(problem.grams.gram, problem.fixed, problem.fixed_ridge(0.0)), {}
     for c in problem.candidates:
-        if not screen.follows_clock(c.effect):
-            told.setdefault(c.effect.name, []).append(clustered(gram, c.columns))
-    return lent(told).freedom
+        if not c.effect.follows_clock:
+            scores.setdefault(c.effect.name, []).append(clustered_score(gram, c.columns))
+    return pooled_excess(scores).freedom
 
 
 def test_what_is_there_does_not_keep_others_from_lending():
@@ -27,9 +27,9 @@ def test_what_is_there_does_not_keep_others_from_lending():
     for delay in (0.0, 0.05):
         made = course(delay=delay)
         setting = Setting(made, FittedResponse(made), list(library()))
-        problem = prepare(setting, frame(setting))
-        tested = screen.test(problem)
-        freedoms.append((freedom_of(problem), tested.lent[False].freedom))
+        problem = prepare(setting, null_model(setting))
+        tested = score_tests(problem)
+        freedoms.append((freedom_of(problem), tested.pooled[False].freedom))
         if delay:
             assert problem.candidates[int(tested.z.argmax())].called in ("latency", "low_pass_filter", "servo_lag")
     (_, quiet), (spoilt, mended) = freedoms

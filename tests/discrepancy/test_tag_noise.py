@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from pressing import course
 
+from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.null_model import frame
+from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.noise.readings import beside_depth
-from tacdata.discrepancy.search.judge import judge
-from tacdata.discrepancy.verdict import decide
+from tacdata.discrepancy.search.find import find
+from tacdata.discrepancy.verdict.decide import decide
 from tacdata.effects import load
 
 SCALES = ("travel_scale", "view_scale")
@@ -32,10 +33,16 @@ def gauged(compliance, power=1.0, seed=0):
     return replace(made, tip=asked, tag=seen)
 
 
+def decided(made, effects):
+    """Return what may be said of presses."""
+    found = find(Setting(made, FittedResponse(made), [load(name) for name in effects]))
+    return decide(found, DataChecks(made.episodes))
+
+
 @pytest.mark.parametrize("compliance", [0.0, 0.1])
 def test_a_gauges_noise_is_its_own(compliance):
     made = gauged(compliance)
-    told = frame(Setting(made, FittedResponse(made), [])).noise
+    told = null_model(Setting(made, FittedResponse(made), [])).noise
     assert told.scale[-1] == pytest.approx(NOISE, rel=0.3)
 
 
@@ -50,11 +57,11 @@ def test_nothing_is_taken_from_readings_or_from_recordings_without_a_tag():
 def test_compliance_that_a_gauge_sees_is_named_whatever_power_of_load_is_read(power):
     made = gauged(0.05, power)
     effects = ("carriage_compliance", "carriage_compliance_read", "travel_scale", "screw_error", "backlash", "latency")
-    answer = judge(Setting(made, FittedResponse(made), [load(name) for name in effects]))
-    assert decide.status(answer) == "named"
-    (member,) = answer.members
-    assert member.placed.effect.called == "frame_compliance"
-    assert float(member.placed.values["c"]) == pytest.approx(0.05, rel=0.1)
+    answer = decided(made, effects)
+    assert answer.status == "named"
+    (effect,) = answer.effects
+    assert effect.finding.placed.effect.called == "frame_compliance"
+    assert float(effect.finding.placed.values["c"]) == pytest.approx(0.05, rel=0.1)
 
 
 @pytest.mark.parametrize("scale", [0.004, 0.06])
@@ -63,15 +70,14 @@ def test_a_gauges_scale_is_known_so_well_and_no_better(scale):
     made = gauged(0.0)
     seen = made.tag.copy()
     seen[:, 2] += scale * made.tip[:, 2]
-    effects = [load(name) for name in (*SCALES, "screw_error")]
-    answer = judge(Setting(replace(made, tag=seen), FittedResponse(made), effects))
+    answer = decided(replace(made, tag=seen), (*SCALES, "screw_error"))
     if scale < 0.005:
-        assert decide.status(answer) == "none"
+        assert answer.status == "none"
         return
-    assert decide.status(answer) == "ambiguous"
-    (member,) = decide.members(answer)
-    assert {member.placed.effect.called, *member.rivals} == {"view_scale", "travel_scale"}
-    (value,) = member.placed.values.values()
+    assert answer.status == "ambiguous"
+    (effect,) = answer.effects
+    assert {effect.finding.placed.effect.called, *effect.finding.rivals} == {"view_scale", "travel_scale"}
+    (value,) = effect.finding.placed.values.values()
     assert float(value) == pytest.approx(scale, rel=0.05)
 
 
@@ -80,6 +86,6 @@ def test_compliance_is_named_beside_a_gauge_of_slightly_wrong_scale():
     seen = made.tag.copy()
     seen[:, 2] *= 1.004
     effects = ("carriage_compliance", "carriage_compliance_read", *SCALES, "screw_error", "latency")
-    answer = judge(Setting(replace(made, tag=seen), FittedResponse(made), [load(name) for name in effects]))
-    assert decide.status(answer) == "named"
-    assert [m.placed.effect.called for m in decide.members(answer)] == ["frame_compliance"]
+    answer = decided(replace(made, tag=seen), effects)
+    assert answer.status == "named"
+    assert [e.finding.placed.effect.called for e in answer.effects] == ["frame_compliance"]

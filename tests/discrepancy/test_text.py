@@ -4,10 +4,11 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
-from pressing import course
 
-from tacdata.discrepancy.search.findings import Judgement, Member
-from tacdata.discrepancy.verdict.document import why
+from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.verdict.decide import Decided, Decision, Reason
+from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import in_text
 from tacdata.effects import Placed, load
@@ -76,42 +77,44 @@ def test_a_gap_that_becomes_wider_on_sealed_episodes_is_told_of():
     assert better.endswith("1.286 at best; 96 % of the gap closed (90 %: 90 to 100 %)")
 
 
-def member(name, *rivals):
+def finding(name, *rivals):
     """Return an effect of an answer."""
-    return Member(Placed(load(name), {}), {}, (), rivals, {}, 9.0)
+    return Finding(Placed(load(name), {}), {}, (), rivals, {}, 9.0)
 
 
 def said(status, answer, before=None, after=None):
     """Return the sentence of a verdict."""
     found = SimpleNamespace(until="decide", share_left=0.1, left=SimpleNamespace(t=3.0))
     shown = Gap(np.array([before]), np.array([after]), np.array([1.0]), ("press",)) if before else None
-    return why(status, cast(Judgement, found), answer, course(episodes=8), shown)
+    reason = Reason.RIVALS if status == "ambiguous" else Reason.LEFTOVERS
+    decision = Decision(status, reason, tuple(Decided(f, status, {}, None) for f in answer))
+    return reason_in_words(decision, cast(Findings, found), DataChecks(8), shown)
 
 
 def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
     rates = ("relaxation", "backlash", "hysteresis", "latency", "creep")
-    answer = [member(n, *(r for r in rates if r != load(n).called)) for n in ("power_creep", "backlash", "bouc_wen")]
+    answer = [finding(n, *(r for r in rates if r != load(n).called)) for n in ("power_creep", "backlash", "bouc_wen")]
     assert said("ambiguous", answer) == (
         "these recordings do not say which effect it is: relaxation, backlash and hysteresis together fit best, but "
         "latency or creep may stand in for any of them"
     )
-    assert said("ambiguous", [member("low_pass_filter", "latency", "creep")]).endswith(
+    assert said("ambiguous", [finding("low_pass_filter", "latency", "creep")]).endswith(
         "low_pass_filter fits best, but latency or creep may stand in for it"
     )
-    assert said("ambiguous", [member("drift"), member("backlash", "creep")]).startswith(
+    assert said("ambiguous", [finding("drift"), finding("backlash", "creep")]).startswith(
         "drift, and something else: these recordings do not say which effect it is: backlash fits best, but creep may"
     )
-    pair = [member("backlash", "hysteresis"), member("bouc_wen", "backlash")]
+    pair = [finding("backlash", "hysteresis"), finding("bouc_wen", "backlash")]
     assert said("ambiguous", pair).endswith("and hysteresis together fit best, but one may stand in for another")
 
 
 def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
-    assert said("unknown", [member("power_creep")], 18.489, 20.374) == (
+    assert said("unknown", [finding("power_creep")], 18.489, 20.374) == (
         "something is missing; relaxation comes closest and leaves 10 % of what could be explained, but sealed "
         "episodes fit worse by 10 % with it (mean square 18.5 times the noise without, 20.4 with): it is not the name"
     )
-    assert "fit no better" in said("unknown", [member("power_creep")], 20.128, 20.130)
-    both = said("unknown", [member("latency"), member("power_creep")], 95.0, 6.0)
+    assert "fit no better" in said("unknown", [finding("power_creep")], 20.128, 20.130)
+    both = said("unknown", [finding("latency"), finding("power_creep")], 95.0, 6.0)
     assert both == (
         "something is missing; latency and relaxation together come closest and leave 10 % of what could be explained, "
         "so they are not the names, or not all of it"

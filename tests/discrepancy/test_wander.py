@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.noise.offset_process import wander
+from tacdata.discrepancy.noise.offset_process import offset_process
 
 ROWS = 20
 """Quiet rows an episode."""
@@ -40,7 +40,7 @@ def slope_score(offsets, rng, levels=None):
     c = course(count)
     read = offsets[c.episode] + rng.normal(size=(len(c.episode), 24))
     none = np.zeros(count, dtype=np.int64)
-    told = wander(read, c, np.ones(24), 0.0, levels or [none])
+    told = offset_process(read, c, np.ones(24), 0.0, levels or [none])
     assert told is not None
     clock = (np.arange(count) - count / 2)[c.episode][:, None, None] * np.ones((1, 24, 1))
     means = np.stack([read[(c.episode == e) & told.quiet].mean(axis=0) for e in range(count)])
@@ -104,4 +104,4 @@ def test_episodes_left_out_say_nothing_and_the_others_go_on():
 
 def test_few_episodes_tell_no_wander():
     c = course(4)
-    assert wander(np.zeros((len(c.episode), 24)), c, np.ones(24), 0.0, [np.zeros(4, dtype=np.int64)]) is None
+    assert offset_process(np.zeros((len(c.episode), 24)), c, np.ones(24), 0.0, [np.zeros(4, dtype=np.int64)]) is None

@@ -35,7 +35,7 @@ def held():
 
 def rival(held, name, **values):
     placed = [Placed(load(name), {k: np.array(v) for k, v in values.items()})]
-    return Rival(load(name).called, tuple(placed), refine(held.setting, placed, held.frame, steps=0))
+    return Rival(load(name).called, tuple(placed), refine(held.setting, placed, held.null, steps=0))
 
 
 def test_lag_and_play_are_told_apart_by_another_rate(held):

@@ -23,7 +23,7 @@ def residual_curves(told: Residuals) -> tuple[Curves, ...]:
     """
     time_ns = np.round(told.time * 1e9).astype(np.int64)
     breaks = np.flatnonzero(np.diff(told.episode)) + 1
-    power = np.nanmean(np.square(told.off(told.before)), axis=0)
+    power = np.nanmean(np.square(told.standardized(told.before)), axis=0)
     made = []
     for k in np.argsort(-np.nan_to_num(power))[:MOST].tolist():
         name = told.streams[k].replace(" ", "_")

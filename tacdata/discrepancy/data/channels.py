@@ -74,7 +74,7 @@ def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, list[str]]:
 
 def _clipped(recorded: Sequence[Readings], channels: list[int]) -> list[str]:
     """Return in words which channels stop at their largest or smallest reading while the tip goes on deeper."""
-    told = []
+    words = []
     for name, extreme in (("largest", np.nanmax), ("smallest", np.nanmin)):
         found = []
         for channel in channels:
@@ -85,11 +85,11 @@ def _clipped(recorded: Sequence[Readings], channels: list[int]) -> list[str]:
             if len(runs) >= SEVERAL or sum(runs) >= ENOUGH:
                 found.append(f"channel {channel} at {limit:g} ({100 * np.mean(values == limit):.2g} %)")
         if found:
-            told.append(
+            words.append(
                 f"clipped at the {name} reading (share of its readings): {', '.join(found)}; it stays while the tip "
                 "goes on deeper: press less deep, or give it a wider range"
             )
-    return told
+    return words
 
 
 def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> list[int]:
@@ -107,7 +107,7 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
         return []
     noise = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], values == limit, [False]]).astype(int)))
-    told = []
+    words = []
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         on = float(depth[begin:end].max() - depth[begin])
         if begin == 0 or end - begin < LONG or on < DEEPER * float(np.ptp(depth)):
@@ -116,8 +116,8 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
         at = int(before[-1]) if len(before) else int(np.argmin(depth[:begin]))
         way = float(depth[begin] - depth[at])
         if way > 0 and abs(limit - values[at]) * min(on / way, 1.0) > FLAT * max(noise, step):
-            told.append(end - begin)
-    return told
+            words.append(end - begin)
+    return words
 
 
 def in_source(recordings: Sequence[Recording], channels: int) -> list[str]:

@@ -1,4 +1,4 @@
-"""What readings say of the clocks that they and the path were recorded on."""
+"""Whether readings and path were recorded on one clock."""
 
 from __future__ import annotations
 
@@ -6,27 +6,12 @@ import numpy as np
 
 from tacdata.chain import Course
 
-LATE = 0.25
-"""Delays beyond this are of clocks, not of sensors [s]."""
+LEAST_SHIFT = 0.25
+"""A smaller shift is a sensor's delay, no error of clocks [s]."""
 WIDEST, LAGS = 5.0, 101
 """Largest delay that is tried [s], and how many."""
 CLEARER = 0.3
-"""What is left of the readings' variance at the best delay, over what is left without one, when clocks are told [1]."""
-
-
-def clocks(called: set[str], late: float) -> list[str]:
-    """Return in words what a named delay says of the clocks.
-
-    Args:
-        called: Mechanisms in the answer.
-        late: The delay found [s]; 0 for none.
-    """
-    told = []
-    if abs(late) > LATE:
-        told.append(f"readings are {late:.2f} s late: more than a sensor is; were the clocks of path and readings one?")
-    if "clock_skew" in called:
-        told.append("the clocks of path and readings run apart: record both on one clock, or a tap early and late")
-    return told
+"""Largest share of the unexplained variance that may be left at the best delay [1]."""
 
 
 def shifted(course: Course) -> list[str]:
@@ -37,7 +22,7 @@ def shifted(course: Course) -> list[str]:
     lags = np.linspace(-WIDEST, WIDEST, LAGS)
     left = np.array([_left_at(course, main, lag) for lag in lags])
     best, none = int(np.argmin(left)), float(left[LAGS // 2])
-    if abs(lags[best]) <= LATE or left[best] > CLEARER * none:
+    if abs(lags[best]) <= LEAST_SHIFT or left[best] > CLEARER * none:
         return []
     return [
         f"readings follow the path about {abs(lags[best]):.1f} s {'later' if lags[best] > 0 else 'earlier'} than their "

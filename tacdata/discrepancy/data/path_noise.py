@@ -38,7 +38,7 @@ def without_noise(time_ns: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np
         return path, np.zeros(3)
     time = (time_ns - time_ns[0]) * 1e-9
     noise = np.array([_noise(time, axis) for axis in path.T])
-    axes = [_told(time, axis, s) if s > LEAST else axis for axis, s in zip(path.T, noise, strict=True)]
+    axes = [_smoothed(time, axis, s) if s > LEAST else axis for axis, s in zip(path.T, noise, strict=True)]
     return np.column_stack(axes), np.where(noise > LEAST, noise, 0.0)
 
 
@@ -77,12 +77,12 @@ def _noise(time: np.ndarray, values: np.ndarray) -> float:
     By second differences of that: a path bends alike from one position to the next, its noise does not.
     """
     share = (time[1:-1] - time[:-2]) / np.maximum(time[2:] - time[:-2], 1e-12)
-    off = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
-    fourth = off[:-2] - 2 * off[1:-1] + off[2:]
+    deviation = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
+    fourth = deviation[:-2] - 2 * deviation[1:-1] + deviation[2:]
     return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(17.5))
 
 
-def _told(time: np.ndarray, values: np.ndarray, noise: float) -> np.ndarray:
+def _smoothed(time: np.ndarray, values: np.ndarray, noise: float) -> np.ndarray:
     """Return values as the widest windows tell them that agree with all narrower ones, shape (n,)."""
     count = len(values)
     middle, mean = time.mean(), values.mean()

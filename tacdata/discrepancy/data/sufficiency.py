@@ -8,48 +8,50 @@ from tacdata.chain import Course
 from tacdata.discrepancy.data.clocks import shifted
 from tacdata.discrepancy.data.tip_motion import HOLD, longest_hold, speeds
 
-FEWEST = 8
-"""Fewer episodes carry no name."""
+FEWEST_EPISODES = 8
+"""Fewer episodes carry no name: a standard error over them is not known."""
 RATES = 2.5
 """Rates of pressing must differ by such a factor for lags to be told from play and friction [1]."""
 
 
-def amiss(course: Course) -> list[str]:
+def shortcomings(course: Course) -> list[str]:
     """Return in words what is missing from recordings, each with its remedy."""
-    told = list(course.notes)
-    if course.episodes < FEWEST:
-        told.append(
-            f"{course.episodes} episodes are too few for a verdict: record {FEWEST} or more, better 40, presses of "
-            "several depths and rates (`tacdata plan diagnostic`)"
+    remarks = list(course.notes)
+    if course.episodes < FEWEST_EPISODES:
+        remarks.append(
+            f"{course.episodes} episodes are too few for a verdict: record {FEWEST_EPISODES} or more, better 40, "
+            "presses of several depths and rates (`tacdata plan diagnostic`)"
         )
     if course.episodes > 1 and one_rate(course):
-        told.append(
+        remarks.append(
             "one rate only: delay, filter, backlash and relaxation look alike; record three rates over a decade"
         )
     if longest_hold(course) < HOLD:
-        told.append("no hold of a second or more: relaxation and baseline tracking show in holds; hold for 60 s")
+        remarks.append("no hold of a second or more: relaxation and baseline tracking show in holds; hold for 60 s")
     elif not _recovers(course):
-        told.append("no rest after release: record the recovery, as long as the longest hold")
+        remarks.append("no rest after release: record the recovery, as long as the longest hold")
     depths = np.array([course.tip[course.episode == e, 2].max() for e in range(course.episodes)])
     reach = float(depths.max()) if depths.max() > 0 else course.stroke
     if len(depths) > 1 and np.ptp(depths) < 0.15 * reach:
-        told.append("one depth only: record three")
+        remarks.append("one depth only: record three")
     if course.tip[:, 2].min() > 0.05 * course.stroke and course.tip[:, 2].max() > 0:
-        told.append("never without contact: idle readings are not known; begin and end every press off the skin")
+        remarks.append("never without contact: idle readings are not known; begin and end every press off the skin")
     if _tared(course):
-        told.append("every episode begins at the same reading, as if tared: drift and set are lost; record un-tared")
+        remarks.append("every episode begins at the same reading, as if tared: drift and set are lost; record un-tared")
     if any(t.shape == "unknown" or not np.isfinite(t.radius) for t in course.tools):
-        told.append("an indenter without a known radius: what depends on it is not judged")
+        remarks.append("an indenter without a known radius: what depends on it is not judged")
     if len(course.tools) < 2:
-        told.append("one indenter: compliance, stiffening and poroelasticity need a second radius")
-    told += shifted(course)
-    told += units(course)
-    told += stuck(course)
+        remarks.append("one indenter: compliance, stiffening and poroelasticity need a second radius")
+    remarks += shifted(course)
+    remarks += units(course)
+    remarks += stuck(course)
     if course.force is None:
-        told.append("no force: stiffness and gain, relaxing skin and relaxing taxel cannot be told apart")
+        remarks.append("no force: stiffness and gain, relaxing skin and relaxing taxel cannot be told apart")
     if course.tag is None:
-        told.append("no second observation of the pose: the guide and the skin are told apart by their response alone")
-    return told
+        remarks.append(
+            "no second observation of the pose: the guide and the skin are told apart by their response alone"
+        )
+    return remarks
 
 
 def one_rate(course: Course) -> bool:
@@ -57,7 +59,7 @@ def one_rate(course: Course) -> bool:
 
     How they come to the skin does not count.
     """
-    return not any(_varies(told) for told in speeds(course))
+    return not any(_varies(rates) for rates in speeds(course))
 
 
 def _varies(rates: np.ndarray) -> bool:
@@ -72,36 +74,38 @@ STROKE, RATE, RADIUS, EVERY = (0.02, 60.0), 500.0, 200.0, (2e-5, 5.0)
 
 def units(course: Course) -> list[str]:
     """Return in words what is of another size than its unit lets expect."""
-    told = []
+    remarks = []
     if not STROKE[0] < course.stroke < STROKE[1]:
-        told.append(f"strokes of {course.stroke:.3g} mm: is the depth in mm? Say its unit in the import mapping")
+        remarks.append(f"strokes of {course.stroke:.3g} mm: is the depth in mm? Say its unit in the import mapping")
     if float(np.abs(course.speed).max()) > RATE:
-        told.append(f"presses of {np.abs(course.speed).max():.3g} mm/s: are times in s and lengths in mm?")
+        remarks.append(f"presses of {np.abs(course.speed).max():.3g} mm/s: are times in s and lengths in mm?")
     if any(np.isfinite(t.radius) and t.radius > RADIUS for t in course.tools):
-        told.append(f"an indenter of {max(t.radius for t in course.tools):.3g} mm radius: is it in mm?")
+        remarks.append(f"an indenter of {max(t.radius for t in course.tools):.3g} mm radius: is it in mm?")
     reduced = course.reduced
     every = float(np.median(reduced.step[~reduced.first])) if not reduced.first.all() else 0.0
     if not EVERY[0] < every < EVERY[1]:
-        told.append(f"a reading every {every:.3g} s: are times in s?")
-    return told
+        remarks.append(f"a reading every {every:.3g} s: are times in s?")
+    return remarks
 
 
 def stuck(course: Course) -> list[str]:
     """Return in words which channels, or the second observation, say nothing in some episodes."""
-    told, reduced = [], course.reduced
+    remarks, reduced = [], course.reduced
     episodes = np.unique(reduced.episode)
     still = np.array([np.ptp(reduced.readings[reduced.episode == e], axis=0) == 0 for e in episodes])
     for channel in np.flatnonzero(still.any(axis=0) & ~still.all(axis=0)):
         count = int(still[:, channel].sum())
         if count > 0.1 * len(episodes) and still[:, channel].mean() > 2 * np.median(still.mean(axis=0)):
             called = course.channel_names[channel]
-            told.append(f"{called}: the same reading throughout {count} of {len(episodes)} episodes: stuck at times; "
-                        "mend its contact, or leave it out")  # fmt: skip
+            remarks.append(
+                f"{called}: the same reading throughout {count} of {len(episodes)} episodes: stuck at times; "
+                "mend its contact, or leave it out"
+            )
     for name, values in (("force", course.force), ("tag", None if course.tag is None else course.tag[:, 2])):
         if values is not None and np.isfinite(values[course.read]).mean() < 0.5:
             share = 100 * (1 - np.isfinite(values[course.read]).mean())
-            told.append(f"{name}: missing at {share:.0f} % of the readings")
-    return told
+            remarks.append(f"{name}: missing at {share:.0f} % of the readings")
+    return remarks
 
 
 def _recovers(course: Course) -> bool:

@@ -114,8 +114,8 @@ def _stops(time: np.ndarray, depth: np.ndarray, band: float) -> int:
     """Return how often a depth stays within a band for as long as a stop."""
     found, begin = 0, 0
     while begin < len(depth):
-        off = np.flatnonzero(np.abs(depth[begin:] - depth[begin]) > band)
-        end = begin + int(off[0]) if len(off) else len(depth)
+        outside = np.flatnonzero(np.abs(depth[begin:] - depth[begin]) > band)
+        end = begin + int(outside[0]) if len(outside) else len(depth)
         stops = time[end - 1] - time[begin] >= STOP
         found += bool(stops)
         begin = end if stops else begin + 1

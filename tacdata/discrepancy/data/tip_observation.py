@@ -12,7 +12,7 @@ import numpy as np
 
 from tacdata.recording import Episode
 
-FEWEST = 30
+FEWEST_VIEWS = 30
 """Views of a session below which its camera tells nothing."""
 NEAR = 150_000_000
 """A reading farther from any view has none [ns]."""
@@ -37,19 +37,19 @@ class Views:
         """Return what was seen at times [ns], shape (n, 3): linear between views, NaN far from any."""
         result = np.stack([np.interp(time_ns, self.time_ns, column) for column in self.tip.T], axis=-1)
         behind = np.clip(np.searchsorted(self.time_ns, time_ns), 1, len(self.time_ns) - 1)
-        off = np.minimum(np.abs(time_ns - self.time_ns[behind - 1]), np.abs(time_ns - self.time_ns[behind]))
-        result[off > NEAR] = np.nan
+        distance = np.minimum(np.abs(time_ns - self.time_ns[behind - 1]), np.abs(time_ns - self.time_ns[behind]))
+        result[distance > NEAR] = np.nan
         return result
 
 
 def second_views(episodes: list[Episode]) -> dict[int, Views]:
     """Return what a session's episodes saw of the tip, by their place in the list; none if it cannot be told."""
     raw = {k: seen for k, e in enumerate(episodes) if (seen := _seen(e)) is not None}
-    if sum(len(time) for time, _ in raw.values()) < FEWEST:
+    if sum(len(time) for time, _ in raw.values()) < FEWEST_VIEWS:
         return {}
-    told = np.concatenate([_right_handed(episodes[k].tip_at(time)) for k, (time, _) in raw.items()])
+    commanded = np.concatenate([_right_handed(episodes[k].tip_at(time)) for k, (time, _) in raw.items()])
     seen = np.concatenate([place for _, place in raw.values()])
-    turn, offset = _laid_on(seen, told)
+    turn, offset = _laid_on(seen, commanded)
     result = {}
     for k, (time, place) in raw.items():
         laid = _right_handed(place @ turn.T + offset)
@@ -85,7 +85,7 @@ def _right_handed(tip: np.ndarray) -> np.ndarray:
     return tip * np.array([1.0, 1.0, -1.0])
 
 
-def _laid_on(seen: np.ndarray, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _laid_on(seen: np.ndarray, commanded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return rotation (3, 3) and offset (3,) that lay one set of points onto another, trimmed (Kabsch 1976).
 
     Motion along one line fixes no rotation: the third row is then the line's direction, and the others are 0.
@@ -93,9 +93,9 @@ def _laid_on(seen: np.ndarray, told: np.ndarray) -> tuple[np.ndarray, np.ndarray
     kept = np.ones(len(seen), dtype=bool)
     turn, offset = np.eye(3), np.zeros(3)
     for _ in range(4):
-        a, b = seen[kept].mean(axis=0), told[kept].mean(axis=0)
-        cross = (seen[kept] - a).T @ (told[kept] - b)
-        width = np.sqrt(np.linalg.eigvalsh(np.cov((told[kept] - b).T))[-2])
+        a, b = seen[kept].mean(axis=0), commanded[kept].mean(axis=0)
+        cross = (seen[kept] - a).T @ (commanded[kept] - b)
+        width = np.sqrt(np.linalg.eigvalsh(np.cov((commanded[kept] - b).T))[-2])
         flat = np.count_nonzero(np.ptp(seen[kept], axis=0) > 1e-9) < 2
         if width < LINE or flat:
             line = cross[:, 2] / max(float(np.linalg.norm(cross[:, 2])), 1e-12)
@@ -105,7 +105,7 @@ def _laid_on(seen: np.ndarray, told: np.ndarray) -> tuple[np.ndarray, np.ndarray
             sign = np.sign(np.linalg.det(right.T @ left.T))
             turn = right.T @ np.diag([1.0, 1.0, sign]) @ left.T
         offset = b - turn @ a
-        off = np.abs((seen @ turn.T + offset - told)[:, 2])
-        usual = 1.4826 * float(np.median(off[kept]))
-        kept = off <= max(TRIMMED * usual, 1e-6)
+        distance = np.abs((seen @ turn.T + offset - commanded)[:, 2])
+        usual = 1.4826 * float(np.median(distance[kept]))
+        kept = distance <= max(TRIMMED * usual, 1e-6)
     return turn, offset

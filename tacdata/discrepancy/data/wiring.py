@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.data.streams import Streams
 
-FEWEST = 40
+FEWEST_TOUCHING = 40
 """Readings in contact that are needed."""
 BETTER = 0.15
 """By how much another channel must correlate better with a reading than its own [1]."""
@@ -31,50 +31,50 @@ def miswired(course: Course, response: Response) -> list[str]:
     """
     if response.fitted or course.channels < 2:
         return []
-    said = Streams.of(course).rise(predict(course, response, []), response)[:, : course.channels]
-    touched = np.abs(said).max(axis=1) > SHARE * np.abs(said).max()
-    if touched.sum() < FEWEST:
+    predicted = Streams.of(course).rise(predict(course, response, []), response)[:, : course.channels]
+    touched = np.abs(predicted).max(axis=1) > SHARE * np.abs(predicted).max()
+    if touched.sum() < FEWEST_TOUCHING:
         return []
     read = course.reduced.readings[touched] - np.median(course.reduced.readings[~touched], axis=0)
-    said = said[touched]
-    moved = np.abs(said).max(axis=0) > SHARE * np.abs(said).max()
-    likeness = _likeness(read, said)
+    predicted = predicted[touched]
+    moved = np.abs(predicted).max(axis=0) > SHARE * np.abs(predicted).max()
+    likeness = _likeness(read, predicted)
     likeness[:, ~moved] = 0.0
     own = np.diag(likeness)
     turned = [int(k) for k in np.flatnonzero(moved & (own < INVERTED))]
-    told = [f"{course.channel_names[k]} reads the other way round: turn its sign" for k in turned]
+    words = [f"{course.channel_names[k]} reads the other way round: turn its sign" for k in turned]
     likeness[turned] = np.abs(likeness[turned])
     _, best = linear_sum_assignment(-likeness)
     own = np.diag(likeness)
-    off = [k for k in range(course.channels) if moved[k] and moved[best[k]] and own[k] < POOR
+    mismatched = [k for k in range(course.channels) if moved[k] and moved[best[k]] and own[k] < POOR
            and likeness[k, best[k]] > own[k] + BETTER]  # fmt: skip
-    return told + (_in_words(off, best, course) if off else [])
+    return words + (_in_words(mismatched, best, course) if mismatched else [])
 
 
-def _likeness(read: np.ndarray, said: np.ndarray) -> np.ndarray:
+def _likeness(read: np.ndarray, predicted: np.ndarray) -> np.ndarray:
     """Return the cosine of every reading with every prediction, shape (channels, channels)."""
     read_size = np.maximum(np.linalg.norm(read, axis=0), 1e-12)
-    said_size = np.maximum(np.linalg.norm(said, axis=0), 1e-12)
-    return (read / read_size).T @ (said / said_size)
+    predicted_size = np.maximum(np.linalg.norm(predicted, axis=0), 1e-12)
+    return (read / read_size).T @ (predicted / predicted_size)
 
 
-def _in_words(off: list[int], best: np.ndarray, course: Course) -> list[str]:
+def _in_words(mismatched: list[int], best: np.ndarray, course: Course) -> list[str]:
     centers, number = course.centers, course.numbers or range(course.channels)
     if centers is not None:
         middle = centers.mean(axis=0)
-        for words, sign in (
+        for turn, sign in (
             ("mirrored along x", (-1, 1)),
             ("mirrored along y", (1, -1)),
             ("turned by 180 degrees", (-1, -1)),
         ):
             there = middle + (centers - middle) * sign
             mirror = np.argmin(np.linalg.norm(centers[None] - there[:, None], axis=2), axis=1)
-            if len(off) > 3 and np.mean(mirror[off] == best[off]) > 0.7:
-                return [f"the channels are {words}: correct the order of channels, or how the sensor lies"]
-    pairs = sorted({(min(k, int(best[k])), max(k, int(best[k]))) for k in off if best[best[k]] == k})
-    single = [k for k in off if best[best[k]] != k]
-    told = [f"channels {number[a]} and {number[b]} look swapped: check their wires" for a, b in pairs]
-    return told + [
+            if len(mismatched) > 3 and np.mean(mirror[mismatched] == best[mismatched]) > 0.7:
+                return [f"the channels are {turn}: correct the order of channels, or how the sensor lies"]
+    pairs = sorted({(min(k, int(best[k])), max(k, int(best[k]))) for k in mismatched if best[best[k]] == k})
+    single = [k for k in mismatched if best[best[k]] != k]
+    words = [f"channels {number[a]} and {number[b]} look swapped: check their wires" for a, b in pairs]
+    return words + [
         f"channel {number[k]} reads what channel {number[int(best[k])]} should: check the order of channels"
         for k in single
     ]

@@ -63,7 +63,7 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
     if not isinstance(response, FittedResponse) or not acting:
         return response.features(course.reduced)
     none = np.zeros((course.rows, response.width + 1))
-    plain = replace(course, readings=none, centers=None, force=None).forgetting()
+    plain = replace(course, readings=none, centers=None, force=None, apart=True)
     little = SMALL * max(float(np.abs(response.force(course.tip, course.tool)).max()), 1e-12)
-    said = predict(plain, SplineResponse(response, little), acting).signal
-    return ((said[:, :-1] - said[:, -1:]) / little + response.air)[course.read]
+    predicted = predict(plain, SplineResponse(response, little), acting).signal
+    return ((predicted[:, :-1] - predicted[:, -1:]) / little + response.air)[course.read]

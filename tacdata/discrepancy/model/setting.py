@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from tacdata.chain import Course, Response
-from tacdata.effects import Effect, Placed
+from tacdata.effects import Effect, GainKind, LikeGain, Placed, library, load
 
 NUISANCE = {"channel_gain": 0.05}
 """What calibration leaves open of a response that was not fitted: standard deviations in the effects' own units."""
@@ -24,5 +24,23 @@ class Setting:
     """Effect -> prior standard deviation, for a response that is not fitted."""
     given: tuple[Placed, ...] = ()
     """Effects that the model has already, with their numbers fixed."""
-    decoys: bool = True
-    """Whether effects race with copies of all by chance; without, each is tested alone (to see what that costs)."""
+    correct_p: bool = True
+    """Whether p-values are corrected for the number of effects tried; without, each is tested alone (an ablation)."""
+
+    @property
+    def channel_gain(self) -> Effect | None:
+        """The nuisance that is a gain of each channel; None without one, or where the response is fitted."""
+        if self.response.fitted:
+            return None
+        return next((e for e in map(load, self.nuisance) if e.gain is GainKind.PER_CHANNEL), None)
+
+    @property
+    def absorbed(self) -> frozenset[str]:
+        """Effects that calibration takes up: nuisances, and what all channels' gains have in common."""
+        if self.response.fitted:
+            return frozenset()
+        force = self.course.force is not None
+        common = {
+            e.name for e in library() if e.gain is GainKind.COMMON or (e.like_gain is LikeGain.EQUAL and not force)
+        }  # fmt: skip
+        return frozenset(self.nuisance) | common

@@ -9,9 +9,9 @@ import numpy as np
 from tacdata.chain import Course
 from tacdata.discrepancy.noise import offset_random_walk, readings
 from tacdata.discrepancy.noise.gram import Noise
-from tacdata.discrepancy.noise.offset_process import wander
+from tacdata.discrepancy.noise.offset_process import offset_process
 from tacdata.discrepancy.noise.variance_components import positive, spreads
-from tacdata.discrepancy.noise.whitener import Cleaner
+from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.statistics.gram_fit import solve
 
 LEAST, MOST = 0.1, 10.0
@@ -23,7 +23,7 @@ ODD = 6.0
 
 
 @dataclass(frozen=True)
-class Sizes:
+class ErrorSizes:
     """How far episodes err by themselves."""
 
     sizes: np.ndarray
@@ -57,20 +57,20 @@ class EpisodeErrors:
         columns = np.concatenate([residual[:, :, None], self.rich], axis=2)
         best = np.zeros(self.rich.shape[2])
         for _ in range(2):
-            best = self._best(columns, Cleaner(course, known, self.context, self.features, errors))
+            best = self._best(columns, Whitener(course, known, self.context, self.features, errors))
             left = (residual - self.rich @ best.astype(np.float32)) / known.scale
             still = readings.still(known, left.shape[1])
-            cleaner = Cleaner(course, still, self.context, self.features, errors / known.scale[None, :, None])
-            bare = cleaner.cleaned(left[:, :, None])[:, :, 0]
+            whitener = Whitener(course, still, self.context, self.features, errors / known.scale[None, :, None])
+            bare = whitener.whitened(left[:, :, None])[:, :, 0]
             bare[~np.isfinite(residual)] = np.nan
             known = readings.refined(bare * known.scale, course, known)
         rest = residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
-        wandering = wander(rest, course, known.scale, known.memory, kinds)
+        wandering = offset_process(rest, course, known.scale, known.memory, kinds)
         walk = offset_random_walk.modes(rest, course, known.scale, known.memory, self._places())
-        return replace(known, wander=wandering, random_walk=walk, tag=readings.tag_wander(rest, course, known))
+        return replace(known, offsets=wandering, random_walk=walk, tag=readings.tag_wander(rest, course, known))
 
-    def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> Sizes:
+    def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> ErrorSizes:
         """Return how large episodes' own errors of pose are.
 
         An episode's errors are told by generalized least squares as if they were free, all kinds together, beside all
@@ -83,8 +83,8 @@ class EpisodeErrors:
             errors: What errors of one standard deviation of their prior change, shape (m, streams, kinds).
             sizes: Sizes so far [prior's], shape (kinds,).
         """
-        cleaner = Cleaner(self.course, known, self.context, self.features, errors * sizes)
-        score, information = cleaner.moved(self._left(cleaner), errors)
+        whitener = Whitener(self.course, known, self.context, self.features, errors * sizes)
+        score, information = whitener.episode_scores(self._left(whitener), errors)
         # Sealed episodes say nothing.
         there = np.flatnonzero(np.diagonal(information, axis1=1, axis2=2).min(axis=1) > 0)
         place, score, information = self._places()[there], score[there], information[there]
@@ -94,15 +94,16 @@ class EpisodeErrors:
             order, again = np.arange(len(place)), np.ones(max(len(place) - 1, 0), dtype=bool)
         before, after = order[:-1][again], order[1:][again]
         if len(before) < readings.FEW_GAPS:
-            return Sizes(np.ones(len(sizes)), np.zeros(0, dtype=np.int64))
+            return ErrorSizes(np.ones(len(sizes)), np.zeros(0, dtype=np.int64))
         unsure = np.linalg.inv(information + UNTOLD * np.eye(len(sizes)))
         found = np.einsum("ekl,el->ek", unsure, score)
         unsure = positive(unsure - np.diag(np.square(sizes)))
-        told = spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST, MOST)
+        estimated = spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST, MOST)
         middle = np.stack([np.median(found[place == p], axis=0) for p in place])
-        off = found - middle
-        far = np.einsum("ek,ek->e", off, np.linalg.solve(unsure + np.diag(np.square(told)), off[:, :, None])[:, :, 0])
-        return Sizes(told, there[far > ODD**2])
+        deviation = found - middle
+        spread = unsure + np.diag(np.square(estimated))
+        far = np.einsum("ek,ek->e", deviation, np.linalg.solve(spread, deviation[:, :, None])[:, :, 0])
+        return ErrorSizes(estimated, there[far > ODD**2])
 
     def gains(self, known: Noise, errors: np.ndarray) -> float:
         """Return how far an episode's gain of a stream is off the next one's at its place [1].
@@ -111,8 +112,8 @@ class EpisodeErrors:
             known: Noise without own gains.
             errors: Of pose, shape (m, streams, kinds).
         """
-        cleaner = Cleaner(self.course, known, self.context, self.features, errors)
-        score, information = cleaner.told(self._left(cleaner), self.rise)
+        whitener = Whitener(self.course, known, self.context, self.features, errors)
+        score, information = whitener.stream_scores(self._left(whitener), self.rise)
         return readings.gain_spread(score, information, self._places())
 
     def _places(self) -> np.ndarray:
@@ -120,17 +121,17 @@ class EpisodeErrors:
         place[self.course.episode] = self.context
         return place
 
-    def _best(self, columns: np.ndarray, cleaner: Cleaner) -> np.ndarray:
+    def _best(self, columns: np.ndarray, whitener: Whitener) -> np.ndarray:
         """Return the weights of the over-rich columns that fit best, shape (k,)."""
         count = self.rich.shape[2]
-        gram = cleaner.collected(columns).of(np.arange(self.course.episodes))
+        gram = whitener.episode_grams(columns).of(np.arange(self.course.episodes))
         free = np.full(count, np.inf)
         return solve(gram, np.arange(count), np.ones(count), -free, free)
 
-    def _left(self, cleaner: Cleaner) -> np.ndarray:
+    def _left(self, whitener: Whitener) -> np.ndarray:
         """Return what an over-rich fit leaves of the residual, shape (m, streams), float32."""
         columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
-        return (self.residual - self.rich @ self._best(columns, cleaner).astype(np.float32)).astype(np.float32)
+        return (self.residual - self.rich @ self._best(columns, whitener).astype(np.float32)).astype(np.float32)
 
 
 def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray]:

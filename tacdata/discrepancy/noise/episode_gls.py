@@ -20,16 +20,16 @@ LEAST = 1e-7
 
 
 @dataclass(frozen=True)
-class Own:
+class EpisodeErrorModel:
     """What the episodes of one place err by themselves, whitened; streams first."""
 
     offset: np.ndarray
     """A constant [1], shape (streams, n)."""
     prior: np.ndarray
     """Its standard deviation in each episode, in noise scales [1], shape (episodes,); inf leaves it free."""
-    swing: np.ndarray | None = None
+    gain_error: np.ndarray | None = None
     """What one standard deviation of a stream's own gain changes [1], shape (streams, n)."""
-    moved: np.ndarray | None = None
+    pose_errors: np.ndarray | None = None
     """What one standard deviation of each error of pose changes [1], shape (streams, n, kinds)."""
     features: np.ndarray | None = None
     """What all episodes may take up together, each stream by itself [1], shape (streams, n, p)."""
@@ -37,13 +37,13 @@ class Own:
     """What one standard deviation of each mode of a stream's own wander changes [1], shape (streams, n, modes)."""
 
 
-class Factored:
+class FactoredErrors:
     """What the episodes of one place err by, factored: takes it out of any columns."""
 
-    def __init__(self, spans: Sequence[np.ndarray], own: Own) -> None:
+    def __init__(self, spans: Sequence[np.ndarray], own: EpisodeErrorModel) -> None:
         """Factor what episodes, each given by its rows, err by."""
-        swing = None if own.swing is None else own.swing[:, :, None]
-        parts = {"moved": own.moved, "swing": swing, "free": own.features}
+        gain_error = None if own.gain_error is None else own.gain_error[:, :, None]
+        parts = {"pose": own.pose_errors, "gain": gain_error, "free": own.features}
         given = {name: value for name, value in parts.items() if value is not None}
         edges = np.cumsum([value.shape[2] for value in given.values()])[:-1]
         stacked = np.concatenate([*given.values()], axis=2) if given else None
@@ -53,8 +53,8 @@ class Factored:
             modes = None if own.random_walk is None else own.random_walk[:, rows]
             offsets, rest = _Offsets(own.offset[:, rows, None], float(prior), modes), {}
             if stacked is not None:
-                rest = dict(zip(given, np.split(offsets.off(stacked[:, rows]), edges, axis=2), strict=True))
-            errors = _Errors(len(own.offset), len(rows), rest.get("moved"), rest.get("swing"))
+                rest = dict(zip(given, np.split(offsets.rooted(stacked[:, rows]), edges, axis=2), strict=True))
+            errors = _Errors(len(own.offset), len(rows), rest.get("pose"), rest.get("gain"))
             self._episodes.append((rows, offsets, errors))
             if self._free is not None:
                 self._free.take(np.ascontiguousarray(rest["free"]), errors)
@@ -74,11 +74,11 @@ class Factored:
         """
         result = np.empty_like(columns)
         for rows, offsets, errors in self._episodes:
-            result[:, rows] = errors.rooted(offsets.off(columns[:, rows]))
+            result[:, rows] = errors.rooted(offsets.rooted(columns[:, rows]))
         if self._free is not None:
             weights = self._free.weights([result[:, rows] for rows, _, _ in self._episodes])
             for k, (rows, _, _) in enumerate(self._episodes):
-                result[:, rows] -= self._free.said(k, weights)
+                result[:, rows] -= self._free.fitted(k, weights)
         return result
 
     def projected(self, white: np.ndarray) -> np.ndarray:
@@ -88,10 +88,10 @@ class Factored:
         result = white.copy()
         weights = self._free.weights([white[:, rows] for rows, _, _ in self._episodes])
         for k, (rows, _, _) in enumerate(self._episodes):
-            result[:, rows] -= self._free.said(k, weights)
+            result[:, rows] -= self._free.fitted(k, weights)
         return result
 
-    def moved(self, left: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def episode_scores(self, left: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what a residual says of columns in each episode by itself, and how much it knows.
 
         Args:
@@ -103,7 +103,7 @@ class Factored:
         """
         scores, known = [], []
         for k, (rows, offsets, errors) in enumerate(self._episodes):
-            own, rest = offsets.off(columns[:, rows]), left[:, rows]
+            own, rest = offsets.rooted(columns[:, rows]), left[:, rows]
             inner = errors.inner(own)
             turned = np.linalg.solve(np.eye(len(errors.gram)) + errors.gram, inner)
             pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
@@ -113,7 +113,7 @@ class Factored:
             known.append(power if self._free is None else power - self._free.taken_of_all(k, own, turned))
         return np.array(scores), np.array(known)
 
-    def told(self, left: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def stream_scores(self, left: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what a residual says of columns that each stand in one stream of one episode, and how much it knows.
 
         Like the products with what `without` makes of such columns, but for streams times episodes of them at once.
@@ -128,12 +128,12 @@ class Factored:
         """
         scores, known = [], []
         for k, (rows, offsets, errors) in enumerate(self._episodes):
-            own, rest = offsets.off(alone[:, rows, None])[:, :, 0], left[:, rows]
-            moved = errors.of_each(own)
+            own, rest = offsets.rooted(alone[:, rows, None])[:, :, 0], left[:, rows]
+            pose = errors.of_each(own)
             pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
-            turned = moved @ np.linalg.inv(np.eye(len(errors.gram)) + errors.gram)
-            scores.append(np.einsum("sm,sm->s", own, rest) - moved @ pulled)
-            power = np.einsum("sm,sm->s", own, own) - np.einsum("sk,sk->s", turned, moved)
+            turned = pose @ np.linalg.inv(np.eye(len(errors.gram)) + errors.gram)
+            scores.append(np.einsum("sm,sm->s", own, rest) - pose @ pulled)
+            power = np.einsum("sm,sm->s", own, own) - np.einsum("sk,sk->s", turned, pose)
             known.append(power if self._free is None else power - self._free.taken(k, own, turned))
         return np.array(scores), np.array(known)
 
@@ -157,7 +157,7 @@ class _Offsets:
             root[:, 0, 0] = 1.0
         self._pull = (root @ turned).astype(np.float32)
 
-    def off(self, block: np.ndarray) -> np.ndarray:
+    def rooted(self, block: np.ndarray) -> np.ndarray:
         """Return columns (streams, m, k) with it accounted for."""
         return block - self._columns @ (self._pull @ block)
 
@@ -172,17 +172,17 @@ def _root(gram: np.ndarray) -> np.ndarray:
 class _Errors:
     """One episode's errors of pose and gain, T: kinds of pose, then a gain a stream."""
 
-    def __init__(self, streams: int, rows: int, moved: np.ndarray | None, swing: np.ndarray | None) -> None:
+    def __init__(self, streams: int, rows: int, pose: np.ndarray | None, gain_error: np.ndarray | None) -> None:
         self._shape = streams, rows
-        kinds = 0 if moved is None else moved.shape[2]
-        pose = np.zeros((streams * rows, 0), dtype=np.float32) if moved is None else moved.reshape(-1, kinds)
-        self._pose = np.ascontiguousarray(pose)
-        self._swing = None if swing is None else np.ascontiguousarray(swing)
-        if self._swing is not None:
-            power = np.square(self._swing).sum(axis=(1, 2)).astype(np.float64)
+        kinds = 0 if pose is None else pose.shape[2]
+        flat = np.zeros((streams * rows, 0), dtype=np.float32) if pose is None else pose.reshape(-1, kinds)
+        self._pose = np.ascontiguousarray(flat)
+        self._gain = None if gain_error is None else np.ascontiguousarray(gain_error)
+        if self._gain is not None:
+            power = np.square(self._gain).sum(axis=(1, 2)).astype(np.float64)
             self._mean = power / max(float(power.sum()), 1e-12)
         every = [self._pose.reshape(streams, rows, kinds)]
-        if self._swing is not None:
+        if self._gain is not None:
             every.append(self._gains(np.eye(streams)))
         self.gram = self.inner(np.concatenate(every, axis=2).astype(np.float32))
         self.root = _root(0.5 * (self.gram + self.gram.T))
@@ -191,8 +191,8 @@ class _Errors:
         """Return T' of columns (streams, m, k), shape (kinds + streams, k)."""
         flat = block.reshape(len(self._pose), block.shape[2])
         parts = [(self._pose.T @ flat).astype(np.float64)]
-        if self._swing is not None:
-            each = (self._swing.transpose(0, 2, 1) @ block)[:, 0].astype(np.float64)
+        if self._gain is not None:
+            each = (self._gain.transpose(0, 2, 1) @ block)[:, 0].astype(np.float64)
             parts.append(each - self._mean[:, None] * each.sum(axis=0))
         return np.concatenate(parts)
 
@@ -204,23 +204,23 @@ class _Errors:
         """Return T' of columns (streams, m, p), each in one stream alone, shape (streams, p, kinds + streams)."""
         turned = shared.transpose(0, 2, 1)
         parts = [turned @ self._pose.reshape(*self._shape, self._pose.shape[1])]
-        if self._swing is not None:
-            parts.append((turned @ self._swing) * (np.eye(len(shared)) - self._mean)[:, None, :])
+        if self._gain is not None:
+            parts.append((turned @ self._gain) * (np.eye(len(shared)) - self._mean)[:, None, :])
         return np.concatenate(parts, axis=2).astype(np.float64)
 
-    def said(self, weights: np.ndarray) -> np.ndarray:
+    def times(self, weights: np.ndarray) -> np.ndarray:
         """Return T weights, shape (streams, m, k), for weights of shape (kinds + streams, k)."""
         kinds = self._pose.shape[1]
         result = (self._pose @ weights[:kinds].astype(np.float32)).reshape(*self._shape, weights.shape[1])
-        return result if self._swing is None else result + self._gains(weights[kinds:])
+        return result if self._gain is None else result + self._gains(weights[kinds:])
 
     def _gains(self, weights: np.ndarray) -> np.ndarray:
         own = weights - self._mean @ weights
-        return self._swing * own[:, None, :].astype(np.float32)
+        return self._gain * own[:, None, :].astype(np.float32)
 
     def rooted(self, block: np.ndarray) -> np.ndarray:
         """Return columns (streams, m, k) times the root of the inverse of 1 + T T'."""
-        return block - self.said(self.root @ self.inner(block))
+        return block - self.times(self.root @ self.inner(block))
 
 
 class _Free:
@@ -296,9 +296,9 @@ class _Free:
         inside -= 2 * np.einsum("sp,spk,sk->s", alone, pose, turned)
         return inside + np.einsum("sk,kl,sl->s", turned, np.einsum("spk,spl->kl", joint, pose), turned)
 
-    def said(self, episode: int, weights: np.ndarray) -> np.ndarray:
+    def fitted(self, episode: int, weights: np.ndarray) -> np.ndarray:
         """Return what weights change in an episode, shape (streams, m, k)."""
         errors, joint = self._errors[episode], self._joints[episode]
         flat = joint.reshape(joint.shape[0] * joint.shape[1], joint.shape[2])
         through = errors.root @ (flat.T @ weights.reshape(len(flat), -1))
-        return self._shared[episode] @ weights.astype(np.float32) - errors.said(through)
+        return self._shared[episode] @ weights.astype(np.float32) - errors.times(through)

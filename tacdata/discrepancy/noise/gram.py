@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.noise.offset_process import Wander
+from tacdata.discrepancy.noise.offset_process import OffsetProcess
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ class Noise:
     """Standard deviation of the innovations [each stream's unit], shape (streams,)."""
     memory: float
     """Correlation of successive rows at the median step [1]."""
-    wander: Wander | None = None
+    offsets: OffsetProcess | None = None
     """How episodes' offsets go on from one to the next; None leaves each free."""
-    swing: np.ndarray | None = None
+    gain_error: np.ndarray | None = None
     """What one standard deviation of an episode's own gain of a stream changes [its unit], shape (n, streams)."""
     missing: np.ndarray | None = None
     """Which values were not read, shape (n, streams), bool; None: all were."""
@@ -43,13 +43,13 @@ class Noise:
 
     def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> Noise:
         """Return the noise of some rows, shape (n,), bool; ``episodes`` are those left, if they are numbered anew."""
-        each = {name: getattr(self, name) for name in ("swing", "missing", "random_walk", "relative_scale")}
+        each = {name: getattr(self, name) for name in ("gain_error", "missing", "random_walk", "relative_scale")}
         kept = {name: None if value is None else value[rows] for name, value in each.items()}
-        return replace(self, **kept, wander=None if self.wander is None else self.wander.of(rows, episodes))
+        return replace(self, **kept, offsets=None if self.offsets is None else self.offsets.of(rows, episodes))
 
 
 @dataclass(frozen=True)
-class Evidence:
+class EpisodeGrams:
     """Gram matrices of the residual (first) and the columns, episode by episode."""
 
     gram: np.ndarray
@@ -105,9 +105,9 @@ def _filter(course: Course, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
     return decay, spread / np.sqrt(np.minimum(course.averaged, 4.0))
 
 
-def summed(
+def episode_grams(
     columns: np.ndarray, course: Course, beside: np.ndarray | None = None, inner: np.ndarray | None = None
-) -> Evidence:  # fmt: skip
+) -> EpisodeGrams:  # fmt: skip
     """Return the `Evidence` of columns that are cleaned.
 
     Args:
@@ -126,4 +126,4 @@ def summed(
         if beside is not None and inner is not None:
             both = flat.T @ beside[begin:end].reshape(values, more)
             gram[number, :few, few:], gram[number, few:, :few], gram[number, few:, few:] = both, both.T, inner[number]
-    return Evidence(gram, rows)
+    return EpisodeGrams(gram, rows)

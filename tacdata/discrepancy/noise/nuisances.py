@@ -12,7 +12,7 @@ from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.regressors.candidates import build
 from tacdata.discrepancy.regressors.generic import depth_slope
 from tacdata.discrepancy.regressors.stack import side_by_side
-from tacdata.effects import Placed, load
+from tacdata.effects import Placed, library, load
 
 IDLE = 0.01
 """Standard deviation of what is known of the readings without load, of the largest rise [1]."""
@@ -68,11 +68,6 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
     return columns, np.ones(columns.shape[2])
 
 
-def calibrated(setting: Setting) -> bool:
-    """Return whether the first nuisances are gains of channels, and then what is known of them without load."""
-    return not setting.response.fitted and "channel_gain" in setting.nuisance
-
-
 def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
     """Return what an episode's own errors of pose change, at one standard deviation, shape (n, streams, kinds)."""
     course, response = setting.course, setting.response
@@ -82,9 +77,10 @@ def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
         rise = Streams.of(course).rise(predict(course, response, list(placed)), response)
         rise[:, course.channels :] = 0.0
         return np.stack([slope * FITTED_JITTER * course.stroke, rise * FITTED_GAIN], axis=2)
-    sideways = build(course, response, placed, [load("xy_offset")])
-    shift = sideways.candidates[0].effect.amplitudes[0].typical if sideways.candidates else 1.0
     parts = [slope[:, :, None] * JITTER[2]]
-    if sideways.candidates:
-        parts.append(side_by_side(sideways.columns)[:, :, 1:] * (JITTER[0] / shift))
+    for effect in (e for e in library() if e.each_episode):
+        board = build(course, response, placed, [effect])
+        if board.candidates:
+            shift = board.candidates[0].effect.amplitudes[0].typical
+            parts.append(side_by_side(board.columns)[:, :, 1:] * (JITTER[0] / shift))
     return np.concatenate(parts, axis=2)

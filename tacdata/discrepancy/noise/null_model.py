@@ -14,10 +14,10 @@ from tacdata.discrepancy.model.fitted_response import contexts
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise import gram
-from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, Sizes
+from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, ErrorSizes
 from tacdata.discrepancy.noise.gram import Noise
 from tacdata.discrepancy.noise.nuisances import jitter, nuisance_columns
-from tacdata.discrepancy.noise.whitener import Cleaner
+from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.regressors.generic import generic, slow
 from tacdata.discrepancy.statistics.gram_fit import fold_of
 from tacdata.effects import Placed
@@ -33,7 +33,7 @@ SETTLED = 0.1
 
 
 @dataclass(frozen=True)
-class Frame:
+class NullModel:
     """What stays the same while effects come and go: nuisances and noise, of the model as it was given."""
 
     context: np.ndarray
@@ -54,7 +54,7 @@ class Frame:
     """Noise as an over-rich fit leaves it."""
     folds: np.ndarray
     """Fold of each episode, shape (episodes,), int64."""
-    known: Cleaner
+    whitener: Whitener
     """Takes nuisances out of columns, beside the model as it was given."""
     odd: np.ndarray
     """Episodes that err by far more than the others, shape (k,), int64."""
@@ -68,20 +68,21 @@ class Frame:
     @classmethod
     def of(
         cls, reduced: Course, context: np.ndarray, features: np.ndarray | None, errors: np.ndarray, ridge: np.ndarray,
-        beside: np.ndarray, noise: Noise, folds: np.ndarray, known: Cleaner | None = None,
+        beside: np.ndarray, noise: Noise, folds: np.ndarray, known: Whitener | None = None,
         odd: np.ndarray | None = None, sizes: np.ndarray | None = None, spread: float = 0.0,
-    ) -> Frame:  # fmt: skip
+    ) -> NullModel:  # fmt: skip
         """Return a frame of the rows read, with what follows from its parts."""
         white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), DRAWS))
         nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
         return cls(
-            context, features, errors, ridge, beside, nuisances, gram.summed(nuisances, reduced).gram, noise, folds,
-            known or Cleaner(reduced, noise, context, features, errors),
+            context, features, errors, ridge, beside, nuisances, gram.episode_grams(nuisances, reduced).gram, noise,
+            folds,
+            known or Whitener(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
             white, sizes, spread,
         )  # fmt: skip
 
-    def cleaner(self, setting: Setting, placed: Sequence[Placed]) -> Cleaner:
+    def whitener_for(self, setting: Setting, placed: Sequence[Placed]) -> Whitener:
         """Return what takes nuisances out of columns beside a model's response.
 
         What the response takes up, and an episode's own errors of pose and gain, go through the model's effects: those
@@ -92,77 +93,77 @@ class Frame:
             setting: With the model's response.
             placed: Its effects, given ones first.
         """
-        course, before = setting.course, self.known.features
+        course, before = setting.course, self.whitener.features
         features = taken_up(course, setting.response, placed)
         if features is before or (features is not None and before is not None and np.array_equal(features, before)):
-            return self.known
+            return self.whitener
         errors, noise = self.errors, self.noise
-        if self.sizes is not None and noise.swing is not None:
+        if self.sizes is not None and noise.gain_error is not None:
             episode, streams = course.reduced.episode, Streams.of(course)
             errors = as_large(jitter(setting, placed), errors, episode)
             rise = streams.rise(predict(course, setting.response, list(placed)), setting.response)
-            noise = replace(noise, swing=as_large(rise, noise.swing, episode))
-        return Cleaner(course.reduced, noise, self.context, features, errors)
+            noise = replace(noise, gain_error=as_large(rise, noise.gain_error, episode))
+        return Whitener(course.reduced, noise, self.context, features, errors)
 
-    def shaken(self, cleaner: Cleaner) -> np.ndarray:
+    def projected_draws(self, whitener: Whitener) -> np.ndarray:
         """Return what a cleaner leaves of the draws [noise scales], shape (m, streams, draws), float32."""
-        return self._shaken if cleaner is self.known else cleaner.projected(self.draws)
+        return self._shaken if whitener is self.whitener else whitener.projected(self.draws)
 
     @cached_property
     def _shaken(self) -> np.ndarray:
-        return self.known.projected(self.draws)
+        return self.whitener.projected(self.draws)
 
 
-def as_large(shape: np.ndarray, told: np.ndarray, episode: np.ndarray) -> np.ndarray:
+def as_large(shape: np.ndarray, reference: np.ndarray, episode: np.ndarray) -> np.ndarray:
     """Return what an episode's error changes in one model, as large in each episode as it was told to be in another.
 
     Pose: shape (m, streams, kinds), the size of each kind over all streams. Gains: shape (m, streams), that of each.
 
     Args:
         shape: In the one model.
-        told: In the other.
+        reference: In the other.
         episode: Of each row, shape (m,), int64.
     """
-    over = 1 if told.ndim == 3 else ()
-    sizes = np.zeros((2, int(episode.max()) + 1, told.shape[-1]))
-    for size, values in zip(sizes, (shape, told), strict=True):
+    over = 1 if reference.ndim == 3 else ()
+    sizes = np.zeros((2, int(episode.max()) + 1, reference.shape[-1]))
+    for size, values in zip(sizes, (shape, reference), strict=True):
         np.add.at(size, episode, np.square(values, dtype=float).sum(axis=over))
     by = np.sqrt(sizes[1] / np.maximum(sizes[0], 1e-300))[episode]
-    return (shape * (by[:, None] if told.ndim == 3 else by)).astype(np.float32)
+    return (shape * (by[:, None] if reference.ndim == 3 else by)).astype(np.float32)
 
 
-def frame(setting: Setting) -> Frame:
+def null_model(setting: Setting) -> NullModel:
     """Return what stays the same, for a model without further effects."""
     course, response = setting.course, setting.response
     reduced, streams = course.reduced, Streams.of(course)
-    said = predict(course, response, list(setting.given))
+    predicted = predict(course, response, list(setting.given))
     context, features = contexts(reduced), taken_up(course, response, setting.given)
     errors = jitter(setting, setting.given)
     extra, ridge = nuisance_columns(setting, setting.given)
     rich = generic(course, response, list(setting.given))
-    residual = streams.measured(course) - streams.predicted(said)
+    residual = streams.measured(course) - streams.predicted(predicted)
     every = np.concatenate([extra, rich, slow(course, response, list(setting.given))], axis=2)
     every = every.astype(np.float32)
-    rise = streams.rise(said, response).astype(np.float32)
-    told = EpisodeErrors(residual, every, reduced, context, features, rise)
-    known = told.noise(errors)
-    prior, own = errors, Sizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
+    rise = streams.rise(predicted, response).astype(np.float32)
+    measured = EpisodeErrors(residual, every, reduced, context, features, rise)
+    known = measured.noise(errors)
+    prior, own = errors, ErrorSizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
     before, spread = np.zeros(errors.shape[2] + 1), MODEL
     for _ in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is told beside the other.
-        known = replace(known, swing=None)
-        spread = told.gains(known, errors)
-        known = replace(known, swing=(rise * max(spread, MODEL)).astype(np.float32))
-        own = told.poses(known, prior, own.sizes)
+        known = replace(known, gain_error=None)
+        spread = measured.gains(known, errors)
+        known = replace(known, gain_error=(rise * max(spread, MODEL)).astype(np.float32))
+        own = measured.poses(known, prior, own.sizes)
         errors = prior * own.sizes
         now = np.array([*own.sizes, max(spread, MODEL)])
         if np.all(np.abs(now - before) <= SETTLED * now):
             break
         before = now
-    cleaner = Cleaner(reduced, known, context, features, errors)
-    beside = cleaner.cleaned(every[:, :, : extra.shape[2] + rich.shape[2]])
+    whitener = Whitener(reduced, known, context, features, errors)
+    beside = whitener.whitened(every[:, :, : extra.shape[2] + rich.shape[2]])
     folds = fold_of(course.episodes)
     sizes = own.sizes if response.fitted else None
-    return Frame.of(
-        reduced, context, features, errors, ridge, beside, known, folds, cleaner, own.odd, sizes, max(spread, MODEL)
+    return NullModel.of(
+        reduced, context, features, errors, ridge, beside, known, folds, whitener, own.odd, sizes, max(spread, MODEL)
     )

@@ -37,7 +37,7 @@ LIKELY = 1.0
 
 
 @dataclass(frozen=True)
-class Wander:
+class OffsetProcess:
     """What is known of episodes' offsets before they are read."""
 
     covariance: np.ndarray
@@ -75,7 +75,7 @@ class Wander:
             spread[e] = np.sqrt(max(self.covariance[e, e] - float(half @ half), LEAST**2))
         return weights, spread
 
-    def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> Wander:
+    def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> OffsetProcess:
         """Return what is known if only some rows were read.
 
         Args:
@@ -86,7 +86,7 @@ class Wander:
         if episodes is None:
             there = np.isin(np.arange(len(self.error)), number)
             return replace(self, error=np.where(there, self.error, np.inf), quiet=self.quiet[rows], episode=number)
-        return Wander(
+        return OffsetProcess(
             self.covariance[np.ix_(episodes, episodes)], self.error[episodes], self.quiet[rows],
             np.searchsorted(episodes, number),
         )  # fmt: skip
@@ -102,9 +102,9 @@ class Wander:
         return (self.weights @ means.reshape(len(means), -1)).reshape(means.shape)
 
 
-def wander(
+def offset_process(
     residual: np.ndarray, course: Course, scale: np.ndarray, memory: float, levels: Sequence[np.ndarray]
-) -> Wander | None:  # fmt: skip
+) -> OffsetProcess | None:  # fmt: skip
     """Return how offsets wander; None if there are too few episodes to say.
 
     Args:
@@ -126,11 +126,11 @@ def wander(
     # The mean of n rows with memory m and innovations of variance 1.
     error = np.where(known, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
     time = _times(course)
-    walk, length, own = _told(offsets[known], error[known], time[known], [level[known] for level in levels])
+    walk, length, own = _reml(offsets[known], error[known], time[known], [level[known] for level in levels])
     apart = np.abs(np.subtract.outer(time, time))
     same = np.sum([level[:, None] == level for level in levels], axis=0)
     covariance = walk * np.exp(-apart / length) + FREE**2 * same + max(own, LEAST**2) * np.eye(len(time))
-    return Wander(covariance, error, quiet, course.episode)
+    return OffsetProcess(covariance, error, quiet, course.episode)
 
 
 def _times(course: Course) -> np.ndarray:
@@ -155,7 +155,7 @@ def _means(
     return sums / np.maximum(count, 1)
 
 
-def _told(
+def _reml(
     offsets: np.ndarray, error: np.ndarray, time: np.ndarray, levels: Sequence[np.ndarray]
 ) -> tuple[float, float, float]:  # fmt: skip
     """Return variance and time constant [s] of the wander, and the variance of episodes' own offsets.
@@ -178,8 +178,8 @@ def _told(
     apart = np.abs(np.subtract.outer(time, time))
     between = max(float(np.median(np.diff(time))), 1e-9)
     seen = contrast.T @ offsets
-    shaken = (contrast.T * error) @ contrast
-    size = max(float(np.mean(seen**2) - np.trace(shaken) / len(shaken)), 0.01 * float(np.mean(seen**2)), 1e-6)
+    read_error = (contrast.T * error) @ contrast
+    size = max(float(np.mean(seen**2) - np.trace(read_error) / len(read_error)), 0.01 * float(np.mean(seen**2)), 1e-6)
     best = []
     for steps in LENGTHS:
         alike = np.exp(-apart / (steps * between))
@@ -187,7 +187,8 @@ def _told(
 
         def cost(log: np.ndarray, pattern: np.ndarray = pattern) -> float:
             walk, own = np.exp(np.clip(log, -14, 14))
-            factor = cho_factor(walk * pattern + shaken + own * np.eye(len(shaken)), lower=True, check_finite=False)
+            covariance = walk * pattern + read_error + own * np.eye(len(read_error))
+            factor = cho_factor(covariance, lower=True, check_finite=False)
             power = float(np.sum(seen * cho_solve(factor, seen, check_finite=False)))
             return seen.shape[1] * float(np.log(np.diag(factor[0])).sum()) + 0.5 * power
 

@@ -37,7 +37,7 @@ def modes(
         memory: Correlation of successive rows [1].
         place: Of each episode, shape (episodes,).
     """
-    rate = told(rest, course, scale, memory, place)
+    rate = walk_rate(rest, course, scale, memory, place)
     count = np.bincount(course.episode, minlength=course.episodes)
     begin = np.full(course.episodes, np.inf)
     np.minimum.at(begin, course.episode, course.time)
@@ -57,7 +57,7 @@ def modes(
     return (size * np.cos(np.pi * number[:most] * share[:, None])).astype(np.float32)
 
 
-def told(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray) -> float:
+def walk_rate(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray) -> float:
     """Return the rate of the wander [noise scales squared a second], 0 where it cannot be told; as for `modes`."""
     quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
     streams = rest[:, : course.channels] / scale[: course.channels]

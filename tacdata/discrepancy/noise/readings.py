@@ -37,10 +37,11 @@ def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np
     quiet = read & (at <= SHARES[1])
     count, power = quiet.sum(axis=0), np.sum(np.square(second), axis=0, where=quiet)
     # A stream that mostly stands still without load, or was not read, tells nothing.
-    told = np.sum(quiet & (second != 0), axis=0) > 0.5 * count
-    if count[told].sum() < ENOUGH:
+    informative = np.sum(quiet & (second != 0), axis=0) > 0.5 * count
+    if count[informative].sum() < ENOUGH:
         return None
-    second, at, known = second[:, told] / np.sqrt(power[told] / count[told]), at[:, told], read[:, told]
+    size = np.sqrt(power[informative] / count[informative])
+    second, at, known = second[:, informative] / size, at[:, informative], read[:, informative]
     nodes, levels = [0.0], [_spread(second[known & (at <= SHARES[1])])]
     for low, high in itertools.pairwise(SHARES[1:]):
         inside = known & (at > low) & (at <= high)
@@ -100,10 +101,10 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
     seen = np.isfinite(leftover).any(axis=0)
     if not seen.all():
         own = replace(before, scale=before.scale[seen], missing=None)
-        told = refined(leftover[:, seen], course, own)
+        estimate = refined(leftover[:, seen], course, own)
         scale = before.scale.copy()
-        scale[seen] = told.scale
-        return replace(before, scale=scale, memory=told.memory)
+        scale[seen] = estimate.scale
+        return replace(before, scale=scale, memory=estimate.memory)
     inside = ~course.first
     median = float(np.median(course.step[inside])) if inside.any() else 1.0
     pairs = inside & (course.step < 1.5 * median)
@@ -129,10 +130,10 @@ def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -
         place: Of each episode, shape (episodes,).
     """
     gaps, known = [], []
-    said = information.max(axis=1) > 0  # sealed episodes say nothing
-    for key in np.unique(place[said]):
-        power = information[said & (place == key)]
-        gain = score[said & (place == key)] / np.maximum(power, 1e-9)
+    informative = information.max(axis=1) > 0  # sealed episodes say nothing
+    for key in np.unique(place[informative]):
+        power = information[informative & (place == key)]
+        gain = score[informative & (place == key)] / np.maximum(power, 1e-9)
         both = (power[1:] > 1.0) & (power[:-1] > 1.0)
         gaps.append(np.diff(gain, axis=0)[both])
         known.append((1 / np.maximum(power[1:], 1e-9) + 1 / np.maximum(power[:-1], 1e-9))[both])
@@ -236,15 +237,6 @@ def tag_wander(residual: np.ndarray, course: Course, known: Noise) -> float | No
         gaps.append(np.diff(mean)[both])
         error.append((1 / np.maximum(count[1:], 1) + 1 / np.maximum(count[:-1], 1))[both])
     return max(spread_of(np.concatenate(gaps), np.concatenate(error)), 0.2)
-
-
-def number_within(context: np.ndarray, episode: np.ndarray) -> np.ndarray:
-    """Return the number of each row's episode among those of its place, from 0, shape (n,), int64."""
-    result = np.zeros(len(context), dtype=np.int64)
-    for key in np.unique(context):
-        rows = context == key
-        result[rows] = np.unique(episode[rows], return_inverse=True)[1]
-    return result
 
 
 def still(known: Noise, streams: int) -> Noise:

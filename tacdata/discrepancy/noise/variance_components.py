@@ -55,7 +55,7 @@ def _consistent(kinds: int) -> float:
     """Return the factor of the t distribution's scale with which it tells normal numbers' covariance right [1]."""
     at = chi2.ppf((np.arange(4000) + 0.5) / 4000, kinds)
 
-    def off(scale: float) -> float:
+    def bias(scale: float) -> float:
         return float(np.mean((FREEDOM + kinds) * at / (FREEDOM * scale + at))) - kinds
 
-    return float(root_scalar(off, bracket=(0.1, 20.0)).root)
+    return float(root_scalar(bias, bracket=(0.1, 20.0)).root)

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.noise.episode_gls import Factored, Own
-from tacdata.discrepancy.noise.gram import Evidence, Noise, whiten
+from tacdata.discrepancy.noise.episode_gls import EpisodeErrorModel, FactoredErrors
+from tacdata.discrepancy.noise.gram import EpisodeGrams, Noise, whiten
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,11 @@ class _Place:
     rows: np.ndarray
     episode: np.ndarray
     offset: np.ndarray
-    seen: Factored
-    tag: Factored | None
+    seen: FactoredErrors
+    tag: FactoredErrors | None
 
 
-class Cleaner:
+class Whitener:
     """Whitens columns and takes nuisances out of them."""
 
     def __init__(
@@ -40,7 +40,7 @@ class Cleaner:
             jitter: What an episode's own errors of pose of one standard deviation change, shape (n, streams, kinds).
         """
         self.features = features
-        self._course, self._noise, wander = course, noise, noise.wander
+        self._course, self._noise, offsets = course, noise, noise.offsets
         streams = len(noise.scale)
         self._seen = seen = streams - (3 if noise.tag is not None else 0)
         flat = replace(noise, scale=np.ones(1))
@@ -51,10 +51,10 @@ class Cleaner:
         if noise.random_walk is not None:
             each = np.broadcast_to(noise.random_walk[:, None, :], (course.rows, streams, noise.random_walk.shape[1]))
             random_walk = whiten(each, course, flat)
-        swung = None if noise.swing is None else whiten(noise.swing[:, :, None], course, noise)[:, :, 0]
+        swung = None if noise.gain_error is None else whiten(noise.gain_error[:, :, None], course, noise)[:, :, 0]
         ahead = None
-        if wander is not None and features is not None:
-            ahead = wander.expected(features[:, None, :]).astype(np.float32)
+        if offsets is not None and features is not None:
+            ahead = offsets.expected(features[:, None, :]).astype(np.float32)
         order = np.argsort(context, kind="stable")
         self._places: list[_Place] = []
         # A place at a time: columns of all rows together would not stay in a processor's cache.
@@ -71,9 +71,9 @@ class Cleaner:
                 if ahead is not None:
                     ones = whiten(np.ones((len(group), 1, 1)), course, one, group)[:, :, 0]
                     _follow(shared, ones, local, ahead[:, :, used])
-            own = Own(
+            own = EpisodeErrorModel(
                 _turned(offset[group, :seen]),
-                free if wander is None else wander.spread[[local[span[0]] for span in spans]],
+                free if offsets is None else offsets.spread[[local[span[0]] for span in spans]],
                 None if swung is None else _turned(swung[group, :seen]),
                 _turned(moved[group, :seen]),
                 None if shared is None else _features(shared, offset[group, :seen]),
@@ -83,10 +83,10 @@ class Cleaner:
             if seen < streams:
                 # A tag knows nothing of the response: it has a free offset for the place, and each episode's own.
                 prior = np.full(len(spans), float(noise.tag or 1.0))
-                tag = Factored(
-                    spans, Own(_turned(offset[group, seen:]), prior, features=_turned(offset[group, seen:, None]))
-                )
-            self._places.append(_Place(group, local, offset[group], Factored(spans, own), tag))
+                free_offset = _turned(offset[group, seen:, None])
+                tag_errors = EpisodeErrorModel(_turned(offset[group, seen:]), prior, features=free_offset)
+                tag = FactoredErrors(spans, tag_errors)
+            self._places.append(_Place(group, local, offset[group], FactoredErrors(spans, own), tag))
 
     @property
     def freedom(self) -> float:
@@ -100,9 +100,9 @@ class Cleaner:
             columns: Shape (n, streams, k).
         """
         noise, seen, expected = self._noise, self._seen, None
-        if noise.wander is not None:
+        if noise.offsets is not None:
             gone = None if noise.missing is None else noise.missing[:, :seen]
-            expected = noise.wander.expected(columns[:, :seen], gone)
+            expected = noise.offsets.expected(columns[:, :seen], gone)
             expected = (expected / noise.scale[:seen, None]).astype(np.float32)
         for place in self._places:
             white = whiten(columns[place.rows], self._course, noise, place.rows)
@@ -114,7 +114,7 @@ class Cleaner:
                 part[:, seen:] = _turned(place.tag.without(_turned(white[:, seen:])))
             yield place.rows, part
 
-    def told(self, residual: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def stream_scores(self, residual: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what a residual says of columns that each stand in one stream of one episode, and how much it knows.
 
         Args:
@@ -128,11 +128,11 @@ class Cleaner:
         white = whiten(alone[:, : self._seen, None], self._course, self._of_seen())[:, :, 0]
         for place, (rows, part) in zip(self._places, self.parts(residual[:, :, None]), strict=True):
             episodes = np.unique(place.episode)
-            own = place.seen.told(_turned(part[:, : self._seen, 0]), _turned(white[rows]))
+            own = place.seen.stream_scores(_turned(part[:, : self._seen, 0]), _turned(white[rows]))
             score[episodes, : self._seen], known[episodes, : self._seen] = own
         return score, np.maximum(known, 0.0)
 
-    def moved(self, residual: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def episode_scores(self, residual: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what a residual says of columns in each episode by itself, and how much it knows.
 
         Args:
@@ -147,11 +147,11 @@ class Cleaner:
         white = whiten(columns, self._course, self._noise)
         for place, (rows, part) in zip(self._places, self.parts(residual[:, :, None]), strict=True):
             episodes, own = np.unique(place.episode), white[rows]
-            score[episodes], known[episodes] = place.seen.moved(
+            score[episodes], known[episodes] = place.seen.episode_scores(
                 _turned(part[:, : self._seen, 0]), _turned(own[:, : self._seen])
             )
             if place.tag is not None:
-                more = place.tag.moved(_turned(part[:, self._seen :, 0]), _turned(own[:, self._seen :]))
+                more = place.tag.episode_scores(_turned(part[:, self._seen :, 0]), _turned(own[:, self._seen :]))
                 score[episodes] += more[0]
                 known[episodes] += more[1]
         return score, known
@@ -162,7 +162,7 @@ class Cleaner:
         relative = None if noise.relative_scale is None else noise.relative_scale[:, :seen]
         return replace(noise, scale=noise.scale[:seen], missing=missing, relative_scale=relative)
 
-    def cleaned(self, columns: np.ndarray) -> np.ndarray:
+    def whitened(self, columns: np.ndarray) -> np.ndarray:
         """Return columns whitened and without nuisances, shape (n, streams, k)."""
         result = np.zeros(columns.shape, dtype=np.float32)
         for rows, part in self.parts(columns):
@@ -180,7 +180,7 @@ class Cleaner:
             result[place.rows] = own
         return result
 
-    def collected(self, columns: np.ndarray, beside: np.ndarray | None = None) -> Evidence:
+    def episode_grams(self, columns: np.ndarray, beside: np.ndarray | None = None) -> EpisodeGrams:
         """Reduce columns to `Evidence`.
 
         Args:
@@ -198,7 +198,7 @@ class Cleaner:
                 number = course.episode[group[begin]]
                 gram[number] = flat.T @ flat
                 rows[number] = flat.shape[0]
-        return Evidence(gram, rows)
+        return EpisodeGrams(gram, rows)
 
 
 def _follow(white: np.ndarray, offset: np.ndarray, episode: np.ndarray, expected: np.ndarray) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -71,7 +71,7 @@ def build(
     response: Response,
     placed: Sequence[Placed],
     effects: Sequence[Effect],
-    nuisance: Sequence[str] = (),
+    absorbed: Collection[str] = (),
 ) -> Board:
     """Predict, and differentiate the chain by every effect at its typical size.
 
@@ -80,7 +80,7 @@ def build(
         response: What the chain starts from.
         placed: Effects that the model has already.
         effects: Effects to try.
-        nuisance: Effects that calibration takes up.
+        absorbed: Names of effects that calibration takes up.
     """
     streams = Streams.of(course)
     chain = Chain(course, response, placed)
@@ -89,7 +89,7 @@ def build(
     candidates: list[Candidate] = []
     unjudgeable: dict[str, str] = {}
     for effect in effects:
-        reason = _unjudgeable(effect, course, response) or _absorbed(effect, nuisance)
+        reason = _unjudgeable(effect, course, response) or _absorbed(effect, absorbed)
         if reason:
             unjudgeable[effect.name] = reason
             continue
@@ -137,9 +137,9 @@ def _unjudgeable(effect: Effect, course: Course, response: Response) -> str:
     return effect.unjudgeable(course, response)
 
 
-def _absorbed(effect: Effect, nuisance: Sequence[str]) -> str:
+def _absorbed(effect: Effect, absorbed: Collection[str]) -> str:
     """Return why an effect is not tried by itself: what calibration takes up cannot be tested beside it."""
-    return "read off the calibration of each channel's gain" if effect.name in nuisance else ""
+    return "read off the calibration of each channel's gain" if effect.name in absorbed else ""
 
 
 def _unlike(first: list[np.ndarray], second: list[np.ndarray]) -> bool:

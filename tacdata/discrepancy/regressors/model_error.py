@@ -21,7 +21,9 @@ NOTHING = 1e-9
 """What changes less than this share of what the effect does is no form of it [1]."""
 
 
-def forms(course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()) -> np.ndarray:
+def model_error_columns(
+    course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()
+) -> np.ndarray:  # fmt: skip
     """Return columns at one standard deviation, shape (n, streams, k), float32; k is 0 without placed effects.
 
     A large effect whose equation is a little wrong leaves what small effects explain: what lies along these columns is

@@ -1,4 +1,4 @@
-"""What the workflow found: the effects of the answer, and the model with and without them."""
+"""Findings: the effects of the answer, and the model with and without them."""
 
 from __future__ import annotations
 
@@ -6,19 +6,28 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.problem import Problem
-from tacdata.discrepancy.search.screen import Left, Tested
+from tacdata.discrepancy.search.score_tests import ScoreTests
 from tacdata.effects import Placed
 
-NEEDED = 3.8
-"""An effect that was chosen among all is named if the answer is worse by so many standard errors without it [1].
+NAMED_Z = 3.8
+"""Necessity: an effect that was chosen among all is named from so many standard errors on [1].
 
 The best of some 150 independent columns lies beyond that once in a hundred times.
+"""
+STEPS = ("gate", "locate", "fit", "decide")
+"""Steps of the workflow, each of which may be the last.
+
+- gate: is there anything to explain?
+- locate: where the residual lives; nothing is fitted.
+- fit: what fits best; no rivals, no leftovers.
+- decide: all.
 """
 
 
 @dataclass(frozen=True)
-class Member:
+class Finding:
     """One effect of the answer, with those that would do as well."""
 
     placed: Placed
@@ -29,47 +38,56 @@ class Member:
     rivals: tuple[str, ...]
     """Mechanisms that explain the episodes as well in its place."""
     margins: dict[str, float]
-    """Rival effect -> by how many standard errors over episodes the member is better."""
+    """Rival effect -> by how many standard errors over episodes this one is better (J test)."""
     necessity: float
-    """By how many standard errors over episodes the model is worse without it."""
+    """By how many standard errors over episodes the model is worse without it (J test)."""
     losses: dict[str, float] = field(default_factory=dict)
-    """Rival effect -> by how much half the whitened energy is larger with it [nats]."""
+    """Rival effect -> by how much half the whitened sum of squares is larger with it [1]."""
     selected: float = 1.0
-    """Share of resamplings of the episodes in which its mechanism explains most [1]."""
-    decoys: float | None = None
-    """Share of decoys, all effects with chance scores, that do as well [1]; None for what did not race them."""
-    needed: float = NEEDED
+    """Share of bootstrap samples of the episodes in which its mechanism explains most [1]."""
+    corrected_p: float | None = None
+    """P-value corrected for all candidates [1]; None for what calibration shows, which did not race."""
+    needed: float = NAMED_Z
     """From which necessity on it is named [1]."""
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """What was found."""
+class Findings:
+    """What the search found."""
 
     gap: bool
     """Whether anything is missing."""
-    tested: Tested
-    members: tuple[Member, ...]
-    left: Left
-    """What is still predictable with the members in place."""
+    tests: ScoreTests
+    """Of all candidates beside the model as it was given."""
+    effects: tuple[Finding, ...]
+    """The effects of the answer."""
+    left: Leftovers
+    """What is still predictable with the effects in place."""
     explained: float
-    """Gain of the members in half the whitened energy [nats]."""
+    """Fall of half the whitened sum of squares by the effects [1]."""
     energy: tuple[np.ndarray, np.ndarray]
-    """Half the whitened energy of each episode before and after [nats], each of shape (episodes,)."""
+    """Half the whitened sum of squares of each episode before and after [1], each of shape (episodes,)."""
     values: np.ndarray
     """Whitened values behind each episode [1], shape (episodes,)."""
     problem: Problem
     """The model as it was given."""
     final: Problem
-    """The model with the members in place."""
+    """The model with the effects in place."""
+    limits: dict[str, float]
+    """Effect -> detection limit beside the answer [typical sizes]; inf where it is not excited."""
     gains: np.ndarray
     """Gain of each channel beyond the response's, as calibration finds it [1], shape (channels,); 0 if fitted, NaN for
     channels that these presses do not stir."""
     until: str = "decide"
-    """The last step that was made, one of `tacdata.discrepancy.search.judge.STEPS`."""
+    """The last step that was made, one of `STEPS`."""
 
     @property
     def share_left(self) -> float:
-        """Share of what could be explained that the members leave [1]."""
+        """Share of what could be explained that the effects leave [1]."""
         whole = self.left.gain + max(self.explained, 0.0)
         return self.left.gain / whole if whole > 0 else 0.0
+
+    @property
+    def loudness(self) -> float:
+        """Mean square of the whitened residual of the model as it was given [noise floor]."""
+        return 2 * float(self.energy[0].sum()) / max(float(self.values.sum()), 1.0)

@@ -14,9 +14,9 @@ from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise import gram
-from tacdata.discrepancy.noise.gram import Evidence
-from tacdata.discrepancy.noise.null_model import Frame
-from tacdata.discrepancy.noise.whitener import Cleaner
+from tacdata.discrepancy.noise.gram import EpisodeGrams
+from tacdata.discrepancy.noise.null_model import NullModel
+from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.regressors.tangent import Tangent, tangents
 from tacdata.discrepancy.statistics.gram_fit import solve
 from tacdata.effects import Placed
@@ -46,34 +46,56 @@ class Refined:
     """Of each of its rows, shape (m,), int64."""
     place: np.ndarray
     """Group of rows that share a response's features, shape (m,), int64."""
-    shaken: np.ndarray
-    """What it leaves of the frame's draws of noise [noise scales], shape (m, streams, draws), float32."""
-    cleaner: Cleaner
+    projected_draws: np.ndarray
+    """What it leaves of the null model's draws of noise [noise scales], shape (m, streams, draws), float32."""
+    whitener: Whitener
     """What took nuisances out of it, and what its response may take up."""
     freedom: float
     """Degrees of freedom that its response takes up [1]; another response has others where effects move the pose."""
 
     @property
     def loss(self) -> float:
-        """Half the whitened energy, with what the response takes of the noise [nats]: models are compared by it."""
+        """Half the whitened sum of squares, with half the response's degrees of freedom [1]: as a log-likelihood."""
         return float(self.energy.sum()) + 0.5 * self.freedom
 
+    @property
+    def half_bic(self) -> float:
+        """Half the Bayesian information criterion, with the episodes as the sample [1]."""
+        return self.loss + 0.5 * len(self.tangent.knobs) * float(np.log(max(len(self.energy), 2)))
 
-def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int = STEPS) -> Refined:
+    def errors(self, at: int) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return the standard error of each parameter of one effect, in its unit, and the parameters at a bound."""
+        error: dict[str, float] = {}
+        bound = []
+        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        for k, knob in enumerate(self.tangent.knobs):
+            if knob.at != at:
+                continue
+            p, value = knob.parameter, knob.value(self.placed)
+            size = float(spread[k]) * (abs(value) if knob.shape else p.typical)
+            error[p.name] = max(error.get(p.name, 0.0), size)
+            if not knob.shape and p.low < p.default and (value <= p.low * 0.999 or value >= p.high * 0.999):
+                bound.append(p.name)
+            elif value >= p.high * 0.999:
+                bound.append(p.name)
+        return error, tuple(bound)
+
+
+def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: int = STEPS) -> Refined:
     """Fit the numbers of placed effects on the chain itself.
 
     Args:
         setting: What is judged.
         placed: Effects with a first guess of their numbers.
-        frame: Frame model, kept.
+        null: Null model, kept.
         steps: Most Gauss-Newton steps.
     """
     response = _own(setting.response)
     now = list(placed)
     if isinstance(response, FittedResponse) and now:
         _correct(response, setting, now)
-    view = _looked(setting, response, now, frame)
-    state = _state(setting, response, now, frame, view)
+    view = _looked(setting, response, now, null)
+    state = _state(setting, response, now, null, view)
     for _ in range(steps):
         best = None
         for share in (1.0, 0.3):
@@ -83,7 +105,7 @@ def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int 
             fresh = _own(response)
             if isinstance(fresh, FittedResponse):
                 _correct(fresh, setting, there)
-            tried = _looked(replace(setting, response=fresh), fresh, there, frame)
+            tried = _looked(replace(setting, response=fresh), fresh, there, null)
             if tried.energy.sum() < view.energy.sum() - 1e-6:
                 best = tried, there, fresh
                 break
@@ -91,12 +113,12 @@ def refine(setting: Setting, placed: Sequence[Placed], frame: Frame, steps: int 
             break
         gained = view.energy.sum() - best[0].energy.sum()
         view, now, response = best
-        state = _state(replace(setting, response=response), response, now, frame, view)
+        state = _state(replace(setting, response=response), response, now, null, view)
         if gained < SMALL:
             break
     return Refined(
         tuple(now), response, state.tangent, view.energy, state.covariance, view.left, setting.course.reduced.episode,
-        frame.context, frame.shaken(view.cleaner), view.cleaner, view.cleaner.freedom,
+        null.context, null.projected_draws(view.whitener), view.whitener, view.whitener.freedom,
     )  # fmt: skip
 
 
@@ -120,7 +142,7 @@ class _View:
 
     clean: np.ndarray
     """Whitened residual [1], shape (m, streams, 1)."""
-    cleaner: Cleaner
+    whitener: Whitener
     """What took nuisances out of it."""
     energy: np.ndarray
     left: np.ndarray
@@ -135,25 +157,25 @@ class _State:
     covariance: np.ndarray
 
 
-def _looked(setting: Setting, response: Response, placed: list[Placed], frame: Frame) -> _View:
+def _looked(setting: Setting, response: Response, placed: list[Placed], null: NullModel) -> _View:
     course, streams = setting.course, Streams.of(setting.course)
-    said = predict(course, response, [*setting.given, *placed])
-    residual = (streams.measured(course) - streams.predicted(said))[:, :, None].astype(np.float32)
-    cleaner = frame.cleaner(replace(setting, response=response), [*setting.given, *placed])
-    clean = cleaner.cleaned(residual)
-    found = gram.summed(clean, course.reduced, frame.nuisances, frame.inner)
-    still = _without(found.gram.sum(axis=0), np.arange(len(frame.ridge)), frame.ridge)
-    return _View(clean, cleaner, _energy(found, still), clean[:, :, 0] - frame.nuisances @ still.astype(np.float32))
+    predicted = predict(course, response, [*setting.given, *placed])
+    residual = (streams.measured(course) - streams.predicted(predicted))[:, :, None].astype(np.float32)
+    whitener = null.whitener_for(replace(setting, response=response), [*setting.given, *placed])
+    clean = whitener.whitened(residual)
+    found = gram.episode_grams(clean, course.reduced, null.nuisances, null.inner)
+    still = _without(found.gram.sum(axis=0), np.arange(len(null.ridge)), null.ridge)
+    return _View(clean, whitener, _energy(found, still), clean[:, :, 0] - null.nuisances @ still.astype(np.float32))
 
 
-def _state(setting: Setting, response: Response, placed: list[Placed], frame: Frame, view: _View) -> _State:
-    course, ridge = setting.course, frame.ridge
+def _state(setting: Setting, response: Response, placed: list[Placed], null: NullModel, view: _View) -> _State:
+    course, ridge = setting.course, null.ridge
     moving = tangents(course, response, placed, setting.given)
     if not moving.knobs:
         return _State(moving, np.zeros(0), np.zeros((0, 0)))
-    clean = view.cleaner.cleaned(moving.values)
+    clean = view.whitener.whitened(moving.values)
     both = np.concatenate([view.clean, clean], axis=2)
-    found = gram.summed(both, course.reduced, frame.nuisances, frame.inner)
+    found = gram.episode_grams(both, course.reduced, null.nuisances, null.inner)
     k = len(moving.knobs)
     rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
     weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
@@ -169,12 +191,12 @@ def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.nd
     return solve(total, columns, ridge, -free, free) if len(columns) else np.zeros(0)
 
 
-def _energy(found: Evidence, values: np.ndarray) -> np.ndarray:
+def _energy(found: EpisodeGrams, values: np.ndarray) -> np.ndarray:
     whole = np.concatenate([[1.0], -values])
     return 0.5 * np.einsum("i,eij,j->e", whole, found.gram, whole)
 
 
-def _covariance(found: Evidence, values: np.ndarray, weight: np.ndarray, knobs: int) -> np.ndarray:
+def _covariance(found: EpisodeGrams, values: np.ndarray, weight: np.ndarray, knobs: int) -> np.ndarray:
     """Return the covariance of the first ``knobs`` numbers: a sandwich over episodes, beside the others.
 
     Errors within an episode may depend on each other in any way. Each episode's score is that of a fit without it (CR3,
@@ -208,8 +230,8 @@ def _correct(response: FittedResponse, setting: Setting, placed: Sequence[Placed
     course, streams = setting.course, Streams.of(setting.course)
     keep = streams.channels + streams.force
     for _ in range(2):
-        said = predict(course, response, [*setting.given, *placed])
-        residual = streams.measured(course) - streams.predicted(said)
+        predicted = predict(course, response, [*setting.given, *placed])
+        residual = streams.measured(course) - streams.predicted(predicted)
         features = taken_up(course, response, [*setting.given, *placed])
         if features is not None:
             response.correct(residual[:, :keep], features)

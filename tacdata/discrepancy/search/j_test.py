@@ -1,19 +1,19 @@
-"""Which of two models the episodes bear out: what is left beside one, held against what the other says otherwise.
+"""The J test: which of two models that do not contain each other the episodes support.
 
-The test is that of Davidson & MacKinnon (Econometrica 49, 1981, 781, their J test): to the worse of two models the
-difference of both is added as one more column; if the better one is right, its coefficient is 1. An episode says as
-much as the models differ in it, so that an effect that few presses excite is seen as well as one that all do. (Means
-of differences of energy over episodes are blind to that: of 48 episodes 5 cannot reach 2.4 standard errors by them,
-however clear they are.)
+After Davidson & MacKinnon (Econometrica 49, 1981, 781): the difference of the two predictions is added to the worse
+model as one more column; if the better model is right, its coefficient is 1. The statistic is the cluster-robust score
+of that column. Each episode weighs by how much the models differ in it, so few presses that excite an effect show it as
+well as many. (Means over episodes of the difference in fit do not: of 48 episodes 5 cannot reach 2.4 standard errors.)
 
-Where a response is fitted, models that move the pose, or remember, have it take up different functions. What the
-second's may take up is taken out of the difference d first (Frisch & Waugh, Econometrica 1, 1933, 387): the residual
-beside it has nothing of that over all episodes of a place, but much in each. Both differ in noise alone by
-V = |(1 - P2) P1 n|^2, P1 and P2 projections on what they take up, told by draws of noise. By chance that is the mean of
-the pull, too, which is taken off, and the pull has a variance that the draws tell as well (it is a quadratic form in
-normal variables), beside the |d|^2 - V of what truly differs. A model's own amplitudes follow noise as well: all but
-the first of those that the other has not count (the first is what a test of one column pays for; that the test rejects
-too often by the others: Godfrey & Pesaran, J. Econometrics 21, 1983, 133).
+Where a response is fitted, the two models project out different functions:
+
+- What the second's response may take up is projected out of the difference d first (Frisch & Waugh, Econometrica 1,
+  1933, 387). The residual has nothing of that summed over a place's episodes, but much in single ones.
+- Noise n alone makes the models differ by V = |(1 - P2) P1 n|^2, P1 and P2 their projections; draws of noise estimate
+  V. By chance V is the score's mean, too, and is taken off. The score's variance beyond that of the true difference,
+  |d|^2 - V, is estimated by the draws (a quadratic form in normal variables).
+- A model's own amplitudes follow noise as well. All that the other model has not, but the first, are paid for (that the
+  test rejects too often by them: Godfrey & Pesaran, J. Econometrics 21, 1983, 133).
 """
 
 from __future__ import annotations
@@ -24,152 +24,167 @@ import numpy as np
 
 from tacdata.chain import Course
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.gram import summed
-from tacdata.discrepancy.noise.null_model import Frame
-from tacdata.discrepancy.regressors.model_error import forms
+from tacdata.discrepancy.noise.gram import episode_grams
+from tacdata.discrepancy.noise.null_model import NullModel
+from tacdata.discrepancy.regressors.model_error import model_error_columns
 from tacdata.discrepancy.search.gauss_newton import Refined
-from tacdata.discrepancy.search.screen import follows_clock
-from tacdata.discrepancy.statistics.cluster_robust import Lent, clustered
+from tacdata.discrepancy.statistics.cluster_robust import PooledExcess, clustered_score
 from tacdata.discrepancy.statistics.gram_fit import eliminated
 
-MOST = 3.0
-"""No equation is off by more than so many of its standard deviations, however much they would explain [1]."""
-TINY = 1e-6
-"""Models that differ by less, over all episodes, are the same [noise scales squared]."""
+MOST_ERROR = 3.0
+"""Model error: no equation is wrong by more than so many of its standard deviations [1]."""
+SAME = 1e-6
+"""J test: models that differ by less, over all episodes, are the same [noise scales squared]."""
+NEEDED_Z = 2.8
+"""Necessity: an effect stays in the answer if the model is worse by so many standard errors without it [1]."""
+
+Pooled = dict[bool, PooledExcess | None]
+"""Shrinkage priors of effects that follow the clock (True), and of the others."""
 
 
 @dataclass(frozen=True)
-class Off:
-    """What the equations of a model's effects may be off about, beside nuisances."""
+class ModelError:
+    """What a model's equations may be wrong by: regressors with a prior, beside the nuisances."""
 
     columns: np.ndarray
-    """Whitened and cleaned, at one standard deviation [1], shape (m, streams, k), float32."""
+    """Whitened, at one standard deviation [1], shape (m, streams, k), float32."""
     course: Course
     """Of the rows that were read."""
-    frame: Frame
+    null: NullModel
 
     @classmethod
-    def of(cls, setting: Setting, model: Refined, frame: Frame, at: int | None = None) -> Off:
-        """Return what a model's effect number ``at`` may be off about; all of them, unless given."""
+    def of(cls, setting: Setting, model: Refined, null: NullModel, at: int | None = None) -> ModelError:
+        """Return the model error of a model's effect number ``at``; of all its effects, unless given."""
         own = [p for k, p in enumerate(model.placed) if at is None or k == at]
         others = [p for p in model.placed if p not in own]
-        columns = forms(setting.course, model.response, own, [*setting.given, *others])
-        cleaner = frame.cleaner(replace(setting, response=model.response), [*setting.given, *model.placed])
-        return cls(cleaner.cleaned(columns), setting.course.reduced, frame)
+        columns = model_error_columns(setting.course, model.response, own, [*setting.given, *others])
+        whitener = null.whitener_for(replace(setting, response=model.response), [*setting.given, *model.placed])
+        return cls(whitener.whitened(columns), setting.course.reduced, null)
 
-    def beside(self, left: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, float]:
-        """Hold two whitened residuals, shape (m, streams), beside these columns.
+    def beside(self, residual: np.ndarray, difference: np.ndarray) -> tuple[np.ndarray, float]:
+        """Eliminate these columns from a residual and a difference, shape (m, streams) each.
 
         Returns:
-            Their Gram matrix of each episode, and by how much more half the energy of the first falls than that of the
-            first less the second [nats]: what both models miss is nothing to either.
+            Their Gram matrix of each episode, and by how much more half the sum of squares of the residual falls than
+            that of residual less difference: what both models miss counts against neither.
         """
-        both = np.concatenate([np.stack([left, apart], axis=2), self.columns], axis=2)
-        gram = summed(both, self.course, self.frame.nuisances, self.frame.inner).gram
+        both = np.concatenate([np.stack([residual, difference], axis=2), self.columns], axis=2)
+        gram = episode_grams(both, self.course, self.null.nuisances, self.null.inner).gram
         own = self.columns.shape[2]
-        ridge = np.concatenate([np.ones(own), self.frame.ridge])
+        ridge = np.concatenate([np.ones(own), self.null.ridge])
         total, index = gram.sum(axis=0), np.arange(2, gram.shape[1])
-        pulls = np.stack([total[index, 0], total[index, 0] - total[index, 1]])
+        scores = np.stack([total[index, 0], total[index, 0] - total[index, 1]])
         bare = total[np.ix_(index, index)]
         bare = bare + 1e-9 * np.eye(len(index)) * max(float(np.trace(bare)) / len(index), 1e-12)
-        while np.abs(np.linalg.solve(bare + np.diag(ridge), pulls[0])[:own]).max(initial=0.0) > MOST:
+        while np.abs(np.linalg.solve(bare + np.diag(ridge), scores[0])[:own]).max(initial=0.0) > MOST_ERROR:
             ridge[:own] *= 2
         matrix = bare + np.diag(ridge)
-        falls = 0.5 * np.einsum("ki,ik->k", pulls, np.linalg.solve(matrix, pulls.T))
-        fallen = max(float(falls[0] - falls[1]), 0.0)
-        return eliminated(gram, index - 1, ridge)[:, :2, :2], fallen
+        falls = 0.5 * np.einsum("ki,ik->k", scores, np.linalg.solve(matrix, scores.T))
+        fall = max(float(falls[0] - falls[1]), 0.0)
+        return eliminated(gram, index - 1, ridge)[:, :2, :2], fall
 
 
 @dataclass(frozen=True)
-class Chance:
-    """What noise alone makes of the difference of two models, and of how it pulls at the second."""
+class NoiseDifference:
+    """What noise alone makes of the difference of two models, and of its score."""
 
-    apart: float
-    """V, the difference squared and summed [noise scales squared]."""
-    pull: float
-    """Mean of the pull [1]."""
+    square: float
+    """V, the difference's sum of squares [noise scales squared]."""
+    mean: float
+    """Mean of the score [1]."""
     variance: float
-    """Of the pull [1]."""
+    """Variance of the score [1]."""
 
     @classmethod
-    def of(cls, first: Refined, second: Refined) -> Chance:
-        """Return what the draws of noise say.
+    def of(cls, first: Refined, second: Refined) -> NoiseDifference:
+        """Estimate it from draws of noise.
 
-        V is half of |(P2 - P1) n|^2 and of what the first's response has more of freedom. Places and streams are
+        V is half of |(P2 - P1) n|^2 and of the first response's further degrees of freedom. Places and streams are
         nearly independent. The variance is V for responses that are much alike, and 2 V for those that have nothing in
         common.
         """
-        if first.shaken is second.shaken:
+        if first.projected_draws is second.projected_draws:
             return cls(0.0, 0.0, 0.0)
-        apart = second.shaken - first.shaken
+        apart = second.projected_draws - first.projected_draws
         draws = apart.shape[2]
         noise = max(0.5 * (float(np.square(apart).sum()) / draws + first.freedom - second.freedom), 0.0)
-        pull = np.zeros((int(first.place.max()) + 1, *apart.shape[1:]))
-        np.add.at(pull, first.place, second.shaken * apart)
-        groups = int(np.count_nonzero(np.any(pull, axis=2)))
-        told = float(np.var(pull, axis=2, ddof=1).sum()) * (1 + 2 * np.sqrt(2 / max(groups * (draws - 1), 1)))
-        return cls(noise, noise, float(np.clip(told, noise, 2 * noise)))
+        score = np.zeros((int(first.place.max()) + 1, *apart.shape[1:]))
+        np.add.at(score, first.place, second.projected_draws * apart)
+        groups = int(np.count_nonzero(np.any(score, axis=2)))
+        spread = float(np.var(score, axis=2, ddof=1).sum()) * (1 + 2 * np.sqrt(2 / max(groups * (draws - 1), 1)))
+        return cls(noise, noise, float(np.clip(spread, noise, 2 * noise)))
 
-    def beside(self, more: int, less: int) -> Chance:
+    def with_amplitudes(self, more: int, less: int) -> NoiseDifference:
         """Return the same with amplitudes that only the first (``more``) or only the second (``less``) has."""
-        return Chance(self.apart + more + less, self.pull + more, self.variance + 2 * more)
+        return NoiseDifference(self.square + more + less, self.mean + more, self.variance + 2 * more)
 
     def share(self, gram: np.ndarray) -> float:
-        """Return the share of a pull that noise does not make [1]; products of episodes as in `ahead`."""
-        pull, apart = float(gram[:, 0, 1].sum()), float(gram[:, 1, 1].sum())
-        return max(pull - min(self.pull, apart), 0.0) / pull if pull > 0 else 1.0
+        """Return the share of a score that noise does not make [1]; products of episodes as in `j_statistic`."""
+        score, apart = float(gram[:, 0, 1].sum()), float(gram[:, 1, 1].sum())
+        return max(score - min(self.mean, apart), 0.0) / score if score > 0 else 1.0
 
     def spread(self, apart: float) -> float:
-        """Return the variance of a pull over what it is where noise makes nothing, the difference squared [1]."""
-        return (max(apart - self.apart, 0.0) + self.variance) / apart
+        """Return the variance of a score over the difference's sum of squares, its variance without noise [1]."""
+        return (max(apart - self.square, 0.0) + self.variance) / apart
 
 
-def ahead(first: Refined, second: Refined, lent: dict[bool, Lent | None], off: Off | None = None) -> float:
-    """Return by how many standard errors the first model is borne out against the second [1]; negative: the other way.
+def j_statistic(first: Refined, second: Refined, pooled: Pooled, error: ModelError | None = None) -> float:
+    """Return by how many standard errors episodes support the first model [1]; negative: the second.
 
     Args:
         first: A model at its optimum.
-        second: Another one of the same episodes, in the same frame.
-        lent: What candidates say of how much scores scatter, for those that follow the clock (True) and others.
-        off: What the second's equations may be off about: only what that does not explain counts against it.
+        second: Another one of the same episodes, beside the same null model.
+        pooled: Shrinkage priors.
+        error: Model error of the second: what it explains does not count against the second.
     """
-    more, less = _beyond(first, second), _beyond(second, first)
+    more, less = _further_amplitudes(first, second), _further_amplitudes(second, first)
     loss = second.loss - first.loss - 0.5 * (more - less)
     if loss < 0:
-        return -ahead(second, first, lent)
-    apart = second.left - first.left
-    if first.shaken is not second.shaken:
-        apart = second.cleaner.projected(apart[:, :, None])[:, :, 0]
-    if off is None:
+        return -j_statistic(second, first, pooled)
+    difference = second.left - first.left
+    if first.projected_draws is not second.projected_draws:
+        difference = second.whitener.projected(difference[:, :, None])[:, :, 0]
+    if error is None:
         gram = np.zeros((len(first.energy), 2, 2))
-        for i, values in ((0, second.left), (1, apart)):
-            own = np.einsum("ij,ij->i", apart, values)
+        for i, values in ((0, second.left), (1, difference)):
+            own = np.einsum("ij,ij->i", difference, values)
             gram[:, i, 1] = gram[:, 1, i] = np.bincount(first.episode, own, minlength=len(gram))
     else:
-        gram, fallen = off.beside(second.left, apart)
-        loss -= fallen
-    if gram[:, 1, 1].sum() < TINY or loss <= 0:
+        gram, fall = error.beside(second.left, difference)
+        loss -= fall
+    if gram[:, 1, 1].sum() < SAME or loss <= 0:
         return 0.0
-    clock = any(_differ(first, second))
-    told = clustered(gram, np.zeros(1, dtype=np.int64))
-    # Two models that are equally wrong pull towards each other: the better one must explain more, too.
-    most = float(np.sqrt(2 * loss / max(told.power / told.expected, 1.0)))
-    # Before few stretches are paid for: a large score shrinks more by that than what is sound of it.
-    chance = Chance.of(first, second).beside(more, less)
+    score = clustered_score(gram, np.zeros(1, dtype=np.int64))
+    # Two models that are equally wrong score against each other: the better one must fit better, too.
+    most = float(np.sqrt(2 * loss / max(score.variance / score.expected_variance, 1.0)))
+    # Before few clusters are paid for: a large score shrinks by more than its sound part.
+    noise = NoiseDifference.of(first, second).with_amplitudes(more, less)
     sound = replace(
-        told, pull=told.pull * chance.share(gram), expected=told.expected * chance.spread(float(gram[:, 1, 1].sum()))
-    )
-    return min(max(sound.score(lent.get(clock)), 0.0), most)
+        score, total=score.total * noise.share(gram),
+        expected_variance=score.expected_variance * noise.spread(float(gram[:, 1, 1].sum())),
+    )  # fmt: skip
+    return min(max(sound.z_score(pooled.get(_differ_by_clock(first, second))), 0.0), most)
 
 
-def _beyond(model: Refined, other: Refined) -> int:
+def necessity(setting: Setting, model: Refined, without: Refined, null: NullModel, pooled: Pooled) -> float:
+    """Return by how many standard errors a model is better than one with fewer effects [1].
+
+    What the fewer effects' own equations may be wrong by is no evidence of others.
+    """
+    need = j_statistic(model, without, pooled)
+    if need < NEEDED_Z or not without.placed:
+        return need
+    return j_statistic(model, without, pooled, ModelError.of(setting, without, null))
+
+
+def _further_amplitudes(model: Refined, other: Refined) -> int:
     """Return how many amplitudes, beyond the first, a model has that another has not."""
     taken = {p.effect.name for p in other.placed}
     own = [k for k in model.tangent.knobs if not k.shape and model.placed[k.at].effect.name not in taken]
     return max(len(own) - 1, 0)
 
 
-def _differ(first: Refined, second: Refined) -> list[bool]:
-    """Return for each effect that only one of two models has whether it follows the clock."""
+def _differ_by_clock(first: Refined, second: Refined) -> bool:
+    """Return whether an effect that only one of two models has follows the clock."""
     names = {p.effect.name for p in first.placed} ^ {p.effect.name for p in second.placed}
-    return [follows_clock(p.effect) for p in (*first.placed, *second.placed) if p.effect.name in names]
+    return any(p.effect.follows_clock for p in (*first.placed, *second.placed) if p.effect.name in names)

@@ -23,8 +23,8 @@ def overlap(problem: Problem, candidates: Sequence[Candidate]) -> float:
         problem: With columns for what is placed.
         candidates: Shapes of an effect; 0 without any.
     """
-    beside = np.concatenate([problem.tangent.columns, problem.forms]).astype(int) + 1
-    gram = problem.evidence.gram
+    beside = np.concatenate([problem.tangent.columns, problem.model_errors]).astype(int) + 1
+    gram = problem.grams.gram
     if not len(beside) or not candidates:
         return 0.0
     inner = gram[:, beside][:, :, beside]
@@ -34,6 +34,6 @@ def overlap(problem: Problem, candidates: Sequence[Candidate]) -> float:
     for candidate in candidates:
         own = candidate.columns + 1
         across = gram[:, beside][:, :, own]
-        said = np.einsum("eik,eik->", across, np.linalg.solve(inner, across))
-        shares.append(float(said) / max(float(np.einsum("ekk->", gram[:, own][:, :, own])), 1e-300))
+        explained = np.einsum("eik,eik->", across, np.linalg.solve(inner, across))
+        shares.append(float(explained) / max(float(np.einsum("ekk->", gram[:, own][:, :, own])), 1e-300))
     return min(max(shares), 1.0)

@@ -1,4 +1,4 @@
-"""A course, a response and a model spec's effects, ready to be tested: columns and Gram matrices beside a frame."""
+"""The regression problem: columns of everything that may be missing, reduced to a Gram matrix an episode."""
 
 from __future__ import annotations
 
@@ -10,16 +10,13 @@ import numpy as np
 from tacdata.chain import predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.gram import Evidence
-from tacdata.discrepancy.noise.null_model import Frame
+from tacdata.discrepancy.noise.gram import EpisodeGrams
+from tacdata.discrepancy.noise.null_model import NullModel
 from tacdata.discrepancy.regressors.candidates import Board, Candidate, build
-from tacdata.discrepancy.regressors.model_error import forms
+from tacdata.discrepancy.regressors.model_error import model_error_columns
 from tacdata.discrepancy.regressors.stack import apart, side_by_side
 from tacdata.discrepancy.regressors.tangent import Tangent, tangents
 from tacdata.effects import Placed
-
-AMPLITUDES = ("gain", "modulus")
-"""What all channels' gains have in common: read off their calibration too, and not to be told apart."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +24,13 @@ class Problem:
     """One state of the model with everything that may be missing beside it."""
 
     setting: Setting
-    frame: Frame
+    null: NullModel
     placed: tuple[Placed, ...]
     board: Board
-    evidence: Evidence
+    grams: EpisodeGrams
     tangent: Tangent
     """Columns by which what is placed already may still move."""
-    forms: np.ndarray
+    model_errors: np.ndarray
     """Columns of what the equations of what is placed may be off about, from 0, shape (k,), int64."""
     nuisances: np.ndarray
     """Columns of nuisances, from 0, shape (k,), int64."""
@@ -52,52 +49,49 @@ class Problem:
     @property
     def ridge(self) -> np.ndarray:
         """Weight of each nuisance's prior, shape (k,)."""
-        return self.frame.ridge
+        return self.null.ridge
 
     @property
     def fixed(self) -> np.ndarray:
-        """Columns that stand beside every candidate: nuisances, what is placed, what its forms may be off about."""
-        return np.concatenate([self.nuisances, self.tangent.columns, self.forms]).astype(int)
+        """Columns that stand beside every candidate: nuisances, what is placed, what its equations may be off about."""
+        return np.concatenate([self.nuisances, self.tangent.columns, self.model_errors]).astype(int)
 
     def fixed_ridge(self, moving: float) -> np.ndarray:
         """Return the weights of their priors; ``moving``: of what is placed [1]."""
-        return np.concatenate([self.ridge, np.full(len(self.tangent.columns), moving), np.ones(len(self.forms))])
+        return np.concatenate([self.ridge, np.full(len(self.tangent.columns), moving), np.ones(len(self.model_errors))])
 
     @property
     def folds(self) -> np.ndarray:
         """Fold of each episode, shape (episodes,)."""
-        return self.frame.folds
+        return self.null.folds
 
 
-def prepare(setting: Setting, frame: Frame, placed: Sequence[Placed] = ()) -> Problem:
+def prepare(setting: Setting, null: NullModel, placed: Sequence[Placed] = ()) -> Problem:
     """Build columns beside what is placed and reduce them.
 
     Args:
         setting: What is judged.
-        frame: Its nuisances and noise.
+        null: Its nuisances and noise.
         placed: Effects that the model has.
     """
     course, response = setting.course, setting.response
-    # A force reading tells a stiffer skin from a larger gain: then only the gain is left to calibration.
-    common = AMPLITUDES[:1] if course.force is not None else AMPLITUDES
-    taken = () if response.fitted else (*setting.nuisance, *common)
-    board = build(course, response, [*setting.given, *placed], setting.effects, taken)
+    board = build(course, response, [*setting.given, *placed], setting.effects, setting.absorbed)
     moving = tangents(course, response, placed, setting.given)
-    off = forms(course, response, placed, setting.given)
+    errors = model_error_columns(course, response, placed, setting.given)
     count = len(board.columns) - 1
     numerics = _numerics(setting, placed)
     slack = count + moving.values.shape[2]
-    last = slack + off.shape[2]
+    last = slack + errors.shape[2]
     first = last + (numerics is not None)
-    more = [moving.values, off, *([] if numerics is None else [numerics])]
+    more = [moving.values, errors, *([] if numerics is None else [numerics])]
     values = side_by_side([*board.columns, *(column for each in more for column in apart(each))])
-    found = frame.cleaner(setting, [*setting.given, *placed]).collected(values, frame.beside)
-    second = first + len(frame.ridge)
-    nuisances, rich = np.arange(first, second), np.arange(second, first + frame.beside.shape[2])
+    found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, null.beside)
+    second = first + len(null.ridge)
+    nuisances, rich = np.arange(first, second), np.arange(second, first + null.beside.shape[2])
     board = replace(board, columns=board.columns[:1])
     return Problem(
-        setting, frame, tuple(placed), board, found, moving.at(count), np.arange(slack, last), nuisances, rich,
-        _rise(setting, frame), None if numerics is None else last,
+        setting, null, tuple(placed), board, found, moving.at(count), np.arange(slack, last), nuisances, rich,
+        _rise(setting, null), None if numerics is None else last,
     )  # fmt: skip
 
 
@@ -111,7 +105,7 @@ def _numerics(setting: Setting, placed: Sequence[Placed]) -> np.ndarray | None:
     return (now - other)[:, :, None].astype(np.float32)
 
 
-def _rise(setting: Setting, frame: Frame) -> float:
+def _rise(setting: Setting, null: NullModel) -> float:
     course = setting.course
     rise = Streams.of(course).rise(predict(course, setting.response, list(setting.given)), setting.response)
-    return float(np.sqrt(np.sum(np.square((rise / frame.noise.scale)[:, : course.channels]))))
+    return float(np.sqrt(np.sum(np.square((rise / null.noise.scale)[:, : course.channels]))))

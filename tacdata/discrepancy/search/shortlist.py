@@ -6,24 +6,24 @@ import numpy as np
 
 from tacdata.discrepancy.data.identifiability import lookalikes
 from tacdata.discrepancy.regressors.candidates import Candidate
+from tacdata.discrepancy.search.fits import best_shapes, fitted, held_out
 from tacdata.discrepancy.search.problem import Problem
-from tacdata.discrepancy.search.screen import Tested, best_shapes, fitted, held_out
+from tacdata.discrepancy.search.score_tests import ScoreTests
 from tacdata.discrepancy.statistics.gram_fit import clipped_t, gains
 
 ALPHA = 0.01
-"""Share of decoys that may do as well, over all candidates together."""
+"""Level of the score tests, corrected for the number of candidates [1]."""
 TOP = 8
-"""How many effects are tried as members of pairs and as rivals."""
-RIVAL = 2.33
-"""A rival as likely beforehand is out when the winner is better by so many standard errors over episodes: one in a
-hundred, one-sided [1]."""
+"""How many effects are tried as parts of pairs and as rivals."""
+RIVAL_Z = 2.33
+"""J test: a rival as likely beforehand is out from so many standard errors on: 1 %, one-sided [1]."""
 BEAM = 5
-"""Sets that a search for pairs keeps [1]."""
-SURE_PAIR = 3.0
-"""A pair of which neither is significant must help by so many standard errors over episodes [1]."""
+"""Pairs that the beam search keeps."""
+PAIR_Z = 3.0
+"""Cross-validation: a pair without a significant part must help by so many standard errors over episodes [1]."""
 
 
-def shortlist(problem: Problem, tested: Tested) -> list[list[Candidate]]:
+def shortlist(problem: Problem, tested: ScoreTests) -> list[list[Candidate]]:
     """Return sets of effects worth adding: up to three single ones, and the pair that does better than any of them."""
     taken = {p.effect.called for p in (*problem.setting.given, *problem.placed)}
     best = best_shapes(problem)
@@ -38,9 +38,9 @@ def shortlist(problem: Problem, tested: Tested) -> list[list[Candidate]]:
     pair = _pair(problem, [c for _, c in singles], free)
     if order:
         alone = max((held[c.effect.name] for c in order), key=lambda h: h.sum())
-        better = pair and clipped_t(held_out(problem, pair) - alone) > RIVAL
+        better = pair and clipped_t(held_out(problem, pair) - alone) > RIVAL_Z
         return [[c] for c in _tried(order)] + ([pair] if better else [])
-    if tested.p_generic <= ALPHA and pair and clipped_t(held_out(problem, pair)) > SURE_PAIR:
+    if tested.p_generic <= ALPHA and pair and clipped_t(held_out(problem, pair)) > PAIR_Z:
         return [pair[:1], pair]
     return []
 
@@ -57,13 +57,13 @@ def _gain(problem: Problem, chosen: list[Candidate]) -> float:
     everything = np.arange(len(problem.folds))
     columns, values = fitted(problem, chosen, everything)
     fee = 0.5 * sum(len(c.columns) for c in chosen) * float(np.log(max(len(problem.folds), 2)))
-    return float(gains(problem.evidence.of(everything)[None], columns, values)[0]) - fee
+    return float(gains(problem.grams.of(everything)[None], columns, values)[0]) - fee
 
 
 def _beside(problem: Problem, first: Candidate, others: list[Candidate]) -> list[float]:
     """Return the gain of a first effect with each of others, without bounds, less half a log of episodes a number."""
     fixed = np.concatenate([problem.fixed, first.columns]).astype(int) + 1
-    total = problem.evidence.of(np.arange(len(problem.folds)))
+    total = problem.grams.of(np.arange(len(problem.folds)))
     ridge = np.concatenate([problem.fixed_ridge(1.0), np.zeros(len(first.columns))])
     matrix = total[np.ix_(fixed, fixed)] + np.diag(ridge + 1e-9 * max(float(np.trace(total)), 1e-12) / len(total))
     rest = total - total[:, fixed] @ np.linalg.solve(matrix, total[fixed])
@@ -89,8 +89,8 @@ def _pair(problem: Problem, first: list[Candidate], free: list[Candidate]) -> li
         others = [c for c in free if c.called not in alike]
         made += [(gain, [a, c]) for gain, c in zip(_beside(problem, a, others), others, strict=True)]
     made.sort(key=lambda item: -item[0])
-    told = [(float(held_out(problem, pair).sum()), pair) for _, pair in made[:BEAM]]
-    if not told:
+    scored = [(float(held_out(problem, pair).sum()), pair) for _, pair in made[:BEAM]]
+    if not scored:
         return []
-    pair = max(told, key=lambda item: item[0])[1]
+    pair = max(scored, key=lambda item: item[0])[1]
     return sorted(pair, key=lambda c: -_gain(problem, [c]))

@@ -1,13 +1,15 @@
-"""How far a candidate's score is off chance, told from how the episodes' own scores scatter.
+"""Cluster-robust score tests: is a regressor's score beyond chance, given how episodes scatter?
 
-The score of an episode is what its residual says of a candidate's amplitudes. What is left of it beside the candidate's
-own fit scatters as the noise does, whatever memory or tails that has, and however large the effect is. Episodes of
-large leverage count as if they were left out (HC3: MacKinnon & White, J. Econometrics 29, 1985, 305), successive ones
-that have something in common are taken together (cluster-robust), and the few that remain are paid for by an F
-distribution with the degrees of freedom of their leverage (after Bell & McCaffrey, Survey Methodology 28, 2002, 169).
-How much a score scatters, against what the noise makes, is told from few episodes where few excite a candidate; all
-candidates of a kind lend each other what they have in common (empirical Bayes: Smyth, Stat. Appl. Genet. Mol. Biol. 3,
-2004, article 3).
+The score of an episode is the inner product of its residual with the regressor, after generalized least squares.
+Its variance is estimated by a sandwich over episodes, which holds whatever the noise within an episode is:
+
+- HC3: each episode's score is that beside a fit without it (MacKinnon & White, J. Econometrics 29, 1985, 305).
+- Clusters: where successive episodes correlate, runs of them count as one.
+- Small samples: an F distribution with the degrees of freedom that the leverages leave (Bell & McCaffrey, Survey
+  Methodology 28, 2002, 169).
+- Shrinkage: few episodes estimate a variance badly. All regressors of a kind share one prior for the ratio of the
+  variance to the one that the noise model expects (empirical Bayes: Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004, 3).
+- Null distribution: a multiplier bootstrap, the same for all regressors (`ClusteredScore.bootstrap`).
 """
 
 from __future__ import annotations
@@ -17,114 +19,115 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import digamma, fdtrc, ndtri, polygamma
 
-EACH = 5
-"""Successive episodes that are taken together where they have something in common [1]."""
-FEWEST, MOST = 10, 24
-"""Least (if there are so many episodes) and most stretches."""
-ALIKE = 1.64
-"""Successive episodes have something in common beyond so many standard errors of their correlation [1]."""
-LEVERAGE = 0.6
-"""A candidate of which one stretch holds a larger share of all information is not judged [1]."""
+CLUSTER_SIZE = 5
+"""Clusters: successive episodes in one cluster, where they correlate [episodes]."""
+FEWEST_CLUSTERS, MOST_CLUSTERS = 10, 24
+"""Clusters: bounds of their number; few clusters leave no degrees of freedom, many are correlated again."""
+CORRELATED_Z = 1.64
+"""Clusters: episodes are joined if lag-1 correlation exceeds so many standard errors (5 %, one-sided) [1]."""
+LARGEST_LEVERAGE = 0.6
+"""HC3: an amplitude of which one cluster holds a larger share of the information is not tested [1]."""
 FLOOR = 1e-300
-LENT = 0.5
-"""Most degrees of freedom that effects lend each other, of their number: many look alike [1]."""
-LEAST = 1.0
-"""Least excess that is lent: nothing scatters less than the noise makes, but by chance, or as noise was told too large
-[1]."""
-UNLIKE = 0.05
-"""One that scatters more than so many of its kind would by chance is lent the less, the fewer would [1]."""
-LENDERS = 5
-"""Fewer effects of a kind lend nothing [1]."""
+PRIOR_FREEDOM = 0.5
+"""Shrinkage: most prior degrees of freedom, over the number of effects; many effects look alike [1]."""
+LEAST_EXCESS = 1.0
+"""Shrinkage: least prior excess. Less than the noise expects is chance, or an overestimated noise [1]."""
+OUTLIER_P = 0.05
+"""Shrinkage: an effect whose variance is less probable than this under the prior is shrunk the less [1]."""
+FEWEST_POOLED = 5
+"""Shrinkage: fewer effects of a kind estimate no prior."""
 
 
 @dataclass(frozen=True)
-class Clustered:
-    """One candidate's score, in units in which its amplitudes' errors are alike."""
+class ClusteredScore:
+    """A candidate's score in coordinates in which its information is the unit matrix."""
 
-    pull: np.ndarray
+    total: np.ndarray
     """Sum of the episodes' scores [1], shape (k,)."""
-    scatter: np.ndarray
-    """What each stretch's score is off what the fit says [1], shape (stretches, k)."""
-    of: np.ndarray
-    """Stretch of each episode, shape (episodes,), int64."""
+    residuals: np.ndarray
+    """HC3 residual of each cluster's score [1], shape (clusters, k)."""
+    cluster: np.ndarray
+    """Cluster of each episode, shape (episodes,), int64."""
     freedom: tuple[float, float]
-    """Degrees of freedom of the statistic: of the pull, of the scatter [1]."""
-    expected: float = 1.0
-    """What `power` is if nothing but the noise shakes [1]."""
-    drawn: float = 1.0
-    """Degrees of freedom of what `by_chance` draws: no more than the stretches at hand span [1]."""
+    """Degrees of freedom of the F statistic: numerator, denominator [1]."""
+    expected_variance: float = 1.0
+    """`variance` under the noise model [1]."""
+    bootstrap_freedom: float = 1.0
+    """Degrees of freedom of what `bootstrap` draws: at most those that the clusters span [1]."""
 
     @property
-    def power(self) -> float:
-        """Mean square of the pull by chance, as these episodes scatter [1]."""
-        return max(float(np.sum(np.square(self.scatter))), 1e-12)
+    def variance(self) -> float:
+        """Sandwich estimate of the total's variance, summed over amplitudes [1]."""
+        return max(float(np.sum(np.square(self.residuals))), 1e-12)
 
-    def score(self, lent: Lent | None = None) -> float:
-        """Return the standard normal score of the pull [1], with what other candidates lend."""
-        power, (first, second) = self.power, self.freedom
-        if lent is not None:
-            more = lent.freedom * self._of_a_kind(lent)
-            power = (second * power + more * lent.excess * self.expected) / (second + more)
+    def z_score(self, pooled: PooledExcess | None = None) -> float:
+        """Return the F statistic as a standard normal score [1], its variance shrunk towards a prior if given."""
+        variance, (first, second) = self.variance, self.freedom
+        if pooled is not None:
+            more = pooled.freedom * self._prior_weight(pooled)
+            variance = (second * variance + more * pooled.excess * self.expected_variance) / (second + more)
             second = second + more
-        return float(_normal(np.array([np.sum(np.square(self.pull)) / power]), first, second)[0])
+        return float(_normal(np.array([np.sum(np.square(self.total)) / variance]), first, second)[0])
 
-    def _of_a_kind(self, lent: Lent) -> float:
-        """Return how much of what others lend applies [1]: little to one that scatters far more than they do.
+    def _prior_weight(self, pooled: PooledExcess) -> float:
+        """Return the weight of the prior [1], little for an outlier of its kind.
 
-        (Robust empirical Bayes: Phipson et al., Ann. Appl. Stat. 10, 2016, 946.)
+        Robust empirical Bayes: Phipson et al., Ann. Appl. Stat. 10, 2016, 946.
         """
-        ratio = self.power / max(lent.excess * self.expected, 1e-12)
-        return float(min(fdtrc(self.freedom[1], max(lent.freedom, 1.0), ratio) / UNLIKE, 1.0))
+        ratio = self.variance / max(pooled.excess * self.expected_variance, 1e-12)
+        return float(min(fdtrc(self.freedom[1], max(pooled.freedom, 1.0), ratio) / OUTLIER_P, 1.0))
 
-    def by_chance(self, normal: np.ndarray) -> np.ndarray:
-        """Return the scores that scatter alone gives, shape (draws,).
+    def bootstrap(self, normal: np.ndarray) -> np.ndarray:
+        """Return scores under the null by the multiplier bootstrap, shape (draws,).
 
-        Every stretch's say is multiplied by a normal number, which keeps what candidates have in common and stays
-        right for few stretches, where signs do not (Chernozhukov, Chetverikov & Kato, Ann. Stat. 41, 2013, 2786).
+        Each cluster's residual is multiplied by a normal number. Regressors that share the numbers keep their
+        correlation. It holds for few clusters, where flips of sign do not (Chernozhukov, Chetverikov & Kato, Ann. Stat.
+        41, 2013, 2786).
 
         Args:
-            normal: Of each stretch's number, at least as many as there are, shape (draws, stretches or more).
+            normal: A number for each cluster, shape (draws, clusters or more).
         """
-        pulls = normal[:, : len(self.scatter)] @ self.scatter
-        return _normal(np.sum(np.square(pulls), axis=1) / self.power, self.drawn, 1e6)
+        totals = normal[:, : len(self.residuals)] @ self.residuals
+        return _normal(np.sum(np.square(totals), axis=1) / self.variance, self.bootstrap_freedom, 1e6)
 
 
 @dataclass(frozen=True)
-class Lent:
-    """What all candidates of a kind say of how much scores scatter."""
+class PooledExcess:
+    """Prior for the ratio of a score's variance to the expected one, from all candidates of a kind (shrinkage)."""
 
     excess: float
-    """Square of the scatter over what the noise makes [1]."""
+    """Prior ratio [1]."""
     freedom: float
-    """Degrees of freedom that this is worth [1]."""
+    """Prior degrees of freedom [1]."""
 
 
-def lent(effects: dict[str, list[Clustered]]) -> Lent | None:
-    """Return what effects of a kind have in common; None if they are too few to say.
+def pooled_excess(effects: dict[str, list[ClusteredScore]]) -> PooledExcess | None:
+    """Return the prior of a kind; None if it has too few effects.
 
-    By medians, so that a few that miss what is there do not count.
+    Estimated by medians: the few effects that resemble a missing one do not count.
 
     Args:
-        effects: Each with the scores of its shapes, which are much alike.
+        effects: Effect -> scores of its shapes, which are much alike.
     """
-    told = [[s for s in shapes if np.any(s.pull)] for shapes in effects.values()]
-    told = [shapes for shapes in told if shapes]
-    if len(told) < LENDERS:
+    excited = [[s for s in shapes if np.any(s.total)] for shapes in effects.values()]
+    excited = [shapes for shapes in excited if shapes]
+    if len(excited) < FEWEST_POOLED:
         return None
-    half = 0.5 * np.array([np.median([s.freedom[1] for s in shapes]) for shapes in told])
-    excess = [np.median([s.power / max(s.expected, 1e-12) for s in shapes]) for shapes in told]
+    half = 0.5 * np.array([np.median([s.freedom[1] for s in shapes]) for shapes in excited])
+    excess = [np.median([s.variance / max(s.expected_variance, 1e-12) for s in shapes]) for shapes in excited]
     log = np.log(excess) - digamma(half) + np.log(half)
     middle = float(np.median(log))
     spread = float(1.4826 * np.median(np.abs(log - middle))) ** 2 - float(np.mean(polygamma(1, half)))
-    freedom = min(2 * _trigamma_inverse(spread), LENT * len(told)) if spread > 0 else LENT * len(told)
-    return Lent(max(float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2))), LEAST), freedom)
+    most = PRIOR_FREEDOM * len(excited)
+    freedom = min(2 * _trigamma_inverse(spread), most) if spread > 0 else most
+    return PooledExcess(max(float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2))), LEAST_EXCESS), freedom)
 
 
-def of_kinds(others: Lent | None, clock: Lent | None) -> dict[bool, Lent | None]:
-    """Return what effects that follow the clock (True), and others, are lent.
+def pooled_by_kind(others: PooledExcess | None, clock: PooledExcess | None) -> dict[bool, PooledExcess | None]:
+    """Return the priors of effects that follow the clock (True) and of all others (False).
 
-    Few effects follow the clock, and lend each other little. Where they scatter no more than all others do, the larger
-    excess of those counts, and all that they know; where something wanders, only their own.
+    Few effects follow the clock, and estimate a prior badly. Where they scatter no more than the others, they get the
+    others' prior. Where something drifts, they keep their own.
     """
     if others is not None and clock is not None and others.excess >= clock.excess:
         clock = others
@@ -143,8 +146,8 @@ def _trigamma_inverse(value: float) -> float:
     return x
 
 
-def clustered(gram: np.ndarray, columns: np.ndarray) -> Clustered:
-    """Return a candidate's score.
+def clustered_score(gram: np.ndarray, columns: np.ndarray) -> ClusteredScore:
+    """Return a candidate's cluster-robust score.
 
     Args:
         gram: One Gram matrix an episode, residual first, nuisances eliminated, shape (episodes, 1 + p, 1 + p).
@@ -160,29 +163,29 @@ def clustered(gram: np.ndarray, columns: np.ndarray) -> Clustered:
     scores = gram[:, index, 0]
     turned = _unit(total)
     white = scores @ turned.T
-    pull = white.sum(axis=0)
+    whole = white.sum(axis=0)
     inside = np.einsum("ji,eik,lk->ejl", turned, information, turned, optimize=True)
-    bare = white - inside @ pull
+    bare = white - inside @ whole
     leverage = np.einsum("ejj->ej", inside)
-    of = np.arange(len(gram))
-    if _alike(bare, leverage):
-        count = int(np.clip(len(gram) // EACH, min(FEWEST, len(gram)), MOST))
-        of = of * count // len(gram)
-    together = np.zeros((of.max() + 1, len(index)))
+    cluster = np.arange(len(gram))
+    if _correlated(bare, leverage):
+        count = int(np.clip(len(gram) // CLUSTER_SIZE, min(FEWEST_CLUSTERS, len(gram)), MOST_CLUSTERS))
+        cluster = cluster * count // len(gram)
+    together = np.zeros((cluster.max() + 1, len(index)))
     heavy = np.zeros_like(together)
-    np.add.at(together, of, bare)
-    np.add.at(heavy, of, leverage)
-    told = heavy.max(axis=0) <= LEVERAGE
-    if not told.any():
+    np.add.at(together, cluster, bare)
+    np.add.at(heavy, cluster, leverage)
+    tested = heavy.max(axis=0) <= LARGEST_LEVERAGE
+    if not tested.any():
         return _nothing(len(gram))
-    scatter = together[:, told] / (1 - heavy[:, told])
-    expected = float(np.sum(heavy[:, told] / (1 - heavy[:, told])))
-    own, freedom = _freedom(scatter, heavy[:, told])
-    return Clustered(pull[told], scatter, of, freedom, expected, own)
+    residuals = together[:, tested] / (1 - heavy[:, tested])
+    expected = float(np.sum(heavy[:, tested] / (1 - heavy[:, tested])))
+    drawn, freedom = _freedom(residuals, heavy[:, tested])
+    return ClusteredScore(whole[tested], residuals, cluster, freedom, expected, drawn)
 
 
-def _nothing(episodes: int) -> Clustered:
-    return Clustered(np.zeros(1), np.ones((1, 1)), np.zeros(episodes, dtype=int), (1.0, 1.0))
+def _nothing(episodes: int) -> ClusteredScore:
+    return ClusteredScore(np.zeros(1), np.ones((1, 1)), np.zeros(episodes, dtype=int), (1.0, 1.0))
 
 
 def _unit(total: np.ndarray) -> np.ndarray:
@@ -192,31 +195,33 @@ def _unit(total: np.ndarray) -> np.ndarray:
     return (vectors[:, good] / np.sqrt(values[good])) @ vectors[:, good].T
 
 
-def _alike(bare: np.ndarray, leverage: np.ndarray) -> bool:
+def _correlated(bare: np.ndarray, leverage: np.ndarray) -> bool:
+    """Return whether the residual scores of successive episodes correlate."""
     sized = bare / np.sqrt(np.maximum(leverage, 1e-9))
     sized = np.where(leverage > 0.05 * np.median(leverage), sized, 0.0)
     power = np.sum(np.square(sized), axis=0)
     common = float(np.sum(sized[1:] * sized[:-1])) / max(float(power.sum()), 1e-12)
     freedom = float(power.sum()) ** 2 / max(float(np.sum(power**2)), 1e-12)
     # An episode's own mean taken off makes successive ones differ by 1/n on average.
-    return (common + 1 / len(bare)) * np.sqrt(len(bare) * freedom) > ALIKE
+    return (common + 1 / len(bare)) * np.sqrt(len(bare) * freedom) > CORRELATED_Z
 
 
-def _freedom(scatter: np.ndarray, heavy: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """Return the degrees of freedom that the scatter spans, and those of the pull and of its power.
+def _freedom(residuals: np.ndarray, heavy: np.ndarray) -> tuple[float, tuple[float, float]]:
+    """Return the degrees of freedom that the clusters span, and those of the F statistic.
 
-    Few stretches span fewer directions than the pull has: the participation ratio (tr C)^2 / tr C^2 of the amplitudes'
-    covariance C is told without that bias, as tr C^2 from n equal stretches is too large by (tr C)^2 / n.
+    The numerator's is the participation ratio (tr C)^2 / tr C^2 of the amplitudes' covariance C. From n equal clusters
+    tr C^2 is too large by (tr C)^2 / n, which is taken off.
     """
-    product = scatter @ scatter.T
+    product = residuals @ residuals.T
     whole, square = float(np.trace(product)) ** 2, max(float(np.sum(product**2)), FLOOR)
     share = heavy.sum(axis=1) / max(float(heavy.sum()), 1e-12)
     together = float(np.sum(share**2))
-    least = whole / scatter.shape[1]
+    least = whole / residuals.shape[1]
     own = whole / max((square - together * whole) / (1 + together), least, FLOOR)
     own = max(own, 1.0)
     return max(whole / square, 1.0), (own, max(own * (1 / together - 1), 1.0))
 
 
 def _normal(ratio: np.ndarray, first: float, second: float) -> np.ndarray:
+    """Return F statistics as standard normal scores."""
     return -ndtri(np.clip(fdtrc(first, second, np.maximum(ratio, 0.0)), FLOOR, 1 - 1e-12))

@@ -6,7 +6,7 @@ import numpy as np
 
 from tacdata.chain import Course, predict
 from tacdata.discrepancy.data.streams import Streams
-from tacdata.discrepancy.search.findings import Judgement
+from tacdata.discrepancy.search.findings import Findings
 from tacdata.discrepancy.verdict.residual_slices import PHASES, phases
 from tacdata.discrepancy.verdict.residual_table import Residuals
 
@@ -14,7 +14,7 @@ MOST = 2_000_000
 """Values that a file holds of each kind; of more, every second, third, ... reading is kept [1]."""
 
 
-def beside_model(course: Course, found: Judgement, sealed: np.ndarray, most: int = MOST) -> Residuals:
+def beside_model(course: Course, found: Findings, sealed: np.ndarray, most: int = MOST) -> Residuals:
     """Lay the readings beside the model before and after.
 
     Args:
@@ -27,7 +27,7 @@ def beside_model(course: Course, found: Judgement, sealed: np.ndarray, most: int
     measured = streams.measured(course)
     before = streams.predicted(predict(course, first.setting.response, list(first.setting.given)))
     after = streams.predicted(predict(course, last.setting.response, [*last.setting.given, *last.placed]))
-    scale = first.frame.noise
+    scale = first.null.noise
     every = max(int(np.ceil(measured.size / most)), 1)
     kept = slice(None, None, every)
     return Residuals(
@@ -41,12 +41,12 @@ def beside_model(course: Course, found: Judgement, sealed: np.ndarray, most: int
     )  # fmt: skip
 
 
-def _level(measured: np.ndarray, said: np.ndarray, episode: np.ndarray) -> np.ndarray:
+def _level(measured: np.ndarray, predicted: np.ndarray, episode: np.ndarray) -> np.ndarray:
     """Return what is said, moved by the median of what it is off in each episode: offsets are no one's fault."""
-    result = said.copy()
+    result = predicted.copy()
     for number in np.unique(episode):
         own = episode == number
-        off = measured[own] - said[own]
-        known = np.isfinite(off).any(axis=0)
-        result[np.ix_(own, known)] += np.nanmedian(off[:, known], axis=0)
+        deviation = measured[own] - predicted[own]
+        known = np.isfinite(deviation).any(axis=0)
+        result[np.ix_(own, known)] += np.nanmedian(deviation[:, known], axis=0)
     return result

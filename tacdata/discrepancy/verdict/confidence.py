@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.discrepancy.search.findings import Judgement, Member
+from tacdata.discrepancy.search.findings import Finding, Findings
 
 FILE = "confidence.json"
 """The map: weights, and the worlds and the command that they come from."""
@@ -17,23 +17,24 @@ MOST = 12.0
 """Margins beyond so many standard errors are all the same [1]."""
 
 
-def features(found: Judgement, member: Member, members: int) -> dict[str, float]:
-    """Return what the confidence in a member rests on, each about 0 to 1.
+def features(found: Findings, finding: Finding, count: int) -> dict[str, float]:
+    """Return what the confidence in an effect rests on, each about 0 to 1.
 
     Args:
         found: What was found.
-        member: One effect of the answer.
-        members: How many there are.
+        finding: One effect of the answer.
+        count: How many there are.
     """
-    margin = min((float(v) for v in member.margins.values()), default=MOST)
+    p = finding.corrected_p
+    margin = min((float(v) for v in finding.margins.values()), default=MOST)
     return {
         "margin": float(np.clip(margin, 0, MOST)) / MOST,
-        "need": float(np.clip(member.necessity, 0, MOST)) / MOST,
-        "selected": member.selected,
-        "decoys": 1.0 if member.decoys is None else float(np.clip(-np.log10(max(member.decoys, 1e-3)) / 3, 0, 1)),
+        "need": float(np.clip(finding.necessity, 0, MOST)) / MOST,
+        "selected": finding.selected,
+        "decoys": 1.0 if p is None else float(np.clip(-np.log10(max(p, 1e-3)) / 3, 0, 1)),  # the file's name for it
         "explained": 1 - float(np.clip(found.share_left, 0, 1)),
         "left": float(np.clip(found.left.t, 0, MOST)) / MOST,
-        "others": (members - 1) / 3,
+        "others": (count - 1) / 3,
         "episodes": float(np.clip(np.log10(len(found.energy[0])) / 2, 0, 1)),
     }
 

@@ -1,132 +1,162 @@
-"""From what was found to what may be said: named, ambiguous, unknown or none."""
+"""The decision: named, ambiguous, unknown or none. Every status is given here, and nowhere else."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from enum import Enum, auto
 
-import numpy as np
-
+from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
-from tacdata.discrepancy.search.findings import Judgement, Member
-from tacdata.discrepancy.search.judge import DECOYS, GATE
-from tacdata.effects import Placed, load
+from tacdata.discrepancy.search.elimination import LARGEST_P
+from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.gate import GATE
+from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
+from tacdata.discrepancy.verdict.confidence import confidence, features
+from tacdata.effects import load
 
-LEFT = 0.05
-"""Share of the explainable that may be left before no name is given [1]."""
-ALONE = 0.15
-"""The same for a single effect of which every rival leaves more than that again [1]."""
+SHARE_LEFT = 0.05
+"""Leftovers: largest share of the explainable that an answer may leave [1]."""
+SHARE_LEFT_ALONE = 0.15
+"""Leftovers: the same for a single effect of which every rival leaves twice as much [1]."""
 LEFT_T = 2.0
-"""Leftovers count when they show over episodes by so many standard errors [1]."""
-FAR = 5.0
-"""A rival beaten by so many standard errors over episodes is out, whatever the answer leaves [1]."""
-SURE = 3.0
-"""Without any effect that helps, leftovers must show by so many standard errors to be called a gap [1]."""
+"""Leftovers: they count from so many standard errors over episodes on [1]."""
+GAP_T = 3.0
+"""Leftovers: without any effect that helps, they are a gap from so many standard errors on [1]."""
+SETTLED_Z = 5.0
+"""J test: a rival beaten by so many standard errors is out, whatever the answer leaves [1]."""
 LOUD = 2.0
-"""A residual of so many times the noise floor is not nothing, even if several episodes bear no effect out [1]."""
-BEYOND = 3.0
-"""A channel's gain is more than calibration's business beyond so many of its standard deviations [1]."""
-OUTLYING = 4.0
-"""... or, where all together scatter little, of what the others scatter by [1]."""
-WIDE = 2.0
-"""Gains scatter more than calibration leaves open beyond so many of its standard deviations [1]."""
-RARE = 0.003
-"""What so few decoys do as well as is needed, whatever the two models' own episodes make of it [1]."""
-VIEW, SCALES = "view_scale", ("view_scale", "travel_scale")
-"""Scale of a second observation; what it cannot be told from where nothing else follows the tip."""
-CALIBRATED = 0.005
-"""Standard deviation of that scale: what calibrating a camera or a gauge leaves [1]."""
-COMMON = ("modulus", "thickness")
-"""What a common gain cannot be told from without a force reading."""
+"""Residual: a mean square of so many noise floors is unknown, not none, even if no test rejects [1]."""
+RARE_P = 0.003
+"""Score test: with so small a corrected p-value `NEEDED_Z` standard errors of necessity are enough [1]."""
 
 
-def adequate(found: Judgement, answer: list[Member]) -> bool:
+class Reason(Enum):
+    """Why a status was given."""
+
+    CONTRADICTION = auto()
+    """The recordings contradict the model's wiring, or units."""
+    TOO_FEW = auto()
+    """Too few episodes."""
+    STOPPED = auto()
+    """Stopped before the last step."""
+    QUIET = auto()
+    """Nothing is missing that these recordings would show."""
+    NAMED = auto()
+    """Nothing else explains the episodes as well."""
+    RIVALS = auto()
+    """Others explain the episodes as well, or the effect is not surely needed."""
+    LEFTOVERS = auto()
+    """The best answer leaves too much."""
+    ODD = auto()
+    """Some episodes are unlike all others, and no effect explains them."""
+    LOUD = auto()
+    """The residual is far above the noise, but no effect is supported by several episodes."""
+    UNEXPLAINED = auto()
+    """A gap that no modelled effect explains."""
+
+
+@dataclass(frozen=True)
+class Decided:
+    """One effect of the verdict with its status."""
+
+    finding: Finding
+    """Its rivals include those that the recordings cannot tell from it."""
+    status: str
+    """named, ambiguous, or suspected where the verdict names nothing."""
+    features: dict[str, float]
+    """What the confidence rests on."""
+    confidence: float | None
+    """Probability that the name is right [1]; None where nothing is named."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What may be said."""
+
+    status: str
+    """named, ambiguous, unknown or none."""
+    reason: Reason
+    effects: tuple[Decided, ...] = field(default=())
+
+
+def decide(found: Findings, checks: DataChecks) -> Decision:
+    """Decide what may be said of findings.
+
+    Args:
+        found: What the search found.
+        checks: What the recordings can carry.
+    """
+    answer = answer_of(found)
+    status, reason = _status(found, answer)
+    if checks.contradictions:
+        status, reason = "unknown", Reason.CONTRADICTION
+    elif checks.too_few:
+        status, reason = "unknown", Reason.TOO_FEW
+    return Decision(status, reason, tuple(_decided(f, status, found, len(answer)) for f in answer))
+
+
+def _status(found: Findings, answer: list[Finding]) -> tuple[str, Reason]:
+    """Return what the statistics allow."""
+    if found.until != "decide":
+        return ("unknown" if found.gap else "none"), Reason.STOPPED
+    # One test in a hundred rejects by chance: without an effect, leftovers must bear the gap out.
+    chance = found.tests.p_generic > GATE and found.left.t < GAP_T
+    if not answer and (not found.gap or chance):
+        if len(found.problem.null.odd):
+            return "unknown", Reason.ODD
+        if found.loudness > LOUD:
+            return "unknown", Reason.UNEXPLAINED if found.gap else Reason.LOUD
+        return "none", Reason.QUIET
+    if not answer:
+        return "unknown", Reason.ODD if len(found.problem.null.odd) else Reason.UNEXPLAINED
+    if not adequate(found, answer):
+        return "unknown", Reason.LEFTOVERS
+    if any(settled(f) != "named" for f in answer):
+        return "ambiguous", Reason.RIVALS
+    return "named", Reason.NAMED
+
+
+def answer_of(found: Findings) -> list[Finding]:
+    """Return the effects of the answer, with all their rivals, and those that calibration shows."""
+    course, own = found.problem.setting.course, []
+    for f in found.effects:
+        effect = f.placed.effect
+        rivals = [*f.rivals, *lookalikes(course, effect, f.placed.values), *_hidden(found, f)]
+        own.append(replace(f, rivals=tuple(name for name in dict.fromkeys(rivals) if name != effect.called)))
+    return [*(f for f in own if not calibration_error(f)), *gains_beyond_calibration(found)]
+
+
+def adequate(found: Findings, answer: list[Finding]) -> bool:
     """Return whether nothing much is left to explain.
 
-    Real things have other forms than any library. What a single effect leaves is its own form where every rival would
+    Real effects have other forms than any library. What a single effect leaves is its own form where every rival would
     leave twice as much, or more.
     """
-    if found.left.t < LEFT_T or found.share_left < LEFT:
+    if found.left.t < LEFT_T or found.share_left < SHARE_LEFT:
         return True
-    if len(answer) != 1 or settled(answer[0]) != "named" or found.share_left >= ALONE:
+    if len(answer) != 1 or settled(answer[0]) != "named" or found.share_left >= SHARE_LEFT_ALONE:
         return False
     return all(loss > found.left.gain for loss in answer[0].losses.values())
 
 
-def members(found: Judgement) -> list[Member]:
-    """Return the effects of the answer, those that calibration shows among them."""
-    course = found.problem.setting.course
-    own = []
-    for m in found.members:
-        effect = m.placed.effect
-        more = [*m.rivals, *lookalikes(course, effect, m.placed.values), *_hidden(found, m)]
-        own.append(replace(m, rivals=tuple(name for name in dict.fromkeys(more) if name != effect.called)))
-    return [*(m for m in own if not _of_calibration(m)), *calibrated(found)]
+def settled(finding: Finding) -> str:
+    """Return whether one effect may be named: named or ambiguous."""
+    needed = finding.necessity >= finding.needed
+    if finding.corrected_p is not None:
+        needed = finding.corrected_p <= (LARGEST_P if needed else RARE_P)
+    return "named" if needed and not finding.rivals and not finding.at_bound else "ambiguous"
 
 
-def _hidden(found: Judgement, member: Member) -> list[str]:
+def _hidden(found: Findings, finding: Finding) -> list[str]:
     """Return rivals that are worse by less than what the answer itself leaves: another form may turn them around."""
     if found.left.t < LEFT_T:
         return []
-    near = [name for name, loss in member.losses.items() if loss < found.left.gain]
-    return [load(name).called for name in near if member.margins[name] < FAR]
+    near = [name for name, loss in finding.losses.items() if loss < found.left.gain]
+    return [load(name).called for name in near if finding.margins[name] < SETTLED_Z]
 
 
-def calibrated(found: Judgement) -> list[Member]:
-    """Return gains that are beyond what calibration leaves open: common to all channels, or of some."""
-    prior = found.problem.setting.nuisance.get("channel_gain")
-    known = found.gains[np.isfinite(found.gains)]
-    if prior is None or not np.any(known):
-        return []
-    made = []
-    common = float(np.median(known))
-    if abs(common) > BEYOND * prior / np.sqrt(len(known)) * 2:
-        placed = Placed(load("gain"), {"e": np.array(common)})
-        error = float(1.25 * np.std(known) / np.sqrt(len(known)))
-        rivals = COMMON if found.problem.setting.course.force is None else ()
-        made.append(Member(placed, {"e": error}, (), rivals, {}, abs(common) / max(error, 1e-9), needed=BEYOND))
-    own = np.nan_to_num(found.gains - common)
-    spread = float(np.sqrt(np.mean(np.square(known - common))))
-    # Gains may all be worse than calibration was thought to be; else a channel must stand out against its kind.
-    usual = prior if spread > WIDE * prior else max(prior, 1.4826 * float(np.median(np.abs(known - common))))
-    far = np.abs(own) > (BEYOND if spread > WIDE * prior else OUTLYING) * usual
-    if far.any():
-        placed = Placed(load("channel_gain"), {"e": np.where(far, own, 0.0)})
-        made.append(Member(placed, {"e": prior}, (), (), {}, float(np.abs(own).max() / prior), needed=BEYOND))
-    return made
-
-
-def _of_calibration(member: Member) -> bool:
-    """Return whether a drive and its observer disagree by no more than calibrating the observer leaves open."""
-    placed = member.placed
-    called = {placed.effect.called, *member.rivals}
-    if VIEW not in called or placed.effect.called not in SCALES:
-        return False
-    return all(abs(float(value)) <= BEYOND * CALIBRATED for value in placed.values.values())
-
-
-def loudness(found: Judgement) -> float:
-    """Return the mean square of the whitened residual of the model as it was given [noise floor]."""
-    return 2 * float(found.energy[0].sum()) / max(float(found.values.sum()), 1.0)
-
-
-def status(found: Judgement) -> str:
-    """Return the verdict: none, named, ambiguous or unknown."""
-    answer = members(found)
-    if found.until != "decide":
-        return "unknown" if found.gap else "none"
-    quiet = "unknown" if loudness(found) > LOUD or len(found.problem.frame.odd) else "none"
-    if not found.gap and not answer:
-        return quiet
-    if not answer and found.tested.p_generic > GATE and found.left.t < SURE:
-        return quiet  # one effect in a hundred flips, and nothing that bears it out
-    if not answer or not adequate(found, answer):
-        return "unknown"
-    return "ambiguous" if any(settled(m) != "named" for m in answer) else "named"
-
-
-def settled(member: Member) -> str:
-    """Return whether one effect may be named: named or ambiguous."""
-    needed = member.necessity >= member.needed
-    if member.decoys is not None:
-        needed = member.decoys <= (DECOYS if needed else RARE)
-    return "named" if needed and not member.rivals and not member.at_bound else "ambiguous"
+def _decided(finding: Finding, verdict: str, found: Findings, count: int) -> Decided:
+    """Return an effect with its status; whoever reads it alone must not take it for a name that the verdict refuses."""
+    status = "suspected" if verdict == "unknown" else settled(finding)
+    values = features(found, finding, count)
+    return Decided(finding, status, values, confidence(values) if status == "named" else None)

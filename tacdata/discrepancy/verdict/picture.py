@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from tacdata.discrepancy.data.streams import Streams
-from tacdata.discrepancy.search.findings import Judgement
-from tacdata.discrepancy.verdict.residual_slices import Slice, residual
+from tacdata.discrepancy.search.findings import Findings
+from tacdata.discrepancy.verdict.residual_slices import Slice, whitened_residual
 
 MOST_ROWS = 1200
 """Rows drawn of the worst episodes."""
@@ -19,7 +19,7 @@ WIDEST = 120
 """Characters in a line of the title: more do not fit."""
 
 
-def draw(found: Judgement, before: list[Slice], after: list[Slice], verdict: dict[str, Any], path: Path) -> None:
+def draw(found: Findings, before: list[Slice], after: list[Slice], verdict: dict[str, Any], path: Path) -> None:
     """Draw the page into a PNG file."""
     import matplotlib
 
@@ -27,8 +27,8 @@ def draw(found: Judgement, before: list[Slice], after: list[Slice], verdict: dic
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(12, 8), constrained_layout=True)
-    said = textwrap.fill(f"{verdict['status']}: {verdict['why']}", WIDEST)
-    figure.suptitle(said, fontsize=11)
+    title = textwrap.fill(f"{verdict['status']}: {verdict['why']}", WIDEST)
+    figure.suptitle(title, fontsize=11)
     added = bool(verdict["effects"])  # without an effect there is no after
     _streams(axes[0, 0], found, added)
     _slices(axes[0, 1], before, after, added)
@@ -38,9 +38,9 @@ def draw(found: Judgement, before: list[Slice], after: list[Slice], verdict: dic
     plt.close(figure)
 
 
-def _streams(axis: Any, found: Judgement, added: bool) -> None:
+def _streams(axis: Any, found: Findings, added: bool) -> None:
     course = found.problem.setting.course.reduced
-    first, last = residual(found.problem), residual(found.final)
+    first, last = whitened_residual(found.problem), whitened_residual(found.final)
     power = np.square(first).mean(axis=1)
     # Sealed episodes have no rows here.
     read = np.unique(course.episode)
@@ -74,22 +74,22 @@ def _slices(axis: Any, before: list[Slice], after: list[Slice], added: bool) -> 
     axis.set(xscale="log", xlabel="mean square over the noise floor", title="where it lives")
 
 
-def _rivals(axis: Any, found: Judgement) -> None:
+def _rivals(axis: Any, found: Findings) -> None:
     best: dict[str, float] = {}
-    for candidate, gain in zip(found.problem.candidates, found.tested.gain, strict=True):
+    for candidate, gain in zip(found.problem.candidates, found.tests.gain, strict=True):
         best[candidate.effect.name] = max(best.get(candidate.effect.name, 0.0), float(gain))
     order = sorted(best, key=lambda name: -best[name])[:12]
-    chosen = {m.placed.effect.name for m in found.members}
+    chosen = {m.placed.effect.name for m in found.effects}
     colors = ["tab:blue" if name in chosen else "0.6" for name in order]
     axis.barh(order, [best[name] for name in order], color=colors)
     axis.invert_yaxis()
     axis.tick_params(axis="y", labelsize=7)
-    axis.set(xlabel="gain of each effect alone, to first order [nats]", title="candidates")
+    axis.set(xlabel="fall of half the squared residual by each effect alone, to first order", title="candidates")
     axis.locator_params(axis="x", nbins=5)
     axis.ticklabel_format(axis="x", style="sci", scilimits=(-1, 4))
 
 
-def _episodes(axis: Any, found: Judgement, added: bool) -> None:
+def _episodes(axis: Any, found: Findings, added: bool) -> None:
     floor = np.maximum(found.values, 1)
     axis.plot(2 * found.energy[0] / floor, "o", color="tab:red", ms=3, label="before")
     if added:

@@ -31,9 +31,9 @@ class Slice:
     """How far above 1, in standard errors over episodes."""
 
 
-def residual(problem: Problem) -> np.ndarray:
+def whitened_residual(problem: Problem) -> np.ndarray:
     """Return the whitened residual without nuisances, shape (m, streams)."""
-    return problem.frame.known.cleaned(problem.board.columns[0][:, :, None])[:, :, 0]
+    return problem.null.whitener.whitened(problem.board.columns[0][:, :, None])[:, :, 0]
 
 
 PHASES = ("without contact", "loading", "hold", "unloading")
@@ -48,10 +48,10 @@ def phases(course: Course) -> np.ndarray:
     return np.where(~inside, 0, np.where(still, 2, np.where(speed > 0, 1, 3)))
 
 
-def slices(problem: Problem, white: np.ndarray) -> list[Slice]:
+def slices(problem: Problem) -> list[Slice]:
     """Return the residual by phase, depth, rate, place, indenter, clock and channel."""
     course = problem.setting.course.reduced
-    square = np.square(white).astype(float)
+    square = np.square(whitened_residual(problem)).astype(float)
     each = square.mean(axis=1)
     speed, depth, phase = course.speed, course.tip[:, 2], phases(course)
     inside, still = phase != PHASES.index("without contact"), phase == PHASES.index("hold")
@@ -114,24 +114,25 @@ def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) ->
     if not 0 < len(high) <= FEW_ALONE * len(there):
         return []
     order = sorted(high.tolist(), key=lambda k: -energy[k] / values[k])
-    told = ", ".join(f"{names[k]} {2 * energy[k] / values[k]:.3g}" for k in order[:5])
+    words = ", ".join(f"{names[k]} {2 * energy[k] / values[k]:.3g}" for k in order[:5])
     return [
-        f"episode: {told} times the noise, the others {usual:.3g}: {len(high)} of {len(there)} stand out by "
+        f"episode: {words} times the noise, the others {usual:.3g}: {len(high)} of {len(there)} stand out by "
         "themselves; look at them, or record what they did again"
     ]
 
 
-def in_words(found: list[Slice]) -> list[str]:
-    """Return sentences on the slices that stand out, each kind of slice by itself."""
-    told = []
+def in_words(found: list[Slice], alone: list[str] | None = None) -> list[str]:
+    """Return sentences on what stands out: ``alone`` first, then the slices, each kind of slice by itself."""
+    words = list(alone or [])
     for by in dict.fromkeys(s.by for s in found):
         own = [s for s in found if s.by == by]
         high = [s for s in own if s.mean_square > NOTABLE and s.t > SURE]
         if not high:
             continue
         if len(high) == len(own) > 2 and max(s.mean_square for s in high) < 2 * min(s.mean_square for s in high):
-            told.append(f"{by}: everywhere alike, {np.median([s.mean_square for s in high]):.3g} times the noise floor")
+            usual = np.median([s.mean_square for s in high])
+            words.append(f"{by}: everywhere alike, {usual:.3g} times the noise floor")
         else:
             high.sort(key=lambda s: -s.mean_square)
-            told.append(f"{by}: " + ", ".join(f"{s.name} {s.mean_square:.3g}" for s in high[:4]) + " times the noise")
-    return told or [NOWHERE]
+            words.append(f"{by}: " + ", ".join(f"{s.name} {s.mean_square:.3g}" for s in high[:4]) + " times the noise")
+    return words or [NOWHERE]

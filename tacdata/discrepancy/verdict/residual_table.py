@@ -54,27 +54,28 @@ class Residuals:
     every: int = 1
     """One reading in so many is kept."""
 
-    def off(self, said: np.ndarray) -> np.ndarray:
-        """Return measured less said, over the noise [1], shape (n, streams)."""
-        return (self.measured - said) / self.noise.astype(np.float32)
+    def standardized(self, predicted: np.ndarray) -> np.ndarray:
+        """Return measured less predicted, over the noise [1], shape (n, streams)."""
+        return (self.measured - predicted) / self.noise.astype(np.float32)
 
 
-def write(path: Path, told: Residuals, verdict: str) -> None:
+def write(path: Path, residuals: Residuals, verdict: str) -> None:
     """Write the file; a crash leaves the old one or the new one.
 
     Args:
         path: File to write.
-        told: What to write.
+        residuals: What to write.
         verdict: Content hash of the verdict that they belong to.
     """
     header: dict[str, Any] = {
-        "version": schemas.version("residuals"), "rows": len(told.time), "every": told.every, "verdict": verdict,
-        "phases": list(told.phases), "streams": list(told.streams), "noise": [float(v) for v in told.noise],
-        "episodes": list(told.names), "sealed": list(told.sealed),
+        "version": schemas.version("residuals"), "rows": len(residuals.time), "every": residuals.every,
+        "verdict": verdict, "phases": list(residuals.phases), "streams": list(residuals.streams),
+        "noise": [float(v) for v in residuals.noise], "episodes": list(residuals.names),
+        "sealed": list(residuals.sealed),
     }  # fmt: skip
     documents.check(header, "residuals", str(path))
-    flat = {name: pa.array(getattr(told, name)) for name in ("episode", "time", "phase", "depth", "rate")}
-    wide = {name: _wide(getattr(told, name)) for name in ("measured", "before", "after")}
+    flat = {name: pa.array(getattr(residuals, name)) for name in ("episode", "time", "phase", "depth", "rate")}
+    wide = {name: _wide(getattr(residuals, name)) for name in ("measured", "before", "after")}
     table = pa.table({**flat, **wide}).replace_schema_metadata({HEADER: json.dumps(header)})
     with replacement(path) as stream:
         pq.write_table(table, stream, compression="zstd", write_page_checksum=True)

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.chain import Course, Response, predict
+from tacdata.chain import Course, predict
 from tacdata.discrepancy.regressors.generic import histories
-from tacdata.discrepancy.search.findings import Judgement
+from tacdata.discrepancy.search.findings import Findings
 
 SHARE = 0.1
 """Share of the episodes that is sealed [1]..."""
-FEWEST = 4
-"""...and no fewer: a handful shows the gap, all the others are needed to say what it is."""
+LEAST_SEALED = 4
+"""...and no fewer: a handful shows the gap, all the others are needed to say what it is [episodes]."""
 ENOUGH = 20
 """With fewer episodes none is sealed: all are needed for the verdict."""
 KEPT = 2
@@ -46,7 +46,7 @@ def chosen(course: Course) -> np.ndarray:
     for k in order:
         others = [other for other in left[int(course.site[k]), int(tool[k])] if other != k]
         enough = len(others) >= KEPT and depth[others].max() >= (1 - WITHIN) * depth[k]
-        if len(found) < max(int(SHARE * course.episodes), FEWEST) and enough:
+        if len(found) < max(int(SHARE * course.episodes), LEAST_SEALED) and enough:
             found.append(k)
             left[int(course.site[k]), int(tool[k])] = others
     return np.sort(np.array(found, dtype=np.int64))
@@ -80,7 +80,8 @@ class Gap:
         share = _closed(before, after, np.minimum(ceiling, after))
         low, high = np.quantile(share, [0.05, 0.95])
         return {
-            "episodes": len(self.before), "share": SHARE, "rule": f"least SHA-256 of session/name, {FEWEST} at least",
+            "episodes": len(self.before), "share": SHARE,
+            "rule": f"least SHA-256 of session/name, {LEAST_SEALED} at least",
             "before": float(self.before.mean()), "after": float(self.after.mean()), "floor": 1.0, "ceiling": best,
             "closed": float(_closed(self.before.mean(), self.after.mean(), np.array(best))),
             "interval": [float(low), float(high)],
@@ -94,25 +95,24 @@ def _closed(before: np.ndarray, after: np.ndarray, best: np.ndarray) -> np.ndarr
     return np.where(room > 1e-3 * np.asarray(before), (before - after) / np.maximum(room, 1e-12), 0.0)
 
 
-def gap(course: Course, response: Response, found: Judgement, episodes: np.ndarray) -> Gap:
+def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
     """Return the gap on sealed episodes.
 
     Args:
         course: All recordings, the sealed ones with their readings.
-        response: What the judgement started from.
         found: What was found without the sealed episodes.
         episodes: The sealed ones.
     """
     if not len(episodes):
         return Gap(np.zeros(0), np.zeros(0), np.zeros(0), ())
-    given = list(found.problem.setting.given)
+    given, response = list(found.problem.setting.given), found.problem.setting.response
     rows = course.read
     first = course.readings[rows] - predict(course, response, given).signal[rows]
     model = found.final
     placed = [*model.setting.given, *model.placed]
     last = course.readings[rows] - predict(course, model.setting.response, placed).signal[rows]
     rest = first - _predicted(course, first, episodes)
-    noise = found.problem.frame.noise
+    noise = found.problem.null.noise
     scale = noise.scale[: course.channels] / np.sqrt(max(1 - noise.memory**2, 0.02))
     number = course.episode[rows]
     before, after, ceiling = (_squares(r / scale, number, episodes) for r in (first, last, rest))
@@ -135,10 +135,11 @@ def _predicted(course: Course, residual: np.ndarray, episodes: np.ndarray) -> np
     columns = columns / np.maximum(columns.std(axis=0), 1e-9)
     number = course.episode[course.read]
     sealed = np.isin(number, episodes)
-    test = ~sealed & (number % 4 == 0)
+    validation = ~sealed & (number % 4 == 0)
     best, chosen_weight = np.inf, STRENGTHS[-1]
     for strength in STRENGTHS:
-        error = residual[test] - columns[test] @ _ridge(columns[~sealed & ~test], residual[~sealed & ~test], strength)
+        train = ~sealed & ~validation
+        error = residual[validation] - columns[validation] @ _ridge(columns[train], residual[train], strength)
         if float(np.mean(np.square(error))) < best:
             best, chosen_weight = float(np.mean(np.square(error))), strength
     return columns @ _ridge(columns[~sealed], residual[~sealed], chosen_weight)

@@ -25,9 +25,9 @@ def in_text(verdict: dict[str, Any]) -> str:
         lines += ["next:", *(f"  {words}" for words in verdict["next"])]
     if verdict["remarks"]:
         lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
-    told = answered(verdict)
-    lines.append("cannot be judged here: " + ", ".join(sorted(set(verdict["unjudgeable"]) - told)))
-    weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK) and k not in told]
+    spoken = answered(verdict)
+    lines.append("cannot be judged here: " + ", ".join(sorted(set(verdict["unjudgeable"]) - spoken)))
+    weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK) and k not in spoken]
     if weak:
         lines.append("would be seen only at more than three times their usual size: " + ", ".join(sorted(weak)))
     if verdict["untested"]:
@@ -44,17 +44,17 @@ def answered(verdict: dict[str, Any]) -> set[str]:
     return {e["effect"] for e in verdict["effects"]} | {e.name for e in library() if e.called in spoken}
 
 
-def _effect(told: dict[str, Any]) -> list[str]:
-    sure = told["confidence"] if told["status"] == "named" else None
+def _effect(entry: dict[str, Any]) -> list[str]:
+    sure = entry["confidence"] if entry["status"] == "named" else None
     words = "" if sure is None else f", {100 * sure:.0f} % sure"
-    lines = [f"  {told['mechanism']} ({told['effect']}, {told['stage']}): {told['status']}{words}"]
-    for name, p in told["parameters"].items():
+    lines = [f"  {entry['mechanism']} ({entry['effect']}, {entry['stage']}): {entry['status']}{words}"]
+    for name, p in entry["parameters"].items():
         if isinstance(p["value"], list):
             lines.append(f"    {name}: {min(p['value']):.4g} to {max(p['value']):.4g} {p['unit']} over the channels")
         else:
             spread = f" +- {p['error']:.2g}" if p["error"] is not None else ""
             lines.append(f"    {name} = {p['value']:.4g}{spread} {p['unit']}")
-    rivals = sorted(told["margins"].items(), key=lambda item: item[1])
+    rivals = sorted(entry["margins"].items(), key=lambda item: item[1])
     worse = [(name, by) for name, by in rivals if by > 0][:FEW]
     better = [(name, -by) for name, by in rivals if by <= 0][:FEW]
     if worse:

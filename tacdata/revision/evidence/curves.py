@@ -53,7 +53,7 @@ def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, mos
     after = held.after(placed)
     predicted_before = held.predicted(held.before.response, [])
     predicted_after = held.predicted(after.response, after.placed)
-    course, scale = held.course, held.frame.noise.scale[: held.course.channels]
+    course, scale = held.course, held.null.noise.scale[: held.course.channels]
     change = np.square((predicted_after - predicted_before) / scale).mean(axis=1)
     order = sorted(episodes.tolist(), key=lambda e: -float(change[course.episode == e].mean()))[:most]
     found = []

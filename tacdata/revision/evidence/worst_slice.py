@@ -25,7 +25,7 @@ def sealed_slices(held: Comparison, placed: Sequence[Placed], episodes: np.ndarr
         placed: The effects, their parameters fitted without these episodes.
         episodes: The sealed ones.
     """
-    course, noise = held.course.reduced, held.frame.noise
+    course, noise = held.course.reduced, held.null.noise
     scale = noise.scale[: course.channels] / np.sqrt(max(1 - noise.memory**2, 0.02))
     after = held.after(placed)
     square = [

@@ -12,7 +12,7 @@ from tacdata.chain.table_response import TableResponse
 from tacdata.effects import Placed
 from tacdata.errors import SolveError
 from tacdata.revision.comparison import Comparison
-from tacdata.revision.labels.relabel import THICKNESS, changed_skin
+from tacdata.revision.labels.relabel import changed_skin
 from tacdata.sensor import Sensor
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
@@ -44,7 +44,7 @@ class Confirmed:
 
 def touches_fem(placed: Sequence[Placed]) -> bool:
     """Return whether effects change the input of the finite elements: the tip's position, or the skin's thickness."""
-    return any(p.stage == "kinematics" or p.effect.name == THICKNESS for p in placed)
+    return any(p.stage == "kinematics" or p.effect.changes_skin for p in placed)
 
 
 def confirm(
@@ -68,7 +68,7 @@ def confirm(
     course = held.course
     before = predict(course, response, held.setting.given).pose
     after = predict(course, response, [*held.setting.given, *placed]).pose
-    mechanical = [p for p in placed if p.effect.name == THICKNESS]
+    mechanical = [p for p in placed if p.effect.changes_skin]
     loads, moved = response.load(before, course.tool), response.load(after, course.tool)
     for effect in mechanical:
         moved = moved * _factor(held, effect, after)[:, None]

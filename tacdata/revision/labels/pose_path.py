@@ -15,8 +15,6 @@ from tacdata.recording import Episode
 
 BETWEEN = 0.02
 """Largest distance between points of a path [mm]."""
-LATE = "latency"
-"""The effect by which a reading belongs to an earlier position of the tip."""
 
 
 def moved_episodes(episodes: Sequence[Episode], placed: Sequence[Placed]) -> list[Episode]:
@@ -30,7 +28,7 @@ def moved_episodes(episodes: Sequence[Episode], placed: Sequence[Placed]) -> lis
         episodes: The episodes of one session.
         placed: The model's effects; all but kinematic ones and a constant delay are ignored.
     """
-    late = round(1e9 * sum(float(p.values["L"]) for p in placed if p.effect.name == LATE))
+    late = round(1e9 * sum(p.effect.delay(p.values) for p in placed))
     return [replace(e, tip_ns=e.tip_ns + late) for e in _placed_elsewhere(episodes, placed)]
 
 

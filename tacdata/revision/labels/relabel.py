@@ -13,11 +13,8 @@ from label_farm.store.store import Store
 from tacdata.effects import Placed
 from tacdata.labels import file_names, read_label
 from tacdata.recording import read_episode, read_session
-from tacdata.revision.labels.pose_path import LATE, moved_episodes
+from tacdata.revision.labels.pose_path import moved_episodes
 from tacdata.sensor import Sensor
-
-THICKNESS = "thickness"
-"""The effect that changes the skin itself."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ LEAST = 0.001
 
 def moves_labels(placed: Sequence[Placed]) -> bool:
     """Return whether effects change labels: the tip's path, its timing, or the skin's thickness."""
-    return any(p.stage == "kinematics" or p.effect.name in (THICKNESS, LATE) for p in placed)
+    return any(p.stage == "kinematics" or p.effect.changes_skin or p.effect.delay(p.values) != 0 for p in placed)
 
 
 def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:
@@ -101,7 +98,7 @@ def relabelled(
 
 def changed_skin(sensor: Sensor, placed: Sequence[Placed]) -> Sensor | None:
     """Return the sensor with the thickness that effects give it; None if they do not change it."""
-    factor = float(np.prod([1 + float(p.values["e"]) for p in placed if p.effect.name == THICKNESS]))
+    factor = float(np.prod([p.effect.thickness_factor(p.values) for p in placed]))
     if factor == 1.0:
         return None
     return replace(sensor, skin=replace(sensor.skin, thickness=sensor.skin.thickness * factor))

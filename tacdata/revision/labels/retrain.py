@@ -150,7 +150,7 @@ class _Simulated:
         read = rows[course.averaged[rows] > 0]
         when = course.time[rows] - course.time[read[0]]
         level = np.nanmedian(course.readings[read] - self._predicted[key][read], axis=0)
-        noise = self._held.frame.noise.scale
+        noise = self._held.null.noise.scale
         for c, number in enumerate(course.numbers or range(course.channels)):
             said = np.interp(seconds, when, self._predicted[key][rows, c]) + level[c]
             counts[:, number] = said + noise[c] * rng.normal(size=len(seconds))

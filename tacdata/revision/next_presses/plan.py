@@ -110,7 +110,7 @@ def _probabilities(found: list[Rival]) -> dict[str, float]:
 
 
 def _distances(held: Comparison, found: list[Rival], trial: CandidatePress) -> dict[tuple[str, str], float]:
-    course, noise = held.course, held.frame.noise
+    course, noise = held.course, held.null.noise
     given, predicted = list(held.setting.given), []
     for rival in found:
         _, signal = predicted_readings(course, rival.model.response, [*given, *rival.placed], trial)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.search.fits import best_shapes, fitted
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.problem import prepare
-from tacdata.discrepancy.search.screen import best_shapes, fitted
 from tacdata.effects import Placed, library, load
 from tacdata.revision.comparison import Comparison
 
@@ -49,18 +49,18 @@ def rivals(
     if at is None or not own:
         return []
     kept = [p for k, p in enumerate(own) if k != at]
-    found = [Rival(verdict["effects"][at]["mechanism"], tuple(own), refine(held.setting, own, held.frame))]
+    found = [Rival(verdict["effects"][at]["mechanism"], tuple(own), refine(held.setting, own, held.null))]
     wanted = list(verdict["effects"][at]["alternatives"])[: most - 1]
     known = [e for e in library() if e.called in wanted]
     setting = Setting(held.course, held.setting.response, known, held.setting.nuisance, held.setting.given)
-    bare = prepare(setting, held.frame, kept)
+    bare = prepare(setting, held.null, kept)
     everything = np.arange(len(bare.folds))
     best: dict[str, Rival] = {}
     for candidate in best_shapes(bare).values():
         note(f"next presses: {candidate.effect.name} fitted")
         _, values = fitted(bare, [candidate], everything)
         first = candidate.placed(values[: len(candidate.columns)], held.course.channels)
-        model = refine(setting, [*kept, first], held.frame)
+        model = refine(setting, [*kept, first], held.null)
         called = candidate.effect.called
         if called not in best or model.energy.sum() < best[called].model.energy.sum():
             best[called] = Rival(called, model.placed, model)

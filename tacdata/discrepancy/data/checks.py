@@ -1,0 +1,49 @@
+"""Checks of the data, made once before anything is fitted: what can recordings carry, and are they what they say?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tacdata.discrepancy.data.sufficiency import FEWEST_EPISODES, shortcomings, units
+from tacdata.discrepancy.data.wiring import miswired
+from tacdata.discrepancy.model.setting import Setting
+
+FITTED = (
+    "the base was fitted to these recordings and takes up all that has no memory (stiffness, gain, thickness, offsets, "
+    "compliance): such effects need a model of the sensor (--spec, --fem), or for compliance a gauge at the tip"
+)
+
+
+@dataclass(frozen=True)
+class DataChecks:
+    """What was found of the recordings themselves, in words."""
+
+    episodes: int
+    """Number of episodes."""
+    wiring: tuple[str, ...] = ()
+    """Channels that are not those of the model: no verdict."""
+    units: tuple[str, ...] = ()
+    """Values of another size than their unit: no verdict."""
+    shortcomings: tuple[str, ...] = ()
+    """What is missing from the recordings, each with its remedy."""
+    base: tuple[str, ...] = ()
+    """What the model that they are held against leaves open."""
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """What keeps these recordings from any verdict."""
+        return (*self.wiring, *self.units)
+
+    @property
+    def too_few(self) -> bool:
+        """Whether there are too few episodes for a name."""
+        return self.episodes < FEWEST_EPISODES
+
+
+def check(setting: Setting) -> DataChecks:
+    """Check recordings against the model that they are to be held against."""
+    course, response = setting.course, setting.response
+    wiring = () if setting.given else tuple(miswired(course, response))
+    return DataChecks(
+        course.episodes, wiring, tuple(units(course)), tuple(shortcomings(course)), (FITTED,) if response.fitted else ()
+    )

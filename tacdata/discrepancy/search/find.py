@@ -1,0 +1,74 @@
+"""The search for missing effects, step by step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import null_model
+from tacdata.discrepancy.search.detection_limits import detection_limits
+from tacdata.discrepancy.search.elimination import Answer, eliminate
+from tacdata.discrepancy.search.findings import STEPS, Finding, Findings
+from tacdata.discrepancy.search.fits import channel_gains
+from tacdata.discrepancy.search.gate import Gate, gate
+from tacdata.discrepancy.search.gauss_newton import Refined
+from tacdata.discrepancy.search.leftovers import Leftovers, leftovers
+from tacdata.discrepancy.search.problem import Problem, prepare
+from tacdata.discrepancy.search.race import Note, Selection, race, start
+
+
+def find(setting: Setting, note: Note = lambda text: None, until: str = "decide") -> Findings:
+    """Find which effects a model lacks.
+
+    Noise and nuisances, regressors, gate, race (forward selection), backward elimination with rivals, leftovers.
+
+    Args:
+        setting: Recordings, response, library.
+        note: Is told what is being done.
+        until: The last step to make, one of `STEPS`.
+    """
+    note("gate: is there a gap")
+    given = gate(prepare(setting, null_model(setting)))
+    selection = start(setting, given)
+    if given.gap and until in STEPS[2:]:
+        selection = race(setting, selection, note)
+    if until != "decide":
+        return _findings(given, selection, given.problem, selection.problem, _fitted(selection), until)
+    note("rivals and leftovers")
+    problem = prepare(setting, selection.null) if selection.model.placed else given.problem
+    answer, final = eliminate(setting, selection, problem), selection.problem
+    if answer.findings and _names(answer.model) != _names(selection.model):
+        final = prepare(replace(setting, response=answer.model.response), selection.null, answer.model.placed)
+    return _findings(given, selection, problem, final, answer, until)
+
+
+def _fitted(selection: Selection) -> Answer:
+    """Return the effects that fit best, without necessity and rivals."""
+    model = selection.model
+    return Answer(tuple(Finding(p, *model.errors(k), (), {}, 0.0) for k, p in enumerate(model.placed)), model)
+
+
+def _findings(
+    given: Gate, selection: Selection, problem: Problem, final: Problem, answer: Answer, until: str
+) -> Findings:  # fmt: skip
+    """Put together what was found.
+
+    Args:
+        given: The model as it was given, with its own noise.
+        selection: With the noise of the answer.
+        problem: The model as it was given, beside that noise.
+        final: The model with the answer.
+        answer: The effects.
+        until: The last step.
+    """
+    nothing, model = selection.nothing, answer.model
+    return Findings(
+        gap=given.gap, tests=given.tests, effects=answer.findings,
+        left=leftovers(final) if until == "decide" else Leftovers(0.0, 0.0), explained=nothing.loss - model.loss,
+        energy=(nothing.energy, model.energy), values=problem.grams.rows, problem=problem, final=final,
+        limits=detection_limits(final), gains=channel_gains(final), until=until,
+    )  # fmt: skip
+
+
+def _names(model: Refined) -> list[str]:
+    return [p.effect.name for p in model.placed]

@@ -1,0 +1,181 @@
+"""The race: forward selection of effects, each refined on the chain itself before one is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.chain import Response
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import NullModel, null_model
+from tacdata.discrepancy.regressors.candidates import Candidate
+from tacdata.discrepancy.regressors.model_error import SPREAD
+from tacdata.discrepancy.search.fits import fitted
+from tacdata.discrepancy.search.gate import Gate
+from tacdata.discrepancy.search.gauss_newton import Refined, refine
+from tacdata.discrepancy.search.j_test import NEEDED_Z, necessity
+from tacdata.discrepancy.search.overlap import overlap
+from tacdata.discrepancy.search.problem import Problem, prepare
+from tacdata.discrepancy.search.score_tests import ScoreTests, score_tests
+from tacdata.discrepancy.search.shortlist import shortlist
+from tacdata.effects import Effect
+
+MOST_EFFECTS = 4
+"""Forward selection: most effects in one verdict."""
+REFITS = 3
+"""Gauss-Newton steps after the noise was estimated again."""
+MINOR = 0.3
+"""Forward selection: a further effect must explain this share of the model error that resembles it [1]."""
+
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A model on its way: so many effects selected."""
+
+    null: NullModel
+    """Noise and nuisances, estimated beside the effects."""
+    nothing: Refined
+    """The model as it was given, beside the same noise."""
+    model: Refined
+    """The model with the effects."""
+    problem: Problem
+    """What may be missing beside them."""
+    tests: ScoreTests
+    """Of that."""
+    explained: tuple[tuple[Effect, float], ...] = ()
+    """Each effect with the fall of half the sum of squares by it [1]."""
+    least_p: tuple[tuple[str, float], ...] = ()
+    """Mechanism -> least corrected p-value so far [1]."""
+
+
+def start(setting: Setting, gate: Gate) -> Selection:
+    """Return the selection without effects."""
+    nothing = refine(setting, [], gate.problem.null)
+    least = least_p_values(gate.problem, gate.tests, ())
+    return Selection(gate.problem.null, nothing, nothing, gate.problem, gate.tests, (), least)
+
+
+def race(setting: Setting, selection: Selection, note: Note) -> Selection:
+    """Add effects, or pairs of them, as long as episodes ask for them."""
+    while len(selection.model.placed) < MOST_EFFECTS:
+        chosen = shortlist(selection.problem, selection.tests)
+        if not chosen:
+            break
+        note(f"fit: {', '.join(' with '.join(c.effect.name for c in one) for one in chosen)}")
+        best = _winner(selection, chosen)
+        if best is None or _is_minor(selection, best):
+            break
+        selection = _added(setting, selection, best)
+    return selection
+
+
+def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None:
+    """Refine each set on the chain; return the best if it is needed, None if none is."""
+    problem, everything = selection.problem, np.arange(len(selection.problem.folds))
+    tried = []
+    for chosen in sets:
+        _, values = fitted(problem, chosen, everything)
+        first, at = [], 0
+        for candidate in chosen:
+            own = values[at : at + len(candidate.columns)]
+            first.append(candidate.placed(own, problem.setting.course.channels))
+            at += len(candidate.columns)
+        tried.append(refine(problem.setting, [*problem.placed, *first], problem.null))
+    tried.sort(key=lambda model: model.half_bic)
+    if not tried:
+        return None
+    for model in (without_minor(tried, selection.model), tried[0]):
+        if necessity(problem.setting, model, selection.model, problem.null, selection.tests.pooled) >= NEEDED_Z:
+            return model
+    return None
+
+
+def _is_minor(selection: Selection, best: Refined) -> bool:
+    """Return whether what a model adds is no more than the model error of the effects before."""
+    if not selection.model.placed:
+        return False
+    added = shares(best, len(selection.model.placed), selection.model.loss - best.loss)
+    further = [effect for effect, _ in added]
+    error = model_error_energy(list(selection.explained), further, best.response, selection.problem)
+    return selection.model.loss - best.loss < MINOR * error
+
+
+def _added(setting: Setting, selection: Selection, best: Refined) -> Selection:
+    """Return the selection with a model's effects; its noise is estimated anew beside them.
+
+    Noise that was estimated beside a large missing effect is too large.
+    """
+    added = shares(best, len(selection.model.placed), selection.model.loss - best.loss)
+    null = null_model(replace(setting, response=best.response, given=(*setting.given, *best.placed)))
+    nothing = refine(setting, [], null)
+    model = refine(replace(setting, response=best.response), best.placed, null, REFITS)
+    problem = prepare(replace(setting, response=model.response), null, model.placed)
+    tests = score_tests(problem, seed=len(best.placed))
+    least = least_p_values(problem, tests, selection.least_p)
+    return Selection(null, nothing, model, problem, tests, (*selection.explained, *added), least)
+
+
+def least_p_values(
+    problem: Problem, tests: ScoreTests, before: tuple[tuple[str, float], ...]
+) -> tuple[tuple[str, float], ...]:  # fmt: skip
+    """Return the least corrected p-value of each mechanism, those of earlier tests included."""
+    least = dict(before)
+    for candidate, p in zip(problem.candidates, tests.p, strict=True):
+        least[candidate.called] = min(least.get(candidate.called, 1.0), float(p))
+    return tuple(least.items())
+
+
+def shares(model: Refined, before: int, more: float) -> list[tuple[Effect, float]]:
+    """Return a model's effects but the first ``before``, each with an equal share of what they explain."""
+    added = [p.effect for p in model.placed[before:]]
+    return [(effect, more / len(added)) for effect in added]
+
+
+def model_error_energy(
+    explained: list[tuple[Effect, float]], further: list[Effect], response: Response, problem: Problem | None = None
+) -> float:  # fmt: skip
+    """Return how much of what further effects explain may be the model error of those before them.
+
+    In the unit of ``explained``, as the fall of half the sum of squares. An effect of the same ambiguity group looks
+    like another form of what is there, and takes more of it.
+
+    Args:
+        explained: Effects, each with what it explains.
+        further: Those that would be added.
+        response: Its own error counts, too.
+        problem: With model error columns, by which the overlap with a further effect is measured; it is taken as
+            complete without.
+    """
+
+    def error(one: Effect) -> float:
+        own = [c for c in problem.candidates if c.effect.name == one.name] if problem else []
+        alike = overlap(problem, own) if problem else 1.0
+        kin = [SPREAD if effect.group == one.group else 1.0 for effect, _ in explained]
+        return sum(
+            much * (alike * (wide * effect.form_error) ** 2 + response.form_error**2)
+            for wide, (effect, much) in zip(kin, explained, strict=True)
+        )
+
+    return min(error(one) for one in further)
+
+
+def without_minor(tried: list[Refined], current: Refined) -> Refined:
+    """Return the best model, or the best with one effect less if what the last adds is model error.
+
+    Args:
+        tried: Models, the best first.
+        current: What they were added to.
+    """
+    best = tried[0]
+    fewer = [other for other in tried if len(other.placed) < len(best.placed)]
+    if not fewer:
+        return best
+    explained = shares(fewer[0], len(current.placed), current.loss - fewer[0].loss)
+    there = [p.effect.name for p in fewer[0].placed]
+    further = [p.effect for p in best.placed if p.effect.name not in there]
+    minor = MINOR * model_error_energy(explained, further or [p.effect for p in best.placed[-1:]], best.response)
+    return fewer[0] if fewer[0].loss - best.loss < minor else best

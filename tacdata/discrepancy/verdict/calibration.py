@@ -1,0 +1,61 @@
+"""Calibration: what it leaves open of gains and scales, and what is beyond that."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.effects import Effect, GainKind, Placed, Scale, library
+
+BEYOND = 3.0
+"""Calibration: a gain or a scale is wrong beyond so many of its prior's standard deviations [1]."""
+OUTLYING = 4.0
+"""Calibration: ... or, where all gains scatter little, beyond so many of theirs (robust) [1]."""
+WIDE = 2.0
+"""Calibration: gains scatter more than it leaves open beyond so many of its standard deviations [1]."""
+OBSERVER_SCALE = 0.005
+"""Calibration: standard deviation of the scale of a camera or a gauge [1]."""
+
+
+def gains_beyond_calibration(found: Findings) -> list[Finding]:
+    """Return gains that are beyond what calibration leaves open: common to all channels, or of some."""
+    setting, known = found.problem.setting, found.gains[np.isfinite(found.gains)]
+    per_channel = setting.channel_gain
+    if per_channel is None or not np.any(known):
+        return []
+    prior, made = setting.nuisance[per_channel.name], []
+    common = float(np.median(known))
+    if abs(common) > BEYOND * prior / np.sqrt(len(known)) * 2:
+        error = float(1.25 * np.std(known) / np.sqrt(len(known)))
+        alike = sorted({e.called for e in library() if e.like_gain is not None})
+        rivals = tuple(alike) if setting.course.force is None else ()
+        effect = next(e for e in library() if e.gain is GainKind.COMMON)
+        made.append(_finding(effect, np.array(common), error, rivals, abs(common) / max(error, 1e-9)))
+    own = np.nan_to_num(found.gains - common)
+    spread = float(np.sqrt(np.mean(np.square(known - common))))
+    # Gains may all be worse than calibration was thought to be; else a channel must stand out against its kind.
+    usual = prior if spread > WIDE * prior else max(prior, 1.4826 * float(np.median(np.abs(known - common))))
+    far = np.abs(own) > (BEYOND if spread > WIDE * prior else OUTLYING) * usual
+    if far.any():
+        made.append(_finding(per_channel, np.where(far, own, 0.0), prior, (), float(np.abs(own).max() / prior)))
+    return made
+
+
+def _finding(effect: Effect, value: np.ndarray, error: float, rivals: tuple[str, ...], necessity: float) -> Finding:
+    """Return a gain of a value as a finding; it did not race."""
+    name = effect.amplitudes[0].name
+    return Finding(Placed(effect, {name: value}), {name: error}, (), rivals, {}, necessity, needed=BEYOND)
+
+
+def calibration_error(finding: Finding) -> bool:
+    """Return whether a drive and its observer disagree by no more than calibrating the observer leaves open.
+
+    One of the two must be its observer's scale, in its own place or in its rival's.
+    """
+    placed = finding.placed
+    if placed.effect.scale is None:
+        return False
+    observers = {e.called for e in library() if e.scale is Scale.OBSERVER}
+    if not observers & {placed.effect.called, *finding.rivals}:
+        return False
+    return all(abs(float(value)) <= BEYOND * OBSERVER_SCALE for value in placed.values.values())

@@ -1,0 +1,116 @@
+"""The verdict in a sentence: words for a reason that was decided before."""
+
+from __future__ import annotations
+
+from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.verdict.decide import LEFT_T, Decision, Reason
+from tacdata.discrepancy.verdict.sealed import Gap
+from tacdata.discrepancy.verdict.text import worsened
+
+MOST_LISTED = 6
+"""Episodes that are listed by name."""
+
+
+def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, shown: Gap | None = None) -> str:
+    """Return the verdict in a sentence.
+
+    Args:
+        decision: Status and reason.
+        found: What was found.
+        checks: What the recordings can carry.
+        shown: The gap on episodes that were sealed before.
+    """
+    answer = [e.finding for e in decision.effects]
+    names = " and ".join(f.placed.effect.title.lower() for f in answer)
+    match decision.reason:
+        case Reason.CONTRADICTION:
+            return "; ".join(checks.contradictions)
+        case Reason.TOO_FEW:
+            best = f"; so far {_best(answer)}" if answer else ""
+            return f"{checks.episodes} episodes cannot carry a verdict{best}"
+        case Reason.STOPPED:
+            fits = f"; {names} fits best, rivals were not tried" if answer else ""
+            return f"stopped after {found.until}: {'a gap' if found.gap else 'no gap'}{fits}"
+        case Reason.QUIET:
+            return "nothing is missing that these recordings would show; see the detection limits"
+        case Reason.NAMED:
+            more = "" if found.left.t < LEFT_T else f"; {100 * found.share_left:.1f} % of it is another form"
+            return f"{names}: nothing else explains the episodes as well{more}"
+        case Reason.RIVALS:
+            return _undecided(answer)
+        case Reason.LEFTOVERS:
+            return f"something is missing; {_closest(answer, found.share_left, shown)}"
+        case Reason.ODD:
+            return _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
+        case Reason.LOUD:
+            return (
+                f"readings are off by {found.loudness:.1f} times the noise, but no effect is borne out by several "
+                "episodes: look at where it lives"
+            )
+        case Reason.UNEXPLAINED:
+            return "something is missing that no modelled effect explains"
+
+
+def _undecided(answer: list[Finding]) -> str:
+    """Return what is open: rivals, bounds, episodes that are too few."""
+    bounds = [f.placed.effect.called for f in answer if f.at_bound]
+    weak = [f.placed.effect.called for f in answer if f.necessity < f.needed]
+    words = _best(answer)
+    words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
+    return words + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
+
+
+def _odd(names: list[str]) -> str:
+    """Return which presses are unlike all others."""
+    listed = ", ".join(names[:MOST_LISTED])
+    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+    return (
+        f"{listed}{more}: unlike all other presses of their place, and no effect explains them: was something touched "
+        "or moved? Look at them (`tacdata view`), leave them out or record them again"
+    )
+
+
+def _closest(answer: list[Finding], share: float, shown: Gap | None) -> str:
+    """Return what comes closest without being the name: what it leaves, and how it fails on sealed episodes if so."""
+    names = list(dict.fromkeys(m.placed.effect.called for m in answer))
+    alone, words = len(names) == 1, _listed(names, "and")
+    words += " comes closest and leaves" if alone else " together come closest and leave"
+    words += f" {100 * share:.0f} % of what could be explained"
+    it, name = ("it", "it is not the name") if alone else ("them", "they are not the names")
+    if shown is not None and len(shown.before):
+        before, after = float(shown.before.mean()), float(shown.after.mean())
+        if worse := worsened(before, after):
+            return (
+                f"{words}, but sealed episodes fit {worse} with {it} (mean square {before:.3g} times the noise "
+                f"without, {after:.3g} with): {name}"
+            )
+    return f"{words}, so {name}, or not all of it"
+
+
+def _best(answer: list[Finding]) -> str:
+    """Return what is found, and where that is open what fits best and what may stand in for it."""
+    clear = list(dict.fromkeys(m.placed.effect.called for m in answer if not m.rivals))
+    groups: dict[frozenset[str], list[Finding]] = {}
+    for m in answer:
+        if m.rivals:
+            groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
+    words = "; ".join(_open(own) for own in groups.values())
+    if not words:
+        return _listed(clear, "and")
+    begins = f"{_listed(clear, 'and')}, and something else: " if clear else ""
+    return f"{begins}these recordings do not say which effect it is: {words}"
+
+
+def _open(own: list[Finding]) -> str:
+    """Return effects of the answer with the same rivals, and those."""
+    names = list(dict.fromkeys(m.placed.effect.called for m in own))
+    others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in names]
+    words = f"{names[0]} fits best" if len(names) == 1 else f"{_listed(names, 'and')} together fit best"
+    if others:
+        return f"{words}, but {_listed(others, 'or')} may stand in for {'it' if len(names) == 1 else 'any of them'}"
+    return f"{words}, but one may stand in for another"
+
+
+def _listed(names: list[str], last: str) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}"

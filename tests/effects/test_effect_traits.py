@@ -1,0 +1,210 @@
+"""A new effect is one file: the search races, refuses and splits it as its class data say, no other file touched."""
+
+import importlib
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_effects_conform import Springs, pressed
+
+import tacdata.effects
+from tacdata.chain import predict
+from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.data.identifiability import lookalikes
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.nuisances import jitter
+from tacdata.discrepancy.noise.null_model import null_model
+from tacdata.discrepancy.search.find import find
+from tacdata.discrepancy.search.findings import Finding
+from tacdata.discrepancy.search.j_test import j_statistic
+from tacdata.discrepancy.search.problem import prepare
+from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
+from tacdata.discrepancy.verdict.decide import decide
+from tacdata.effects import Placed, library, load
+from tacdata.revision.labels.relabel import moves_labels
+
+FILE = '''
+"""A file of a test."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.chain.memory import low_pass
+from tacdata.effects.effect import AtRest, Effect, GainKind, Growth, LikeGain, Parameter, Scale
+
+
+class Newcomer(Effect):
+    """Readings are smeared and grow."""
+
+    title = "Readings are smeared and grow"
+    catalogue = ("X1",)
+    stage = "{stage}"
+    moves = ("signal",)
+    group = "lag"
+    equation = "s = (1 + k) L_k s_e"
+    source = "a test"
+    experiment = "none"
+    parameters = (Parameter("k", "{unit}", "size", 0.05, 0.0, 1.0),)
+    {traits}
+
+    def apply(self, state, values):
+        k = float(values["k"])
+        if self.stage != "readout":
+            return replace(state, pose=state.pose * (1 + k * np.array([0.0, 0.0, 1.0])))
+        return replace(state, signal=low_pass(state.signal - 1000, state.course.step, max(k, 1e-9)) * (1 + k) + 1000)
+'''
+
+
+@pytest.fixture
+def newcomer(tmp_path, monkeypatch):
+    """Return what writes an effect's file with traits beside the library, and loads it."""
+    monkeypatch.setattr(tacdata.effects, "__path__", [*tacdata.effects.__path__, str(tmp_path)])
+
+    def write(*traits, stage="readout", unit="1"):
+        text = FILE.replace("{traits}", "\n    ".join(traits)).replace("{stage}", stage).replace("{unit}", unit)
+        (tmp_path / "newcomer.py").write_text(text)
+        importlib.invalidate_caches()
+        return load("newcomer")
+
+    yield write
+    sys.modules.pop("tacdata.effects.newcomer", None)
+
+
+def read_with(effect, size, rates):
+    """Return presses at some rates that were read with an effect in place, and their response."""
+    made, response = pressed(), Springs()
+    rng, parts, clock = np.random.default_rng(0), [], 0.0
+    for k in range(16):
+        rate, depth = rates[k % len(rates)], (0.6, 1.0)[k // 2 % 2]
+        at = np.cumsum([0.0, 0.5, (depth + 0.3) / rate, 1.5, (depth + 0.3) / rate, 0.5])
+        time = np.arange(0.0, at[-1], 0.02)
+        parts.append((clock + time, k, np.interp(time, at, [-0.3, -0.3, depth, depth, -0.3, -0.3])))
+        clock += at[-1] + 2.0
+    depth, rows = np.concatenate([d for _, _, d in parts]), sum(len(t) for t, _, _ in parts)
+    episode = np.concatenate([np.full(len(t), k) for t, k, _ in parts])
+    course = replace(
+        made, time=np.concatenate([t for t, _, _ in parts]), episode=episode, averaged=np.ones(rows),
+        tip=np.column_stack([0 * depth + 0.3, 0 * depth + 0.2, depth]), tool=np.zeros(rows, dtype=int),
+        readings=np.zeros((rows, 9)), session=np.zeros(16, dtype=int), site=np.zeros(16, dtype=int),
+        names=tuple(f"press {k}" for k in range(16)), force=None, tag=None, temperature=None,
+    )  # fmt: skip
+    truth = predict(course, response, [Placed(effect, {"k": np.array(size)})]).signal
+    return replace(course, readings=truth + rng.normal(size=truth.shape)), response
+
+
+def test_a_new_file_is_raced_and_named(newcomer):
+    effect = newcomer("at_rest = AtRest.CATCHES_UP", unit="s")
+    assert effect.name in {e.name for e in library()}
+    course, response = read_with(effect, 0.1, (0.5, 2.0))
+    found = find(Setting(course, response, [effect, load("backlash"), load("drift")]))
+    decision = decide(found, DataChecks(course.episodes))
+    assert [e.finding.placed.effect.name for e in decision.effects] == ["newcomer"]
+    assert decision.status == "named" and not decision.effects[0].finding.rivals
+
+
+def test_one_that_needs_two_rates_is_not_split_by_one(newcomer):
+    effect = newcomer("at_rest = AtRest.CATCHES_UP", unit="s")
+    course, response = read_with(effect, 0.1, (1.0,))
+    others = lookalikes(course, effect, {"k": 0.1})
+    assert {"latency", "backlash"} <= set(others) and "newcomer" not in others
+    assert "newcomer" in lookalikes(course, load("latency"), {}), "nor are the others from it"
+    decision = decide(find(Setting(course, response, [effect])), DataChecks(course.episodes))
+    assert decision.status == "ambiguous" and "backlash" in decision.effects[0].finding.rivals
+    assert lookalikes(read_with(effect, 0.1, (0.5, 2.0))[0], effect, {"k": 0.1}) == ()
+
+
+def test_one_without_a_trait_is_split_by_any_presses(newcomer):
+    effect = newcomer()
+    course, _ = read_with(effect, 0.1, (1.0,))
+    assert lookalikes(course, effect, {"k": 0.1}) == ()
+    assert "newcomer" not in lookalikes(course, load("latency"), {})
+
+
+@pytest.mark.parametrize(("grows", "other"), [("PRESSES", "gain_drift"), ("TIME", "softening")])
+def test_evenly_spaced_presses_do_not_tell_growth_by_presses_from_growth_by_time(newcomer, grows, other):
+    effect = newcomer(f"grows_with = Growth.{grows}")
+    even = read_with(effect, 0.1, (1.0,))[0]
+    first, begins = np.flatnonzero(even.first), 50.0 * np.arange(even.episodes)
+    even = replace(even, time=even.time - even.time[first][even.episode] + begins[even.episode])
+    assert lookalikes(even, effect, {}) == (other,)
+    rested = replace(even, time=even.time + 2000.0 * (even.episode >= 8))
+    assert lookalikes(rested, effect, {}) == ()
+
+
+def test_one_that_equals_a_gain_without_a_force_reading_is_refused_then(newcomer):
+    effect = newcomer("like_gain = LikeGain.EQUAL")
+    course, response = read_with(effect, 0.1, (0.5, 2.0))
+    for force, refused in ((None, True), (np.ones(course.rows), False)):
+        setting = Setting(replace(course, force=force), response, [effect])
+        assert (effect.name in setting.absorbed) == refused
+        if refused:
+            board = prepare(setting, null_model(setting)).board
+            assert "calibration" in board.unjudgeable["newcomer"] and not board.candidates
+
+
+def test_one_that_resembles_a_gain_is_its_rival_without_a_force_reading(newcomer):
+    newcomer("like_gain = LikeGain.SIMILAR")
+    prior = {"channel_gain": 0.05}
+    for force, rivals in ((None, ("modulus", "newcomer", "thickness")), (np.ones(1), ())):
+        setting = SimpleNamespace(
+            nuisance=prior, channel_gain=load("channel_gain"), course=SimpleNamespace(force=force)
+        )
+        found = SimpleNamespace(gains=np.full(24, 0.2), problem=SimpleNamespace(setting=setting))
+        (gain,) = gains_beyond_calibration(found)
+        assert gain.placed.effect.name == "gain" and gain.rivals == rivals
+
+
+@pytest.mark.parametrize(("size", "known"), [(0.004, True), (0.06, False)])
+def test_the_scale_of_an_observer_is_known_as_well_as_it_is_calibrated(newcomer, size, known):
+    effect = newcomer("scale = Scale.OBSERVER")
+    found = Finding(Placed(effect, {"k": np.array(size)}), {}, (), (), {}, 9.0)
+    assert calibration_error(found) == known
+    drive = Finding(Placed(load("travel_scale"), {"k": np.array(size)}), {}, (), ("newcomer",), {}, 9.0)
+    assert calibration_error(drive) == known
+    assert not calibration_error(replace(drive, rivals=())), "the drive alone has no calibrated observer"
+
+
+@pytest.mark.parametrize("clock", [True, False])
+def test_one_that_follows_the_clock_is_held_against_others_that_do(newcomer, clock):
+    effect, asked = newcomer(f"follows_clock = {clock}"), []
+
+    class Priors:
+        def get(self, kind):
+            asked.append(kind)
+
+    def model(residual, *placed):
+        episode = np.repeat(np.arange(12), 10)
+        return SimpleNamespace(
+            left=residual, episode=episode, place=episode // 4, placed=placed, freedom=0.0, projected_draws=still,
+            energy=0.5 * np.bincount(episode, np.square(residual).sum(axis=1)), tangent=SimpleNamespace(knobs=[]),
+            loss=0.5 * float(np.square(residual).sum()),
+        )  # fmt: skip
+
+    rng, still = np.random.default_rng(0), np.zeros((120, 1, 2))
+    noise = rng.normal(size=(120, 1))
+    j_statistic(model(noise, SimpleNamespace(effect=effect)), model(noise + 0.5), Priors())
+    assert asked == [clock]
+
+
+def test_one_that_each_episode_has_of_its_own_is_a_nuisance(newcomer):
+    effect = newcomer()
+    course, response = read_with(effect, 0.1, (1.0,))
+    before = jitter(Setting(course, response, []), []).shape[2]
+    type(effect).each_episode = True
+    assert jitter(Setting(course, response, []), []).shape[2] == before + 1
+
+
+def test_what_delays_readings_or_changes_the_skin_moves_labels_and_says_so(newcomer):
+    effect = newcomer(
+        "changes_skin = True",
+        "def delay(self, values): return 0.0",
+        "def remark(self, values): return 'look at the clocks'",
+    )
+    placed = Placed(effect, {"k": np.array(0.1)})
+    assert moves_labels([placed]) and not moves_labels([Placed(load("drift"), {})])
+    assert effect.remark(placed.values) == "look at the clocks"
+    late = Placed(load("latency"), {"L": np.array(0.4)})
+    assert moves_labels([late]) and "0.40 s late" in late.effect.remark(late.values)
