@@ -13,7 +13,7 @@ from tacdata.discrepancy.data.sufficiency import shortcomings
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.race import without_minor
 from tacdata.discrepancy.search.rivals import required_margin
 from tacdata.discrepancy.verdict.calibration import BEYOND, gains_beyond_calibration
@@ -141,7 +141,7 @@ def test_a_channel_is_named_by_what_calibration_leaves_open(gain, named):
     [(2.9, None, False), (3.1, None, True), (2.9, 0.002, True), (2.9, 0.004, False), (4, 0.04, True), (9, 0.06, False)],
 )
 def test_what_did_not_race_is_named_by_its_necessity_alone(necessity, p, named):
-    one = Finding(None, {}, (), (), {}, necessity, corrected_p=p, needed=BEYOND)
+    one = FoundEffect(None, {}, (), (), {}, necessity, corrected_p=p, needed=BEYOND)
     assert (settled(one) == "named") == named
 
 
@@ -151,7 +151,7 @@ def test_what_did_not_race_is_named_by_its_necessity_alone(necessity, p, named):
 )
 def test_a_single_effect_may_leave_more_where_every_rival_leaves_twice_as_much(share, rival, others, enough):
     left = SimpleNamespace(gain=10.0, t=4.0)
-    one = Finding(None, {}, (), (), {}, 9.0, losses={"creep": rival})
+    one = FoundEffect(None, {}, (), (), {}, 9.0, losses={"creep": rival})
     assert adequate(SimpleNamespace(left=left, share_left=share), [one] * (1 + others)) == enough
 
 

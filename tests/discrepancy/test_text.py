@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 
 from tacdata.discrepancy.data.checks import DataChecks
-from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import Decided, Decision, Reason
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.sealed import Gap
@@ -79,7 +79,7 @@ def test_a_gap_that_becomes_wider_on_sealed_episodes_is_told_of():
 
 def finding(name, *rivals):
     """Return an effect of an answer."""
-    return Finding(Placed(load(name), {}), {}, (), rivals, {}, 9.0)
+    return FoundEffect(Placed(load(name), {}), {}, (), rivals, {}, 9.0)
 
 
 def said(status, answer, before=None, after=None):

@@ -17,7 +17,7 @@ from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.nuisances import jitter
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.search.findings import Finding
+from tacdata.discrepancy.search.findings import FoundEffect
 from tacdata.discrepancy.search.j_test import j_statistic
 from tacdata.discrepancy.search.problem import prepare
 from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
@@ -160,9 +160,9 @@ def test_one_that_resembles_a_gain_is_its_rival_without_a_force_reading(newcomer
 @pytest.mark.parametrize(("size", "known"), [(0.004, True), (0.06, False)])
 def test_the_scale_of_an_observer_is_known_as_well_as_it_is_calibrated(newcomer, size, known):
     effect = newcomer("scale = Scale.OBSERVER")
-    found = Finding(Placed(effect, {"k": np.array(size)}), {}, (), (), {}, 9.0)
+    found = FoundEffect(Placed(effect, {"k": np.array(size)}), {}, (), (), {}, 9.0)
     assert calibration_error(found) == known
-    drive = Finding(Placed(load("travel_scale"), {"k": np.array(size)}), {}, (), ("newcomer",), {}, 9.0)
+    drive = FoundEffect(Placed(load("travel_scale"), {"k": np.array(size)}), {}, (), ("newcomer",), {}, 9.0)
     assert calibration_error(drive) == known
     assert not calibration_error(replace(drive, rivals=())), "the drive alone has no calibrated observer"
 

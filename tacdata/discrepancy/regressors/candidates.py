@@ -56,7 +56,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Board:
+class CandidateColumns:
     """All candidates with their columns."""
 
     columns: list[np.ndarray]
@@ -72,7 +72,7 @@ def build(
     placed: Sequence[Placed],
     effects: Sequence[Effect],
     absorbed: Collection[str] = (),
-) -> Board:
+) -> CandidateColumns:
     """Predict, and differentiate the chain by every effect at its typical size.
 
     Args:
@@ -107,7 +107,7 @@ def build(
                 index = np.arange(len(columns) - 1, len(columns) - 1 + len(columns_of))
                 columns += columns_of
                 candidates.append(Candidate(effect, shapes, index, np.array(low), np.array(high)))
-    return Board(columns, candidates, unjudgeable)
+    return CandidateColumns(columns, candidates, unjudgeable)
 
 
 class StandIn(Response):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.search.findings import Finding
+from tacdata.discrepancy.search.findings import FoundEffect
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.j_test import NEEDED_Z, necessity
 from tacdata.discrepancy.search.problem import Problem, prepare
@@ -26,7 +26,7 @@ LARGEST_P = 0.05
 class Answer:
     """The effects that are needed, and the model with them."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[FoundEffect, ...]
     model: Refined
 
 

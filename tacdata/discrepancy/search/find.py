@@ -8,7 +8,7 @@ from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.detection_limits import detection_limits
 from tacdata.discrepancy.search.elimination import Answer, eliminate
-from tacdata.discrepancy.search.findings import STEPS, Finding, Findings
+from tacdata.discrepancy.search.findings import STEPS, Findings, FoundEffect
 from tacdata.discrepancy.search.fits import channel_gains
 from tacdata.discrepancy.search.gate import Gate, gate
 from tacdata.discrepancy.search.gauss_newton import Refined
@@ -45,7 +45,7 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
 def _fitted(selection: Selection) -> Answer:
     """Return the effects that fit best, without necessity and rivals."""
     model = selection.model
-    return Answer(tuple(Finding(p, *model.errors(k), (), {}, 0.0) for k, p in enumerate(model.placed)), model)
+    return Answer(tuple(FoundEffect(p, *model.errors(k), (), {}, 0.0) for k, p in enumerate(model.placed)), model)
 
 
 def _findings(

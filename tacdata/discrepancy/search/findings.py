@@ -27,7 +27,7 @@ STEPS = ("gate", "locate", "fit", "decide")
 
 
 @dataclass(frozen=True)
-class Finding:
+class FoundEffect:
     """One effect of the answer, with those that would do as well."""
 
     placed: Placed
@@ -59,7 +59,7 @@ class Findings:
     """Whether anything is missing."""
     tests: ScoreTests
     """Of all candidates beside the model as it was given."""
-    effects: tuple[Finding, ...]
+    effects: tuple[FoundEffect, ...]
     """The effects of the answer."""
     left: Leftovers
     """What is still predictable with the effects in place."""

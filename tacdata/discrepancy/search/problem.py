@@ -12,7 +12,7 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.gram import EpisodeGrams
 from tacdata.discrepancy.noise.null_model import NullModel
-from tacdata.discrepancy.regressors.candidates import Board, Candidate, build
+from tacdata.discrepancy.regressors.candidates import Candidate, CandidateColumns, build
 from tacdata.discrepancy.regressors.model_error import model_error_columns
 from tacdata.discrepancy.regressors.stack import apart, side_by_side
 from tacdata.discrepancy.regressors.tangent import Tangent, tangents
@@ -26,7 +26,7 @@ class Problem:
     setting: Setting
     null: NullModel
     placed: tuple[Placed, ...]
-    board: Board
+    board: CandidateColumns
     grams: EpisodeGrams
     tangent: Tangent
     """Columns by which what is placed already may still move."""

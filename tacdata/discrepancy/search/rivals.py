@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.regressors.candidates import Candidate
-from tacdata.discrepancy.search.findings import Finding
+from tacdata.discrepancy.search.findings import FoundEffect
 from tacdata.discrepancy.search.fits import best_shapes, fitted
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.j_test import ModelError, Pooled, j_statistic, necessity
@@ -35,7 +35,7 @@ BOOTSTRAPS = 200
 class Tried:
     """An effect of the answer with its rivals tried."""
 
-    finding: Finding
+    finding: FoundEffect
     better: Refined | None
     """The model with a rival in its place, where that is ahead."""
 
@@ -84,7 +84,7 @@ def try_rivals(
             rivals.append(best[name].called)
     error, bounds = current.errors(at)
     selected = _selected(bare, best, each, mine.effect.called)
-    found = Finding(mine, error, bounds, tuple(dict.fromkeys(rivals)), margins, need, losses, selected)
+    found = FoundEffect(mine, error, bounds, tuple(dict.fromkeys(rivals)), margins, need, losses, selected)
     return Tried(found, better)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.effects import Effect, GainKind, Placed, Scale, library
 
 BEYOND = 3.0
@@ -17,7 +17,7 @@ OBSERVER_SCALE = 0.005
 """Calibration: standard deviation of the scale of a camera or a gauge [1]."""
 
 
-def gains_beyond_calibration(found: Findings) -> list[Finding]:
+def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
     """Return gains that are beyond what calibration leaves open: common to all channels, or of some."""
     setting, known = found.problem.setting, found.gains[np.isfinite(found.gains)]
     per_channel = setting.channel_gain
@@ -41,13 +41,13 @@ def gains_beyond_calibration(found: Findings) -> list[Finding]:
     return made
 
 
-def _finding(effect: Effect, value: np.ndarray, error: float, rivals: tuple[str, ...], necessity: float) -> Finding:
+def _finding(effect: Effect, value: np.ndarray, error: float, rivals: tuple[str, ...], necessity: float) -> FoundEffect:
     """Return a gain of a value as a finding; it did not race."""
     name = effect.amplitudes[0].name
-    return Finding(Placed(effect, {name: value}), {name: error}, (), rivals, {}, necessity, needed=BEYOND)
+    return FoundEffect(Placed(effect, {name: value}), {name: error}, (), rivals, {}, necessity, needed=BEYOND)
 
 
-def calibration_error(finding: Finding) -> bool:
+def calibration_error(finding: FoundEffect) -> bool:
     """Return whether a drive and its observer disagree by no more than calibrating the observer leaves open.
 
     One of the two must be its observer's scale, in its own place or in its rival's.

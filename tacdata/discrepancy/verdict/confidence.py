@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
 
 FILE = "confidence.json"
 """The map: weights, and the worlds and the command that they come from."""
@@ -17,7 +17,7 @@ MOST = 12.0
 """Margins beyond so many standard errors are all the same [1]."""
 
 
-def features(found: Findings, finding: Finding, count: int) -> dict[str, float]:
+def features(found: Findings, finding: FoundEffect, count: int) -> dict[str, float]:
     """Return what the confidence in an effect rests on, each about 0 to 1.
 
     Args:

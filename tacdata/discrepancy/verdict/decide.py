@@ -8,7 +8,7 @@ from enum import Enum, auto
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
 from tacdata.discrepancy.search.elimination import LARGEST_P
-from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gate import GATE
 from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
 from tacdata.discrepancy.verdict.confidence import confidence, features
@@ -59,7 +59,7 @@ class Reason(Enum):
 class Decided:
     """One effect of the verdict with its status."""
 
-    finding: Finding
+    finding: FoundEffect
     """Its rivals include those that the recordings cannot tell from it."""
     status: str
     """named, ambiguous, or suspected where the verdict names nothing."""
@@ -95,7 +95,7 @@ def decide(found: Findings, checks: DataChecks) -> Decision:
     return Decision(status, reason, tuple(_decided(f, status, found, len(answer)) for f in answer))
 
 
-def _status(found: Findings, answer: list[Finding]) -> tuple[str, Reason]:
+def _status(found: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
     """Return what the statistics allow."""
     if found.until != "decide":
         return ("unknown" if found.gap else "none"), Reason.STOPPED
@@ -116,7 +116,7 @@ def _status(found: Findings, answer: list[Finding]) -> tuple[str, Reason]:
     return "named", Reason.NAMED
 
 
-def answer_of(found: Findings) -> list[Finding]:
+def answer_of(found: Findings) -> list[FoundEffect]:
     """Return the effects of the answer, with all their rivals, and those that calibration shows."""
     course, own = found.problem.setting.course, []
     for f in found.effects:
@@ -126,7 +126,7 @@ def answer_of(found: Findings) -> list[Finding]:
     return [*(f for f in own if not calibration_error(f)), *gains_beyond_calibration(found)]
 
 
-def adequate(found: Findings, answer: list[Finding]) -> bool:
+def adequate(found: Findings, answer: list[FoundEffect]) -> bool:
     """Return whether nothing much is left to explain.
 
     Real effects have other forms than any library. What a single effect leaves is its own form where every rival would
@@ -139,7 +139,7 @@ def adequate(found: Findings, answer: list[Finding]) -> bool:
     return all(loss > found.left.gain for loss in answer[0].losses.values())
 
 
-def settled(finding: Finding) -> str:
+def settled(finding: FoundEffect) -> str:
     """Return whether one effect may be named: named or ambiguous."""
     needed = finding.necessity >= finding.needed
     if finding.corrected_p is not None:
@@ -147,7 +147,7 @@ def settled(finding: Finding) -> str:
     return "named" if needed and not finding.rivals and not finding.at_bound else "ambiguous"
 
 
-def _hidden(found: Findings, finding: Finding) -> list[str]:
+def _hidden(found: Findings, finding: FoundEffect) -> list[str]:
     """Return rivals that are worse by less than what the answer itself leaves: another form may turn them around."""
     if found.left.t < LEFT_T:
         return []
@@ -155,7 +155,7 @@ def _hidden(found: Findings, finding: Finding) -> list[str]:
     return [load(name).called for name in near if finding.margins[name] < SETTLED_Z]
 
 
-def _decided(finding: Finding, verdict: str, found: Findings, count: int) -> Decided:
+def _decided(finding: FoundEffect, verdict: str, found: Findings, count: int) -> Decided:
     """Return an effect with its status; whoever reads it alone must not take it for a name that the verdict refuses."""
     status = "suspected" if verdict == "unknown" else settled(finding)
     values = features(found, finding, count)

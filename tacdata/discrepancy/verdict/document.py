@@ -12,7 +12,7 @@ import schemas
 from tacdata import provenance
 from tacdata.chain import Course
 from tacdata.discrepancy.data.checks import DataChecks
-from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.score_tests import DRAWS
 from tacdata.discrepancy.verdict.decide import Decided, Decision
 from tacdata.discrepancy.verdict.reasons import reason_in_words
@@ -89,7 +89,7 @@ def _effect(decided: Decided) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def untested(answer: list[Finding]) -> list[str]:
+def untested(answer: list[FoundEffect]) -> list[str]:
     """Return effects that are known and not modelled, of the answer's ambiguity groups; all, without an answer."""
     groups = {m.placed.effect.group for m in answer}
     groups |= {load(name).group for m in answer for name in m.margins}

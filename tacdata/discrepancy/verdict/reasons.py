@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tacdata.discrepancy.data.checks import DataChecks
-from tacdata.discrepancy.search.findings import Finding, Findings
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import LEFT_T, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import worsened
@@ -52,7 +52,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             return "something is missing that no modelled effect explains"
 
 
-def _undecided(answer: list[Finding]) -> str:
+def _undecided(answer: list[FoundEffect]) -> str:
     """Return what is open: rivals, bounds, episodes that are too few."""
     bounds = [f.placed.effect.called for f in answer if f.at_bound]
     weak = [f.placed.effect.called for f in answer if f.necessity < f.needed]
@@ -71,7 +71,7 @@ def _odd(names: list[str]) -> str:
     )
 
 
-def _closest(answer: list[Finding], share: float, shown: Gap | None) -> str:
+def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
     """Return what comes closest without being the name: what it leaves, and how it fails on sealed episodes if so."""
     names = list(dict.fromkeys(m.placed.effect.called for m in answer))
     alone, words = len(names) == 1, _listed(names, "and")
@@ -88,10 +88,10 @@ def _closest(answer: list[Finding], share: float, shown: Gap | None) -> str:
     return f"{words}, so {name}, or not all of it"
 
 
-def _best(answer: list[Finding]) -> str:
+def _best(answer: list[FoundEffect]) -> str:
     """Return what is found, and where that is open what fits best and what may stand in for it."""
     clear = list(dict.fromkeys(m.placed.effect.called for m in answer if not m.rivals))
-    groups: dict[frozenset[str], list[Finding]] = {}
+    groups: dict[frozenset[str], list[FoundEffect]] = {}
     for m in answer:
         if m.rivals:
             groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
@@ -102,7 +102,7 @@ def _best(answer: list[Finding]) -> str:
     return f"{begins}these recordings do not say which effect it is: {words}"
 
 
-def _open(own: list[Finding]) -> str:
+def _open(own: list[FoundEffect]) -> str:
     """Return effects of the answer with the same rivals, and those."""
     names = list(dict.fromkeys(m.placed.effect.called for m in own))
     others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in names]
