@@ -42,6 +42,6 @@ def test_noise_of_some_rows_keeps_what_belongs_to_them():
         random_walk=rng.normal(size=(10, 4)), relative_scale=1 + rng.random((10, 2)),
     )  # fmt: skip
     some = whole.of(rows)
-    for name in ("swing", "missing", "random_walk", "relative_scale"):
+    for name in ("gain_error", "missing", "random_walk", "relative_scale"):
         assert np.array_equal(getattr(some, name), getattr(whole, name)[rows]), name
     assert some.memory == 0.3 and some.offsets is None
