@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -67,12 +69,21 @@ def run(
         stack.enter_context(source.board)
         print(f"{source.name}: taring, do not touch the skin", flush=True)
         loop = LiveLoop(source, stream, trained.content_hash, server, watch, maps)
+        if sys.stdin.isatty():
+            print("Enter tares anew, Ctrl-C ends", flush=True)
+            Thread(target=_tare_at_enter, args=(loop,), daemon=True).start()
         with _stopping(loop):
             loop.run(seconds, lambda words: print(words, flush=True))
     figures = loop.meter.figures
     print(figures.text if figures else "no estimate was made")
     lost = source.board.counts.lost
     print(f"board: {source.rate:g} Hz, {lost} frames lost, {loop.skipped} estimates left out as late")
+
+
+def _tare_at_enter(loop: LiveLoop) -> None:
+    """Tare anew at every line that a person types."""
+    for _ in sys.stdin:
+        loop.tare()
 
 
 def _mode(name: str, ahead: int, causal: bool, rate: float) -> str:

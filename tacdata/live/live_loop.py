@@ -16,6 +16,8 @@ PATIENCE = 0.05
 """Timeout of a read [s of the host's clock]."""
 LATE = 2.0
 """A frame that waited longer [frame periods] is estimated only if no newer one is there."""
+TOUCHED = "the skin was touched while it was tared; lift what touches it and tare again"
+"""What a reading below the tare means."""
 SAID_EVERY = 1.0
 """Interval between status lines for a person [s of real time]."""
 
@@ -44,7 +46,11 @@ class LiveLoop:
         self.meter = LatencyMeter()
         self.skipped = 0
         """Estimates left out because computing did not keep up."""
-        self._stopped = False
+        self._stopped = self._tare_wanted = False
+
+    def tare(self) -> None:
+        """Tare anew before the next frame; safe in any thread."""
+        self._tare_wanted = True
 
     def stop(self) -> None:
         """End `run` soon; safe in any thread and signal handler."""
@@ -54,10 +60,14 @@ class LiveLoop:
         """Read until stopped, or for so long [s of real time].
 
         Raises:
-            DeviceError: If the board breaks, or is touched while it is tared.
+            DeviceError: If the board breaks.
         """
         begun = said = time.monotonic()
         while not self._stopped and (seconds is None or time.monotonic() - begun < seconds):
+            if self._tare_wanted:
+                self._tare_wanted = False
+                self._stream.tare()
+                say(f"{self._source.name}: taring anew, do not touch the skin")
             frames = self._source.board.read(PATIENCE)
             for frame in frames:
                 # When late, only the newest estimate helps a controller; the others would make it later still.
@@ -67,9 +77,10 @@ class LiveLoop:
                 made = self._stream.push(frame, wanted)
                 if made is not None:
                     self._hand_out(made)
-                    if time.monotonic() - said >= SAID_EVERY:
-                        said = time.monotonic()
-                        say(self._words(made))
+                is_time = time.monotonic() - said >= SAID_EVERY
+                if is_time and (words := self._words(made) if made else self._stream.waiting_for_rest):
+                    said = time.monotonic()
+                    say(words if made else f"{self._source.name}: {words}; waiting until nothing moves the skin")
 
     def _hand_out(self, made: Estimate) -> None:
         sent = self._source.clock.now_ns()
@@ -85,5 +96,7 @@ class LiveLoop:
         if made.novelty is not None and made.novelty > 1:
             word = "a guess" if made.novelty > ALIEN else "may be off"
             where += f" ({word}: {made.novelty:.1f} times as far from what was learnt as validation presses)"
+        if made.below_tare:
+            where += f"; readings lie {made.below_tare:.0f} counts below the tare: {TOUCHED}"
         pace = f"; {figures.rate:.1f} Hz, age {figures.age[0]:.0f} ms (95 %: {figures.age[1]:.0f})" if figures else ""
         return f"{self._source.name}: depth {made.largest:.2f} mm, {where}{pace}"

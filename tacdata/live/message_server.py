@@ -35,6 +35,8 @@ def message(made: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = T
     }  # fmt: skip
     if made.novelty is not None:
         values["novelty"] = round(made.novelty, 3)
+    if made.below_tare:
+        values["below_tare"] = round(made.below_tare, 1)
     if maps:
         values["map"] = [[round(float(value), 4) for value in row] for row in made.depth]
     return values

@@ -9,7 +9,7 @@ import pytest
 
 from tacdata import documents
 from tacdata.devices.device import StreamCounts, TaxelBoard, TaxelFrame
-from tacdata.errors import DeviceError, UsageError
+from tacdata.errors import UsageError
 from tacdata.live.depth_stream import DepthStream, contact_centre
 from tacdata.live.latency_meter import LatencyMeter
 from tacdata.live.live_loop import LiveLoop
@@ -68,13 +68,39 @@ def test_a_network_without_look_ahead_waits_for_nothing():
     assert [int(e.depth[0, 1]) for e in run(made)] == list(range(3, 30))
 
 
-def test_a_touch_while_taring_is_refused():
+def test_taring_waits_until_nothing_moves_the_skin():
     made = stream(tare=20)
-    with pytest.raises(DeviceError, match="tared"):
-        for k in range(20):
-            made.push(frame(k, 40.0 * k))
+    for k in range(20):
+        made.push(frame(k, 40.0 * k))
+    assert "while it was tared" in made.waiting_for_rest and made.baseline is None
+    for k in range(20, 45):
+        made.push(frame(k, 800.0))
+    assert not made.waiting_for_rest
+    np.testing.assert_allclose(made.baseline, 9800.0)
     with pytest.raises(UsageError, match="taring over 0"):
         stream(tare=0)
+
+
+def test_a_skin_that_was_held_while_it_was_tared_shows_itself_when_it_is_let_go():
+    """Held still it looks like rest, so depth reads 0 in the hand; let go, every reading lies below the tare."""
+    made = stream(causal=True, tare=10)
+    found = [made.push(frame(k, 1500.0 if k < 30 else 0.0)) for k in range(60)]
+    assert [e.below_tare for e in found[10:30] if e] == [0.0] * 20
+    assert found[-1].below_tare == pytest.approx(1500.0)
+    line = message(found[-1], {"finger": "a", "network": "b", "causal": True, "lookahead": 0}, 0, maps=False)
+    assert line["below_tare"] == 1500.0
+    documents.check(line, "live_message", "a message")
+    made.tare()
+    found = [made.push(frame(k, 0.0)) for k in range(60, 90)]
+    assert found[:10] == [None] * 10 and found[-1].below_tare == 0.0
+
+
+def test_noise_and_slow_drift_below_the_tare_are_no_touch():
+    random, made = np.random.default_rng(0), stream(causal=True, tare=20)
+    for k in range(400):
+        counts = 9000 + random.normal(0, 4, 24) - 0.1 * k
+        found = made.push(TaxelFrame(k * PERIOD, k, counts))
+        assert found is None or found.below_tare == 0.0
 
 
 def test_the_contact_centre_is_in_the_sensors_millimetres():
