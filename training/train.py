@@ -24,7 +24,8 @@ from training.inference import checkpoint
 from training.inference.compute import choose_device, reproducible
 from training.inference.predictor import predict
 from training.loss import normalized
-from training.metrics import depth_maps, seen, spread
+from training.metrics import conformal_intervals, depth_maps, novelty
+from training.metrics.conformal_intervals import ConformalIntervals
 from training.networks.network import Network, create
 from training.settings import TrainingSettings
 from training.splits.split import Split, divide
@@ -127,22 +128,22 @@ def train(
             listener(Progress(run.epoch, settings.epochs, 0, 0, line))
         best = checkpoint.load(out, place)
         if len(split.validation) > 1:
-            spread.write(out, _calibrated(best, windows, frames, split))
+            conformal_intervals.write(out, _calibrated(best, windows, frames, split))
         validated = frames.indices(split.validation)
-        known = seen.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
+        known = novelty.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
         if known is not None:
-            seen.write(out, known)
+            novelty.write(out, known)
     return checkpoint.load(out)
 
 
-def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, split: Split) -> spread.CalibratedSpread:
+def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, split: Split) -> ConformalIntervals:
     """Return how far off the best epoch's pixels are on the validation episodes."""
     grid, maps, labels = frames.sensor.map, [], []
     for number in split.validation:
         chosen = frames.indices((number,))
         maps.append(predict(best.network, windows, chosen, grid.depth_max))
         labels.append(np.clip(frames.depth[chosen], 0.0, grid.depth_max))
-    return spread.calibrate(maps, labels, grid.pixel_pitch, best.content_hash)
+    return conformal_intervals.calibrate(maps, labels, grid.pixel_pitch, best.content_hash)
 
 
 def normalization(taxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -44,12 +44,12 @@ def run(
     from tacdata.recording.live.device_streams import stream_clock
     from training.inference.checkpoint import load
     from training.inference.sequence import window_map
-    from training.metrics import seen
+    from training.metrics import novelty
 
     trained = load(network)
     source = touched_board(rig, finger, trained.sensor)
     trained.check_sensor(source.sensor, str(rig))
-    offsets, known = trained.network.offsets, seen.read(trained.path.parent, trained.content_hash)
+    offsets, known = trained.network.offsets, novelty.read(trained.path.parent, trained.content_hash)
     stream = DepthStream(
         window_map(trained), offsets, source.sensor.map, stream_clock(source.board), round(tare * source.rate), causal,
         known.novelty if known else None,

@@ -93,9 +93,9 @@ def _estimator(network: Path) -> Estimator:
     from tacdata.demonstrations.paths.tracking import Estimator
     from training.inference.checkpoint import load
     from training.inference.sequence import identity, sequence_maps
-    from training.metrics import seen
+    from training.metrics import novelty
 
     trained = load(network)
-    known = seen.read(trained.path.parent, trained.content_hash)
+    known = novelty.read(trained.path.parent, trained.content_hash)
     maps = partial(sequence_maps, trained)
     return Estimator(identity(trained), trained.sensor, maps, known.novelty if known else None)

@@ -18,7 +18,7 @@ from training.frames.windows import Windows
 from training.inference.checkpoint import Checkpoint
 from training.inference.compute import choose_device, reproducible
 from training.inference.predictor import milliseconds_per_frame, predict
-from training.metrics import depth_maps, physical, spread
+from training.metrics import conformal_intervals, depth_maps, physical
 from training.metrics.depth_maps import FrameScores
 from training.metrics.physical import PressScore
 from training.scoring import baselines, published
@@ -254,12 +254,12 @@ def _uncertainty(
     trained: Checkpoint, identity: str, episodes: tuple[EpisodeResult, ...], frames: Frames
 ) -> dict[str, Any]:
     """Return what share of errors each interval holds; nothing if the run was not calibrated."""
-    known = spread.read(trained.path.parent, identity)
+    known = conformal_intervals.read(trained.path.parent, identity)
     if known is None:
         return {}
     maps, labels = ([getattr(e, name)[e.valid] for e in episodes] for name in ("depth", "label"))
-    levels = spread.reliability(known, maps, labels, frames.sensor.map.pixel_pitch)
-    return {"uncertainty": {"definition": spread.DEFINITION, "levels": levels}}
+    levels = conformal_intervals.reliability(known, maps, labels, frames.sensor.map.pixel_pitch)
+    return {"uncertainty": {"definition": conformal_intervals.DEFINITION, "levels": levels}}
 
 
 def _press_table(scores: list[PressScore]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tacdata.errors import FormatError
-from training.metrics import seen
+from training.metrics import novelty
 from training.settings import TrainingSettings
 from training.train import train
 
@@ -24,7 +24,7 @@ def rows(frames, episodes):
 
 
 def known_of(frames, **options):
-    found = seen.gathered(frames, rows(frames, LEARNED), rows(frames, VALIDATED), "a" * 64, **options)
+    found = novelty.gathered(frames, rows(frames, LEARNED), rows(frames, VALIDATED), "a" * 64, **options)
     assert found is not None
     return found
 
@@ -53,19 +53,19 @@ def test_mirrored_training_knows_mirrored_presses(many):
 
 def test_nothing_is_said_without_enough_validation(many):
     few = rows(many, VALIDATED)[:10]
-    assert seen.gathered(many, rows(many, LEARNED), few, "a" * 64) is None
+    assert novelty.gathered(many, rows(many, LEARNED), few, "a" * 64) is None
 
 
 def test_what_is_written_is_read_for_its_checkpoint_alone(many, tmp_path):
     known = known_of(many)
-    assert seen.read(tmp_path, "a" * 64) is None
-    seen.write(tmp_path, known)
-    again = seen.read(tmp_path, "a" * 64)
-    assert again is not None and seen.read(tmp_path, "b" * 64) is None
+    assert novelty.read(tmp_path, "a" * 64) is None
+    novelty.write(tmp_path, known)
+    again = novelty.read(tmp_path, "a" * 64)
+    assert again is not None and novelty.read(tmp_path, "b" * 64) is None
     np.testing.assert_array_equal(again.novelty(many.taxels[:50]), known.novelty(many.taxels[:50]))
-    (tmp_path / seen.FILE).write_text("{")
+    (tmp_path / novelty.FILE).write_text("{")
     with pytest.raises(FormatError, match=r"seen\.json"):
-        seen.read(tmp_path, "a" * 64)
+        novelty.read(tmp_path, "a" * 64)
 
 
 def test_a_training_run_says_what_it_has_seen(make_frames, tmp_path):
@@ -73,12 +73,12 @@ def test_a_training_run_says_what_it_has_seen(make_frames, tmp_path):
     small = TrainingSettings(arguments={"hidden": 8, "channels": 4}, epochs=1)
     run = tmp_path / "run"
     trained = train(frames, small, run, "cpu", threads=1)
-    known = seen.read(run, trained.content_hash)
-    assert known is not None and len(known.readings) <= seen.KEPT
+    known = novelty.read(run, trained.content_hash)
+    assert known is not None and len(known.readings) <= novelty.KEPT
     assert (known.novelty(frames.taxels[frames.indices(trained.split.train)]) > 1).mean() < 0.01
     assert known.novelty(np.full((1, 24), 5000.0))[0] > 2
-    (run / seen.FILE).unlink()
+    (run / novelty.FILE).unlink()
     train(
         frames, small, run, "cpu", resume=True, threads=1
     )  # as somebody does who trained before there was such a file
-    assert (run / seen.FILE).is_file()
+    assert (run / novelty.FILE).is_file()

@@ -1,12 +1,11 @@
-"""Whether readings are like those that a network has learnt from: for readings that have no label to score by.
+"""Novelty of readings: how far they lie from the training data, for readings without a label to score by.
 
-A network says something of any readings. Where they lie far from all that it was trained on, that is a guess, and no
-figure of its scores holds. Kept are readings that stand for the training frames: each next one is the frame farthest
-from all chosen so far (T. F. Gonzalez, Theoretical Computer Science 38 (1985) 293), so that few cover all. The measure
-of far is what the validation episodes show: presses that were not learnt from, on which the network is known to do.
+A network predicts something for any readings. Far from its training data no score holds. A few hundred training frames
+are kept: each next one is the frame farthest from all chosen so far (T. F. Gonzalez, Theoretical Computer Science 38
+(1985) 293). The validation episodes set the scale: their readings count as near.
 
 Distances are Euclidean between square roots of readings (with their signs), so that a weak contact counts too. Single
-frames are compared, not windows: a movement never seen before passes.
+frames are compared, not windows: a movement that is new passes.
 """
 
 from __future__ import annotations
@@ -35,8 +34,8 @@ BLOCK = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """What a network has learnt from, and how far from it is far."""
+class TrainingReadings:
+    """Readings that cover a network's training data, and the distance that counts as far."""
 
     readings: np.ndarray
     """Tared readings that stand for the training frames [counts], shape (k, taxels)."""
@@ -46,7 +45,7 @@ class Seen:
     """SHA-256 of the checkpoint that it belongs to."""
 
     def novelty(self, taxels: np.ndarray) -> np.ndarray:
-        """Return how far readings are from all that was learnt from, over `far` [1], shape (m,).
+        """Return the distance of readings from the training data over `far` [1], shape (m,).
 
         Above 1 they are farther than nearly all readings on which the network was validated.
 
@@ -61,13 +60,13 @@ class Seen:
         return {
             "version": schemas.version("seen"), "checkpoint": self.checkpoint, "far": self.far, "share": SHARE,
             "readings": np.round(self.readings, 1).tolist(),
-            "provenance": provenance.stamp("training.metrics.seen", {"checkpoint": self.checkpoint}, {"kept": KEPT}),
+            "provenance": provenance.stamp("training.metrics.novelty", {"checkpoint": self.checkpoint}, {"kept": KEPT}),
         }  # fmt: skip
 
 
 def gathered(
     frames: Frames, learned: np.ndarray, validated: np.ndarray, checkpoint: str, mirror: bool = False
-) -> Seen | None:
+) -> TrainingReadings | None:
     """Return what a network has seen; None where the validation episodes hold too little contact to say what is far.
 
     Args:
@@ -85,15 +84,15 @@ def gathered(
         known = np.concatenate(_mirrored(known, frames.sensor.taxels.rows, frames.sensor.taxels.columns))
     chosen = np.round(known[_covering(_root(known))], 1)
     far = float(np.quantile(_nearest(_root(frames.taxels[pressed]), _root(chosen)), SHARE))
-    return Seen(chosen, max(far, 1e-6), checkpoint)
+    return TrainingReadings(chosen, max(far, 1e-6), checkpoint)
 
 
-def write(run: Path, seen: Seen) -> None:
+def write(run: Path, known: TrainingReadings) -> None:
     """Write RUN/seen.json; an older one is replaced, as it belongs to an older checkpoint."""
-    documents.write(run / FILE, seen.document, "seen")
+    documents.write(run / FILE, known.document, "seen")
 
 
-def read(run: Path, checkpoint: str) -> Seen | None:
+def read(run: Path, checkpoint: str) -> TrainingReadings | None:
     """Return what a run's checkpoint has seen; None if the run does not say it of this checkpoint.
 
     Raises:
@@ -104,7 +103,7 @@ def read(run: Path, checkpoint: str) -> Seen | None:
     document = documents.read(run / FILE, "seen")
     if document["checkpoint"] != checkpoint:
         return None
-    return Seen(np.array(document["readings"], float), float(document["far"]), checkpoint)
+    return TrainingReadings(np.array(document["readings"], float), float(document["far"]), checkpoint)
 
 
 def _root(taxels: np.ndarray) -> np.ndarray:

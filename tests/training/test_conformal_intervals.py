@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tacdata.errors import FormatError, UsageError
-from training.metrics import spread
-from training.metrics.spread import LEVELS, calibrate, reliability
+from training.metrics import conformal_intervals
+from training.metrics.conformal_intervals import LEVELS, calibrate, reliability
 
 PITCH = 0.4
 
@@ -51,19 +51,19 @@ def test_deep_pixels_are_less_certain_as_their_errors_are():
 
 def test_what_is_written_is_read_for_its_checkpoint_alone(tmp_path):
     known = calibrate(*episodes(6, 0), PITCH, "a" * 64)
-    assert spread.read(tmp_path, "a" * 64) is None
-    spread.write(tmp_path, known)
-    again = spread.read(tmp_path, "a" * 64)
+    assert conformal_intervals.read(tmp_path, "a" * 64) is None
+    conformal_intervals.write(tmp_path, known)
+    again = conformal_intervals.read(tmp_path, "a" * 64)
     np.testing.assert_array_equal(again.deviation, known.deviation)
     assert again.factors == known.factors
-    assert spread.read(tmp_path, "b" * 64) is None
-    (tmp_path / spread.FILE).write_text("{")
+    assert conformal_intervals.read(tmp_path, "b" * 64) is None
+    (tmp_path / conformal_intervals.FILE).write_text("{")
     with pytest.raises(FormatError):
-        spread.read(tmp_path, "a" * 64)
+        conformal_intervals.read(tmp_path, "a" * 64)
 
 
 def test_too_little_to_calibrate_on():
     with pytest.raises(UsageError, match="two or more"):
         calibrate(*episodes(1, 0), PITCH, "a" * 64)
     nothing = [np.zeros((4, 35, 26), np.float32)] * 2
-    assert calibrate(nothing, nothing, PITCH, "a" * 64).factors[0] == spread.NOT_KNOWN
+    assert calibrate(nothing, nothing, PITCH, "a" * 64).factors[0] == conformal_intervals.NOT_KNOWN

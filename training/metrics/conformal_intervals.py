@@ -1,13 +1,16 @@
-"""How far off each pixel may be: calibrated on the validation episodes, for any network.
+"""Conformal intervals of each predicted pixel, calibrated on the validation episodes, for any network.
 
-The error of a depth map is largest at the contact's edge and where it is deep. So each pixel falls into a cell by its
-predicted depth and by the depth's slope there; the cell's root mean square error over one half of the validation
-episodes is its standard deviation (cells with few pixels take that of all cells of their depth). The other half of the
-episodes says, as in split conformal prediction (Angelopoulos and Bates, 2023, section 1.1), within how many of these
-deviations a given share of errors lies. Whole episodes are divided, because frames of one press err alike.
+The error of a depth map is largest at the contact's edge and where it is deep. So each pixel falls into a cell, by its
+predicted depth and by the depth's slope there. Split conformal prediction (Angelopoulos and Bates, 2023, section 1.1)
+then takes two steps:
 
-What holds on validation episodes holds for presses like them. `reliability` measures on the scored episodes what share
-of the errors really lies inside each interval: on unseen shapes it is less, and the report says how much.
+1. One half of the validation episodes gives each cell its standard deviation, the root mean square error. A cell with
+   few pixels takes that of all cells of its depth.
+2. The other half gives the factor of this deviation within which a share of the errors lies.
+
+Whole episodes are divided, because frames of one press have correlated errors. The intervals hold for presses like
+those of validation. `reliability` measures what share of the errors lies inside on the scored episodes; on unseen
+shapes it is less.
 """
 
 from __future__ import annotations
@@ -43,8 +46,8 @@ FLOOR = 1e-4
 
 
 @dataclass(frozen=True)
-class CalibratedSpread:
-    """Deviation by cell, and how many deviations hold each share of the errors."""
+class ConformalIntervals:
+    """Standard deviation by cell, and the factors of it that make intervals of each level."""
 
     deviation: np.ndarray
     """Root mean square error [mm], shape (len(DEPTHS) + 1, len(SLOPES) + 1)."""
@@ -63,7 +66,7 @@ class CalibratedSpread:
         return self.deviation[cells(depth, pitch)]
 
     def half_width(self, depth: np.ndarray, pitch: float, level: float) -> np.ndarray:
-        """Return how far either way the interval of a level reaches [mm], same shape as ``depth``.
+        """Return half the width of a level's interval [mm], same shape as ``depth``.
 
         Raises:
             UsageError: If the level is none of `LEVELS`.
@@ -83,7 +86,7 @@ class CalibratedSpread:
             "deviation": self.deviation.tolist(),
             "levels": list(LEVELS),
             "factors": list(self.factors),
-            "provenance": provenance.stamp("training.metrics.spread", {"checkpoint": self.checkpoint}, {}),
+            "provenance": provenance.stamp("training.metrics.conformal_intervals", {"checkpoint": self.checkpoint}, {}),
         }
 
 
@@ -93,7 +96,7 @@ def cells(depth: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
     return np.digitize(depth, DEPTHS), np.digitize(np.hypot(along_x, along_y), SLOPES)
 
 
-def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, checkpoint: str) -> CalibratedSpread:
+def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, checkpoint: str) -> ConformalIntervals:
     """Calibrate on episodes that the network did not learn from.
 
     Args:
@@ -106,7 +109,7 @@ def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, ch
         UsageError: If there are fewer than two episodes.
     """
     if len(maps) < 2:
-        raise UsageError(f"{len(maps)} validation episodes", "two or more, to calibrate the spread", "record more")
+        raise UsageError(f"{len(maps)} validation episodes", "two or more, to calibrate intervals", "record more")
     shape = (len(DEPTHS) + 1, len(SLOPES) + 1)
     square, count = np.zeros(shape), np.zeros(shape)
     for depth, label in zip(maps[::2], labels[::2], strict=True):
@@ -115,7 +118,7 @@ def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, ch
         square += np.bincount(place, error**2, minlength=square.size).reshape(shape)
         count += np.bincount(place, minlength=square.size).reshape(shape)
     deviation = _filled(square, count)
-    draft = CalibratedSpread(deviation, (1.0,) * len(LEVELS), checkpoint)
+    draft = ConformalIntervals(deviation, (1.0,) * len(LEVELS), checkpoint)
     ratios = [
         np.abs(depth - label)[_interesting(depth, label)] / draft.sigma(depth, pitch)[_interesting(depth, label)]
         for depth, label in zip(maps[1::2], labels[1::2], strict=True)
@@ -123,17 +126,17 @@ def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, ch
     together = np.concatenate(ratios)
     if not len(together):
         # Nothing touched: there is nothing to calibrate on, and the widest claim is the honest one.
-        return CalibratedSpread(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint)
-    return CalibratedSpread(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint)
+        return ConformalIntervals(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint)
+    return ConformalIntervals(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint)
 
 
 def reliability(
-    spread: CalibratedSpread, maps: list[np.ndarray], labels: list[np.ndarray], pitch: float
+    intervals: ConformalIntervals, maps: list[np.ndarray], labels: list[np.ndarray], pitch: float
 ) -> list[dict[str, float | int]]:
     """Return for each level the share of errors inside its interval, over pixels in contact in label or prediction.
 
     Args:
-        spread: The calibration.
+        intervals: The calibration.
         maps: Predicted maps of each episode [mm], shape (n, pixels_x, pixels_y).
         labels: Their labels [mm], same shapes.
         pitch: Distance of pixels [mm].
@@ -141,8 +144,8 @@ def reliability(
     inside, width, total = np.zeros(len(LEVELS)), np.zeros(len(LEVELS)), 0
     for depth, label in zip(maps, labels, strict=True):
         chosen = _interesting(depth, label)
-        sigma, error = spread.sigma(depth, pitch)[chosen], np.abs(depth - label)[chosen]
-        for k, factor in enumerate(spread.factors):
+        sigma, error = intervals.sigma(depth, pitch)[chosen], np.abs(depth - label)[chosen]
+        for k, factor in enumerate(intervals.factors):
             inside[k] += (error <= factor * sigma).sum()
             width[k] += (2 * factor * sigma).sum()
         total += int(chosen.sum())
@@ -157,12 +160,12 @@ def reliability(
     ]
 
 
-def write(run: Path, spread: CalibratedSpread) -> None:
+def write(run: Path, intervals: ConformalIntervals) -> None:
     """Write RUN/spread.json; an older one is replaced, as it belongs to an older checkpoint."""
-    documents.write(run / FILE, spread.document, "spread")
+    documents.write(run / FILE, intervals.document, "spread")
 
 
-def read(run: Path, checkpoint: str) -> CalibratedSpread | None:
+def read(run: Path, checkpoint: str) -> ConformalIntervals | None:
     """Return the calibration of a run's checkpoint; None if the run has none for it.
 
     Raises:
@@ -179,7 +182,7 @@ def read(run: Path, checkpoint: str) -> CalibratedSpread | None:
         raise FormatError(f"{path}: cells of another release", "cells of this release", "remove it and train again")
     if document["checkpoint"] != checkpoint:
         return None
-    return CalibratedSpread(deviation, tuple(document["factors"]), checkpoint)
+    return ConformalIntervals(deviation, tuple(document["factors"]), checkpoint)
 
 
 def _interesting(depth: np.ndarray, label: np.ndarray) -> np.ndarray:
