@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import inspect
 import sys
@@ -14,7 +15,7 @@ import typer
 
 from tacdata import progress, registry
 from tacdata.commands.command import Result
-from tacdata.errors import Exit, TacdataError
+from tacdata.errors import DeviceError, Exit, TacdataError
 from tacdata.extras import missing_package
 
 ROOM, BASE = "tacdata.commands", "command"
@@ -99,6 +100,8 @@ def answering(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
             raise typer.Exit(Exit.INTERRUPTED) from None
         except ModuleNotFoundError as error:
             raise missing_package(error, name) or error from None
+        except OSError as error:
+            raise refused_by_system(error) or error from error
         if isinstance(result, Result):
             _end(result, as_json)
         return result
@@ -111,6 +114,33 @@ def answering(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
     run.__signature__ = signature.replace(parameters=parameters)  # pyright: ignore[reportAttributeAccessIssue]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return run
+
+
+WRITABLE = "a folder that may be written, on a disk with room"
+REFUSALS = {
+    errno.EACCES: (WRITABLE, "choose another folder, or change its permissions"),
+    errno.EPERM: (WRITABLE, "choose another folder, or change its permissions"),
+    errno.EROFS: (WRITABLE, "choose a folder on a disk that is not read-only"),
+    errno.ENOSPC: (WRITABLE, "make room, or choose a folder on another disk"),
+    errno.EDQUOT: (WRITABLE, "make room within the quota, or choose a folder on another disk"),
+    errno.EISDIR: ("the path of a file", "name a file in that folder"),
+    errno.ENOTDIR: ("a folder on every part of the path but the last", "check the path"),
+    errno.EEXIST: ("a path that is not taken", "choose another name"),
+    errno.ENOENT: ("a path that exists", "check the path; make the folder first if it is to be written to"),
+    errno.ENAMETOOLONG: ("a shorter name", "choose a shorter name"),
+    errno.EMFILE: ("fewer open files", "raise the limit of open files (ulimit -n)"),
+    errno.EIO: ("a disk without faults", "copy what is there to another disk and check this one"),
+}
+"""What the operating system refuses a file for: what is allowed, and what to do next."""
+
+
+def refused_by_system(error: OSError) -> DeviceError | None:
+    """Return an error of the file system in words; None for those that are none of a file."""
+    if error.errno not in REFUSALS:
+        return None
+    allowed, remedy = REFUSALS[error.errno]
+    paths = " to ".join(str(path) for path in (error.filename, error.filename2) if path is not None)
+    return DeviceError(f"{paths or 'a file'}: {error.strerror}", allowed, remedy)
 
 
 def _end(result: Result, as_json: bool) -> None:

@@ -1,5 +1,6 @@
 """Bad input ends in words and an exit code: never in a traceback, and with every file as it was."""
 
+import errno
 import hashlib
 import sys
 
@@ -158,3 +159,33 @@ def run(folder, monkeypatch, capfd, arguments):
     with pytest.raises(SystemExit) as caught:
         cli.main()
     return caught.value.code, capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [(errno.EACCES, "permissions"), (errno.EROFS, "read-only"), (errno.ENOSPC, "make room"), (errno.EDQUOT, "quota")],
+)
+def test_what_the_system_refuses_a_file_for_is_said_in_words(number, words, monkeypatch, capfd):
+    """Any verb, at any write: one place answers for all."""
+
+    def full(*_):
+        raise OSError(number, "no", "/data/page.png")
+
+    monkeypatch.setattr("tacdata.plans.read_plan", full)
+    monkeypatch.setattr("tacdata.documents.read", full)
+    monkeypatch.setattr(sys, "argv", ["tacdata", "plan", __file__])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    said = capfd.readouterr().err
+    assert end.value.code == 4
+    assert "/data/page.png: no" in said and words in said and "Traceback" not in said
+
+
+def test_a_picture_below_a_file_ends_in_words(folder, monkeypatch, capfd):
+    target = folder / "words.txt" / "page.png"
+    monkeypatch.setattr(sys, "argv", ["tacdata", "plan", str(folder / "plan.yaml"), "--picture", str(target)])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    said = capfd.readouterr().err
+    assert end.value.code not in (0, 1) and "words.txt" in said and "Traceback" not in said
+    assert (folder / "words.txt").read_text() == "not what you think"
