@@ -1,17 +1,22 @@
 """The demo goes through the verbs, leaves everything it names, and stops gently."""
 
 import json
+import os
 import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from tacdata import cli, stages
 from tacdata.commands import demo
 from tacdata.errors import UsageError
 
+FARM = Path(__file__).resolve().parents[1] / "label_farm"
 DEMO = [sys.executable, "-m", "tacdata.cli", "demo"]
 
 
@@ -63,6 +68,27 @@ def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
     assert not (tmp_path / "out" / "rig" / "rig.yaml").exists()
 
 
+@pytest.fixture
+def quick_stages(monkeypatch):
+    """Stages run in this process, and a stand-in model solves the presses."""
+    monkeypatch.syspath_prepend(FARM)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(FARM), str(FARM.parents[1])]))
+
+    def run(line):
+        arguments = line[line.index("tacdata.cli") + 1 :]
+        stand_in = ["--factory", "fast_model:FastModel", "--workers", "2"] if arguments[0] == "label" else []
+        ended = CliRunner().invoke(cli.application(), [*arguments, *stand_in])
+        print(ended.output)
+        return ended.exit_code
+
+    monkeypatch.setattr(stages, "_run", run)
+
+
+def test_the_whole_job_with_a_stand_in_model(tmp_path, quick_stages, capfd):
+    demo.run(tmp_path / "out", presses=8, epochs=1, speed=4.0)
+    left_behind(tmp_path / "out", capfd.readouterr().out)
+
+
 @pytest.mark.long("tacdata/commands", reason="the whole job, eight presses solved on the default skin")
 @pytest.mark.timeout(2400)
 def test_the_whole_job(tmp_path):
@@ -71,10 +97,14 @@ def test_the_whole_job(tmp_path):
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
-    typed = re.findall(r"^\$ tacdata ([a-z-]+)", done.stdout, re.M)
+    left_behind(tmp_path / "out", done.stdout)
+
+
+def left_behind(out, said):
+    """Assert that every verb ran and all is there that the demo names."""
+    typed = re.findall(r"^\$ tacdata ([a-z-]+)", said, re.M)
     assert typed == ["virtual-rig", "register", "plan", "record", "check", "label", "pack", "train", "evaluate", "view"]
-    assert "MISSING" not in done.stdout
-    out = tmp_path / "out"
+    assert "MISSING" not in said
     assert len(list((out / "session").glob("episode-*.mcap"))) == 8
     assert len(list((out / "session" / "labels").glob("episode-*.parquet"))) == 8
     scores = json.loads((out / "network" / "scores" / "scores.json").read_text())

@@ -9,6 +9,7 @@ import sys
 import pytest
 from chaos import ROOT
 from farm_examples import HERE
+from running.in_process import tacdata
 from session_examples import session
 
 from label_farm.ledger.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING
@@ -21,12 +22,9 @@ pytest.importorskip("distributed")
 
 
 def label(folder, *options, **variables):
-    path = os.pathsep.join([str(HERE), str(ROOT)])
-    command = [
-        sys.executable, "-m", "tacdata.cli", "label", "s", "--factory", "fast_model:FastModel", *options,
-    ]  # fmt: skip
-    environment = {**os.environ, "PYTHONPATH": path, "FAST_MODEL_LOG": str(folder / "solves.log"), **variables}
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
+    path = os.pathsep.join([str(HERE), str(ROOT)])  # of the workers
+    given = {"PYTHONPATH": path, "FAST_MODEL_LOG": str(folder / "solves.log"), **variables}
+    return tacdata("label", "s", "--factory", "fast_model:FastModel", *options, folder=folder, **given)
 
 
 def test_a_cluster_labels_and_a_press_that_kills_its_worker_is_a_failure(tmp_path):

@@ -1,12 +1,11 @@
 """Finished labels flow into a dataset while others are computed, and the dataset says what it lacks."""
 
 import os
-import subprocess
-import sys
 
 import pytest
 from chaos import ROOT, Service, all_finished
 from farm_examples import HERE
+from running.in_process import tacdata
 from session_examples import examples, session
 
 from tacdata.dataset import label_states
@@ -14,13 +13,8 @@ from tacdata.dataset.reader import read_dataset
 
 
 def label(folder, *options, **variables):
-    path = os.pathsep.join([str(HERE), str(ROOT)])
-    command = [
-        sys.executable, "-m", "tacdata.cli", *options, "--factory", "fast_model:FastModel",
-    ]  # fmt: skip
-    return subprocess.run(
-        command, capture_output=True, text=True, cwd=folder, env={**os.environ, "PYTHONPATH": path, **variables}
-    )
+    path = os.pathsep.join([str(HERE), str(ROOT)])  # of the workers
+    return tacdata(*options, "--factory", "fast_model:FastModel", folder=folder, PYTHONPATH=path, **variables)
 
 
 def states(folder):

@@ -1,13 +1,10 @@
 """Finished labels brought to another computer: here a copy of the session outside of the service's root."""
 
-import os
 import shutil
-import subprocess
-import sys
 
 import pytest
-from chaos import ROOT, Service, all_finished, record
-from farm_examples import HERE
+from chaos import Service, all_finished, record
+from running.in_process import tacdata
 
 from label_farm.labels.session_labels import SessionLabels
 from label_farm.remote.fetch import Fetch
@@ -35,10 +32,7 @@ def copy(served, tmp_path):
 
 
 def fetch(service, *arguments):
-    path = os.pathsep.join([str(HERE), str(ROOT)])
-    command = [sys.executable, "-m", "tacdata.cli", "farm", "fetch", "000001", *map(str, arguments)]
-    environment = {**os.environ, "PYTHONPATH": path, "TACDATA_FARM_URL": service.url}
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment)
+    return tacdata("farm", "fetch", "000001", *arguments, TACDATA_FARM_URL=service.url)
 
 
 def stamps(session):

@@ -1,14 +1,11 @@
 """A session brought to a service that cannot see its folder: whole, once, and nowhere else than asked for."""
 
 import hashlib
-import os
-import subprocess
-import sys
 import urllib.parse
 
 import pytest
-from chaos import ROOT, Service, all_finished
-from farm_examples import HERE
+from chaos import Service, all_finished
+from running.in_process import tacdata
 from session_examples import session
 
 from label_farm.remote import send as sending
@@ -28,9 +25,7 @@ def mine(tmp_path):
 
 
 def verb(service, *arguments):
-    path = os.pathsep.join([str(HERE), str(ROOT)])
-    command = [sys.executable, "-m", "tacdata.cli", "farm", *map(str, arguments), "--url", service.url]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env={**os.environ, "PYTHONPATH": path})
+    return tacdata("farm", *arguments, "--url", service.url)
 
 
 def names(folder):

@@ -12,6 +12,7 @@ import urllib.request
 import pytest
 from chaos import ROOT, Service, all_finished, record
 from farm_examples import HERE
+from running.in_process import tacdata
 
 from label_farm.service.confined import confined
 from tacdata.errors import UsageError
@@ -45,11 +46,7 @@ def ask(service, path, method="GET", body=None, **headers):
 
 
 def verb(*arguments, **variables):
-    path = os.pathsep.join([str(HERE), str(ROOT)])
-    return subprocess.run(
-        [sys.executable, "-m", "tacdata.cli", *arguments], capture_output=True, text=True, cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": path, "COLUMNS": "200", **variables},
-    )  # fmt: skip
+    return tacdata(*arguments, COLUMNS="200", **variables)
 
 
 def test_two_people_submit_and_the_more_urgent_comes_first(busy):

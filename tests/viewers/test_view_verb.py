@@ -1,11 +1,11 @@
-"""The verb as it is typed, in a process of its own."""
+"""The verb as it is typed."""
 
-import os
-import subprocess
 import sys
+from functools import partial
 
 import pytest
 from recorded_press import write_recording
+from running.in_process import tacdata
 
 from tacdata.labels import write_label
 
@@ -18,13 +18,14 @@ def session(episode, label, images, tmp_path_factory):
     return folder
 
 
-def view(*arguments):
-    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-m", "tacdata.cli", "view", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=environment)
+@pytest.fixture
+def view(monkeypatch):
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    return partial(tacdata, "view")
 
 
-def test_file_and_picture_are_written_without_a_display(session, tmp_path):
+def test_file_and_picture_are_written_without_a_display(view, session, tmp_path):
     done = view(session, "--save", tmp_path / "new" / "e.rrd", "--picture", tmp_path / "new" / "e.png")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "new" / "e.rrd").read_bytes()[:3] == b"RRF"
@@ -33,28 +34,28 @@ def test_file_and_picture_are_written_without_a_display(session, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only there a display can be missing")
-def test_without_display_and_file_it_says_what_can_be_done(session):
+def test_without_display_and_file_it_says_what_can_be_done(view, session):
     done = view(session)
     assert done.returncode == 2
     assert "no display" in done.stderr and "--save" in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_an_existing_file_is_kept(session, tmp_path):
+def test_an_existing_file_is_kept(view, session, tmp_path):
     (tmp_path / "e.rrd").write_text("mine")
     done = view(session, "--save", tmp_path / "e.rrd")
     assert done.returncode == 2 and "exists" in done.stderr
     assert (tmp_path / "e.rrd").read_text() == "mine"
 
 
-def test_a_saved_file_cannot_be_saved_again(tmp_path):
+def test_a_saved_file_cannot_be_saved_again(view, tmp_path):
     (tmp_path / "e.rrd").write_text("mine")
     done = view(tmp_path / "e.rrd", "--save", tmp_path / "f.rrd")
     assert done.returncode == 2 and "leave them out" in done.stderr
     assert not (tmp_path / "f.rrd").exists()
 
 
-def test_a_wrong_path_ends_in_words(tmp_path):
+def test_a_wrong_path_ends_in_words(view, tmp_path):
     done = view(tmp_path / "nowhere", "--save", tmp_path / "e.rrd")
     assert done.returncode == 2
     assert "no file or folder" in done.stderr and "Traceback" not in done.stderr
