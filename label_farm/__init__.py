@@ -1,1 +1,1 @@
-"""The label farm: which labels are wanted, who computes them, and where they lie."""
+"""The label farm: solves the presses of recorded sessions once each and writes their labels."""

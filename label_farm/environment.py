@@ -28,7 +28,7 @@ def python(module: str) -> list[str]:
 
 
 DEVICE = "TACDATA_DEVICE"
-"""Variable that says where a process solves: "cpu" or a card such as "cuda:0"."""
+"""Variable that says where a process solves: "cpu" or a GPU such as "cuda:0"."""
 
 
 def variables(device: str = "cpu") -> dict[str, str]:
@@ -37,44 +37,44 @@ def variables(device: str = "cpu") -> dict[str, str]:
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     own = dict.fromkeys(THREADS, "1") | {"PYTHONPATH": path, "PYTHONUNBUFFERED": "1"}
     if device.startswith("cuda:"):
-        # The process sees its own card alone, under the number 0.
-        cards = list(filter(None, os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",")))
+        # The process sees its own GPU alone, under the number 0.
+        gpus = list(filter(None, os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",")))
         number = int(device.removeprefix("cuda:"))
-        own |= {"CUDA_VISIBLE_DEVICES": cards[number] if number < len(cards) else str(number), DEVICE: "cuda:0"}
+        own |= {"CUDA_VISIBLE_DEVICES": gpus[number] if number < len(gpus) else str(number), DEVICE: "cuda:0"}
     else:
         own |= {DEVICE: device}
     return {**os.environ, **own}
 
 
 def devices(asked: Sequence[str]) -> tuple[str, ...]:
-    """Return what workers solve on: what was asked for, "cuda" standing for all cards of this machine; else "cpu".
+    """Return what workers solve on: what was asked for, "cuda" standing for all GPUs of this machine; else "cpu".
 
     Raises:
-        UsageError: If a name is neither, or a card is not there.
+        UsageError: If a name is neither, or a GPU is not there.
     """
     found: list[str] = []
     for name in asked or ("cpu",):
-        cards = [] if name == "cpu" else _cards()
-        there = cards if name == "cuda" else [name]
-        if not there or not re.fullmatch(r"cpu|cuda:[0-9]+", there[0]) or (name != "cpu" and there[0] not in cards):
-            known = f"this machine has {', '.join(cards) or 'no CUDA card'}"
+        gpus = [] if name == "cpu" else _gpus()
+        there = gpus if name == "cuda" else [name]
+        if not there or not re.fullmatch(r"cpu|cuda:[0-9]+", there[0]) or (name != "cpu" and there[0] not in gpus):
+            known = f"this machine has {', '.join(gpus) or 'no CUDA GPU'}"
             raise UsageError(
                 f"the device {name!r}; {known}",
-                "cpu, cuda for all cards, or cards such as cuda:0",
-                "name another with --device" if cards else "leave --device out, or see that nvidia-smi -L lists a card",
+                "cpu, cuda for all GPUs, or GPUs such as cuda:0",
+                "name another with --device" if gpus else "leave --device out, or see that nvidia-smi -L lists a GPU",
             )
         found += there
     return tuple(found)
 
 
-def idle_cards(asked: Sequence[str]) -> str:
-    """Return in words that this machine has cards and no device was chosen; "" otherwise."""
-    count = 0 if asked else len(_cards())
-    named = "1 CUDA card lies" if count == 1 else f"{count} CUDA cards lie"
+def idle_gpus(asked: Sequence[str]) -> str:
+    """Return in words that this machine has GPUs and no device was chosen; "" otherwise."""
+    count = 0 if asked else len(_gpus())
+    named = "1 CUDA GPU lies" if count == 1 else f"{count} CUDA GPUs lie"
     return f"{named} idle here: --device cuda solves on all of them" if count else ""
 
 
-def _cards() -> list[str]:
+def _gpus() -> list[str]:
     found = _listed() or _counted()
     visible = os.environ.get("CUDA_VISIBLE_DEVICES")
     if visible is not None:
@@ -91,7 +91,7 @@ def _listed() -> int:
 
 
 def _counted() -> int:
-    """Return how many cards the driver's library counts: some containers lack nvidia-smi."""
+    """Return how many GPUs the driver's library counts: some containers lack nvidia-smi."""
     count = ctypes.c_int(0)
     try:
         driver = ctypes.CDLL("libcuda.so.1")

@@ -1,4 +1,4 @@
-"""From recordings to labels: plan, solve what is missing, write each label as soon as its path is solved."""
+"""One run over one session: plan, solve what is missing, write each label as soon as its press is solved."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ MANY = 5000
 
 
 class Labelling:
-    """One run over one session. Stopped at any point, a second run goes on where it stood.
+    """One run over one session. A second run goes on where a stopped one ended.
 
     `run` does all of it. A service calls `plan` once and `settle` for every change, beside other runs.
     """
@@ -155,7 +155,7 @@ class Labelling:
         return since
 
     def settle(self, change: JobOutcome) -> None:
-        """Take note of a press that was finished or failed; those of other runs are passed over."""
+        """Write the labels of a press that was solved or failed; presses of other runs are ignored."""
         job = self._jobs.get(change.key)
         if job is None:
             return
@@ -174,7 +174,7 @@ class Labelling:
         self.progress("solve", self._total - len(self._jobs), self._total)
 
     def close(self) -> None:
-        """Take back what is still asked for, and note which labels are current."""
+        """Withdraw open jobs and save which labels are current."""
         with suppress(sqlite3.OperationalError, FormatError):
             with Ledger(self.store.ledger_path, self.settings.lease_seconds) as ledger:
                 ledger.withdraw(self.name)

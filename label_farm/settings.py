@@ -1,4 +1,4 @@
-"""How sessions are labelled."""
+"""Settings of a labelling run."""
 
 from __future__ import annotations
 

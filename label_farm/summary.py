@@ -1,4 +1,4 @@
-"""What became of a session."""
+"""The result of a labelling run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from label_farm.labels.margin import Margin
 
 @dataclass
 class LabellingSummary:
-    """What became of a session."""
+    """Episodes written, current and failed in one run over a session."""
 
     written: list[int] = field(default_factory=list)
     """Episodes whose label was written."""

@@ -1,4 +1,4 @@
-"""Train and score one recipe on several splits and seeds of one dataset: the honest test of a network."""
+"""Trains and scores one recipe on several splits and seeds of one dataset."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DEFAULTS = ("episode", "configuration", "indenter", "site", "depth", "rate", "sp
 
 @dataclass(frozen=True)
 class SplitOutcome:
-    """What came of one split and seed."""
+    """The scores of one split and seed, or why there are none."""
 
     settings: TrainingSettings
     folder: Path

@@ -89,7 +89,7 @@ def train(
         resume: Go on from ``out``'s last epoch; settings must be the same except for the number of epochs.
         threads: CPU threads; by default one a core, at most `compute.THREADS`; others may change last bits.
         listener: Called after every step and every epoch.
-        compiled: Let torch compile the network first; pays off on cards, and changes last bits.
+        compiled: Let torch compile the network first; pays off on GPUs, and changes last bits.
 
     Returns:
         The checkpoint of the epoch with the lowest validation loss.
@@ -221,7 +221,7 @@ def _resumed(frames: Frames, settings: TrainingSettings, out: Path, place: torch
 
 
 def _optimizer(network: Network, settings: TrainingSettings) -> torch.optim.Optimizer:
-    # Fused, a step on a card launches few kernels instead of hundreds.
+    # Fused, a step on a GPU launches few kernels instead of hundreds.
     on_card = network.get_buffer("mean").is_cuda
     return torch.optim.AdamW(
         network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay, fused=on_card or None
@@ -293,7 +293,7 @@ def _always(frames: Frames, learned: np.ndarray, settings: TrainingSettings) -> 
 
 
 def _labels(depth: np.ndarray, place: torch.device) -> torch.Tensor:
-    """Return the labels [mm], (n, pixels_x, pixels_y): on the card or in memory if they fit, else where they lie."""
+    """Return the labels [mm], (n, pixels_x, pixels_y): on the GPU or in memory if they fit, else where they lie."""
     if place.type == "cpu" and depth.nbytes < _free_memory() // 4:
         # Read through once in order, instead of page by page in the order of the first epoch.
         depth = np.array(depth)

@@ -1,1 +1,1 @@
-"""What there is to see, as plain arrays, and the backends that draw it."""
+"""Scenes of recordings, labels, predictions and verdicts as plain arrays, and backends that draw them."""

@@ -1,4 +1,4 @@
-"""What two folders say of the same episode, found and put beside each other."""
+"""Compares two folders' labels or predictions of one episode."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A layout for Foxglove that shows a recording as it lies on the disk, without our code."""
+"""A layout for Foxglove, which shows a recording without our code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A file that a viewer writes: new, and whole or not at all."""
+"""Writes a new file that is whole or not there at all."""
 
 from __future__ import annotations
 

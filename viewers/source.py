@@ -1,4 +1,4 @@
-"""From a path to its scene."""
+"""Makes the scene of a path of any kind."""
 
 from __future__ import annotations
 

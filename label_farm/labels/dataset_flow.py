@@ -1,4 +1,4 @@
-"""Finished labels flow into a LeRobot dataset, one whole episode at a time, while others are still computed."""
+"""Appends finished labels to a LeRobot dataset, one whole episode at a time, while others are solved."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SAY_SECONDS = 2.0
 
 
 class DatasetFlow:
-    """One session's way into a dataset. Several sessions may flow into one, of several processes: each append locks."""
+    """Appends one session's episodes to a dataset. Several processes may append to one: each append locks it."""
 
     def __init__(
         self, out: Path, session: Path, recordings: Sequence[Path], sensor: Sensor | None = None,
@@ -52,7 +52,7 @@ class DatasetFlow:
         self._models: dict[str, str] = {}
 
     def deliver(self, number: int, reason: str) -> None:
-        """Take an episode in whose label lies there, or note why it has none.
+        """Append an episode that has a label, or note why it has none.
 
         Raises:
             UsageError: If the dataset holds labels of another model version.
@@ -71,7 +71,7 @@ class DatasetFlow:
             self.say()
 
     def say(self) -> None:
-        """Write down which episodes of the session are not in the dataset."""
+        """Write which episodes of the session are not in the dataset."""
         if not self._out.exists():
             return
         with self._locked():

@@ -1,4 +1,4 @@
-"""What is known of a session's recordings: the press that each needs, and whether its label is current."""
+"""An index of a session's recordings: the press that each needs, and whether its label is current."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CREATE TABLE IF NOT EXISTS skin (hash TEXT PRIMARY KEY, document TEXT);
 
 
 class Known(NamedTuple):
-    """What was found when a recording was read."""
+    """One recording in the index, as it was when it was read."""
 
     recording: str
     """Name of the recording's file."""
@@ -40,7 +40,7 @@ class Known(NamedTuple):
 
 
 class LabelIndex:
-    """A cache beside the labels, which may be deleted: without it, every recording and label is read again.
+    """An SQLite file beside the labels. It may be deleted: then every recording and label is read again.
 
     A file that changed in content but in neither size, time nor number is not noticed here; `tacdata label --redo`
     reads all, and every reader of a label checks its checksums.

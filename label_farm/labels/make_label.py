@@ -1,4 +1,4 @@
-"""From a request and the solution of its path to the episode's label."""
+"""Makes the label of an episode from its frames and the solved press."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def code_hash() -> str:
 
 
 def parents(request: LabelRequest | Planned) -> dict[str, str]:
-    """Return what a label of this request is made from, by name and hash; equal parents, equal label."""
+    """Return the hashes of everything that a label is made from, by name. Equal hashes give an equal label."""
     made_from = {
         "recording": request.recording,
         "sensor": request.sensor.content_hash,

@@ -1,4 +1,4 @@
-"""How well a label is known, in a few numbers."""
+"""The uncertainty of a label in three numbers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.labels import Label
 
 @dataclass(frozen=True)
 class Margin:
-    """What stands behind the plus-minus of one label, over the pixels that the contact dents."""
+    """Errors and uncertainty of one label over the pixels in contact."""
 
     numerical: float
     """Median of the estimated numerical error [mm]."""
@@ -23,7 +23,7 @@ class Margin:
 
     @classmethod
     def of(cls, label: Label) -> Self | None:
-        """Return a label's margin; None if nothing is dented."""
+        """Return a label's margin; None if no pixel is in contact."""
         dented = label.dented
         if not dented.any():
             return None

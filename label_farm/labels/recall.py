@@ -1,4 +1,4 @@
-"""What a run knows of a session from the run before, so that it reads only what changed."""
+"""Remembers a session from the run before, so that a run reads only what changed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def skin_key(skin: Sensor) -> str:
 
 
 class Recall:
-    """The labels' index, opened for one run."""
+    """The index of a session's labels, opened for one run."""
 
     def __init__(self, folder: Path) -> None:
         """Name the folder of the labels; nothing is known before `open`."""
@@ -52,18 +52,18 @@ class Recall:
                 continue
 
     def prefetch(self, recordings: Sequence[Path]) -> None:
-        """Look up recordings that will be asked for next, some hundreds: one question to the index, not one each."""
+        """Look up some hundred recordings that will be asked for next, in one query."""
         self._near = self._index.find([path.name for path in recordings])
 
     def find(self, recording: Path) -> tuple[Known, Sensor] | None:
-        """Return what is known of a recording and its skin; None if it changed, or what makes its label did."""
+        """Return a recording's entry and its skin; None if the recording, the model or the code changed."""
         row = self._row(recording.name)
         if row is None or row.made != self._made.get((row.skin, bool(row.own))):
             return None
         return (row, self._sensors[row.skin]) if row.source and row.source == stamp(recording) else None
 
     def note(self, row: Known, skin: Sensor) -> None:
-        """Note what was found when a recording was read."""
+        """Add an entry for a recording that was read."""
         if row.skin not in self._skins:
             self._skins[row.skin] = skin.document
         self._new[row.recording] = row
@@ -81,14 +81,14 @@ class Recall:
         return self._new.get(name) or self._near.get(name) or self._index.find([name]).get(name)
 
     def flush(self) -> None:
-        """Write down what is new."""
+        """Write new entries."""
         if self._new:
             self._index.write(self._new.values(), self._skins)
             self._new.clear()
             self._index.open()
 
     def close(self) -> None:
-        """Write down what is new and close the index."""
+        """Write new entries and close the index."""
         self.flush()
         self._index.close()
 

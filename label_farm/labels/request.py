@@ -1,4 +1,4 @@
-"""From a recorded episode to the job that its label needs."""
+"""Makes the job of a recorded episode: the press whose solution its label needs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ RELOAD_LIMIT = 0.05
 
 @dataclass(frozen=True)
 class LabelRequest:
-    """What the label of one episode is made from, apart from the solution."""
+    """The frames of one episode and the job that its label needs."""
 
     episode: int
     """Number of the episode in its session."""
@@ -50,7 +50,7 @@ class LabelRequest:
 
 @dataclass(frozen=True)
 class Planned:
-    """What is to be known of a request until its press is solved: a session may have more frames than memory."""
+    """A request without its frames, kept until its press is solved: frames of a session may exceed memory."""
 
     episode: int
     """Number of the episode in its session."""
@@ -65,12 +65,12 @@ class Planned:
 
     @classmethod
     def of(cls, request: LabelRequest) -> Self:
-        """Keep of a request what is small."""
+        """Return a request without its frames."""
         return cls(request.episode, request.recording, request.sensor, request.model, request.job)
 
 
 def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> LabelRequest:
-    """Work out what an episode's label needs, from the recorded nominal path and not from the plan alone.
+    """Return the request of an episode, from the recorded nominal path and not from the plan alone.
 
     Args:
         episode: The recording.

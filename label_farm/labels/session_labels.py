@@ -1,4 +1,4 @@
-"""The labels of one session: which are current, which must not be touched, and why some are missing."""
+"""The labels of one session: current, of another model version, or missing with a reason."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class SessionLabels:
         return found
 
     def parents(self, episode: int) -> dict[str, str] | None:
-        """Return what the present label was made from; None if there is no readable label."""
+        """Return the hashes that the present label was made from; None without a readable label."""
         if episode not in self._parents:
             found = self._read_parents(self.path(episode))
             # None is not kept: most episodes of a large session have no label yet.
@@ -76,7 +76,7 @@ class SessionLabels:
         return self._parents[episode]
 
     def forget(self, episode: int) -> None:
-        """Keep no longer in memory what a label was made from."""
+        """Forget what a label was made from, as its file changed."""
         self._parents.pop(episode, None)
 
     def _read_parents(self, path: Path) -> dict[str, str] | None:

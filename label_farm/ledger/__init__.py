@@ -1,1 +1,1 @@
-"""Who works on which job."""
+"""The queue of jobs: who works on which, and until when."""

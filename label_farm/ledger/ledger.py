@@ -1,4 +1,4 @@
-"""The queue: an SQLite ledger (WAL) of who works on which job. The store is the truth; this may be lost."""
+"""The queue of jobs, in SQLite (WAL): who works on which. It may be lost, as the store holds the results."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MAX_TRIES = 3
 
 @dataclass(frozen=True)
 class Lease:
-    """A job that a worker holds for a while."""
+    """A job that a worker holds until its lease ends."""
 
     job: Job
     tries: int
@@ -45,7 +45,7 @@ class Lease:
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """A job that was finished or failed."""
+    """A job that was solved or failed."""
 
     number: int
     """Running number of the change in this ledger."""
@@ -151,7 +151,7 @@ class Ledger:
         return self._db.execute(statement, tuple(values)).fetchall()
 
     def register(self, sensors: Mapping[str, dict[str, Any]]) -> None:
-        """Say of which sensor models are.
+        """Store the sensor that each model is of.
 
         Args:
             sensors: Content hash of a model -> document of its sensor.
@@ -166,7 +166,7 @@ class Ledger:
         return json.loads(row[0]) if row else None
 
     def offered(self) -> list[str]:
-        """Return the registered models that `claim` would find a job of, by the priority of their first."""
+        """Return the models with jobs to claim, by the priority of their first job."""
         now = time.monotonic()
         rows = self._db.execute(
             "SELECT version,"
@@ -178,7 +178,7 @@ class Ledger:
         return [version for _, version in sorted(work, key=lambda entry: (entry[0] is None, entry[0] or 0))]
 
     def enqueue(self, jobs: Iterable[Job], priority: int = 0, run: str = "") -> None:
-        """Ask for jobs whose results are missing; one that is already waiting or worked on stays as it is.
+        """Add jobs to the queue; one that is already waiting or worked on stays as it is.
 
         Args:
             jobs: What to compute. One that the ledger holds for done or failed is computed again.
@@ -319,7 +319,7 @@ class Ledger:
         return bool(self._db.execute("SELECT 1 FROM job WHERE key = ?", (key,)).fetchone())
 
     def held(self, key: str, owner: str) -> Job | None:
-        """Return a job that a worker holds; None if it does not hold it any more."""
+        """Return a job that a worker holds; None if its lease was lost."""
         row = self._db.execute(
             "SELECT document, tries FROM job WHERE key = ? AND state = 1 AND owner = ?", (key, owner)
         ).fetchone()
@@ -331,7 +331,7 @@ class Ledger:
         return sum(self._db.execute(count.format(state), (most,)).fetchone()[0] for state in (WAITING, LEASED))
 
     def withdraw(self, run: str) -> int:
-        """Take back what a run asked for; what nobody else asked for and nobody works on leaves the queue.
+        """Withdraw a run's jobs; those that no other run wants and no worker holds leave the queue.
 
         Returns:
             How many jobs left the queue.
@@ -345,7 +345,7 @@ class Ledger:
         return max(removed, 0)
 
     def prioritize(self, run: str, priority: int) -> None:
-        """Change the priority of what a run asked for; a job has the highest priority that is asked for."""
+        """Change the priority of a run's jobs; a job has the highest priority of its runs."""
         with self._transaction():
             self._db.execute("UPDATE wish SET rank = ? WHERE run = ?", (-priority, run))
             self._rank(self._db.execute("SELECT key FROM wish WHERE run = ?", (run,)).fetchall())

@@ -1,4 +1,4 @@
-"""Who works: workers of a ledger, what they have done, and whether they are still there."""
+"""The workers of a ledger: what they have done, and whether they still answer."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from label_farm.ledger.ledger import Ledger, boot_name, is_dead
 
 @dataclass(frozen=True)
 class WorkerRow:
-    """One worker as the ledger knows it."""
+    """One worker: its counts and its last sign of life."""
 
     owner: str
     """Host and process."""
@@ -40,7 +40,7 @@ class Roster:
         self._ledger = ledger
 
     def enter(self, owner: str, device: str) -> None:
-        """Note that a worker begins."""
+        """Add a worker."""
         now = time.monotonic()
         self._ledger.rows(
             "INSERT OR REPLACE INTO worker (owner, device, began, seen, boot) VALUES (?, ?, ?, ?, ?)",
@@ -55,15 +55,15 @@ class Roster:
         )
 
     def note(self, owner: str, text: str) -> None:
-        """Say why a worker does not work."""
+        """Store why a worker does not work."""
         self._ledger.rows("UPDATE worker SET note = ? WHERE owner = ?", (text, owner))
 
     def leave(self, owner: str) -> None:
-        """Strike a worker off."""
+        """Remove a worker."""
         self._ledger.rows("DELETE FROM worker WHERE owner = ?", (owner,))
 
     def listing(self, forget: float = 600.0) -> list[WorkerRow]:
-        """Return the workers; strike off the dead, those of before a restart and the long silent [s]."""
+        """Return the workers; remove those that ended, are from before a restart, or gave no sign for long [s]."""
         now, boot, found = time.monotonic(), boot_name(), []
         rows = self._ledger.rows(
             "SELECT owner, device, done, failed, busy, began, seen, coalesce(note, ''), boot,"

@@ -1,4 +1,4 @@
-"""The ledger's tables, and the statements that several of its methods share."""
+"""The tables of the ledger, and SQL statements that several methods share."""
 
 from __future__ import annotations
 

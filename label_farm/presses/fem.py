@@ -1,4 +1,4 @@
-"""The FEM skin as the farm's model."""
+"""The finite-element skin model as the farm's solver."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _SPREADS = "tacdata.skin.derivatives"
 
 
 class FemModel:
-    """One skin model, kept by a worker for all jobs of its sensor."""
+    """The skin model of one sensor, kept by a worker for all its jobs."""
 
     def __init__(self, sensor: Sensor) -> None:
         """Mesh the skin, or take its mesh from the cache; costs seconds.
@@ -81,7 +81,7 @@ class FemModel:
         return outcome
 
     def solve_many(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
-        """Solve paths together; each is yielded as soon as its states are near enough to each other.
+        """Solve paths as batches; each is yielded as soon as its states keep the tolerance.
 
         The coarser mesh, which is asked for the error in any case, says first where states are needed: a path that is
         solved again is solved whole, since friction remembers it.

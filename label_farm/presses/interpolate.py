@@ -1,4 +1,4 @@
-"""Between the solved states of a path: values in depth, and how far they can be off."""
+"""Interpolation between the solved states of a path, monotone in depth, with a bound on its error."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Branch:
         return PchipInterpolator(self.depth, self.values, axis=0)(np.clip(depth, 0.0, self.depth[-1]))
 
     def left_out(self) -> np.ndarray:
-        """Return how far each state lies from what `at` says of it without it, shape (k, m).
+        """Return each state's interpolation error if it were left out, shape (k, m).
 
         The first and the deepest state, which have neighbours on one side only, take the larger of the two nearest.
         Of a branch without a state between these, all of the change is in doubt.
@@ -59,7 +59,7 @@ class Branch:
         return np.maximum(worst[after - 1], worst[after])
 
     def bound(self, depth: np.ndarray) -> np.ndarray:
-        """Return how far `at` can be off at depths [mm], shape (n,), as shape (n, m).
+        """Return a bound on the error of `at` at depths [mm], shape (n,), as shape (n, m).
 
         Where a quantity bends one way over an interval and its neighbours, it lies between the chord and the
         nearer of the two neighbouring chords prolonged into the interval; the bound is the distance of `at`

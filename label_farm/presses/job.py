@@ -63,7 +63,7 @@ class Job:
 
     @cached_property
     def batch(self) -> str:
-        """What jobs share that may be solved together: of one model, those with equal indenters (hex)."""
+        """Hash of the indenter (hex): jobs of one model that share it may be solved as one batch."""
         return provenance.content_hash(self.indenter)[:16]
 
     @classmethod

@@ -1,4 +1,4 @@
-"""The skin model as the farm sees it: something built once per process from a sensor, which solves jobs."""
+"""The interface of a solver: built from a sensor once per process, it solves jobs."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _TRIES = 3
 
 
 class ProcessDied(SolveError):
-    """The process that was to build a model was killed: by whom or for what memory ever, not by the sensor's fault."""
+    """The process that builds a model was killed, for example for its memory; the sensor is not to blame."""
 
 
 class Model(Protocol):
-    """What a factory builds. The farm knows of a solver only this: a stand-in is one class with these names.
+    """What the farm asks of a solver; another one is a class with these names.
 
     A model may also have ``batch``, how many jobs it likes at a time (1 without it), and ``solve_many(jobs)``, which
     yields each job with its solution or its SolveError as they are found, whatever became of the others.
@@ -66,12 +66,12 @@ def build(factory: str, sensor: Sensor) -> Model:
 
 
 def batch_size(model: Model) -> int:
-    """Return how many jobs a model likes to be given at a time."""
+    """Return how many jobs a model solves as one batch."""
     return max(1, int(getattr(model, "batch", 1)))
 
 
 def solve_each(model: Model, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
-    """Yield each job with its solution or with why it has none: one bad press does not stop the others.
+    """Yield each job with its solution or its error: one bad press does not stop the others.
 
     Errors of other kinds end it: what the process holds is not trusted any more.
     """
@@ -87,7 +87,7 @@ def solve_each(model: Model, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSol
 
 @dataclass(frozen=True)
 class Version:
-    """What is known of a model before anything is solved."""
+    """A model's version and remarks, known before anything is solved."""
 
     content_hash: str
     """Hash of everything in the model that decides a result."""

@@ -1,4 +1,4 @@
-"""What may be lost between the states of a path, and where states are added so that no more is."""
+"""The interpolation error that a path may have, and where states are added to keep it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LEAST_STEP = 0.02
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a state may lie from what its neighbours say of it, as root mean square over the dented pixels.
+    """Largest interpolation error of a state if left out: root mean square over the pixels in contact.
 
     Not at the worst pixel: where the contact's edge passes, a map goes on by whole elements, and no number of states
     makes that smooth (a sphere of 3 mm radius, 1 mm deep: 8 to 15 states take the root mean square from 2.3 to 1.9 um,
@@ -53,11 +53,11 @@ class Tolerance:
             )
 
     def at(self, depth: np.ndarray) -> np.ndarray:
-        """Return what is allowed at depths [mm], as [mm]."""
+        """Return the allowed error at depths [mm], as [mm]."""
         return np.maximum(self.least, self.share * depth)
 
     def refined(self, depth: np.ndarray, surface: np.ndarray) -> tuple[float, ...]:
-        """Return the path with states added on both sides of each that its neighbours do not foretell.
+        """Return the path with states added on both sides of each whose interpolation error is too large.
 
         Args:
             depth: Depths of the states [mm], shape (k,): rising to the deepest, then falling.
@@ -69,7 +69,7 @@ class Tolerance:
         return (*load, *unload[-2::-1])
 
     def foretold(self, path: tuple[float, ...], depth: np.ndarray, surface: np.ndarray) -> tuple[float, ...]:
-        """Return a path with states added, down and up, where a rougher model's loading asks for them.
+        """Return a path with states added, down and up, where a coarser mesh's loading needs them.
 
         Args:
             path: Depths of the states [mm]: rising from 0 to the deepest, then falling.
@@ -89,7 +89,7 @@ class Tolerance:
         return tuple(result)
 
     def exceeded(self, depth: np.ndarray, surface: np.ndarray) -> float:
-        """Return by which factor the worst state of a path misses the tolerance [1]; at most 1 where all keep it."""
+        """Return the largest error of a state over the tolerance [1]; at most 1 where all keep it."""
         peak = int(np.argmax(depth))
         load = self._missed(depth[: peak + 1], surface[: peak + 1])
         unload = self._missed(depth[peak:][::-1], surface[peak:][::-1])

@@ -1,4 +1,4 @@
-"""The service as seen from another computer: documents over HTTP, errors in the service's own words."""
+"""Requests to a service from another computer, with errors in the service's own words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The service as a worker's desk."""
+"""A service as a worker's desk: jobs come and results go over HTTP."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PATIENCE_SECONDS, AGAIN_SECONDS = 600.0, 2.0
 
 
 class RemoteDesk:
-    """Jobs over HTTP. A line that is cut ends nothing here: claims expire at the service, results are made again."""
+    """Jobs over HTTP. A lost connection ends nothing: leases expire at the service, and jobs are solved again."""
 
     def __init__(self, client: Client, owner: str, device: str = "cpu") -> None:
         """Name the service and the worker."""
@@ -71,7 +71,7 @@ class RemoteDesk:
         self._results[job.key] = solution_file.encode(job, solution)
 
     def finish(self, job: Job, seconds: float) -> None:
-        """Send the result, again and again for a while if the line is cut: it cost a solve. Late ones count as well."""
+        """Send the result, repeatedly for a while if the connection is lost. A late result counts as well."""
         headers = {
             "Content-Type": "application/octet-stream", "X-Owner": self.owner, "X-Seconds": f"{seconds:.6f}"
         }  # fmt: skip

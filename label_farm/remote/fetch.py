@@ -1,4 +1,4 @@
-"""Labels that a service made of a session, brought to the copy of that session on this computer."""
+"""Fetches the labels that a service made of a session to the copy of the session here."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tacdata.replacement import replacement
 
 @dataclass
 class Fetched:
-    """What came of it."""
+    """Episodes fetched, current and failed."""
 
     written: list[int] = field(default_factory=list)
     """Episodes whose label was brought."""
@@ -31,7 +31,7 @@ class Fetched:
 
 
 class Fetch:
-    """One submission's results on their way here. Stopped and started again, it goes on."""
+    """Fetches one submission's results; started again, it goes on."""
 
     def __init__(self, client: Client, number: str, session: Path, redo: bool = False) -> None:
         """Look at the session on this computer.
@@ -53,7 +53,7 @@ class Fetch:
         self.fetched = Fetched()
 
     def bring(self, progress: Callable[[int, int], None] = lambda *_: None) -> None:
-        """Bring what is finished and not here.
+        """Fetch what is finished and not here.
 
         Args:
             progress: Called with how many episodes were looked at, and how many there are.

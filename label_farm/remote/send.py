@@ -1,4 +1,4 @@
-"""A session of this computer brought to a service that cannot see its folder."""
+"""Sends a session to a service that cannot see its folder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PIECE = 8 << 20
 
 @dataclass
 class Sent:
-    """What came of it."""
+    """What was sent."""
 
     files: int = 0
     """Files that were sent."""

@@ -1,1 +1,1 @@
-"""The farm as a service: submissions that outlive it, an HTTP interface, a page."""
+"""The farm over HTTP: submissions that survive a restart, workers of other computers, a page."""

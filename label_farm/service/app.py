@@ -27,7 +27,7 @@ STATUS = {UsageError: 400, FormatError: 422, SolveError: 422}
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; img-src blob:"
 
 
-class Wish(BaseModel):
+class SubmissionRequest(BaseModel):
     """What a person may ask for; as `schemas/submission.schema.json`."""
 
     model_config = ConfigDict(extra="forbid")
@@ -43,7 +43,7 @@ class Wish(BaseModel):
     unload_step: float = Field(0.25, gt=0, le=10)
 
 
-class Priority(BaseModel):
+class PriorityRequest(BaseModel):
     """A new priority."""
 
     model_config = ConfigDict(extra="forbid")
@@ -95,7 +95,7 @@ def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
         return {"submissions": _listing(foreman), **_farm(foreman)}
 
     @api.post("/api/submissions", status_code=201)
-    def submit(wish: Wish) -> dict[str, Any]:
+    def submit(wish: SubmissionRequest) -> dict[str, Any]:
         """Ask for a session's labels."""
         return foreman.submit(Submission(**wish.model_dump())).document
 
@@ -113,7 +113,7 @@ def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
         return foreman.cancel(number).document
 
     @api.post("/api/submissions/{number}/priority")
-    def prioritize(number: str, asked: Priority) -> dict[str, Any]:
+    def prioritize(number: str, asked: PriorityRequest) -> dict[str, Any]:
         """Change a submission's priority."""
         return foreman.prioritize(number, asked.priority).document
 

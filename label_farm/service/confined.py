@@ -1,4 +1,4 @@
-"""Paths that came over the network stay under one folder."""
+"""Keeps paths that came over the network under one folder."""
 
 from __future__ import annotations
 

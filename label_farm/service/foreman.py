@@ -1,4 +1,4 @@
-"""The thread that works off the submissions: plans them, tends the workers, writes labels as presses are solved."""
+"""The thread that processes submissions: plans them, tends the workers, writes labels."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ KEPT_RUNS = 200
 
 
 class Foreman:
-    """Works off submissions until stopped. Every method may be called from any thread."""
+    """Processes submissions until stopped. Every method may be called from any thread."""
 
     def __init__(self, root: Path, store: Store, settings: FarmSettings) -> None:
         """Take up the store and what its last service left open.
@@ -61,7 +61,7 @@ class Foreman:
         self._began = False
 
     def announce(self, address: str) -> None:
-        """Note in the lock where this service answers, for whoever tries to start a second one."""
+        """Write this service's address into the lock, for whoever tries to start a second one."""
         os.ftruncate(self._lock_file, 0)
         os.pwrite(self._lock_file, f"{address} (process {os.getpid()})\n".encode(), 0)
 
@@ -99,7 +99,7 @@ class Foreman:
         return filed
 
     def cancel(self, number: str) -> Submission:
-        """Take a submission back: what it alone wants leaves the queue, what is finished stays.
+        """Cancel a submission: jobs that it alone wants leave the queue, finished labels stay.
 
         Raises:
             UsageError: If there is none of that number, or it is finished.
@@ -145,7 +145,7 @@ class Foreman:
         return self._run(self.submissions.get(number)).session
 
     def results(self, number: str) -> tuple[list[int], list[int]]:
-        """Return the episodes of a submission that have their label, and those of which it is known why not.
+        """Return the episodes of a submission that have a label, and those that failed.
 
         Raises:
             UsageError: If there is none of that number, or it left the session's labels as they were.
@@ -157,7 +157,7 @@ class Foreman:
         return labels.labelled, labels.failed
 
     def finished(self, number: str) -> tuple[list[int], dict[str, str]]:
-        """Return what came of a submission, to be shown: some labelled episodes, the last first, and some failures.
+        """Return some labelled episodes of a submission, the last first, and some failures, to be shown.
 
         Of one that was done before a restart the files are looked at once, and the highest numbers taken for the last.
         """
@@ -198,7 +198,7 @@ class Foreman:
         )
 
     def workers(self) -> list[WorkerRow]:
-        """Return who works."""
+        """Return the workers."""
         with Ledger(self.store.ledger_path) as ledger:
             return Roster(ledger).listing()
 
@@ -256,7 +256,7 @@ class Foreman:
 
     @property
     def paused(self) -> str:
-        """Why nothing goes on, in words; "" if it does."""
+        """Why the farm is paused, in words; "" if it is not."""
         return "; ".join(filter(None, dict.fromkeys(self._pauses.values())))
 
     def _pause(self, what: str, why: str) -> None:

@@ -1,4 +1,4 @@
-"""What stands before every request: a token or the loopback, and a limit on sizes."""
+"""Checks every request: a token or the loopback, and a limit on sizes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The part of the interface that takes recordings in: a session of another computer, a piece of a file at a time."""
+"""Routes that receive recordings of another computer, a piece of a file at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The part of the interface that hands out what came of a submission: labels, pictures of them, failures."""
+"""Routes that hand out a submission's labels, their pictures, and failures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One submission being worked off: planned in a thread of its own, settled change by change, told to its dataset."""
+"""One submission in progress: planned in a thread of its own, then settled job by job."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_ATTEMPTS = 20
 
 
 class Run:
-    """The working off of one submission. Planned again after a restart: what is finished is found, not made anew."""
+    """One submission in progress. After a restart it is planned again and finds what is finished."""
 
     def __init__(
         self, submission: Submission, root: Path, store: Store, settings: FarmSettings, versions: dict[str, Version]
@@ -58,7 +58,7 @@ class Run:
 
     @property
     def labelled(self) -> list[int]:
-        """Episodes whose label lies there."""
+        """Episodes that have a label."""
         return sorted(self._labelled)
 
     def is_labelled(self, episode: int) -> bool:
@@ -78,7 +78,7 @@ class Run:
             confined(self._root, wish.dataset, "dataset")
 
     def plan(self) -> None:
-        """Read the recordings, write what can be written, ask for the rest; what stands against it becomes words."""
+        """Read the recordings, write what can be written, enqueue the rest; errors become words of its state."""
         self.attempts += 1
         try:
             self._plan()
@@ -139,7 +139,7 @@ class Run:
                 self._flow, self.remark = None, f"nothing flows into {self.submission.dataset}: {error}"
 
     def settle(self, ledger: Ledger) -> int:
-        """Take note of what was finished or failed since the last call; return how many presses that were."""
+        """Process jobs that were solved or failed since the last call; return how many."""
         if self.labelling is None:
             return 0
         changes = ledger.changes(self._since)
@@ -162,7 +162,7 @@ class Run:
         return replace(counted, state="done", finished_at=now())
 
     def close(self) -> None:
-        """Take back what is still asked for."""
+        """Withdraw open jobs."""
         if self.labelling is not None:
             self.labelling.close()
         if self._flow is not None:

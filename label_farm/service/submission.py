@@ -1,4 +1,4 @@
-"""What the service was asked for: one file a submission, in the store, so that no kill and no restart loses one."""
+"""Submissions to the service: one file each, in the store, so that no restart loses one."""
 
 from __future__ import annotations
 
@@ -92,14 +92,14 @@ class Submissions:
                 self.damaged.append(f"{path}: {str(error).splitlines()[0]}")
 
     def add(self, wish: Submission) -> Submission:
-        """File a submission under the next number; it is on the disk when this returns."""
+        """Store a submission under the next number; it is on the disk when this returns."""
         taken = [int(p.stem) for p in self.folder.glob("*.json") if re.fullmatch("[0-9]{6}", p.stem)]
         filed = replace(wish, id=f"{max(taken, default=0) + 1:06d}", submitted_at=now())
         self.keep(filed)
         return filed
 
     def keep(self, submission: Submission) -> None:
-        """Write a submission as it is now."""
+        """Write a submission's present state."""
         documents.write(self.folder / f"{submission.id}.json", submission.document, "submission")
         self._all[submission.id] = submission
 

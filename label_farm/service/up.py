@@ -1,4 +1,4 @@
-"""The service as a process: checked settings, one socket, the foreman beside it."""
+"""Starts the service: checked settings, one socket, the foreman's thread."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class UpSettings:
     token: str = ""
     """What every request must carry."""
     workers: int | None = None
-    """Worker processes; None for one a card or core."""
+    """Worker processes; None for one a GPU or core."""
     devices: tuple[str, ...] = ()
     """What they solve on, see `environment.devices`; empty for the processor."""
     dask: str = ""
@@ -65,7 +65,7 @@ def up(asked: UpSettings) -> None:
         foreman.announce(address)
         foreman.start()
         print(f"label farm of {root} at {address}", flush=True)
-        if hint := "" if asked.dask else environment.idle_cards(asked.devices):
+        if hint := "" if asked.dask else environment.idle_gpus(asked.devices):
             print(hint, flush=True)
         print("open it in a browser, or: tacdata farm submit SESSION --url " + address, flush=True)
         config = uvicorn.Config(

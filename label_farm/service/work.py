@@ -1,4 +1,4 @@
-"""The part of the interface that workers on other computers use. Nothing is unpickled: documents and checked arrays."""
+"""Routes for workers on other computers. Nothing is unpickled: documents and checked arrays."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ OWNER = r"[A-Za-z0-9_.-]{1,80}/[0-9]{1,10}"
 MOST_JOBS = 512
 
 
-class Hands(BaseModel):
-    """A worker of another computer."""
+class RemoteWorker(BaseModel):
+    """A worker on another computer."""
 
     model_config = ConfigDict(extra="forbid")
     owner: str = Field(pattern=f"^{OWNER}$")
@@ -30,15 +30,15 @@ class Hands(BaseModel):
     note: str = Field("", max_length=2000)
 
 
-class Claim(Hands):
-    """What it asks for."""
+class ClaimRequest(RemoteWorker):
+    """Its request for jobs."""
 
     version: str = Field(pattern="^[0-9a-f]{64}$")
     count: int = Field(1, ge=1, le=MOST_JOBS)
 
 
-class GivenUp(Hands):
-    """Why a press has no result."""
+class FailedJob(RemoteWorker):
+    """Its report of a job that failed."""
 
     kind: str = Field(pattern="^(solve|crash)$")
     reason: str = Field(min_length=1, max_length=10_000)
@@ -54,7 +54,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
         return Ledger(foreman.store.ledger_path, foreman.lease_seconds)
 
     @api.post("/api/work/enter")
-    def enter(hands: Hands) -> dict[str, Any]:
+    def enter(hands: RemoteWorker) -> dict[str, Any]:
         """Begin; answers how long a claim holds without a sign of life."""
         with opened() as ledger:
             Roster(ledger).enter(remote(hands.owner), hands.device)
@@ -76,7 +76,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
         return document
 
     @api.post("/api/work/claim")
-    def claim(asked: Claim) -> list[dict[str, Any]]:
+    def claim(asked: ClaimRequest) -> list[dict[str, Any]]:
         """Take up to ``count`` jobs that share model and indenter."""
         with opened() as ledger:
             leases = ledger.claim(remote(asked.owner), asked.version, asked.count)
@@ -98,7 +98,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
         return await run_in_threadpool(_take, foreman, key, body, owner, seconds)
 
     @api.post("/api/work/failures/{key}")
-    def give_up(key: str, why: GivenUp) -> dict[str, Any]:
+    def give_up(key: str, why: FailedJob) -> dict[str, Any]:
         """Say why a press has no result."""
         owner = remote(why.owner)
         with opened() as ledger:
@@ -109,7 +109,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
             return {"counted": ledger.fail(key, owner, why.reason, why.seconds)}
 
     @api.post("/api/work/beat")
-    def beat(hands: Hands) -> dict[str, Any]:
+    def beat(hands: RemoteWorker) -> dict[str, Any]:
         """Give a sign of life, by which claims stay valid; with a note, say why the worker does not work."""
         with opened() as ledger:
             ledger.heartbeat(remote(hands.owner))
@@ -118,7 +118,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
         return {}
 
     @api.post("/api/work/leave")
-    def leave(hands: Hands) -> dict[str, Any]:
+    def leave(hands: RemoteWorker) -> dict[str, Any]:
         """Give back what was claimed, without blame, and go."""
         with opened() as ledger:
             ledger.release(remote(hands.owner), blame=False)
@@ -127,7 +127,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
 
 
 def remote(owner: str) -> str:
-    """Return the name under which a worker of elsewhere stands in the ledger: never taken for a process of here."""
+    """Return a remote worker's name in the ledger, which is never that of a local process."""
     return f"remote:{owner}"
 
 

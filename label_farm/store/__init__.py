@@ -1,1 +1,1 @@
-"""Solved paths, filed by content."""
+"""Solved presses, stored by the hash of what decides them."""

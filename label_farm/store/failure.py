@@ -1,4 +1,4 @@
-"""Why a press has no label."""
+"""The reason why a press has no label, and its file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a solution must be before it may enter the store."""
+"""Checks a solution before it enters the store."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.sensor import Sensor
 
 
 def check_solution(job: Job, solution: PathSolution, sensor: Sensor) -> None:
-    """Refuse what must not become a label.
+    """Refuse a solution that is not finite, of another path, or of other shapes than the sensor's.
 
     Raises:
         SolveError: If a value is not finite, a shape is not the sensor's, or the path is not the job's.

@@ -1,4 +1,4 @@
-"""Content-addressed results: a job's key names its file, and a job whose intact file exists is done."""
+"""The store of solved presses: a job's key names its file, and an intact file means that the job is done."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The same jobs on a Dask cluster: ledger and store stay here, solves go to whoever joined the scheduler.
+"""Solves jobs on a Dask cluster; ledger and store stay on this computer.
 
 What Dask lacks for this, being durable, the ledger and the store give: a task that is lost with its worker, or with the
 whole cluster, is a claim that is given back. Dask's own messages are pickled: scheduler and workers belong on a network
@@ -122,7 +122,7 @@ class DaskPool(Engine):
         self._beating.start()
 
     def tend(self, wanted: int, settled: bool = False) -> None:
-        """Take in what is finished and give out more; as `Engine.tend`."""
+        """Collect finished jobs and submit more; as `Engine.tend`."""
         if not wanted and not any(self._given.values()):
             return
         client = self._connected()
@@ -161,7 +161,7 @@ class DaskPool(Engine):
         self._client = self._cluster = None
 
     def close(self) -> None:
-        """Stop and let go of the ledger."""
+        """Stop and close the ledger."""
         self._gone.set()
         self.stop()
         for owner in self._seen:
@@ -339,7 +339,7 @@ def dask_engine(address: str) -> EngineMaker:
 
 
 def join(address: str, processes: int | None, devices: tuple[str, ...]) -> None:
-    """Join a scheduler with worker processes of this computer, one a card or core, until interrupted."""
+    """Join a scheduler with worker processes of this computer, one a GPU or core, until interrupted."""
     environment.end_on_terminate()
     chosen = environment.devices(devices)
     count = processes or (environment.cores() if chosen == ("cpu",) else len(chosen))

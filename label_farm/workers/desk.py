@@ -1,4 +1,4 @@
-"""Where a worker gets its jobs and leaves what came of them: the store and the ledger of this machine, or a service."""
+"""Where a worker gets jobs and leaves results: this machine's store and ledger, or a service."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tacdata.sensor import Sensor
 
 
 class Desk(Protocol):
-    """What a worker needs of whoever gives it jobs."""
+    """The interface of a desk, local or remote."""
 
     def offers(self) -> list[str]:
         """Return the model versions that there is work for, the most urgent first."""
@@ -39,11 +39,11 @@ class Desk(Protocol):
         ...
 
     def finish(self, job: Job, seconds: float) -> None:
-        """Say that a job's result lies there."""
+        """Mark a job done."""
         ...
 
     def fail(self, job: Job, failure: Failure, seconds: float = 0.0) -> None:
-        """Say why a job has no result."""
+        """Mark a job failed, with its reason."""
         ...
 
     def beat(self) -> None:
@@ -51,16 +51,16 @@ class Desk(Protocol):
         ...
 
     def note(self, text: str) -> None:
-        """Say in words why this worker does not work."""
+        """Store in words why this worker does not work."""
         ...
 
     def leave(self) -> None:
-        """Give back what was claimed, without blame, and go."""
+        """Return claimed jobs without counting a try, and leave the roster."""
         ...
 
 
 class LocalDesk:
-    """The store's folder on this machine."""
+    """A desk at the store and ledger of this machine."""
 
     def __init__(
         self, store: Path, owner: str, lease_seconds: float, versions: list[str] | None = None, device: str = "cpu"
@@ -81,7 +81,7 @@ class LocalDesk:
         self._device = device
 
     def enter(self) -> None:
-        """Put the worker on the roster."""
+        """Add the worker to the roster."""
         self._roster.enter(self.owner, self._device)
 
     def offers(self) -> list[str]:
@@ -120,11 +120,11 @@ class LocalDesk:
         self.store.put(job, solution, self.sensor(job.model))
 
     def finish(self, job: Job, seconds: float) -> None:
-        """Say that a job's result lies there."""
+        """Mark a job done."""
         self.ledger.finish(job.key, self.owner, seconds)
 
     def fail(self, job: Job, failure: Failure, seconds: float = 0.0) -> None:
-        """Say why a job has no result."""
+        """Mark a job failed, with its reason."""
         self.store.put_failure(job, failure)
         self.ledger.fail(job.key, self.owner, failure.reason, seconds)
 
@@ -133,11 +133,11 @@ class LocalDesk:
         self.ledger.heartbeat(self.owner)
 
     def note(self, text: str) -> None:
-        """Say in words why this worker does not work."""
+        """Store in words why this worker does not work."""
         self._roster.note(self.owner, text)
 
     def leave(self) -> None:
-        """Give back what was claimed, without blame, and go."""
+        """Return claimed jobs without counting a try, and leave the roster."""
         self.ledger.release(self.owner, blame=False)
         self._roster.leave(self.owner)
         self.ledger.close()

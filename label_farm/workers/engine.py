@@ -1,4 +1,4 @@
-"""What runs jobs: the loop that every engine shares, and what each must do itself."""
+"""The base of what runs jobs: the shared loop, and what each engine must do itself."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Engine(ABC):
             self._ledger.register({version: sensor.document for version, sensor in sensors.items()})
 
     def run(self, keys: set[str], since: int, on_change: Callable[[JobOutcome], None]) -> int:
-        """Work until every key is settled, by these workers or by those of another run on the same store.
+        """Run until every job is solved or failed, by these workers or those of another run.
 
         Args:
             keys: Keys of the jobs, already in the ledger.
@@ -71,7 +71,7 @@ class Engine(ABC):
 
     @abstractmethod
     def tend(self, wanted: int, settled: bool = False) -> None:
-        """See to it that the jobs are worked on, once; called several times a second.
+        """Keep workers busy; called several times a second.
 
         Args:
             wanted: How many jobs wait.
@@ -89,7 +89,7 @@ class Engine(ABC):
         """Stop the workers and give their jobs back to the queue; may be called twice."""
 
     def close(self) -> None:
-        """Stop and let go of the ledger."""
+        """Stop and close the ledger."""
         self.stop()
         self._ledger.close()
 

@@ -56,7 +56,7 @@ class Pool(Engine):
                 ledger offers.
             workers: Number of processes.
             lease_seconds: How long a silent worker keeps its job [s].
-            devices: What the workers solve on, one after the other: "cpu" or cards such as "cuda:0".
+            devices: What the workers solve on, one after the other: "cpu" or GPUs such as "cuda:0".
         """
         super().__init__(store, sensors, lease_seconds)
         self.workers = workers
@@ -71,7 +71,7 @@ class Pool(Engine):
         return [slot.process.pid for slot in self._slots]
 
     def tend(self, wanted: int, settled: bool = False) -> None:
-        """Start workers as far as they are wanted, and replace those that died; as `Engine.tend`."""
+        """Start workers as far as there are jobs, and replace those that died; as `Engine.tend`."""
         if settled:
             self._deaths = 0
         self._replace_dead()

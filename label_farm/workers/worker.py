@@ -1,4 +1,4 @@
-"""One worker: a long-lived process that takes jobs from a desk and leaves results there.
+"""A worker process: takes jobs from a desk, solves them, leaves the results there.
 
 `pool.py` starts it as ``python -m label_farm.workers.worker``. It reads its assignment as one line of JSON from
 standard input,
@@ -41,7 +41,7 @@ NO_ROOM = 16
 
 @dataclass(frozen=True)
 class Assignment:
-    """What a worker is told when it starts."""
+    """The arguments of a worker, sent to its process as one line."""
 
     store: str
     """Folder of the store; its ledger lies in it."""
@@ -163,7 +163,7 @@ class Worker:
 
 
 def beat(desk_of: Callable[[], Desk], lease_seconds: float) -> None:
-    """Give signs of life for ever, over a desk of this thread's own."""
+    """Renew leases for ever, over a desk of this thread's own."""
     desk = desk_of()
     while True:
         time.sleep(lease_seconds / 4)
@@ -193,7 +193,7 @@ def work(worker: Worker, stopped: Callable[[], bool] = lambda: False) -> int:
 
 
 def is_disk(error: Exception) -> bool:
-    """Return whether it is the disk that refuses."""
+    """Return whether an error is the disk's: full or read-only."""
     numbers = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES)
     return getattr(error, "errno", None) in numbers or any(
         words in str(error) for words in ("disk is full", "disk I/O error", "readonly database")

@@ -26,7 +26,7 @@ def run(
         Path | None,
         typer.Option(help="Folder of solved presses, may serve many sessions; else SESSION/labels/store."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one per core or card.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one per core or GPU.")] = None,
     redo: Annotated[
         bool, typer.Option("--redo", help="Replace labels of another model version; retry failed presses.")
     ] = False,
@@ -44,7 +44,7 @@ def run(
         Path | None, typer.Option(help="Dataset that each label flows into as soon as it is finished; made if missing.")
     ] = None,
     device: Annotated[
-        list[str] | None, typer.Option(help="What workers solve on: cpu, cuda for all cards, cuda:0, ...; repeatable.")
+        list[str] | None, typer.Option(help="What workers solve on: cpu, cuda for all GPUs, cuda:0, ...; repeatable.")
     ] = None,
     dask: Annotated[
         str, typer.Option(help="Solve on a Dask cluster: tcp://HOST:PORT of its scheduler, or `here` to start one.")
@@ -54,7 +54,7 @@ def run(
     """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
     from functools import partial
 
-    from label_farm.environment import cores, devices, idle_cards
+    from label_farm.environment import cores, devices, idle_gpus
     from label_farm.labelling import Labelling
     from label_farm.labels.dataset_flow import DatasetFlow
     from label_farm.presses.ladder import Ladder
@@ -83,7 +83,7 @@ def run(
         redo=redo,
         engine=dask_engine(dask) if dask else Pool,
     )
-    if hint := "" if dask else idle_cards(device or ()):
+    if hint := "" if dask else idle_gpus(device or ()):
         print(hint)
     skin = read_sensor(sensor) if sensor else None
     labels = file_names.folder(session)

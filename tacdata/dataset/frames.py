@@ -1,4 +1,4 @@
-"""From an episode and its label to the columns of a dataset."""
+"""Makes the columns of a dataset from an episode and its label."""
 
 from __future__ import annotations
 

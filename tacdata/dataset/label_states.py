@@ -1,4 +1,4 @@
-"""What a dataset says of the labels that flow into it: which episodes are complete, failed, waiting or stale."""
+"""States of a dataset's labels: which episodes are complete, failed, waiting or stale."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FILE = Path("meta/tacdata_labels.json")
 
 @dataclass
 class LabelledSession:
-    """A session that flows into a dataset."""
+    """A session whose labels are appended to a dataset as they are finished."""
 
     name: str
     """Its folder."""
@@ -30,7 +30,7 @@ class LabelledSession:
 
 @dataclass(frozen=True)
 class EpisodeState:
-    """What is known of one episode's label."""
+    """The state of one episode's label."""
 
     recording: str
     """Name of the recording."""
@@ -41,7 +41,7 @@ class EpisodeState:
 
 
 def update(root: Path, session: LabelledSession, models: dict[str, str]) -> None:
-    """Write what is known of a session; other sessions stay as they are. The caller locks the dataset.
+    """Write the states of a session; other sessions stay as they are. The caller locks the dataset.
 
     Args:
         root: Folder of the dataset.

@@ -1,4 +1,4 @@
-"""From recordings and labels to a dataset."""
+"""Packs recordings and labels into a dataset."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tacdata.sensor import Sensor
 
 @dataclass(frozen=True)
 class Packed:
-    """What came of packing."""
+    """The result of packing."""
 
     root: Path
     """The dataset."""

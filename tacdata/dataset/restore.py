@@ -1,4 +1,4 @@
-"""Give an edited dataset its sensors and records back."""
+"""Restores sensors and records of a dataset that lerobot edited."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ CASES = [
     ("priority", f"000001 5 --url {NOWHERE}", "no answer from", 4),
     ("worker", NOWHERE, "no answer from", 4),
     ("worker", "nonsense", "http://HOST:PORT", 2),
-    ("worker", "tcp://127.0.0.1:9 --device gpu", "cuda for all cards", 2),
+    ("worker", "tcp://127.0.0.1:9 --device gpu", "cuda for all GPUs", 2),
     ("dataset", "nothing", "nothing", 2),
     ("up", "--host 0.0.0.0", "without a token", 2),
     ("up", "--root nothing", "no folder nothing", 2),
@@ -64,36 +64,36 @@ def test_every_file_of_the_folder_is_a_verb_with_help(tmp_path, monkeypatch, cap
 
 
 def test_devices_are_those_that_are_there(monkeypatch):
-    monkeypatch.setattr(environment, "_cards", lambda: ["cuda:0", "cuda:1"])
+    monkeypatch.setattr(environment, "_gpus", lambda: ["cuda:0", "cuda:1"])
     assert environment.devices(()) == ("cpu",)
     assert environment.devices(("cuda:1", "cpu")) == ("cuda:1", "cpu")
     assert environment.devices(("cuda",)) == ("cuda:0", "cuda:1")
     with pytest.raises(UsageError, match="has cuda:0, cuda:1"):
         environment.devices(("cuda:2",))
-    monkeypatch.setattr(environment, "_cards", lambda: [])
+    monkeypatch.setattr(environment, "_gpus", lambda: [])
     for name in ("cuda", "cuda:0"):
-        with pytest.raises(UsageError, match="no CUDA card"):
+        with pytest.raises(UsageError, match="no CUDA GPU"):
             environment.devices((name,))
     with pytest.raises(UsageError, match="'gpu0'") as error:
         environment.devices(("gpu0",))
-    assert "cuda for all cards" in error.value.allowed
+    assert "cuda for all GPUs" in error.value.allowed
 
 
 def test_cards_are_counted_by_the_driver_where_nvidia_smi_is_missing(monkeypatch):
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     monkeypatch.setattr(environment, "_listed", lambda: 0)
     monkeypatch.setattr(environment, "_counted", lambda: 3)
-    assert environment._cards() == ["cuda:0", "cuda:1", "cuda:2"]
+    assert environment._gpus() == ["cuda:0", "cuda:1", "cuda:2"]
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,6")
-    assert environment._cards() == ["cuda:0", "cuda:1"]
+    assert environment._gpus() == ["cuda:0", "cuda:1"]
 
 
 def test_cards_that_lie_idle_are_named_unless_a_device_was_chosen(monkeypatch):
-    monkeypatch.setattr(environment, "_cards", lambda: ["cuda:0", "cuda:1"])
-    assert "2 CUDA cards" in environment.idle_cards(()) and "--device cuda" in environment.idle_cards(())
-    assert environment.idle_cards(("cpu",)) == ""
-    monkeypatch.setattr(environment, "_cards", lambda: [])
-    assert environment.idle_cards(()) == ""
+    monkeypatch.setattr(environment, "_gpus", lambda: ["cuda:0", "cuda:1"])
+    assert "2 CUDA GPUs" in environment.idle_gpus(()) and "--device cuda" in environment.idle_gpus(())
+    assert environment.idle_gpus(("cpu",)) == ""
+    monkeypatch.setattr(environment, "_gpus", lambda: [])
+    assert environment.idle_gpus(()) == ""
 
 
 def test_a_worker_sees_its_own_card_alone(monkeypatch):

@@ -1,4 +1,4 @@
-"""From signals to depth maps in millimetres."""
+"""Predicts the depth maps of frames with a network, in millimetres."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A trained network over one unlabelled sequence of readings, frame by frame or whole."""
+"""Predicts depth maps of one unlabelled sequence of readings, frame by frame or whole."""
 
 from __future__ import annotations
 

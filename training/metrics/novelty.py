@@ -56,7 +56,7 @@ class TrainingReadings:
 
     @property
     def document(self) -> dict[str, Any]:
-        """It as plain data (`schemas/seen.schema.json`)."""
+        """These readings as plain data (`schemas/seen.schema.json`)."""
         return {
             "version": schemas.version("seen"), "checkpoint": self.checkpoint, "far": self.far, "share": SHARE,
             "readings": np.round(self.readings, 1).tolist(),
@@ -67,7 +67,7 @@ class TrainingReadings:
 def gathered(
     frames: Frames, learned: np.ndarray, validated: np.ndarray, checkpoint: str, mirror: bool = False
 ) -> TrainingReadings | None:
-    """Return what a network has seen; None where the validation episodes hold too little contact to say what is far.
+    """Choose readings that cover the training data; None if the validation episodes have too little contact.
 
     Args:
         frames: The dataset.
@@ -93,7 +93,7 @@ def write(run: Path, known: TrainingReadings) -> None:
 
 
 def read(run: Path, checkpoint: str) -> TrainingReadings | None:
-    """Return what a run's checkpoint has seen; None if the run does not say it of this checkpoint.
+    """Return the training readings of a run's checkpoint; None if the run has none for it.
 
     Raises:
         FormatError: If the file is damaged.

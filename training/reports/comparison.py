@@ -1,4 +1,4 @@
-"""Several runs side by side: by network and split, over seeds, against the paper's figures."""
+"""Compares several runs: by network and split, over seeds, against the paper's figures."""
 
 from __future__ import annotations
 

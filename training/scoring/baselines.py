@@ -1,4 +1,4 @@
-"""What a score must beat to mean anything: predictors without a network, fitted on the training frames."""
+"""Baselines of the scores: predictors without a network, fitted on the training frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Score a trained network: the paper's table, by indenter, against the prescribed contact, and successes."""
+"""Scores a trained network: the paper's table, by indenter, and against the prescribed contact."""
 
 from __future__ import annotations
 

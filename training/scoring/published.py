@@ -1,4 +1,4 @@
-"""What the paper reports, for standing beside our own figures; nothing is computed from it."""
+"""Figures of the paper, shown beside our own; nothing is computed from them."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ VALIDATION_SHARE = 0.15
 
 @dataclass(frozen=True)
 class Split:
-    """Which episodes a network learns from, is watched on, and is scored on."""
+    """The episodes of training, validation and test."""
 
     name: str
     """File name in training/splits."""

@@ -1,4 +1,4 @@
-"""Where a list of episodes comes from: a session's plan, labels and check, or a dataset's own records."""
+"""Lists the episodes of a session (plan, labels, check) or of a dataset (its records)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A viewer that is fed while it runs: a window, or Rerun's web viewer on the loopback."""
+"""A running Rerun viewer that shows what is logged: a window, or the web viewer on the loopback."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ START = 30.0
 
 @dataclass(frozen=True)
 class FedViewer:
-    """It runs, and what is logged arrives."""
+    """A running viewer."""
 
     process: subprocess.Popen
     address: str
@@ -27,7 +27,7 @@ class FedViewer:
     """Where it listens."""
 
     def connect(self, recording: Any) -> None:
-        """Send it what is logged to a Rerun recording (`rerun.RecordingStream`) from now on."""
+        """Send a Rerun recording (`rerun.RecordingStream`) to the viewer from now on."""
         recording.connect_grpc(self.feed)
 
 

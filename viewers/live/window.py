@@ -1,4 +1,4 @@
-"""A live view of a recording in progress, in a process of its own: what it cannot take in time, it does not get."""
+"""A live view of a recording in progress, in a process of its own. It drops what it cannot show in time."""
 
 from __future__ import annotations
 

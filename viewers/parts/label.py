@@ -1,4 +1,4 @@
-"""What is drawn of a label: of a long one the deepest maps, and the rest of its file is not read."""
+"""The maps of a label that are drawn: of a long one the deepest; the rest of its file is not read."""
 
 from __future__ import annotations
 

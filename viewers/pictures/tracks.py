@@ -1,4 +1,4 @@
-"""A demonstration on one page: each finger's path, how sure it is, and what was felt."""
+"""A demonstration on one page: each finger's path, its uncertainty, and its readings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Readings measured and as a model says them, before and after a revision, as a Rerun file."""
+"""Readings measured and predicted, before and after a revision, as a Rerun file."""
 
 from __future__ import annotations
 
@@ -42,22 +42,22 @@ class Shown(Protocol):
 
     @property
     def before(self) -> np.ndarray:
-        """What the model said, shape (n, channels)."""
+        """Readings predicted by the model before, shape (n, channels)."""
         ...
 
     @property
     def after(self) -> np.ndarray:
-        """What it says now, shape (n, channels)."""
+        """Readings predicted by the revised model, shape (n, channels)."""
         ...
 
     @property
     def channel(self) -> int:
-        """The channel that tells most."""
+        """The channel with the largest change."""
         ...
 
     @property
     def channel_name(self) -> str:
-        """What it is called."""
+        """Its name."""
         ...
 
 
@@ -67,7 +67,7 @@ def write(episodes: Sequence[Shown], path: Path, title: str) -> None:
     Args:
         episodes: What to show.
         path: File to write (.rrd).
-        title: What it is called.
+        title: Its name.
 
     Raises:
         UsageError: If the file exists or does not end in .rrd.

@@ -1,4 +1,4 @@
-"""Opens a Rerun file in a window or in a browser, on this machine only and without telling anybody."""
+"""Opens a Rerun file in a window or a browser, on this machine only and without usage statistics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The newest part of a scene, for a viewer that has been shown the rest."""
+"""The newest part of a scene, for a live viewer that has shown the rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a person asks to see."""
+"""The options of a person who wants to see a path."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def nothing() -> None:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a person asks to see beside the path."""
+    """Options beside the path: labels, predictions, episode."""
 
     labels: Path | None = None
     """Folder of labels."""

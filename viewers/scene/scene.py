@@ -1,4 +1,4 @@
-"""What to show, as plain arrays. Backends draw a `Scene`; nothing here knows how.
+"""A scene: everything that is shown, as plain arrays. Backends decide how it looks.
 
 Lengths are in mm, in the sensor's frame or, for fingers, in that of the demonstration; times in ns on the host's
 clock; a camera's poses are in its own frame.

@@ -1,4 +1,4 @@
-"""What has to be computed of a scene before it can be drawn in three dimensions."""
+"""Normals and axes that backends need to draw a scene in three dimensions."""
 
 from __future__ import annotations
 

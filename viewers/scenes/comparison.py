@@ -1,4 +1,4 @@
-"""Two sides of the same frames beside each other and as difference: labels, networks, or model and measurement."""
+"""The scene of a comparison: two sides of the same frames and their difference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From an episode of a dataset, and a network's prediction for it, to a scene."""
+"""The scene of an episode of a dataset, with a network's prediction."""
 
 from __future__ import annotations
 

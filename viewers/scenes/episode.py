@@ -1,4 +1,4 @@
-"""From a recording, its label and a network's prediction to a scene. What is missing is said, not hidden."""
+"""The scene of a recording, its label and a prediction. What is missing stands in the summary."""
 
 from __future__ import annotations
 

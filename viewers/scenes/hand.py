@@ -1,4 +1,4 @@
-"""From a recorded or worked-up demonstration, or a robot's targets, to a scene: fingers in the world, in mm."""
+"""The scene of a demonstration or of a robot's targets: fingers in the world, in mm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a network's prediction alone to a scene."""
+"""The scene of a prediction alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a discrepancy verdict, and what a revision made of it, to a scene."""
+"""The scene of a discrepancy verdict or of a revision."""
 
 from __future__ import annotations
 

@@ -20,9 +20,9 @@ def run(
     token: Annotated[
         str, typer.Option(envvar="TACDATA_FARM_TOKEN", help="What every request must carry; 16 characters or more.")
     ] = "",
-    workers: Annotated[int | None, typer.Option(min=0, help="Worker processes here; else one a card or core.")] = None,
+    workers: Annotated[int | None, typer.Option(min=0, help="Worker processes here; else one a GPU or core.")] = None,
     device: Annotated[
-        list[str] | None, typer.Option(help="What workers solve on: cpu, cuda for all cards, cuda:0, ...")
+        list[str] | None, typer.Option(help="What workers solve on: cpu, cuda for all GPUs, cuda:0, ...")
     ] = None,
     dask: Annotated[
         str, typer.Option(help="Solve on a Dask cluster: tcp://HOST:PORT of its scheduler, or `here` to start one.")

@@ -17,9 +17,9 @@ def run(
         typer.Argument(envvar="TACDATA_FARM_URL", help="The service, http://HOST:PORT; or a Dask scheduler, tcp://…"),
     ],
     token: service.Token = "",
-    processes: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one a card or core.")] = None,
+    processes: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one a GPU or core.")] = None,
     device: Annotated[
-        list[str] | None, typer.Option(help="What they solve on: cpu, cuda for all cards, cuda:0, ...")
+        list[str] | None, typer.Option(help="What they solve on: cpu, cuda for all GPUs, cuda:0, ...")
     ] = None,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> None:

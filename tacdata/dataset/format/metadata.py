@@ -1,4 +1,4 @@
-"""What LeRobot's own metadata has no place for: sensors, units and where each episode comes from.
+"""Metadata beside LeRobot's own: sensors, units and where each episode comes from.
 
 LeRobot's edit tools drop files and columns that they do not know, so nothing here is trusted by its place:
 the frame columns `tacdata.sensor` and `tacdata.record`, which every edit keeps, say which sensor and record
