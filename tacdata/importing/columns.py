@@ -20,7 +20,8 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
 
     Args:
         table: The file's columns.
-        selector: A name, a number from 0, a range "1-15", a pattern "cap*", or a list of these.
+        selector: A name, a number from 0, a range "1-15", a pattern "cap*", one column of an array "cap[3]", several
+            "cap[0-7]", or a list of these. In a file of one array numbers are its columns.
         where: Names the place in the mapping in errors.
 
     Raises:
@@ -30,6 +31,10 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
         found = [name for entry in selector for name in select(table, entry, where)]
         return list(dict.fromkeys(found))
     names = list(table.columns)
+    if len(names) == 1 and table.inner(names[0]):
+        names = [f"{names[0]}[{k}]" for k in range(table.inner(names[0]))]
+        if isinstance(selector, str) and selector in table.columns:
+            return [selector]
     plain = {name: split_unit(name)[0] for name in names}
     if isinstance(selector, str):
         for known in (names, list(plain.values())):
@@ -37,6 +42,8 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
                 return [names[known.index(selector)]]
         if match := re.fullmatch(r"(\d+)\s*-\s*(\d+)", selector):
             return [name for k in range(int(match[1]), int(match[2]) + 1) for name in select(table, k, where)]
+        if found := _inner(table, selector):
+            return found
         if chosen := [name for name in names if fnmatch.fnmatchcase(name, selector)]:
             return chosen
     elif 0 <= selector < len(names):
@@ -48,11 +55,25 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
     )
 
 
+def _inner(table: SourceTable, selector: str) -> list[str]:
+    """Return the columns of an array that ``name[k]`` or ``name[a-b]`` means; [] if there is no such array."""
+    match = re.fullmatch(r"(.+)\[(\d+)(?:\s*-\s*(\d+))?\]", selector)
+    if not match:
+        return []
+    first, last = int(match[2]), int(match[3] or match[2])
+    return [f"{match[1]}[{k}]" for k in range(first, last + 1)] if first <= last < table.inner(match[1]) else []
+
+
 def single(table: SourceTable, selector: Selector, where: str) -> str:
     """Return the one column that a mapping means; raises FormatError if there are none or several."""
     names = select(table, selector, where)
-    if len(names) != 1 or table.columns[names[0]].ndim != 1:
-        raise FormatError(f"{where}: {selector!r} means {len(names)} columns or a table", "one column", "name one")
+    if len(names) != 1:
+        raise FormatError(f"{where}: {selector!r} means {len(names)} columns", "one column", "name one")
+    if width := table.inner(names[0]):
+        raise FormatError(
+            f"{where}: {selector!r} is an array of {width} columns", "one column",
+            f"name one of them, {names[0]}[0] to {names[0]}[{width - 1}]",
+        )  # fmt: skip
     return names[0]
 
 
@@ -64,7 +85,7 @@ def numbers(table: SourceTable, names: list[str], missing: list[float], where: s
     """
     parts = []
     for name in names:
-        values = table.columns[name]
+        values = table.column(name)
         if values.dtype == object:
             raise FormatError(
                 f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -20,6 +21,7 @@ from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.schedule import ScheduledPress, read_schedule
 from tacdata.importing.streams import ImportedStreams, Stream, read_streams
 from tacdata.importing.trials import windows
+from tacdata.importing.units import factor
 from tacdata.indenters import Indenter, from_document
 from tacdata.plans import Press
 from tacdata.rig import Registration
@@ -33,6 +35,7 @@ SLOWEST = 1e-4
 UNITS = {
     "x": "mm",
     "y": "mm",
+    "z": "mm",
     "yaw": "deg",
     "tilt_x": "deg",
     "tilt_y": "deg",
@@ -57,6 +60,10 @@ def presses_of(
     Raises:
         FormatError: If columns, units or clocks are wrong, or there is neither position nor schedule.
     """
+    known = _known(mapping.get("press", {}), tables, parts, "press")
+    contact = mapping.get("contact", {})
+    resolved = _known({k: v for k, v in contact.items() if k != "known_from"}, tables, parts, "contact")
+    mapping = {**mapping, "press": {**mapping.get("press", {}), **known}, "contact": {**contact, **resolved}}
     streams = read_streams(mapping, tables)
     scheduled = read_schedule(mapping, tables, streams.taxels)
     if streams.position is None and not scheduled:
@@ -77,7 +84,6 @@ def presses_of(
             part = replace(part, position=_commanded(planned, begin, end))
         if part.position is None or not len(part.position.time_ns):
             raise FormatError(f"trial {trial or 'without a name'}: no position in it", "a position", "split otherwise")
-        known = _known(mapping, tables, parts)
         yield _imported(mapping, beside, part, place, planned, known, [*unsaid], {
             **record, "trial": trial.strip(), "time_shift_ns": shift, "notes": list(streams.notes),
         })  # fmt: skip
@@ -207,15 +213,17 @@ def _shifted(streams: ImportedStreams, shift_ns: int) -> ImportedStreams:
     )
 
 
-def _known(mapping: dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str]) -> dict[str, float]:
-    """Return what the mapping states about a trial's press beyond its path."""
+def _known(
+    entries: dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str], section: str
+) -> dict[str, float]:
+    """Return what the mapping states of a trial, each a number: given, from the path, or the median of a column."""
     found = {}
-    for name, entry in mapping.get("press", {}).items():
-        where = f"press: {name}"
+    for name, entry in entries.items():
+        where = f"{section}: {name}"
         if isinstance(entry, int | float):
             found[name] = float(entry)
         elif "part" in entry:
-            found[name] = _part(parts, entry["part"], where)
+            found[name] = _part(parts, entry, where)
         else:
             table = tables.get(entry.get("file", next(iter(tables))))
             if table is None:
@@ -225,12 +233,28 @@ def _known(mapping: dict[str, Any], tables: dict[str, SourceTable], parts: dict[
     return found
 
 
-def _part(parts: dict[str, str], name: str, where: str) -> float:
+def _part(parts: dict[str, str], entry: dict[str, Any], where: str) -> float:
+    name = entry["part"]
     if name not in parts:
         raise FormatError(f"{where}: part {name!r}", ", ".join(parts) or "none: no path has a {part}", "correct part")
-    text = parts[name].replace("p", ".").replace(",", ".")
-    digits = "".join(c for c in text if c.isdigit() or c in ".-")
-    try:
-        return float(digits)
-    except ValueError:
-        raise FormatError(f"{where}: {parts[name]!r} in the path is no number", "a number", "correct part") from None
+    text = parts[name]
+    if pattern := entry.get("pattern"):
+        try:
+            match = re.search(pattern, text)
+        except re.error as error:
+            raise FormatError(f"{where}: pattern {pattern!r}: {error}", "a regular expression", "correct it") from None
+        if match is None or not match.groups():
+            raise FormatError(
+                f"{where}: {pattern!r} finds no number in {text!r}", "a pattern with one group, as in x([-0-9.]+)",
+                "correct pattern",
+            )  # fmt: skip
+        text = match[1]
+    # "1p5" and "1,5" are how file names write 1.5.
+    digits = re.findall(r"[-+]?\d+(?:[.,p]\d+)?", text)
+    if len(digits) != 1:
+        raise FormatError(
+            f"{where}: {text!r} in the path holds {len(digits)} numbers", "one number",
+            "say which by pattern: a regular expression with one group",
+        )  # fmt: skip
+    scale = factor(entry["unit"], UNITS[where.split(": ")[1]], where) if "unit" in entry else 1.0
+    return float(digits[0].replace("p", ".").replace(",", ".")) * scale

@@ -167,6 +167,9 @@ def _file(kind: str, table: SourceTable, roles: dict[str, list[str]]) -> dict[st
         path = path.replace("#", f"{{part{k}}}", 1)
     if "time" not in roles:
         return {"path": path, "time": {"rate": 100.0}}
+    if [table.columns[name].dtype for name in roles["time"]] == [object, object]:
+        # A date and a time of day.
+        return {"path": path, "time": {"column": roles["time"]}}
     unit = plain(table.units.get(roles["time"][0], ""))
     return {"path": path, "time": {"column": roles["time"][0], **({"unit": unit} if unit in SHORT else {})}}
 

@@ -25,20 +25,22 @@ class ScheduledPress:
     depth: float
     """Full depth [mm]."""
     speed: float
-    """Speed down and up [mm/s]."""
+    """Speed down [mm/s]."""
     hold: float
     """Time at full depth [s]."""
     height: float
     """Height above the skin at the start [mm]."""
     x: float
     y: float
+    release_speed: float
+    """Speed up [mm/s]."""
 
     @property
     def knots(self) -> tuple[np.ndarray, np.ndarray]:
         """Times [ns], shape (4,), and positions with -depth as z [mm], shape (4, 3), linear in between."""
-        way = round((self.depth + self.height) / self.speed * 1e9)
+        down, up = (round((self.depth + self.height) / speed * 1e9) for speed in (self.speed, self.release_speed))
         hold = round(self.hold * 1e9)
-        time_ns = self.start_ns + np.array([0, way, way + hold, 2 * way + hold], dtype=np.int64)
+        time_ns = self.start_ns + np.array([0, down, down + hold, down + hold + up], dtype=np.int64)
         z = np.array([self.height, -self.depth, -self.depth, self.height])
         return time_ns, np.stack([np.full(4, self.x), np.full(4, self.y), z], axis=1)
 
@@ -88,7 +90,7 @@ def _listed(entry: dict[str, Any], taxels: Stream) -> list[ScheduledPress]:
     return [
         ScheduledPress(
             zero + round(p["start"] * 1e9), p["depth"], p["speed"], p.get("hold", 0.0), p.get("height", 0.0),
-            p.get("x", 0.0), p.get("y", 0.0),
+            p.get("x", 0.0), p.get("y", 0.0), p.get("release_speed", p["speed"]),
         )
         for p in entry["presses"]
     ]  # fmt: skip
@@ -111,8 +113,11 @@ def _tabled(mapping: dict[str, Any], entry: dict[str, Any], tables: dict[str, So
         name: np.broadcast_to(axis(table, entry.get(name, 0.0), unit, [], f"schedule: {name}"), (table.rows,))
         for name, unit in units.items()
     }
-    if not (np.isfinite(values["speed"]) & (values["speed"] > 0)).all():
+    values["release_speed"] = values["speed"]
+    if "release_speed" in entry:
+        up = axis(table, entry["release_speed"], "mm/s", [], "schedule: release_speed")
+        values["release_speed"] = np.broadcast_to(up, (table.rows,))
+    if not all((np.isfinite(values[name]) & (values[name] > 0)).all() for name in ("speed", "release_speed")):
         raise FormatError("schedule: a speed that is not above 0 mm/s", "above 0 mm/s", "correct the speed")
-    return [
-        ScheduledPress(int(t), *(float(values[name][row]) for name in units)) for row, t in enumerate(start_ns.tolist())
-    ]
+    rows = zip(*(column.tolist() for column in values.values()), strict=True)
+    return [ScheduledPress(int(t), *row) for t, row in zip(start_ns.tolist(), rows, strict=True)]

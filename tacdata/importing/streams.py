@@ -9,7 +9,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, numbers, select, single
-from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.formats.source_format import INNER, SourceTable
 from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import factor, plain, quantity_of, split_unit
 
@@ -132,11 +132,16 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[St
         names = select(table, entry["columns"], "taxels: columns")
     unit = entry.get("unit") or next((table.units[n] for n in names if n in table.units), "") or "as in the source"
     values = numbers(table, names, _missing(mapping, entry), "taxels") * entry.get("scale", 1.0)
-    labels = [n for n in names for _ in range(table.columns[n].shape[1] if table.columns[n].ndim > 1 else 1)]
+    labels = [n for n in names for _ in range(max(table.inner(n), 1))]
     if counted := "counter" in entry:
         name = single(table, entry["counter"], "taxels: counter")
         values = np.concatenate([values, numbers(table, [name], [], "taxels: counter")], axis=1)
-    return _timed(mapping, entry, table, "taxels", values, tuple(split_unit(n)[0] for n in labels), unit), counted
+    return _timed(mapping, entry, table, "taxels", values, tuple(map(_label, labels)), unit), counted
+
+
+def _label(name: str) -> str:
+    """Return a channel's name without its unit; a number in brackets is no unit."""
+    return name if INNER.fullmatch(name) else split_unit(name)[0]
 
 
 def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any]) -> tuple[SourceTable, list[str]]:
@@ -145,10 +150,10 @@ def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any])
     time = single(table, clock["column"], "taxels: time") if "column" in clock else None
     if time is None:
         raise FormatError("taxels: long without a time column", "time: {column: NAME}", "add it to the mapping")
-    channel = table.columns[single(table, entry["long"]["channel"], "taxels: long: channel")]
+    channel = table.column(single(table, entry["long"]["channel"], "taxels: long: channel"))
     value = numbers(table, [single(table, entry["long"]["value"], "taxels: long: value")], [], "taxels: long")[:, 0]
-    moments, row = np.unique(table.columns[time].astype(str) if table.columns[time].dtype == object
-                             else table.columns[time], return_inverse=True)  # fmt: skip
+    clocked = table.column(time)
+    moments, row = np.unique(clocked.astype(str) if clocked.dtype == object else clocked, return_inverse=True)
     known, column = np.unique(channel.astype(str) if channel.dtype == object else channel, return_inverse=True)
     wide = np.full((len(moments), len(known)), np.nan)
     wide[row, column] = value

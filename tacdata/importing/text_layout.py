@@ -65,7 +65,7 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     rows = [split(line, delimiter) for line in lines_of_data]
     width = Counter(len(row) for row in rows[-max(len(rows) // 2, 1) :]).most_common(1)[0][0] if rows else 0
     decimal = options.get("decimal") or _decimal(rows, delimiter)
-    first = next((k for k, row in enumerate(rows) if len(row) == width and _is_data(row, decimal)), None)
+    first = _first_row(rows, width, decimal)
     if first is None:
         raise FormatError(
             f"{origin}: no row of numbers among its first {len(lines)} lines",
@@ -127,9 +127,23 @@ def _decimal(rows: list[list[str]], delimiter: str) -> str:
     return "," if commas > points else "."
 
 
-def _is_data(row: list[str], decimal: str) -> bool:
-    numbers = sum(is_number(field, decimal) and field not in MISSING for field in row)
-    return numbers > 0 and 2 * sum(is_number(field, decimal) for field in row) >= len(row)
+def _first_row(rows: list[list[str]], width: int, decimal: str) -> int | None:
+    """Return the first row of data: the first with numbers wherever most later rows have them.
+
+    So a row may hold more words than numbers, and a header more numbers than words.
+    """
+    wide = [row for row in rows if len(row) == width]
+    tail = wide[len(wide) // 2 :]
+    told = [[is_number(field, decimal) and field not in MISSING for field in row] for row in tail]
+    numeric = [k for k in range(width) if 2 * sum(row[k] for row in told) > len(told)]
+    if not numeric:
+        return None
+    for number, row in enumerate(rows):
+        if len(row) != width or not all(is_number(row[k], decimal) for k in numeric):
+            continue
+        if any(row[k] not in MISSING for k in numeric):
+            return number
+    return None
 
 
 def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[str, str]]:

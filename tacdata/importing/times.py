@@ -43,13 +43,15 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
         if "rate" not in clock:
             raise FormatError(f"{where}: neither column nor rate", "one of them", "say where the times are")
         return _shifted(np.arange(table.rows) / clock["rate"], clock), clock.get("zero", "own")
+    if isinstance(clock["column"], list):
+        table, clock = _joined(table, clock, where)
     name = single(table, clock["column"], f"{where}: column")
     unit = clock.get("unit") or plain(table.units.get(name) or split_unit(name)[1])
-    values = table.columns[name]
+    values = table.column(name)
     if values.dtype == object and (clocked := _times_of_day(values)) is not None:
         return _shifted(clocked, clock), clock.get("zero", "shared")
     if values.dtype == object or unit == "datetime":
-        return _shifted_ns(_datetimes(values, f"{where}: {name}"), clock), "unix"
+        return _shifted_ns(_datetimes(values, clock.get("format"), f"{where}: {name}"), clock), "unix"
     if unit in DAY_ZERO:
         return _of_days(values, unit, clock), clock.get("zero", "unix")
     if unit.lower() in NO_UNIT:
@@ -150,21 +152,93 @@ def _times_of_day(values: np.ndarray) -> np.ndarray | None:
     return seconds + 86_400 * np.cumsum(back)
 
 
-def _datetimes(values: np.ndarray, where: str) -> np.ndarray:
+DATES = (
+    "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%d-%b-%Y",
+    "%d %b %Y", "%b %d %Y", "%b %d, %Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y",
+)  # fmt: skip
+CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%I:%M %p", "%H%M%S", "%H:%M:%S:%f")
+"""Dates and times of day as instruments write them; what they have in common with all rows of a file decides."""
+
+
+def _joined(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[SourceTable, dict[str, Any]]:
+    """Return the table with columns of dates and times of day joined into one."""
+    names = [single(table, column, f"{where}: column") for column in clock["column"]]
+    parts = [_as_texts(table.column(name)) for name in names]
+    whole = [" ".join(row) if all(row) else None for row in zip(*parts, strict=True)]
+    joined = " ".join(names)
+    columns = {**table.columns, joined: np.array(whole, dtype=object)}
+    return SourceTable(table.path, columns, table.units, table.notes), {**clock, "column": joined}
+
+
+def _as_texts(values: np.ndarray) -> list[str]:
+    if values.dtype == object:
+        return ["" if text is None else str(text).strip() for text in values.tolist()]
+    return [f"{value:.15g}" if np.isfinite(value) else "" for value in values.astype(float)]
+
+
+def _datetimes(values: np.ndarray, layout: str | None, where: str) -> np.ndarray:
     if values.dtype != object:
         return values.astype(np.int64)
+    texts = ["" if text is None else str(text).strip() for text in values.tolist()]
+    moments = _iso(texts) if layout is None else None
+    if moments is None:
+        layout = layout or _layout(texts, where)
+        moments = [_parsed(text, layout, f"{where}, row {row + 1}") for row, text in enumerate(texts)]
     result = np.full(len(values), NEVER, dtype=np.int64)
-    for row, text in enumerate(values.tolist()):
-        if text is None:
-            continue
-        try:
-            moment = datetime.fromisoformat(str(text).strip().replace(",", "."))
-        except ValueError:
-            raise FormatError(
-                f"{where}, row {row + 1}: {text!r} is no time",
-                "ISO 8601, for example 2026-01-31 12:00:00.250", "convert the column, or give a rate instead",
-            ) from None  # fmt: skip
-        moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-        since = moment - datetime(1970, 1, 1, tzinfo=UTC)
-        result[row] = (since.days * 86_400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
+    for row, moment in enumerate(moments):
+        if moment is not None:
+            moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+            since = moment - datetime(1970, 1, 1, tzinfo=UTC)
+            result[row] = (since.days * 86_400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
     return result
+
+
+def _iso(texts: list[str]) -> list[datetime | None] | None:
+    """Return moments in ISO 8601; None if one is written otherwise."""
+    try:
+        return [datetime.fromisoformat(text.replace(",", ".")) if text else None for text in texts]
+    except ValueError:
+        return None
+
+
+def _parsed(text: str, layout: str, where: str) -> datetime | None:
+    if not text:
+        return None
+    try:
+        return datetime.strptime(text, layout)
+    except ValueError:
+        raise FormatError(
+            f"{where}: {text!r} is not written as {layout}", "one way of writing dates for all rows",
+            "give format under time in the mapping, as Python's strptime has it, or correct the row",
+        ) from None  # fmt: skip
+
+
+def _layout(texts: list[str], where: str) -> str:
+    """Return the one way of writing dates that fits all texts.
+
+    Raises:
+        FormatError: If none fits, or days and months could change places.
+    """
+    known = [text for text in texts if text]
+    sample = known[:: max(len(known) // 200, 1)] + known[-1:]
+    fitting = []
+    for layout in (f"{date} {clock}" for date in DATES for clock in CLOCKS):
+        try:
+            moments = [datetime.strptime(text.replace("T", " "), layout) for text in sample]
+        except ValueError:
+            continue
+        fitting.append((layout, moments))
+    different = {tuple(moments) for _, moments in fitting}
+    example = known[0] if known else ""
+    if len(different) == 1:
+        return fitting[0][0]
+    if not different:
+        raise FormatError(
+            f"{where}: {example!r} is no time that is known",
+            "ISO 8601 (2026-01-31 12:00:00.250), or any other way of writing dates whose format is given",
+            "give format under time in the mapping, for example '%d.%m.%Y %H:%M:%S.%f'",
+        )
+    raise FormatError(
+        f"{where}: {example!r} can be read as {' or as '.join(sorted(layout for layout, _ in fitting))}",
+        "dates that can be read in one way", "give format under time in the mapping",
+    )  # fmt: skip

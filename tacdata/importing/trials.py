@@ -50,7 +50,7 @@ def split_tables(
 
 
 def _labels(table: SourceTable, column: str | int) -> np.ndarray:
-    values = table.columns[single(table, column, "trials: column")]
+    values = table.column(single(table, column, "trials: column"))
     if values.dtype == object:
         return np.array(["" if value is None else str(value) for value in values.tolist()], dtype=object)
     return np.array([f"{value:g}" if np.isfinite(value) else "" for value in values.astype(float)], dtype=object)

@@ -451,3 +451,181 @@ def test_one_damaged_file_of_a_series_leaves_the_good_ones_in(tmp_path):
     made, episodes = imported(tmp_path, path)
     assert len(episodes) == 2
     assert "run1.npz" in " ".join(made.refused)
+
+
+def array_mapping(tmp_path, path, **changes):
+    changes = {"taxels": {"file": "data", "columns": "cap[0-4]", "unit": "pF"}, "measured": None, **changes}
+    position = changes.pop("position", {"file": "data", "depth": {"column": "stage[1]", "unit": "mm"}})
+    files = changes.pop("files", {"data": {"path": path, "time": {"column": "stage[0]", "unit": "s"}}})
+    return mapping(tmp_path, files=files, position=position, **changes)
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat", "npy"])
+def test_columns_inside_arrays_are_named_by_their_numbers(tmp_path, kind):
+    from scipy.io import savemat
+
+    time, depth, _, signals = press_data()
+    stage = np.stack([time, depth], axis=1)
+    if kind == "npz":
+        np.savez(tmp_path / "a.npz", stage=stage, cap=signals)
+    elif kind == "mat":
+        savemat(tmp_path / "a.mat", {"stage": stage, "cap": signals})
+    else:
+        np.save(tmp_path / "a.npy", np.concatenate([stage, signals], axis=1))
+    if kind == "npy":
+        path = array_mapping(
+            tmp_path, "a.npy", taxels={"file": "data", "columns": "2-6", "unit": "pF"},
+            files={"data": {"path": "a.npy", "time": {"column": 0, "unit": "s"}}},
+            position={"file": "data", "depth": {"column": "array[1]", "unit": "mm"}},
+        )  # fmt: skip
+    else:
+        path = array_mapping(tmp_path, f"a.{kind}")
+    _, (episode,) = imported(tmp_path, path)
+    np.testing.assert_allclose(episode.taxels.counts, signals, atol=1e-9)
+    assert episode.press.depth == pytest.approx(depth.max(), abs=1e-3)
+
+
+def test_an_array_where_one_column_is_meant_is_refused_with_its_columns(tmp_path):
+    time, depth, _, signals = press_data()
+    np.savez(tmp_path / "a.npz", stage=np.stack([time, depth], axis=1), cap=signals)
+    for column, words in (("stage", r"stage\[0\] to stage\[1\]"), ("stage[2]", "is not in a.npz")):
+        with pytest.raises(FormatError, match=words):
+            imported(tmp_path, array_mapping(tmp_path, "a.npz", position={"file": "data", "depth": {"column": column}}))
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_trials_along_an_axis_of_an_array_become_recordings(tmp_path, axis):
+    runs = [press_data(seed) for seed in range(3)]
+    time = runs[0][0]
+    depth = np.stack([run[1] for run in runs])  # one value a trial and row
+    signals = np.stack([run[3] for run in runs])
+    np.savez(tmp_path / "a.npz", t=time, disp=depth, cap=np.moveaxis(signals, 0, axis))
+    path = array_mapping(
+        tmp_path, "a.npz", taxels={"file": "data", "columns": "cap", "unit": "pF"}, trials={"column": "trial"},
+        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
+        files={"data": {"path": "a.npz", "trial_axis": axis, "time": {"column": "t", "unit": "s"}}},
+    )  # fmt: skip
+    made, episodes = imported(tmp_path, path)
+    assert made.recordings == 3
+    for episode, run in zip(episodes, runs, strict=True):
+        np.testing.assert_allclose(episode.taxels.counts, run[3], atol=1e-9)
+
+
+def test_rows_with_more_words_than_numbers_are_data(tmp_path):
+    time, depth, _, signals = press_data(channels=1)
+    lines = ["t,disp,lab,person,skin,batch,remark,cap0"]
+    rows = zip(time, depth, signals[:, 0], strict=True)
+    lines += [f"{a:.3f},{b:.4f},north,Ada,blue,B7,fine,{c:.4f}" for a, b, c in rows]
+    (tmp_path / "wide.csv").write_text("\n".join(lines) + "\n")
+    clock = {"column": "t", "unit": "s"}
+    path = mapping(
+        tmp_path, files={"data": {"path": "wide.csv", "time": clock}}, measured=None,
+        taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
+        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
+    )  # fmt: skip
+    _, (episode,) = imported(tmp_path, path)
+    assert len(episode.taxels.counts) == len(time)
+
+
+def test_an_excel_sheet_is_read_like_a_text_file(tmp_path):
+    from datetime import timedelta
+
+    from openpyxl import Workbook
+
+    time, depth, force, signals = press_data()
+    book = Workbook()
+    book.active.title = "cover"
+    book.active.append(["made by hand"])
+    sheet = book.create_sheet("run 1")
+    sheet.append(["when", "disp [um]", "Fz (N)", *(f"cap{k} (pF)" for k in range(5))])
+    begin = datetime(2026, 1, 31, 12)
+    for t, d, f, row in zip(time, depth, force, signals, strict=True):
+        sheet.append([begin + timedelta(seconds=float(t)), 1000 * d, f, *map(float, row)])
+    book.create_sheet("notes").append(["none"])
+    book.save(tmp_path / "wide.xlsx")
+    path = mapping(tmp_path, files={"data": {"path": "wide.xlsx", "time": {"column": "when"}}})
+    _, (episode,) = imported(tmp_path, path)
+    np.testing.assert_allclose(episode.taxels.counts, signals, atol=1e-9)
+    np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 20_000_000, atol=1e6)
+    assert episode.press.depth == pytest.approx(depth.max(), abs=1e-3)
+    assert episode.measured[0].unit == "N"
+    with pytest.raises(FormatError, match="no sheet run 2"):
+        imported(tmp_path, mapping(tmp_path, files={"data": {"path": "wide.xlsx", "table": "run 2"}}), "again")
+
+
+@pytest.mark.parametrize(
+    ("layout", "columns"),
+    [
+        ("%d.%m.%Y;%H:%M:%S.%f", 2), ("%m/%d/%Y;%I:%M:%S.%f %p", 2), ("%Y%m%d;%H:%M:%S.%f", 2),
+        ("%d-%b-%Y %H:%M:%S.%f", 1),
+    ],
+)
+def test_dates_in_two_columns_and_of_any_land_are_read(tmp_path, layout, columns):
+    from datetime import timedelta
+
+    time, depth, _, signals = press_data(channels=1)
+    begin = datetime(2026, 1, 31, 12, 59, 58)
+    stamps = [(begin + timedelta(seconds=float(t))).strftime(layout) for t in time]
+    names = "day;clock" if columns == 2 else "when"
+    rows = zip(stamps, depth, signals[:, 0], strict=True)
+    lines = [f"{names};disp;cap0", *(f"{s};{d:.4f};{c:.4f}" for s, d, c in rows)]
+    (tmp_path / "wide.csv").write_text("\n".join(lines) + "\n")
+    column = ["day", "clock"] if columns == 2 else "when"
+    path = mapping(
+        tmp_path, files={"data": {"path": "wide.csv", "time": {"column": column}}}, measured=None,
+        taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
+        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
+    )  # fmt: skip
+    _, (episode,) = imported(tmp_path, path)
+    first = begin.replace(tzinfo=UTC).timestamp()
+    assert episode.taxels.sample_ns[0] * 1e-9 == pytest.approx(first, abs=1e-3)
+    np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 20_000_000, atol=2000)
+
+
+def test_days_and_months_that_could_change_places_are_asked_for(tmp_path):
+    rows = [f"03/04/2026 12:00:{k / 20:09.6f},{0.01 * k:.3f},{20 + 0.02 * k:.4f}" for k in range(120)]
+    (tmp_path / "wide.csv").write_text("\n".join(["t,disp [mm],cap0 (pF)", *rows]) + "\n")
+    changes = {"taxels": {"file": "data", "columns": ["cap0"], "unit": "pF"}, "measured": None}
+    said = refused(tmp_path, **changes)
+    assert "%d/%m/%Y" in said and "%m/%d/%Y" in said and "give format" in said
+    clock = {"column": "t", "format": "%d/%m/%Y %H:%M:%S.%f"}
+    path = mapping(tmp_path, files={"data": {"path": "wide.csv", "time": clock}}, **changes)
+    _, (episode,) = imported(tmp_path, path)
+    assert datetime.fromtimestamp(episode.taxels.sample_ns[0] * 1e-9, UTC).month == 4
+
+
+def test_place_and_height_of_contact_of_each_press_come_from_paths_and_columns(tmp_path):
+    time, depth, _, signals = press_data(channels=1)
+    for name, height in (("site_x1p5_y-2", 10.0), ("site_x-3_y0.5", 12.5)):
+        lines = ["t,z,touch,cap0"]
+        rows = zip(time, depth, signals[:, 0], strict=True)
+        lines += [f"{a:.3f},{height - b:.4f},{height},{c:.4f}" for a, b, c in rows]
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    path = mapping(
+        tmp_path, files={"data": {"path": "site_{place}.csv", "time": {"column": "t", "unit": "s"}}}, measured=None,
+        taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
+        position={"file": "data", "z": {"column": "z", "unit": "mm"}},
+        contact={"x": 0.0, "y": 0.0, "z": {"column": "touch", "file": "data"}, "known_from": "first reading"},
+        press={"x": {"part": "place", "pattern": "x([-0-9p.]+)"}, "y": {"part": "place", "pattern": "y([-0-9p.]+)"}},
+    )  # fmt: skip
+    _, episodes = imported(tmp_path, path)
+    assert sorted((e.press.x, e.press.y) for e in episodes) == [(-3.0, 0.5), (1.5, -2.0)]
+    assert [e.press.depth for e in episodes] == pytest.approx([depth.max()] * 2, abs=1e-3)
+    changes = {"press": {"x": {"part": "place"}}}
+    document = yaml.safe_load(path.read_text()) | changes
+    path.write_text(yaml.safe_dump(document))
+    with pytest.raises(FormatError, match="holds 2 numbers"):
+        imported(tmp_path, path, "again")
+
+
+def test_a_schedule_may_go_up_at_another_speed(tmp_path):
+    rows = [f"{0.02 * k:.3f},{20 + 0.01 * k:.4f}" for k in range(400)]
+    (tmp_path / "wide.csv").write_text("\n".join(["t,cap0", *rows]) + "\n")
+    press = {"start": 1.0, "depth": 1.0, "speed": 0.5, "release_speed": 2.0, "hold": 1.0}
+    path = mapping(
+        tmp_path, files={"data": {"path": "wide.csv", "time": {"column": "t", "unit": "s"}}}, measured=None,
+        taxels={"file": "data", "columns": ["cap0"], "unit": "pF"}, position=None, schedule={"presses": [press]},
+    )  # fmt: skip
+    _, (episode,) = imported(tmp_path, path)
+    spans = {phase.name: (phase.end_ns - phase.start_ns) * 1e-9 for phase in episode.phases}
+    assert spans["press"] == pytest.approx(2.0) and spans["release"] == pytest.approx(0.5)

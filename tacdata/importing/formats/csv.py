@@ -25,17 +25,32 @@ class Csv(SourceFormat):
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the file by Arrow's reader, with the layout of `text_layout`; see the base class."""
         data, notes = _decoded(path, options)
-        layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
-        own = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
-        body, comments = _body(data, layout, own)
-        if comments:
-            notes.append(f"{path.name}: {comments} comment lines among the rows are left out")
-        if not body.strip():
-            raise FormatError(f"{path} has a header and no row", "one row of data or more", "leave it out")
-        columns, skipped = _parsed(body, layout, [*MISSING, *own], path)
-        if skipped:
-            notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
-        return SourceTable(path, columns, dict(layout.units), tuple(notes))
+        return table_of(path, data, options, notes)
+
+
+def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str]) -> SourceTable:
+    """Return text in UTF-8 as a table.
+
+    Args:
+        path: Where it comes from, for messages.
+        data: The text.
+        options: What the mapping says of it; see `SourceFormat.read`.
+        notes: What is known already; notes on the rows are added.
+
+    Raises:
+        FormatError: If it has no rows of numbers.
+    """
+    layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
+    own = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
+    body, comments = _body(data, layout, own)
+    if comments:
+        notes.append(f"{path.name}: {comments} comment lines among the rows are left out")
+    if not body.strip():
+        raise FormatError(f"{path} has a header and no row", "one row of data or more", "leave it out")
+    columns, skipped = _parsed(body, layout, [*MISSING, *own], path)
+    if skipped:
+        notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
+    return SourceTable(path, columns, dict(layout.units), tuple(notes))
 
 
 def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:

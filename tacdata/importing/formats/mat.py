@@ -34,6 +34,12 @@ class Mat(SourceFormat):
                 "in MATLAB: save('new.mat', ..., '-v7')",
             ) from None
         variables = {name: value for name, value in loaded.items() if not name.startswith("__")}
+        if any(type(value).__name__ == "MatlabOpaque" for value in loaded.values()) and not _readable(variables):
+            raise FormatError(
+                f"{path} holds an object of MATLAB (a table, timetable, datetime or string), which only MATLAB reads",
+                "numbers, texts and structures",
+                "in MATLAB: writetable(t, 'name.csv'), or s = table2struct(t, 'ToScalar', true); save('name.mat', 's')",
+            )
         if wanted := options.get("table"):
             if wanted not in variables:
                 raise FormatError(f"{path}: no variable {wanted}", ", ".join(variables), "correct table in the mapping")
@@ -41,7 +47,12 @@ class Mat(SourceFormat):
         arrays: dict[str, np.ndarray] = {}
         for name, value in variables.items():
             arrays |= _flatten(name if len(variables) > 1 else "", value)
-        return rows_of(path, arrays)
+        return rows_of(path, arrays, options)
+
+
+def _readable(variables: dict[str, Any]) -> bool:
+    """Return whether any variable holds numbers or texts."""
+    return any(_flatten(name, value) for name, value in variables.items())
 
 
 def _flatten(name: str, value: Any) -> dict[str, np.ndarray]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
 
@@ -21,12 +22,21 @@ class Npz(SourceFormat):
         with path.open("rb") as stream:
             loaded = np.load(stream, allow_pickle=False)
             if isinstance(loaded, np.ndarray):
-                return rows_of(path, {"array": loaded})
-            return rows_of(path, {name: loaded[name] for name in loaded.files})
+                return rows_of(path, {"array": loaded}, options)
+            return rows_of(path, {name: loaded[name] for name in loaded.files}, options)
 
 
-def rows_of(path: Path, arrays: dict[str, np.ndarray]) -> SourceTable:
-    """Return the arrays that share one number of rows as a table: structured ones by field, others whole."""
+def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) -> SourceTable:
+    """Return the arrays that share one number of rows as a table: structured ones by field, others whole.
+
+    With ``trial_axis`` in the options, trials lie along that axis of arrays of three axes. They are put below each
+    other, with a column ``trial`` that counts them from 0.
+
+    Raises:
+        FormatError: If no array has that axis.
+    """
+    if (axis := options.get("trial_axis")) is not None:
+        arrays = _below_each_other(path, arrays, axis)
     flat: dict[str, np.ndarray] = {}
     for name, array in arrays.items():
         if array.dtype.names:
@@ -42,6 +52,33 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray]) -> SourceTable:
     dropped = [f"{name} ({len(values)} rows)" for name, values in columns.items() if name not in kept]
     note = (f"{path.name}: not of {rows} rows, left out: {', '.join(dropped)}",) if dropped else ()
     return SourceTable(path, kept, notes=note)
+
+
+def _below_each_other(path: Path, arrays: dict[str, np.ndarray], axis: int) -> dict[str, np.ndarray]:
+    """Return arrays with the trials of one axis as rows.
+
+    Arrays of two axes hold one value a row and trial; those of one axis a value a row, or a value a trial.
+    """
+    blocks = {name: np.moveaxis(array, axis, 0) for name, array in arrays.items() if array.ndim == 3}
+    if not blocks:
+        shapes = ", ".join(f"{name} {'x'.join(map(str, array.shape))}" for name, array in arrays.items())
+        raise FormatError(
+            f"{path}: trial_axis {axis}, but no array has three axes ({shapes})",
+            "an array with one axis for trials, one for rows and one for channels", "leave trial_axis out",
+        )  # fmt: skip
+    trials, rows = max(blocks.values(), key=np.size).shape[:2]
+    whole = {name: block for name, block in blocks.items() if block.shape[:2] == (trials, rows)}
+    made: dict[str, np.ndarray] = {name: block.reshape(trials * rows, -1) for name, block in whole.items()}
+    for name, array in ((name, np.squeeze(array)) for name, array in arrays.items() if name not in blocks):
+        if array.shape == (trials, rows):
+            made[name] = array.ravel()
+        elif array.shape == (rows, trials):
+            made[name] = array.T.ravel()
+        elif array.shape == (rows,):
+            made[name] = np.tile(array, trials)
+        elif array.shape == (trials,):
+            made[name] = np.repeat(array, rows)
+    return {**made, "trial": np.repeat(np.arange(trials), rows)}
 
 
 def _column(array: np.ndarray) -> np.ndarray:

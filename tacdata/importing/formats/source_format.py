@@ -6,6 +6,7 @@ reads a file into a `SourceTable`: named columns as they stand in the file, noth
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +17,8 @@ import numpy as np
 from tacdata import registry
 from tacdata.errors import FormatError, TacdataError, UsageError
 
+INNER = re.compile(r"(.+)\[(\d+)\]")
+"""How one column of a table is named: the table's name and a number from 0, as in ``cap[3]``."""
 ROOM, BASE = "tacdata.importing.formats", "source_format"
 
 
@@ -30,6 +33,20 @@ class SourceTable:
     """Name -> unit, where the file gives one."""
     notes: tuple[str, ...] = ()
     """Remarks on the reading, as sentences."""
+
+    def column(self, name: str) -> np.ndarray:
+        """Return a column's values, or one column of a table in it, named ``name[k]`` (from 0).
+
+        Shape (rows,), or (rows, k) for a table.
+        """
+        if name not in self.columns and (inner := INNER.fullmatch(name)):
+            return self.columns[inner[1]][:, int(inner[2])]
+        return self.columns[name]
+
+    def inner(self, name: str) -> int:
+        """Return how many columns a column holds: 0 for plain values, k for a table."""
+        values = self.columns.get(name)
+        return 0 if values is None or values.ndim < 2 else values.shape[1]
 
     @property
     def rows(self) -> int:
