@@ -1,4 +1,4 @@
-"""Warp, started without its word that there is no card: that is no news to whoever works on a CPU."""
+"""Starts Warp without its banner and without its warning that there is no GPU."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ import tempfile
 
 import warp as wp  # noqa: TID253 - imported by modules of kernels alone
 
-NO_CARD = b"Could not find or load the NVIDIA CUDA driver"
-"""Said by Warp's native library, past Python, at every start on a machine without a card."""
+NO_GPU = b"Could not find or load the NVIDIA CUDA driver"
+"""Printed by Warp's native library, past Python, at every start on a machine without a GPU."""
 
 
 def start() -> None:
-    """Start Warp; whatever else its native library says is passed on."""
+    """Start Warp; all other output of its native library is passed on."""
     wp.config.log_level = wp.LOG_ERROR
     if sys.stderr is None:  # a service without one
         wp.init()
         return
     sys.stderr.flush()
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as printed:
         kept = os.dup(2)
-        os.dup2(said.fileno(), 2)
+        os.dup2(printed.fileno(), 2)
         try:
             wp.init()
         finally:
             os.dup2(kept, 2)
             os.close(kept)
-            said.seek(0)
-            lines = [line for line in said.read().splitlines(keepends=True) if NO_CARD not in line]
+            printed.seek(0)
+            lines = [line for line in printed.read().splitlines(keepends=True) if NO_GPU not in line]
             os.write(2, b"".join(lines))
 
 
