@@ -27,7 +27,13 @@ def canonical(document: Any) -> str:
 
 
 def content_hash(document: Any) -> str:
-    """Return the SHA-256 of a document's canonical JSON (hex, 64 characters)."""
+    """Return the SHA-256 of a document's canonical JSON (hex, 64 characters).
+
+    Example:
+        >>> from tacdata.provenance import content_hash
+        >>> content_hash({"depth": 0.5, "speed": 1.0}) == content_hash({"speed": 1.0, "depth": 0.5})
+        True
+    """
     return hashlib.sha256(canonical(document).encode()).hexdigest()
 
 

@@ -59,6 +59,20 @@ def pack(
     Raises:
         UsageError: If ``out`` exists (without ``append``), or no episode can be packed.
         FormatError: If a label is of another recording, sensor or skin model.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.dataset import pack
+        >>> from tacdata.labels import read_label
+        >>> from tacdata.recording import read_episode, read_session
+        >>> labels = Path("session/labels")
+        >>> packed = pack(
+        ...     [read_episode(path) for path in read_session(Path("session")).episodes],
+        ...     lambda episode: read_label(labels / f"episode-{episode.number:06d}.parquet"),
+        ...     Path("my dataset"),
+        ... )
+        >>> packed.episodes
+        2
     """
     refuse_existing(out, append)
     writer: DatasetWriter | None = None

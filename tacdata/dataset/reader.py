@@ -116,6 +116,17 @@ def read_dataset(root: Path, cache_folder: Path | None = None) -> Dataset:
 
     Warns:
         LostProvenanceWarning: If an edit dropped what can be missed or found again.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.dataset import read_dataset
+        >>> dataset = read_dataset(Path("dataset"), Path("cache"))
+        >>> len(dataset.episodes), dataset.fps
+        (2, 30)
+        >>> dataset["observation.state"].shape  # frames, taxels
+        (340, 24)
+        >>> dataset.units["observation.state"]
+        'counts'
     """
     root = Path(root)
     info = folder.read_info(root)

@@ -31,6 +31,14 @@ class WindowDataset(torch.utils.data.Dataset):
     Beyond an episode's ends its first or last frame is repeated, and ``KEY_is_pad`` says so. ``dataset[i]``
     is one frame; ``dataset[[i, j, ...]]`` and `batch` are a batch, so that a DataLoader with
     ``batch_size=None`` and a BatchSampler reads whole batches at once.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.dataset import read_dataset
+        >>> from tacdata.dataset.windows import WindowDataset
+        >>> windows = WindowDataset(read_dataset(Path("dataset"), Path("cache")))
+        >>> windows[50]["observation.state"].shape  # nine frames around frame 50, taxels
+        torch.Size([9, 24])
     """
 
     def __init__(

@@ -51,7 +51,15 @@ class PathSolution:
 
 @dataclass(frozen=True)
 class Label:
-    """The depth maps of one episode, one per taxel frame."""
+    """The depth maps of one episode, one per taxel frame.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.labels import read_label
+        >>> label = read_label(Path("session/labels/episode-000000.parquet"))
+        >>> bool(label.depth.min() >= 0), label.time_ns.dtype
+        (True, dtype('int64'))
+    """
 
     episode: int
     """Number of the episode in its session."""

@@ -67,6 +67,15 @@ def read(path: Path) -> Label:
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged, no label file, or of another major format version.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.labels import read_label
+        >>> label = read_label(Path("session/labels/episode-000000.parquet"))
+        >>> label.signed.shape  # frames and pixels
+        (170, 35, 26)
+        >>> round(float(label.signed.max()), 1)  # deepest pixel, mm
+        0.8
     """
     file = _open(path)
     header, arrays = _arrays(file, path, file.schema_arrow.names)
