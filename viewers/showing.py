@@ -70,6 +70,13 @@ def show(scene: Scene, output: Output) -> None:
 
     Raises:
         UsageError: If a file exists, or the viewer breaks down.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from viewers.showing import Output, show
+        >>> from viewers.source import scene_at
+        >>> show(scene_at(Path("session/episode-000000.mcap")), Output(picture=Path("press.png")))
+        saved press.png
     """
     if output.save is not None:
         write_rerun(scene, output.save)

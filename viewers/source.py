@@ -29,5 +29,12 @@ def scene_at(
     Raises:
         UsageError: If there is nothing to view, or a named folder holds nothing.
         FormatError: If a file is damaged or of another sensor.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from viewers.source import scene_at
+        >>> scene = scene_at(Path("session/episode-000000.mcap"))
+        >>> [phase.name for phase in scene.phases][:3]
+        ['rest', 'approach', 'press']
     """
     return kind_of(path).scene(path, Asked(labels, predictions, episode, meanwhile))

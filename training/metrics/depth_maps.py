@@ -69,6 +69,15 @@ def score_frames(prediction: np.ndarray, label: np.ndarray, threshold: float = C
         prediction: Predicted depth.
         label: Labelled depth.
         threshold: Depth above which a pixel is in contact [mm].
+
+    Example:
+        >>> import numpy as np
+        >>> from training.metrics.depth_maps import score_frames
+        >>> label = np.zeros((1, 35, 26), np.float32)
+        >>> label[0, 15:20, 10:15] = 1.0  # mm
+        >>> scores = score_frames(0.8 * label, label)
+        >>> float(scores.peak_error[0].round(3)), float(scores.iou[0])
+        (0.2, 1.0)
     """
     n, pixels = len(label), int(np.prod(label.shape[1:]))
     p = prediction.reshape(n, pixels).astype(np.float64)

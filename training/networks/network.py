@@ -60,6 +60,14 @@ def create(name: str, sensor: Sensor, arguments: dict[str, Any] | None = None) -
     Raises:
         UsageError: If no such network exists.
         FormatError: If it does not know one of the arguments.
+
+    Example:
+        >>> import torch
+        >>> from tacdata.sensor import default_sensor
+        >>> from training.networks.network import create
+        >>> network = create("paper", default_sensor())
+        >>> network(torch.zeros(2, 9, 24)).shape  # a batch of two windows gives two maps
+        torch.Size([2, 35, 26])
     """
     kind = registry.load(ROOM, BASE, name, Network)
     try:

@@ -115,6 +115,12 @@ def counted(text: str) -> Rate:
 
     Raises:
         UsageError: If it is not of this form, or makes no proportion.
+
+    Example:
+        >>> from training.scoring.success import counted
+        >>> rate = counted("dense=35/40")
+        >>> [round(bound, 3) for bound in rate.interval]  # Wilson, 95 %
+        [0.739, 0.945]
     """
     name, _, numbers = text.rpartition("=")
     successes, _, trials = numbers.partition("/")
