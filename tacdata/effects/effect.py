@@ -231,7 +231,15 @@ def load(name: str) -> Effect:
 
 
 def library() -> tuple[Effect, ...]:
-    """Return every modelled effect, by name."""
+    """Return every modelled effect, by name.
+
+    Example:
+        >>> from tacdata.effects import library, load
+        >>> len(library()) > 40
+        True
+        >>> load("backlash").stage
+        'kinematics'
+    """
     return _library(registry.folders(ROOM))
 
 

@@ -11,7 +11,15 @@ from tacdata.indenters import Indenter
 
 @dataclass(frozen=True)
 class PressRequest:
-    """One press: an indenter goes down to a depth and comes back."""
+    """One press: an indenter goes down to a depth and comes back.
+
+    Example:
+        >>> from tacdata.indenters.sphere import Sphere
+        >>> from tacdata.skin.press import PressRequest
+        >>> press = PressRequest(Sphere(4.0), x=0.0, y=0.0, yaw=0.0, depths=(0.0, 0.5, 1.0, 0.5, 0.0))
+        >>> press.steps(longest=0.25)  # load steps
+        8.0
+    """
 
     indenter: Indenter
     """What presses."""

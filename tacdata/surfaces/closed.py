@@ -34,6 +34,13 @@ def read_closed(path: Path, scale: float, what: str) -> trimesh.Trimesh:
     Raises:
         UsageError: If there is no such file, or its format is not read.
         FormatError: If it is damaged, or its surface is open, inside out, flat or self-intersecting, with the place.
+
+    Example:
+        >>> from tacdata.indenters.mesh import SHAPES
+        >>> from tacdata.surfaces.closed import read_closed
+        >>> surface = read_closed(SHAPES / "fingertip.stl", scale=1.0, what="indenter")
+        >>> surface.is_watertight
+        True
     """
     import trimesh
 

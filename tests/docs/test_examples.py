@@ -7,6 +7,8 @@ from pathlib import Path
 import example_folder
 import pytest
 
+import tacdata.warp_runtime  # noqa: F401 - starts Warp without its banner
+
 ROOT = Path(__file__).resolve().parents[2]
 FIRST = (
     "tacdata.sensor.default_sensor",
@@ -25,12 +27,22 @@ FIRST = (
     "tacdata.importing.imported_session.import_session",
     "tacdata.wire.frames.decoder.Decoder",
     "tacdata.tags.detect_cube",
-    "tacdata.tags.Cube",
-    "tacdata.transduction.Transducer",
     "tacdata.demonstrations.compensation.compensate",
-    "tacdata.registry.names",
+    "tacdata.transduction.Transducer",
+    "tacdata.provenance.content_hash",
+    "tacdata.labels.read_label",
+    "tacdata.dataset.read_dataset",
+    "tacdata.dataset.pack",
+    "tacdata.dataset.windows.WindowDataset",
+    "tacdata.effects.library",
+    "tacdata.skin.press.PressRequest",
+    "tacdata.discrepancy.model.spec.read_spec",
+    "training.metrics.depth_maps.score_frames",
+    "training.networks.network.create",
+    "viewers.source.scene_at",
+    "viewers.showing.show",
 )
-"""Where a user imports them from."""
+"""Thirty names, by where a user imports them from."""
 PACKAGES = ("tacdata", "schemas", "label_farm", "training", "viewers")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 

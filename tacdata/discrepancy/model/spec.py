@@ -102,6 +102,14 @@ def read_spec(path: Path | None) -> Spec:
     Raises:
         UsageError: If there is no such file.
         FormatError: If it is not one.
+
+    Example:
+        >>> from tacdata.discrepancy.model.spec import read_spec
+        >>> spec = read_spec(None)
+        >>> spec.document["response"]
+        {'kind': 'fitted'}
+        >>> spec.effects()
+        ()
     """
     if path is None:
         document = {

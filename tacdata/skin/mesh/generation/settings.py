@@ -11,6 +11,12 @@ class MeshSettings:
 
     The default ones meet, with some 13,800 nodes, what independent solutions differ by: force 1 %, each protrusion 5 %
     of the largest (`tests/skin/test_skin_reference.py`; decision 0014).
+
+    Example:
+        >>> from tacdata.skin.mesh.generation.settings import MeshSettings
+        >>> coarse = MeshSettings(outer=1.2, tip=None)
+        >>> coarse.interior  # mm
+        2.4
     """
 
     outer: float = 0.6
