@@ -15,7 +15,7 @@ LARGEST = 10
 """Number of largest depths of a map whose mean is the scalar depth (paper)."""
 DEFAULT = Path(__file__).with_name("gains.yaml")
 MOST = 0.1
-"""Largest gain that can be meant [m/mm]: 10 cm of target for a millimetre felt; the paper's are near 0.01."""
+"""Largest plausible gain [m/mm]: 10 cm of target per millimetre felt. The paper's are near 0.01."""
 STEPS = 12
 """Gains tried between zero and the largest before the interval is bisected [count]."""
 

@@ -132,12 +132,12 @@ class MotionController(Device):
 
     @property
     def position_lost(self) -> str:
-        """Why the position is not known, in words; empty while it is. Still answered after `close`."""
+        """Why the position is unknown, as a sentence; empty while it is known. Answered after `close` too."""
         return ""
 
     @property
     def moved(self) -> bool:
-        """Whether anything was told to move since this was made, homing at opening included."""
+        """Whether any motion was commanded since this was created, homing at opening included."""
         return False
 
     @abstractmethod

@@ -22,7 +22,9 @@ HOMING = 600.0
 COMING_TO_REST = 30.0
 """Longest deceleration of a feed hold [s of the clock]."""
 LATE = (1.5, 15.0)
-"""Motion that takes longer than this many times what it should, and so much more [s of the clock], is a fault."""
+"""Motion counts as a fault when it takes longer than this many times its expected duration, plus this time [s of the
+clock].
+"""
 
 
 class Grbl(MotionController):
@@ -127,12 +129,12 @@ class Grbl(MotionController):
 
     @property
     def position_lost(self) -> str:
-        """Why the position is not known, in words; empty while it is."""
+        """Why the position is unknown, as a sentence; empty while it is known."""
         return (self._link.lost if self._link is not None else "") or self._lost
 
     @property
     def moved(self) -> bool:
-        """Whether a move or a homing cycle was sent since this was made."""
+        """Whether a move or a homing cycle was sent since this was created."""
         return self._moved
 
     @property
@@ -259,14 +261,15 @@ class Grbl(MotionController):
 
     @property
     def _remaining(self) -> float:
-        """What the queued motion and pauses may still take [s of the clock]."""
+        """Longest time that the queued motion and pauses may still take [s of the clock]."""
         return max(self._ends_ns - self.clock.now_ns(), 0) * 1e-9
 
     def _queue(self, seconds: float) -> None:
         self._ends_ns = max(self._ends_ns, self.clock.now_ns()) + round(seconds * 1e9)
 
     def _duration(self, position: np.ndarray, speed: float) -> float:
-        """Return what a move from where the queued ones end takes at most [s]: no axis faster than its own limits."""
+        """Return the longest duration of a move from where the queued ones end [s]: no axis faster than its own limits.
+        """
         last = self._opened().last
         start = self._target if self._target is not None else last.position if last else position
         length = float(np.linalg.norm(position - start))

@@ -157,7 +157,7 @@ DATES = (
     "%d %b %Y", "%b %d %Y", "%b %d, %Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y",
 )  # fmt: skip
 CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%I:%M %p", "%H%M%S", "%H:%M:%S:%f")
-"""Dates and times of day as instruments write them; what they have in common with all rows of a file decides."""
+"""Dates and times of day as instruments write them; the layout that fits all rows of a file decides."""
 
 
 def _joined(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[SourceTable, dict[str, Any]]:
@@ -194,7 +194,7 @@ def _datetimes(values: np.ndarray, layout: str | None, where: str) -> np.ndarray
 
 
 def _iso(texts: list[str]) -> list[datetime | None] | None:
-    """Return moments in ISO 8601; None if one is written otherwise."""
+    """Return times in ISO 8601; None if one has another layout."""
     try:
         return [datetime.fromisoformat(text.replace(",", ".")) if text else None for text in texts]
     except ValueError:
@@ -214,7 +214,7 @@ def _parsed(text: str, layout: str, where: str) -> datetime | None:
 
 
 def _layout(texts: list[str], where: str) -> str:
-    """Return the one way of writing dates that fits all texts.
+    """Return the only layout of dates that fits all texts.
 
     Raises:
         FormatError: If none fits, or days and months could change places.

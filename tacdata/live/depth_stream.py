@@ -19,7 +19,9 @@ REGION = 0.4
 STILL = 6.0
 """Largest spread of readings while taring, over their frame-to-frame noise [1]."""
 BELOW = 12.0, 0.01
-"""How far a reading lies below the tare before the tare is doubted: over its noise, and of itself [1]. Touch raises."""
+"""Deviation of readings below the tare that casts doubt on it: over the noise, and as a share of the reading [1]. Touch
+raises readings.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,9 @@ class Estimate:
     novelty: float | None = None
     """Novelty: distance of the reading from all training readings, over the limit [1]; None if it is not known."""
     below_tare: float = 0.0
-    """How far readings at rest lie below the tare [counts]: the skin was touched while it was tared. 0 if none does."""
+    """Deviation of readings at rest below the tare [counts]: the skin was touched while it was tared. 0 if there is
+    none.
+    """
 
 
 class DepthStream:
@@ -91,7 +95,7 @@ class DepthStream:
         """Why taring has not ended, in words; empty if it has or is under way."""
 
     def tare(self) -> None:
-        """Tare anew, over the next frames at rest."""
+        """Tare again, over the next frames at rest."""
         self.baseline, self.waiting_for_rest = None, ""
         self._tare.clear()
         self._recent.clear()
@@ -133,7 +137,7 @@ class DepthStream:
         )  # fmt: skip
 
     def _below_tare(self) -> float:
-        """Return how far the readings of the last moments lie below the tare [counts], if they are at rest there."""
+        """Return the deviation of the latest readings below the tare [counts], if they are at rest."""
         if self.baseline is None or len(self._recent) < (self._recent.maxlen or 0):
             return 0.0
         # All of them: a single low frame is noise, or a channel that dropped out for a moment.

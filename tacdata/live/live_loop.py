@@ -49,7 +49,7 @@ class LiveLoop:
         self._stopped = self._tare_wanted = False
 
     def tare(self) -> None:
-        """Tare anew before the next frame; safe in any thread."""
+        """Tare again before the next frame; safe in any thread."""
         self._tare_wanted = True
 
     def stop(self) -> None:

@@ -1,9 +1,9 @@
-"""A joint path chosen as a whole: of the postures that reach each target, those that follow each other without a jump.
+"""Chooses a joint path as a whole: of the postures that reach each target, those that follow each other without a jump.
 
 An arm reaches most targets in several postures (elbow up or down). Solved row by row, its path may change posture in
 one frame. So other postures are searched at the jumps and at some rows between, and each is continued in both
-directions. Dynamic programming (R. Bellman, 1957) then finds the longest chain of rows that the joints can follow.
-Rows outside of it are left out, and named.
+directions. Dynamic programming (R. Bellman, 1957) then finds the longest chain of rows that the joints can follow. Rows
+outside it are left out and named.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tacdata.replay.kinematics import Joint
 JUMP = {"rad": 15.0, "m": 2.0}
 """Speed above which a joint jumps, where its own limit is not higher [rad/s, m/s]."""
 ANCHORS, STARTS = 8, 6
-"""Rows at which other postures are searched, and random starts at each [count]."""
+"""Number of rows at which other postures are searched, and of random starts at each."""
 MISSES = 3
 """Rows in a row that a posture may miss before its continuation ends [count]."""
 CALM = 0.25
@@ -28,7 +28,7 @@ WINDOW = 90
 ALIKE = 1e-3
 """Difference of joint values up to which two postures are the same [rad or m]."""
 COST = 1e-3
-"""Cost of a motion as fast as a jump, in rows reached [1]: of equally long chains the calmest is taken."""
+"""Cost of a motion as fast as a jump, in rows reached [1]: among equally long chains the slowest motion is taken."""
 
 
 def without_jumps(

@@ -15,7 +15,7 @@ from tacdata.demonstrations.demonstration import Demonstration
 from tacdata.errors import UsageError
 
 GUESS = 0.003
-"""Standard deviation of an axis beyond which a target over a gap is a guess [m]: no grasp is that forgiving."""
+"""Standard deviation of an axis above which a target over a gap is a guess [m]; a grasp tolerates no more."""
 UNITS = {"time_ns": "ns", "position": "m", "quaternion": "1 (xyzw)", "seen": "m", "depth": "mm", "gap": "1"}
 
 
@@ -121,7 +121,7 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
 
 
 def doubts(targets: FingertipTargets) -> list[str]:
-    """Return what is doubtful in a demonstration's targets, a line a finger: stretches without sightings.
+    """Describe what is doubtful in a demonstration's targets, one line per finger: stretches without sightings.
 
     A target over a gap is a guess where its standard deviation exceeds `GUESS`.
     """
@@ -144,7 +144,7 @@ def check_guesses(targets: FingertipTargets) -> None:
     """Refuse targets of which some are guesses.
 
     Raises:
-        UsageError: Naming the finger, how much of the path, and how far it may be off.
+        UsageError: Naming the finger, how much of the path, and its standard deviation.
     """
     for name, bridged, spread in _bridged(targets):
         guess = bridged & (spread > GUESS)

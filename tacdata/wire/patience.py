@@ -1,21 +1,23 @@
-"""A limit on waiting that counts only the time during which this process runs."""
+"""A timeout that counts only the time during which this process runs."""
 
 from __future__ import annotations
 
 import time
 
 REAL_FLOOR = 1.0
-"""No wait for a device gives up sooner than this [s, real time], however fast the clock runs."""
+"""Shortest timeout of any wait for a device [s, real time], however fast the clock runs."""
 STEP = 0.25
-"""What one look may add at most [s, real time]: whoever waits looks far more often, unless the host stands still."""
+"""Largest time that one check adds [s, real time]. Checks are far more frequent, unless the host is stopped."""
 
 
 class Patience:
-    """Runs out after a time of waking waiting.
+    """A timeout in waking time.
 
-    A host that stands still (a closed lid, SIGSTOP, an overloaded machine) hears nothing meanwhile, and what it
-    missed waits in the system's buffers. So a gap between two looks counts as one step, not as silence of the
-    device: after a stall there is time to ask before anything is judged.
+    A stopped host (a closed lid, SIGSTOP, overload) receives nothing in the meantime, and what it missed waits in the
+    system's buffers. So a gap between two checks counts as one step, not as silence of the device. After a stall there
+    is time to ask before anything is judged.
+
+    Example: ``patience = Patience(3.0)``; in a loop ``if patience.over(): raise ...``
 
     Example:
         ``patience = Patience(3.0)``; in a loop ``if patience.over(): raise ...``
@@ -30,11 +32,11 @@ class Patience:
         self.restart()
 
     def restart(self) -> None:
-        """Begin anew, as something was heard."""
+        """Restart, because something was received."""
         self._waited, self._looked = 0.0, time.monotonic()
 
     def over(self) -> bool:
-        """Look at the clock; say whether the time is up."""
+        """Check the clock; return whether the time is up."""
         now = time.monotonic()
         self._waited += min(now - self._looked, self._step)
         self._looked = now

@@ -21,7 +21,7 @@ WEIGHTS = 0.0003, float(np.radians(0.2))
 LEAST_TURN = np.radians(15.0)
 """Minimum rotation of the gripper about two axes [rad]; with less the solution is not determined."""
 MOVED, TURNED = 0.02, float(np.radians(3.0))
-"""Share of the camera's distance [1], and angle [rad], by which images of a board at rest differ at most."""
+"""Largest difference between images of a board at rest: share of the camera's distance [1], and angle [rad]."""
 OUTLYING = 5.0
 """A pair is an outlier if its residual is this many times the median [1]."""
 

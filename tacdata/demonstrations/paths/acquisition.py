@@ -1,8 +1,8 @@
-"""A finger's track, taken up again where the filter lost it: rejected sightings that agree among themselves are right.
+"""Resumes a finger's track where the filter lost it: rejected sightings that agree among themselves are right.
 
-A filter whose process noise is too small for a sudden motion rejects every sighting after it. Such a run of rejections
-is told from mirrored poses and exchanged tags by two things: its members fit one motion, and the whole track becomes
-likelier if the finger may have moved abruptly before the first of them.
+A filter whose process noise is too small for a sudden motion rejects every sighting after it. Two criteria distinguish
+such a run of rejections from mirrored poses and exchanged tags. Its members fit one motion. And the likelihood of the
+whole track increases if the finger may have moved abruptly before the first of them.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from tacdata.demonstrations.paths.motion_filter import ProcessNoise, Smoothed, s
 from tacdata.demonstrations.paths.sightings import Sightings
 
 LEAST_RUN = 4
-"""Rejected sightings in a row from which the track may be taken up again [1]: fewer are mirrored poses."""
+"""Minimum number of rejected sightings in a row for resuming the track; fewer are mirrored poses."""
 LOOKED_AT = 8
-"""Of a run so many sightings at most, its first ones, must fit one motion [1]: later the finger may turn round."""
+"""Number of first sightings of a run that must fit one motion; later the finger may turn round."""
 AGREEING = 0.8
 """Share of a run that must fit one motion of its own [1]."""
 PRIOR = 10.0
-"""By how much log-likelihood the track must gain [nats]: abrupt motions are rare beforehand."""
+"""Minimum gain in log-likelihood of the track [nats]: abrupt motions are rare a priori."""
 MOST = 20
-"""Most places at which a track is taken up again [1]."""
+"""Largest number of places at which a track is resumed."""
 
 
 def acquire(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise) -> Smoothed:
-    """Return a finger's smoothed path, as `smooth` does, with its track taken up again where it was lost.
+    """Return a finger's smoothed path, as `smooth` does, with its track resumed where it was lost.
 
     Args:
         seen: At least two sightings.
@@ -53,7 +53,8 @@ def acquire(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise) -> Smoo
 def _runs(accepted: np.ndarray) -> list[tuple[int, int]]:
     """Return first and end of every run of at least `LEAST_RUN` rejected sightings; accepted ones may stand between.
 
-    Two cameras of which only one is believed alternate. So a run goes on over single accepted sightings.
+    If only one of two cameras is accepted, accepted and rejected sightings alternate. So a run continues over single
+    accepted sightings.
     """
     runs: list[tuple[int, int]] = []
     rejected = np.flatnonzero(~accepted)

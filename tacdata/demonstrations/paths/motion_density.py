@@ -14,13 +14,13 @@ VELOCITIES = (0.0001, 0.001, 0.01, 0.1, 1.0, 10.0, 100.0)
 TURNINGS = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)
 """Spectral densities of the angular acceleration in the search grid [(rad/s^2)^2 s]."""
 BLOCKS, BLOCK = 8, 100
-"""Of a long recording so many stretches, of so many sightings each, are looked at: a hand rests and hurries in turn."""
+"""Number of stretches of a long recording that are used, and sightings in each: a hand rests and moves fast in turn."""
 
 
 def choose(seen: Sightings) -> ProcessNoise:
-    """Return the densities, out of `VELOCITIES` and `TURNINGS`, under which the sightings are likeliest.
+    """Return the densities, out of `VELOCITIES` and `TURNINGS`, with the largest likelihood.
 
-    Stretches from the whole recording count: what its beginning alone asks for rejects the hurry that follows.
+    Stretches from the whole recording count. The beginning alone would give too small a noise for fast motion later.
     """
     parts, nothing = _stretches(seen), np.zeros(0, np.int64)
 

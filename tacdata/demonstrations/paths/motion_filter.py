@@ -1,12 +1,12 @@
 """Fixed-interval smoothing of a pose: an error-state Kalman filter forward, Rauch-Tung-Striebel backward.
 
-State: position p [m], rotation R, velocity v [m/s], turn rate w [rad/s, world]. Between two times p' = p + v dt,
+State: position p [m], rotation R, velocity v [m/s], angular velocity w [rad/s, world]. Between two times p' = p + v dt,
 R' = exp(w dt) R. v and w change as integrated white noise: a constant-velocity model (Bar-Shalom, Li and
-Kirubarajan, Estimation with Applications to Tracking and Navigation, section 6.2). Errors are a small turn in the
+Kirubarajan, Estimation with Applications to Tracking and Navigation, section 6.2). Errors are a small rotation in the
 world, dp, dw, dv in this order. So a rotation never leaves SO(3), and a sighting's covariance is used as it is.
 
-Where a camera's own place is known with a standard deviation, its error is a state too: a turn and a shift, constant
-in time. Averaging many sightings does not make it smaller, as it would if it were noise of each sighting.
+Where a camera's own place is known with a standard deviation, its error is a state too: a rotation and a translation,
+constant in time. Averaging many sightings does not make it smaller, as it would if it were noise of each sighting.
 
 The backward pass is H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965) 1445, on those errors.
 """
@@ -23,7 +23,7 @@ from tacdata.demonstrations.paths.sightings import Sightings
 GATE = 27.9
 """Gate: squared Mahalanobis distance in six dimensions beyond which a sighting is an outlier (chi-squared, 0.9999)."""
 FIRST_SPEED = 1.0, 10.0
-"""Standard deviation of the velocity [m/s] and turn rate [rad/s] before anything is known of them."""
+"""Prior standard deviation of the velocity [m/s] and angular velocity [rad/s]."""
 MOTION = 12
 """States of the motion itself; those of the cameras follow [1]."""
 NS = 1e-9
@@ -40,7 +40,7 @@ class ProcessNoise:
 
 
 MANOEUVRE = ProcessNoise(100.0, 10_000.0)
-"""Process noise of the most abrupt motion that a hand makes: for the step before a track is taken up again."""
+"""Process noise of the most abrupt motion of a hand, for the step before a track is resumed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class _State:
     turning: np.ndarray
     velocity: np.ndarray
     cameras: np.ndarray
-    """Turn [rad] and shift [m] of each camera against its file, shape (6 k,)."""
+    """Rotation [rad] and translation [m] of each camera against its file, shape (6 k,)."""
 
     def plus(self, error: np.ndarray) -> _State:
         return _State(
@@ -104,7 +104,7 @@ def smooth(
         seen: At least two sightings.
         times_ns: Times [ns], shape (n,), ascending; poses outside the sightings' span are NaN.
         wander: Process noise: how freely the finger moves.
-        back: Whether to go back too; without it poses rest on the past alone.
+        back: Whether to smooth backward; without it poses depend on the past only.
         reacquired: Sightings before which the finger may have moved as in `MANOEUVRE`.
 
     Returns:
@@ -196,7 +196,7 @@ def _predicted(
 
 
 def _updated(expected: _State, spread: np.ndarray, seen: Sightings, n: int) -> tuple[_State, np.ndarray, float, float]:
-    """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes none."""
+    """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes neither."""
     seen_as = _observed(expected, seen, n)
     surprise = np.concatenate([
         logarithm(seen.rotation[n] @ expected.rotation.T), seen.position[n] - expected.position
@@ -214,7 +214,7 @@ def _updated(expected: _State, spread: np.ndarray, seen: Sightings, n: int) -> t
 
 
 def _observed(expected: _State, seen: Sightings, n: int) -> np.ndarray:
-    """Return how a sighting's turn and position depend on the state's errors, shape (6, 12 + 6 k)."""
+    """Return the derivatives of a sighting's rotation and position by the state's errors, shape (6, 12 + 6 k)."""
     result = np.zeros((6, MOTION + 6 * len(seen.cameras)))
     result[:, :6] = np.eye(6)
     if seen.camera[n] in seen.cameras:

@@ -18,12 +18,12 @@ UNKNOWN = 0.002, float(np.radians(3.0))
 
 @dataclass(frozen=True, eq=False)
 class CameraError:
-    """How far a camera may stand from where its file says: the same for all of its sightings."""
+    """Error of a camera's pose in its file: the same for all of its sightings."""
 
     place: np.ndarray
-    """Where the camera stands in the world [m], shape (3,): a turn of the camera moves what it sees about it."""
+    """Position of the camera in the world [m], shape (3,): a rotation of the camera moves what it sees about it."""
     spread: tuple[float, float]
-    """Standard deviation of its place [m] and rotation [rad], an axis."""
+    """Standard deviation of its position [m] and rotation [rad], per axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +44,9 @@ class Sightings:
     camera: tuple[str, ...]
     """Camera of each sighting."""
     ids: tuple[tuple[int, ...], ...]
-    """Tags of each, ascending."""
+    """Tags of each sighting, ascending."""
     cameras: dict[str, CameraError] = field(default_factory=dict)
-    """Camera -> what all of its sightings err by alike; without an entry nothing is known of that."""
+    """Camera -> the error common to all of its sightings; cameras without an entry have none stated."""
 
     def __len__(self) -> int:
         """Number of sightings."""
@@ -99,7 +99,7 @@ def sightings_of(
 
 
 def _error_of(camera: str, rig: DemoRig) -> CameraError | None:
-    """Return what all sightings of a camera err by alike; None if its file does not say how well its place is known."""
+    """Return the error common to all sightings of a camera; None if its file states no uncertainty."""
     world = rig.worlds[camera]
     return None if world.spread is None else CameraError(world.matrix[:3, 3], world.spread)
 

@@ -18,7 +18,7 @@ from tacdata import registry
 from tacdata.errors import FormatError, TacdataError, UsageError
 
 INNER = re.compile(r"(.+)\[(\d+)\]")
-"""How one column of a table is named: the table's name and a number from 0, as in ``cap[3]``."""
+"""Name of one column of a table: the table's name and a number from 0, as in ``cap[3]``."""
 ROOM, BASE = "tacdata.importing.formats", "source_format"
 
 
@@ -44,7 +44,7 @@ class SourceTable:
         return self.columns[name]
 
     def inner(self, name: str) -> int:
-        """Return how many columns a column holds: 0 for plain values, k for a table."""
+        """Return the number of columns inside a column: 0 for plain values, k for a table."""
         values = self.columns.get(name)
         return 0 if values is None or values.ndim < 2 else values.shape[1]
 

@@ -1,4 +1,4 @@
-"""Why images show no board: another pattern, size, dictionary, or a mirror, tried on a few of them."""
+"""Diagnoses images without a board: another pattern, size, dictionary, or a mirror, tried on a few of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tacdata.tags.calibration.board_view import LEAST_CORNERS, find_board
 from tacdata.tags.detection.detector import to_grey
 
 LEAST_MARKERS = 4
-"""Markers of another dictionary that must be seen in an image before it is believed [1]; chance shows one or two."""
+"""Markers of another dictionary that must be seen in an image; one or two occur by chance."""
 
 
 @dataclass(frozen=True)
@@ -21,17 +21,17 @@ class Mismatch:
     """What differs between a board file and the board in the images."""
 
     found: str
-    """What the images show, in words."""
+    """What the images show, as a sentence."""
     remedy: str
     """What to change."""
 
 
 def mismatch(images: Sequence[np.ndarray], board: CharucoBoard) -> Mismatch | None:
-    """Return what makes a board's corners appear in images that show none; None if nothing tried does.
+    """Return the change that makes a board's corners appear in images that show none; None if nothing tried does.
 
     Args:
         images: A few images, grey or BGR, uint8.
-        board: The board as its file has it.
+        board: The board of the file.
     """
     best: tuple[int, Mismatch] | None = None
     for candidate, is_mirrored, reason in _candidates(images, board):
@@ -45,7 +45,7 @@ def mismatch(images: Sequence[np.ndarray], board: CharucoBoard) -> Mismatch | No
 
 
 def _candidates(images: Sequence[np.ndarray], board: CharucoBoard) -> Iterator[tuple[CharucoBoard, bool, Mismatch]]:
-    """Yield boards to look for, whether in the mirrored images, and what it means if they are found."""
+    """Yield boards to try, whether in the mirrored images, and the conclusion if they are found."""
     for dictionary in (board.dictionary, *_dictionaries_seen(images, board)):
         named = replace(board, dictionary=dictionary)
         for is_mirrored in (False, True):
@@ -78,7 +78,7 @@ def _in_words(board: CharucoBoard, changed: CharucoBoard, is_mirrored: bool) -> 
 
 
 def _dictionaries_seen(images: Sequence[np.ndarray], board: CharucoBoard) -> list[str]:
-    """Return dictionaries other than the board's of which images show markers, those seen most first."""
+    """Return other dictionaries whose markers the images show, most frequent first."""
     import cv2
 
     needed = board.columns * board.rows // 2
@@ -90,7 +90,7 @@ def _dictionaries_seen(images: Sequence[np.ndarray], board: CharucoBoard) -> lis
         detector = cv2.aruco.ArucoDetector(markers)
         seen = [detector.detectMarkers(grey) for image in images for grey in (to_grey(image), _mirrored(image))]
         counts[name] = max((0 if ids is None else len(ids) for _, ids, _ in seen), default=0)
-    # The larger dictionaries of a size hold the smaller ones: of equals the smallest is named.
+    # The larger dictionaries of a size include the smaller ones: of equals the smallest is named.
     return sorted((n for n in names if counts[n] >= LEAST_MARKERS), key=lambda n: (-counts[n], int(n.split("_")[1])))
 
 

@@ -52,7 +52,7 @@ class Modal:
 
     @property
     def said(self) -> str:
-        """The active words as ``$G`` says them."""
+        """The active modal words, in ``$G``'s form."""
         bent = [self.words[group] for group in ("scaling", "length") if self.words.get(group) in ("G51", "G43.1")]
         return " ".join([*(self.words[group] for group in POWER_ON), *bent])
 
@@ -136,7 +136,7 @@ def interpret(line: str, modal: Modal, position: np.ndarray, offset: np.ndarray,
 def _takes_axes(
     state: Modal, commands: dict[str, str], values: dict[str, float], position: np.ndarray, offset: np.ndarray
 ) -> bool:
-    """Carry out scaling, G92 and the tool's length; return whether the line's axis words belong to one of them."""
+    """Process scaling, G92 and the tool's length; return whether the line's axis words belong to one of them."""
     if commands.get("once") == "G92.1":
         state.shift = np.zeros(3)
     if commands.get("once") == "G92":

@@ -116,9 +116,9 @@ UNKNOWN = "a code of neither Grbl 1.1 nor grblHAL; see the firmware's list"
 
 
 POSITION_KEPT = (2, 4, 5)
-"""Alarms after which the position is still known: nothing moved, or the machine came to rest first."""
+"""Alarms that keep the position: nothing moved, or the machine came to rest first."""
 DAMAGED_LINE = (1, 2, 3, 4, 11, 20, 21, 22, 23, 24, 25, 26, 27, 28, 30, 31, 36)
-"""Refusals that a well-formed line only meets if bytes of it were lost or changed on their way."""
+"""Refusals that a correct line only gets if bytes of it were lost or changed on the way."""
 
 
 def error_in_words(code: int) -> str:

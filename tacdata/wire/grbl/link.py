@@ -149,9 +149,9 @@ class GrblLink:
 
         Args:
             line: One line without its end.
-            limit: Longest wait [s of the clock].
-            motion: What the motion and pauses that hold the answer back may take [s of the clock]; an idle controller
-                that owes the answer after that ends the wait (`Owed`).
+            limit: Timeout [s of the clock].
+            motion: Longest duration of the motion and pauses before the answer [s of the clock]. If the controller is
+                idle after that and has not answered, the wait ends (`Owed`).
 
         Returns:
             The lines pushed meanwhile, and the times of sending and of the answer [ns].
@@ -181,10 +181,10 @@ class GrblLink:
         return entry.pushed, sent_ns, answered_ns
 
     def wait(self, reached: Callable[[], bool], owed: Owed, through_hold: bool = False) -> None:
-        """Wait until ``reached()``; with ``through_hold`` no hold and no interruption ends the wait, only a fault.
+        """Wait until ``reached()``; with ``through_hold`` only a fault ends the wait, not a hold or an interruption.
 
         Raises:
-            DeviceError: On a fault, an interruption or a hold, or when what is owed cannot come any more.
+            DeviceError: On a fault, an interruption or a hold, or when the awaited answer can no longer come.
         """
         watch = owed.watch(self.clock)
         while True:
@@ -290,7 +290,7 @@ class GrblLink:
         self._fail(*self._broken(error), lost=True)
 
     def _fail(self, given: str, allowed: str, remedy: str, lost: bool = False) -> None:
-        """Keep the first fault; ``lost``: after it the position is not known."""
+        """Keep the first fault; ``lost``: the position is unknown after it."""
         with self._changed:
             if self.fault is None:
                 self.fault = DeviceError(given, allowed, remedy)

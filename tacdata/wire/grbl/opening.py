@@ -52,7 +52,7 @@ def greet(link: GrblLink, baud: int) -> None:
 
 
 def _place(link: GrblLink) -> None:
-    """Ask for the offset of work positions where the reports never say it (grblHAL with ``$10=0``)."""
+    """Ask for the offset of work positions, where the reports never contain it (grblHAL with ``$10=0``)."""
     if link.statuses.unplaced:
         link.statuses.offset = GrblSettings.read(link, ANSWER, STATE).work_offset
         if link.statuses.offset is None:
@@ -64,7 +64,8 @@ def _place(link: GrblLink) -> None:
 
 
 def straighten(link: GrblLink) -> tuple[str, ...]:
-    """End what bends coordinates (scaling, rotation, G92, tool length, inches); return what that was, in words.
+    """End everything that changes coordinates (scaling, rotation, G92, tool length, inches); return what that was, as
+    text.
 
     Raises:
         DeviceError: If it cannot be ended.

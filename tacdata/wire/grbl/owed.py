@@ -1,4 +1,4 @@
-"""What the controller owes: every wait for it has a reason, a limit and an ending in words."""
+"""Waiting for the controller: every wait has a reason, a timeout and an error message."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from tacdata.wire.delivered import CncStatus
 from tacdata.wire.patience import REAL_FLOOR, Patience
 
 IDLE, IDLE_FLOOR = 2.0, 1.5
-"""How long an idle controller may owe an answer after its motion should have ended [s of the clock], and the least of
-it [s, real time]. Idle means that nothing runs that could hold the answer back; a pause (G4) counts as motion here."""
+"""Time after the end of its motion within which an idle controller must answer [s of the clock], and its minimum [s,
+real time]. Idle means that nothing runs that could delay the answer; a pause (G4) counts as motion.
+"""
 FLOOR = 3.0
-"""Least wait for a line's answer [s, real time], so that an idle controller is found to be one first."""
+"""Shortest timeout for a line's answer [s, real time], so that an idle controller is recognized as idle first."""
 
 
 @dataclass(frozen=True)
 class Owed:
-    """One thing that is waited for."""
+    """One thing that is waited for, with its timeout."""
 
     what: str
-    """In words, for example "an answer to 'G4P0.01'"."""
+    """Description, for example "an answer to 'G4P0.01'"."""
     limit: float
-    """Longest wait [s of the clock]."""
+    """Timeout [s of the clock]."""
     motion: float = 0.0
-    """What the motion and pauses queued before it may take [s of the clock]."""
+    """Longest duration of the motion and pauses queued before it [s of the clock]."""
     heard: Sequence[str] = ()
-    """What was said meanwhile that is no answer; read when the wait ends."""
+    """Other messages received in the meantime; read when the wait ends."""
     idle_ends_it: bool = False
-    """Whether an idle controller cannot come to it any more."""
+    """Whether an idle controller can no longer send it."""
 
     def watch(self, clock: Clock) -> Watch:
         """Begin to wait."""
@@ -38,17 +39,17 @@ class Owed:
 
 
 class Watch:
-    """Watches over one wait; its user looks several times a second, with the latest report."""
+    """Watches over one wait; the caller checks several times per second, with the latest report."""
 
     def __init__(self, owed: Owed, clock: Clock) -> None:
-        """Begin now."""
+        """Start now."""
         self._owed, self._clock = owed, clock
         self._due_ns = clock.now_ns() + round(min(owed.motion, owed.limit) * 1e9)
         self._late = Patience(owed.limit, clock.rate, floor=FLOOR if owed.idle_ends_it else REAL_FLOOR)
         self._idle = Patience(IDLE, clock.rate, floor=IDLE_FLOOR)
 
     def ending(self, last: CncStatus | None) -> DeviceError | None:
-        """Return why the wait has to end, or None."""
+        """Return why the wait must end, or None."""
         if last is None or last.state != "Idle" or last.sent_ns < self._due_ns or not self._owed.idle_ends_it:
             self._idle.restart()
         elif self._idle.over():

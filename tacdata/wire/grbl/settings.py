@@ -17,15 +17,16 @@ ALWAYS_ON = 255
 """``$1`` that keeps the motors powered."""
 AXIS_WORD = re.compile(r"[XYZ]")
 STATE = ("$G", "$#")
-"""What is asked for the modal state alone."""
+"""Query for the modal state alone."""
 UNDONE_BY = {
     "G51": ("G50", "scaling of the axes"), "G68": ("G69", "rotation of the axes"),
     "G43": ("G49", "tool length offset"), "G43.1": ("G49", "tool length offset"),
     "G43.2": ("G49", "tool length offset"), "G92": ("G92.1", "offset of the axes"), "G20": ("G21", "inches"),
     "G91": ("G90", "relative positions"), "G93": ("G94", "inverse time feed"), "G95": ("G94", "feed per turn"),
 }  # fmt: skip
-"""Modal state that bends coordinates or speeds -> the word that ends it, and what it is. Every move says G53, G90, G21
-and G94 itself, but grblHAL scales and rotates G53 lines too."""
+"""Modal state that changes coordinates or speeds -> the word that ends it, and its description. Every move contains
+G53, G90, G21 and G94, but grblHAL scales and rotates G53 lines too.
+"""
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class GrblSettings:
 
     @classmethod
     def read(cls, link: GrblLink, timeout: float, questions: tuple[str, ...] = QUESTIONS) -> GrblSettings:
-        """Ask, each answer awaited for ``timeout`` [s of the clock].
+        """Send all queries; each answer may take ``timeout`` [s of the clock].
 
         Raises:
             DeviceError: If a question is refused or not answered.
@@ -89,7 +90,7 @@ class GrblSettings:
 
     @property
     def bent_by(self) -> tuple[str, ...]:
-        """What bends coordinates, by its G word (`UNDONE_BY`)."""
+        """Modal state that changes coordinates, by its G word (`UNDONE_BY`)."""
         words = [word for word in self.answers.get("GC", "").split() if word in UNDONE_BY]
         for tag, word in (("G92", "G92"), ("TLO", "G43.1")):
             already = any(UNDONE_BY[w][0] == UNDONE_BY[word][0] for w in words)
