@@ -106,6 +106,7 @@ def search(probe: Probe, site: str, place: tuple[float, float], top: float, lowe
         height -= COARSE
         probe.go((*place, height), SPEED)
         answers = bool((np.abs(probe.read(FRAMES // 2 + 1).mean - rest) > limit).any())
+        # Two answers in a row: a single one may be noise.
         if answers and first is not None:
             if first >= top - 1.5 * COARSE:
                 raise DeviceError(

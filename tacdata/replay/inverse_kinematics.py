@@ -79,6 +79,7 @@ def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinemati
         search, lambda row: search.aim(places[row], turns[row]), partial(_reached, search), values, reached,
         targets.time_ns,
     )  # fmt: skip
+    # The chosen postures differ from the first solution, so their errors are computed again.
     for row in np.flatnonzero(served):
         search.aim(places[row], turns[row])
         errors[row], angles[row], _ = search.errors(values[row])

@@ -53,6 +53,7 @@ def board_poses(
         pose[:3, :3], pose[:3, 3] = exponential(turn.ravel()), shift.ravel()
         off = _pixels(places, pose, camera) - view.corners
         poses.append(pose)
+        # A pixel in metres at the board's distance.
         metre = float(shift[2, 0]) / camera.matrix[0, 0]
         squares.append(float((off**2).sum(axis=1).mean()) * metre**2)
         variance = float((off**2).sum()) / max(2 * len(off) - 6, 1)

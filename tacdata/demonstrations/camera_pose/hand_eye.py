@@ -45,6 +45,7 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
         raise UsageError(given, allowed, "take ten or more, with rotations about all axes")
     _check_turns(grippers)
     kept, remarks = np.ones(len(grippers), bool), []
+    # Outliers are left out and the fit is repeated, until the set of pairs no longer changes.
     for _ in range(3):
         base, held = _refined(*_begun(grippers[kept], cubes[kept]), grippers[kept], cubes[kept])
         off = np.linalg.norm(_residuals(base, held, grippers, cubes).reshape(-1, 6), axis=1)

@@ -70,12 +70,14 @@ def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | N
             "check light, focus, tag numbers and intrinsics with one image first",
         )  # fmt: skip
     paths, settings = {}, {}
+    # A finger can only be missing where an image was searched: these are the images' times.
     looked = np.unique(np.concatenate([view.sample_ns for view in recording.views]))
     for name, found in seen.items():
         seen[name], paths[name], settings[name], words = _path(found, times, looked)
         remarks += words
     if not recording.searched.startswith("all") and any(words.startswith(UNSEARCHED) for words in remarks):
         remarks.append("all images are stored: tacdata track --every-image searches those that were passed over")
+    # These faults show between fingers, so all paths must be known first.
     remarks += path_faults.exchanges(seen, paths, times, begin)
     remarks += path_faults.other_hand(paths, recording.rig.fingers, rate)
     for name, stream in recording.taxels.items():
@@ -162,6 +164,7 @@ def _track(
     finger, inside = recording.rig.fingers[name], np.isfinite(path.position).all(axis=1)
     quaternion = np.full((len(times), 4), np.nan)
     quaternion[inside] = Rotation.from_matrix(path.rotation[inside]).as_quat()
+    # The smoother also gives poses inside a gap; they are marked as interpolated.
     gap = np.logical_not(inside)
     for a, b in path_faults.gaps(seen.time_ns[path.accepted], int(times[0]), int(times[-1])):
         gap = gap | np.asarray((times > a) & (times < b))

@@ -61,6 +61,7 @@ def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, mos
         rows = np.flatnonzero((course.episode == e) & (course.averaged > 0))
         measured = course.readings[rows]
 
+        # A constant per episode belongs to the calibration: both predictions are shifted to the measured mean.
         def level(predicted: np.ndarray, rows: np.ndarray = rows, measured: np.ndarray = measured) -> np.ndarray:
             own = predicted[rows]
             return own + (measured - own).mean(axis=0)

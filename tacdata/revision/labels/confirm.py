@@ -69,9 +69,11 @@ def confirm(
     before = predict(course, response, held.setting.given).pose
     after = predict(course, response, [*held.setting.given, *placed]).pose
     mechanical = [p for p in placed if p.effect.changes_skin]
+    # Two changes of the loads: the tip is elsewhere, and effects of the skin multiply them.
     loads, moved = response.load(before, course.tool), response.load(after, course.tool)
     for effect in mechanical:
         moved = moved * _factor(held, effect, after)[:, None]
+    # Both the change and the difference are given over the largest load, so that they can be compared.
     top = max(float(np.abs(loads).max()), 1e-12)
     change = np.abs(moved - loads).max(axis=1) / top
     rows = _spread(change, course.row_site, course.tool, count)

@@ -73,6 +73,7 @@ def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None
     apart = [pair for pair in apart if len(pair[0]) >= FEWEST]
     if not apart:
         return None
+    # The registration has a constant error of its own, which is reported apart from the path's.
     whole = [np.nanmedian(np.concatenate([pair[i] for pair in apart]), axis=0) for i in (0, 1)]
     apart = [(a - whole[0], b - whole[1]) for a, b in apart]
     constant = [0.0 if truth is None else float(np.sqrt(np.nansum(np.square(w)))) for w in whole]
