@@ -1,7 +1,7 @@
-"""How many converged states per second the skin model solves when many presses share one mesh, on a CPU or a card.
+"""How many converged states per second the skin model solves when many presses share one mesh, on a CPU or a GPU.
 
 Random presses of spheres of several sizes over the pad, down to a random depth by states 0.25 mm apart. A state counts
-when its residual and penetration are within the solver's settings. CPU seconds on the CPU, wall seconds on a card.
+when its residual and penetration are within the solver's settings. CPU seconds on the CPU, wall seconds on a GPU.
 
     python benchmarks/skin_throughput.py [--device cuda:0] [--presses N] [--batch N] [--mesh FILE.npz] [--json FILE]
 """
@@ -46,23 +46,23 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     torch.set_num_threads(1)
-    on_card = arguments.device != "cpu"
+    on_gpu = arguments.device != "cpu"
     mesh = SkinMesh.load(arguments.mesh) if arguments.mesh else None
     began = time.perf_counter()
     model = SkinModel(default_sensor(), device=arguments.device, mesh=mesh)
     requests = presses(arguments.presses)
-    list(model.walk(requests[: max(1, arguments.batch // 8)], arguments.batch, False))
+    list(model.states_many(requests[: max(1, arguments.batch // 8)], arguments.batch, False))
     built = time.perf_counter() - began
-    clock = time.perf_counter if on_card else time.process_time
+    clock = time.perf_counter if on_gpu else time.process_time
     began, states, failures, residual, newton = clock(), 0, 0, [], 0
-    for _, _, state in model.walk(requests, arguments.batch, False):
+    for _, _, state in model.states_many(requests, arguments.batch, False):
         if isinstance(state, SolveError):
             failures += 1
             print(state)
             continue
         states, newton = states + 1, newton + state.newton
         residual.append(state.residual)
-    if on_card:
+    if on_gpu:
         torch.cuda.synchronize()
     seconds = clock() - began
     figures = {

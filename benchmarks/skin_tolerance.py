@@ -20,7 +20,7 @@ from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.solve.settings import SolverSettings
 
 PRESSES = (
     PressRequest(Sphere(2.0), 0.5, -0.3, 0.0, (0.5, 1.0)),

@@ -15,7 +15,7 @@ from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.build import quadratic
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.model import ModelSettings
-from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.solve.settings import SolverSettings
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
 
@@ -88,10 +88,7 @@ def batch(*fields: np.ndarray) -> torch.Tensor:
 
 def joined(*members: Conditions) -> Conditions:
     """Conditions of several members, made of single ones."""
-    together = members[0].repeat(len(members))
-    for column, member in enumerate(members):
-        together.put(column, member)
-    return together
+    return Conditions.joined(members)
 
 
 class HeldSlab:

@@ -13,12 +13,12 @@ from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import Adhesion, Sensor
 from tacdata.skin.adhesions import load_adhesion_law
 from tacdata.skin.adhesions.adhesion_law import BASE, ROOM
-from tacdata.skin.contact.adhesion import AdhesiveContact
+from tacdata.skin.contact.adhesion import AdhesiveSurface
 from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.solve.settings import SolverSettings
 from tacdata.skin.validity import fineness
 
 LAWS = registry.names(ROOM, BASE)
@@ -81,13 +81,13 @@ def test_what_the_indenter_does_is_kept_as_energy():
     """No dissipation: the work along a path is the change of strain energy and of the attraction's potential."""
     skin = model(sticky(Adhesion("exponential", 5.0, 0.1)), cells=6, layers=2, residual=1e-5)
     request = PressRequest(Sphere(2.0), 0.0, 0.0, 0.0, tuple(np.linspace(0.0, 0.2, 9)))
-    batch, [contact] = skin._batch(request, 1)
-    assert isinstance(contact, AdhesiveContact)
+    batch = skin.skin.batch(request, 1)
+    assert isinstance(skin.skin.surfaces(request)[0], AdhesiveSurface)
     kept, force = [], []
-    for state in batch.run(iter([skin._press(0, request)]), lambda members: [members]):
-        _, _, members = state
-        [own] = [batch._conditions]
-        kept.append(float(skin._body.energy(members.u, own)[0] + contact.energy[0]))
+    press = skin.skin.placed(0, request)
+    for _, _, found in batch.run([press], lambda found: [found]):
+        [contact] = found.contacts
+        kept.append(float(skin.skin.body.energy(found.u, press.conditions)[0] + contact.energy[0]))
         force.append(-float(contact.force[2, 0]))
     work = np.concatenate([[0.0], np.cumsum(np.diff(request.depths) * (np.array(force)[1:] + force[:-1]) / 2)])
     np.testing.assert_allclose(np.array(kept) - kept[0], work, atol=0.02 * abs(kept[0]))
@@ -115,7 +115,7 @@ def test_presses_of_a_batch_stick_each_for_itself():
     skin = model(sticky(Adhesion("exponential", 5.0, 0.1), friction=0.2), cells=6, layers=2)
     requests = [PressRequest(Sphere(2.0), x, 0.0, 0.0, (0.0, depth)) for x, depth in ((0.0, 0.1), (0.5, -0.05))]
     together: dict[int, list] = {0: [], 1: []}
-    for number, _, state in skin.walk(requests, capacity=2):
+    for number, _, state in skin.states_many(requests, capacity=2):
         together[number].append(state)
     for request, found in zip(requests, together.values(), strict=True):
         for (_, alone), state in zip(skin.states(request), found, strict=True):

@@ -16,7 +16,7 @@ from tacdata.skin.member.pose import turned
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.batch import Batch
-from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.solve.settings import SolverSettings
 
 SENSOR = slab_sensor(size=4.0, friction=0.2, pixels=9)
 SETTINGS = ModelSettings(solver=SolverSettings(residual=1e-6), error_estimate=False)
@@ -49,9 +49,9 @@ def solved(model, requests, capacity):
 
 def walked(model, presses, request=PRESSES[0]):
     """States of presses that no `PressRequest` can express, in the presses' order; ``request`` says the shape."""
-    batch, contacts = model._batch(request, len(presses))
+    batch = model.skin.batch(request, len(presses))
     states = {press.number: [] for press in presses}
-    for number, _, state in batch.run(iter(presses), lambda members: model._gauge.states(members, contacts, True)):
+    for number, _, state in batch.run(presses, model.skin.reader.states):
         states[number].append(state)
     return list(states.values())
 
@@ -73,7 +73,7 @@ def test_presses_of_several_shapes_come_out_as_one_by_one(model, alone, capacity
 
 def test_states_come_in_the_order_of_the_path(model):
     depths = {number: [] for number in range(3)}
-    for number, depth, state in model.walk(PRESSES[:3], 3):
+    for number, depth, state in model.states_many(PRESSES[:3], 3):
         assert state.displacement.shape == (len(model.mesh.nodes), 3)
         depths[number].append(depth)
     assert [tuple(d) for d in depths.values()] == [request.depths for request in PRESSES[:3]]
@@ -83,8 +83,8 @@ def test_states_come_in_the_order_of_the_path(model):
 def test_what_has_changed_is_evaluated_once_an_iteration(model, monkeypatch):
     """Whether members were sent on, or their multipliers brought up to date: in one iteration both happen."""
     changed, most, mixed = [], 0, False
-    judge, again = Batch._judge, Batch._rebalance
-    monkeypatch.setattr(Batch, "_rebalance", lambda own, now, who: changed.append(who) or again(own, now, who))
+    judge, again = Batch._judge, Batch._updated
+    monkeypatch.setattr(Batch, "_updated", lambda own, now, who: changed.append(who) or again(own, now, who))
 
     def judged(own, now):
         nonlocal mixed
@@ -102,17 +102,17 @@ def test_what_has_changed_is_evaluated_once_an_iteration(model, monkeypatch):
 
     monkeypatch.setattr(Batch, "_judge", judged)
     monkeypatch.setattr(Batch, "_step", stepped)
-    list(model.walk([PressRequest(Sphere(1.5), x, 0.1, 0.0, (0.2, 0.4)) for x in (-0.4, -0.1, 0.2, 0.5)], 4))
+    list(model.states_many([PressRequest(Sphere(1.5), x, 0.1, 0.0, (0.2, 0.4)) for x in (-0.4, -0.1, 0.2, 0.5)], 4))
     assert mixed and most == 1
 
 
 def test_displacements_are_left_out_where_not_wanted(model):
-    [(_, _, state)] = model.walk(PRESSES[1:2], with_displacement=False)
+    [(_, _, state)] = model.states_many(PRESSES[1:2], with_displacement=False)
     assert state.displacement.size == 0 and state.force[2] > 0
 
 
 def test_no_presses_give_nothing(model):
-    assert list(model.walk([])) == [] and list(model.solve_many([])) == []
+    assert list(model.states_many([])) == [] and list(model.solve_many([])) == []
 
 
 GOOD = [PressRequest(FlatPunch(1.0, 0.9), x, 0.1, 0.0, (0.15, 0.3)) for x in (-0.3, 0.2, 0.4)]
@@ -133,14 +133,14 @@ def crushed(coarse):
     found = []
 
     def walk(*arguments):
-        for state in SkinModel.walk(coarse, *arguments):
+        for state in SkinModel.states_many(coarse, *arguments):
             found.append(state)
             yield state
 
     with pytest.MonkeyPatch.context() as patch:
         # Steps need not be halved to 0.01 mm to be given up.
         patch.setattr("tacdata.skin.solve.load_path._LEAST_STEP", 0.1)
-        patch.setattr(coarse, "walk", walk)
+        patch.setattr(coarse, "states_many", walk)
         together = solved(coarse, [GOOD[0], CRUSHING, *GOOD[1:]], 3)
     return together, [state for state in found if state[0] == 1]
 
@@ -163,20 +163,20 @@ def test_a_press_that_goes_wrong_says_so_after_the_states_that_it_reached(crushe
 
 def test_a_material_without_numbers_is_given_up_and_its_neighbour_is_not(model, alone):
     """Whatever makes a member's fields NaN, they stay in its own column."""
-    press = model._press(0, PRESSES[0])
-    broken = replace(press.conditions, law=torch.full_like(press.conditions.law, torch.nan), _other={})
+    press = model.skin.placed(0, PRESSES[0])
+    broken = replace(press.conditions, law=torch.full_like(press.conditions.law, torch.nan))
     sick = replace(press, conditions=broken)
-    [failed], healthy = walked(model, [sick, model._press(1, PRESSES[0])])
+    [failed], healthy = walked(model, [sick, model.skin.placed(1, PRESSES[0])])
     assert isinstance(failed, SolveError) and "residual is nan" in str(failed)
     assert [state.force[2] for state in healthy] == pytest.approx(alone[0].force[:, 2], rel=1e-5)
 
 
 def test_force_is_proportional_to_each_members_modulus(model):
     """Contact stiffness scales with it, so the displacements are the same."""
-    base = model._press(0, PRESSES[0])
+    base = model.skin.placed(0, PRESSES[0])
     presses = [
         replace(
-            model._press(k, PRESSES[0]),
+            model.skin.placed(k, PRESSES[0]),
             conditions=conditions(
                 replace(SENSOR.material, youngs_modulus=factor * SENSOR.material.youngs_modulus),
                 SENSOR.contact.friction,
@@ -199,10 +199,10 @@ def test_a_members_thickness_is_that_of_a_mesh_so_thick(model):
     thick = replace(SENSOR, skin=replace(SENSOR.skin, thickness=factor * SENSOR.skin.thickness))
     mesh = replace(model.mesh, nodes=model.mesh.nodes * [1.0, 1.0, factor])
     expected = [state for _, state in SkinModel(thick, SETTINGS, mesh=mesh).states(request)]
-    press = model._press(0, request)
+    press = model.skin.placed(0, request)
     own = conditions(SENSOR.material, SENSOR.contact.friction, request.indenter, thickness=factor)
     raised = replace(press, touch=press.touch * [1.0, 1.0, factor], conditions=own)
-    found = walked(model, [raised, model._press(1, request)])
+    found = walked(model, [raised, model.skin.placed(1, request)])
     for ours, nominal, theirs in zip(found[0], found[1], expected, strict=True):
         assert ours.force == pytest.approx(theirs.force, rel=1e-5, abs=1e-6)
         assert np.abs(ours.displacement - theirs.displacement).max() < 1e-5
@@ -222,7 +222,7 @@ def test_a_yawed_cylinder_presses_along_the_other_axis(model):
 
 def leaning(model, number, request, tilt_x, tilt_y):
     angles = (torch.tensor([angle], dtype=torch.float64) for angle in (0.0, tilt_x, tilt_y))
-    return replace(model._press(number, request), turn=turned(*angles)[..., 0].numpy())
+    return replace(model.skin.placed(number, request), turn=turned(*angles)[..., 0].numpy())
 
 
 def test_tilts_about_x_and_y_are_mirror_images(model):
@@ -236,7 +236,7 @@ def test_tilts_about_x_and_y_are_mirror_images(model):
 
 def test_a_sphere_tilted_about_its_centre_leaves_the_same_map(model):
     request = PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.3,))
-    plain, tilted = model._press(0, request), leaning(model, 1, request, 0.3, -0.2)
+    plain, tilted = model.skin.placed(0, request), leaning(model, 1, request, 0.3, -0.2)
     centre = plain.touch + np.array([0.0, 0.0, 1.5])
     tilted = replace(tilted, touch=centre - 1.5 * tilted.turn[:, 2])
     [one], [other] = walked(model, [plain, tilted])
@@ -260,5 +260,5 @@ def test_more_presses_than_a_card_holds_are_refused_in_words(model, monkeypatch)
 
     monkeypatch.setattr("tacdata.skin.solve.newton.Newton.step", full)
     with pytest.raises(SolveError, match="presses at a time on a mesh of") as refusal:
-        list(model.walk(PRESSES[:2], 2))
+        list(model.states_many(PRESSES[:2], 2))
     assert "fewer at a time" in refusal.value.remedy

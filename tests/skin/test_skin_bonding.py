@@ -13,10 +13,12 @@ from tacdata.skin.derivatives.parameters import known
 from tacdata.skin.derivatives.path_uncertainty import with_uncertainty
 from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.derivatives.uncertainty import sampled_spread, uncertainties
+from tacdata.skin.member.pose import Pose
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.solve.configuration import Configuration
+from tacdata.skin.solve.settings import SolverSettings
 
 PRESS = PressRequest(Sphere(1.5), 0.13, -0.21, 0.0, (0.1, 0.2, 0.3))
 
@@ -31,8 +33,8 @@ def slab(residual=1e-9, **contact):
 def test_held_faces_are_those_of_the_bonded_parts():
     skin = slab()
     area = 4.0 * 4.0
-    bonding = Bonding(skin.mesh, skin._fixed)
-    faces = held_faces(skin.mesh, skin._fixed)
+    bonding = Bonding(skin.mesh, skin.skin.fixed)
+    faces = held_faces(skin.mesh, skin.skin.fixed)
     assert len(faces) == 2 * 16 and (skin.mesh.nodes[faces][..., 2] == 0).all()
     # A uniform traction t [MPa] gives nodal forces whose sum is t times the area, and moves all nodes by -t.
     normals = np.zeros((len(skin.mesh.nodes), 3, 1))
@@ -40,14 +42,14 @@ def test_held_faces_are_those_of_the_bonded_parts():
         normals[nodes[3:], 2, 0] += 0.5 / 3
     assert normals.sum() == pytest.approx(area)
     moved = bonding.slack(torch.as_tensor(0.02 * normals)).numpy()
-    np.testing.assert_allclose(moved[skin._fixed, 2, 0], -0.02, atol=1e-12)
-    assert not moved[~skin._fixed].any() and not moved[:, :2].any()
+    np.testing.assert_allclose(moved[skin.skin.fixed, 2, 0], -0.02, atol=1e-12)
+    assert not moved[~skin.skin.fixed].any() and not moved[:, :2].any()
 
 
 def test_a_state_with_moved_faces_is_what_the_derivative_says():
     skin, request = slab(residual=1e-10), replace(PRESS, depths=(0.2,))
     [(_, state, sensitivity)] = sensitivities(skin, request, ["bonding", "x"])
-    slack = Bonding(skin.mesh, skin._fixed).slack(_reaction(skin, state))
+    slack = Bonding(skin.mesh, skin.skin.fixed).slack(_reaction(skin, state))
     step = 1e-4  # mm/MPa
     ends = [_solved(skin, request, state, sign * step * slack) for sign in (1.0, -1.0)]
     force, surface = ((a - b) / (2 * step) for a, b in zip(*ends, strict=True))
@@ -58,24 +60,27 @@ def test_a_state_with_moved_faces_is_what_the_derivative_says():
 
 def _solved(skin, request, state, moved):
     """Force and map of the same press with its held faces moved beforehand; no derivative is used."""
-    press, (batch, [contact]) = skin._press(0, request), skin._batch(request, 1)
-    newton, u = batch._newton, torch.as_tensor(state.displacement)[..., None] + moved
-    pose = replace(batch._poses[0], place=torch.as_tensor(press.touch - [0, 0, request.depths[0]])[:, None])
-    history, everyone = [contact.start(pose)], torch.ones(1, dtype=torch.bool)
-    now = newton.balance(u, [pose], history, press.conditions)
-    while float(now.error) > 1e-9:
-        u = u + newton.step(u, now.residual, press.conditions, everyone)[0]
-        now = newton.balance(u, [pose], history, press.conditions)
-    np.testing.assert_allclose((u[..., 0] - torch.as_tensor(state.displacement))[skin._fixed], moved[skin._fixed, :, 0])
+    press, newton = skin.skin.placed(0, request), skin.skin.newton(request)
+    place = torch.as_tensor(press.touch - [0, 0, request.depths[0]])[:, None]
+    pose, everyone = Pose(place, torch.eye(3, dtype=torch.float64)[..., None]), torch.ones(1, dtype=torch.bool)
+    u, histories = torch.as_tensor(state.displacement)[..., None] + moved, (newton.surfaces[0].start(pose),)
+    at = Configuration(u, press.conditions, (pose,), histories, torch.zeros(1, dtype=torch.float64))
+    now = newton.residual(at)
+    while float(now.relative) > 1e-9:
+        at.u = at.u + newton.step(at, now, everyone)[0]
+        now = newton.residual(at)
+    u = at.u
+    held = skin.skin.fixed
+    np.testing.assert_allclose((u[..., 0] - torch.as_tensor(state.displacement))[held], moved[held, :, 0])
     surface = skin.figures([0.0], [replace(state, displacement=u[..., 0].numpy())]).surface[0]
-    return -contact.force[:, 0].numpy(), surface
+    return -now.contacts[0].force[:, 0].numpy(), surface
 
 
 def _reaction(skin, state):
     """Force of the bond on every held node [N]: what holds it against the body; no contact lies there."""
-    own = skin._press(0, PRESS).conditions
-    internal = skin._body.internal_force(torch.as_tensor(state.displacement)[..., None], own)[0]
-    internal[torch.as_tensor(~skin._fixed)] = 0.0
+    own = skin.skin.placed(0, PRESS).conditions
+    internal = skin.skin.body.internal_force(torch.as_tensor(state.displacement)[..., None], own)[0]
+    internal[torch.as_tensor(~skin.skin.fixed)] = 0.0
     return internal
 
 
@@ -86,7 +91,7 @@ def test_the_work_saved_is_half_of_what_the_bond_takes_up():
     slope = np.array([d.force[0, 2] for _, d in found])
     saved = np.trapezoid(slope, depths)
     reaction = _reaction(skin, found[-1][0])
-    taken = 0.5 * float((reaction * Bonding(skin.mesh, skin._fixed).slack(reaction)).sum())
+    taken = 0.5 * float((reaction * Bonding(skin.mesh, skin.skin.fixed).slack(reaction)).sum())
     assert saved == pytest.approx(taken, rel=0.05)
 
 

@@ -10,7 +10,8 @@ from skin_examples import batch, box_mesh, joined, random_rotation, slab_sensor
 from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor.sensor import Material
-from tacdata.skin.contact.contact import Contact, board_distance, face_quadrature
+from tacdata.skin.contact.contact_surface import ContactSurface, face_quadrature
+from tacdata.skin.contact.kernels import board_distance
 from tacdata.skin.member.conditions import conditions
 from tacdata.skin.member.pose import Pose, turned
 
@@ -32,19 +33,25 @@ class Pressed:
         nodes, faces = torch.as_tensor(mesh.nodes), torch.as_tensor(mesh.outer)
         function = distance or Sphere(2.0).distance_function()
         modulus = MATERIAL.youngs_modulus
-        self.contact = Contact(nodes, faces, 1, function, rough, PENALTY / modulus, STICK / modulus)
+        self.surface = ContactSurface(nodes, faces, 1, function, rough, PENALTY / modulus, STICK / modulus)
         self.conditions, self.mesh = joined(*members), mesh
         self.weights, _ = face_quadrature(nodes, faces, 1)
 
-    def force(self, u, pose, state):
-        force = torch.zeros_like(u)
-        self.contact.add_force(u, pose, state, self.conditions, force)
+        self.start, self.tangent = self.surface.start, 0.0
+
+    def force(self, u, pose, history):
+        """Nodal forces; ``now`` keeps the tractions."""
+        force, share = torch.zeros_like(u), torch.full_like(self.conditions.modulus, self.tangent)
+        self.now = self.surface.add_forces(u, pose, history, self.conditions, share, force)
         return force
 
     def product(self, p):
         result = torch.zeros_like(p)
-        self.contact.add_product(p, result)
+        self.surface.add_product(self.now.tangent, p, result)
         return result
+
+    def misfit(self):
+        return self.surface.penetration(self.now)
 
     def flat(self):
         """Displacements of the skin at rest."""
@@ -94,31 +101,31 @@ def test_quadrature_weights_add_up_to_the_area(mesh):
 def test_a_flat_penetration_gives_penalty_times_depth_times_area(mesh):
     """A half-space pushed 0.05 mm into the whole face: pressure and force in closed form."""
     pressed, pose = against_board(mesh), at()
-    contact, u = pressed.contact, pressed.flat()
+    u = pressed.flat()
     u[:, 2] = -2.05
-    force = pressed.force(u, pose, contact.start(pose))
-    assert contact.pressure.numpy() == pytest.approx(np.full(contact.pressure.shape, 0.05 * PENALTY), rel=1e-9)
+    force = pressed.force(u, pose, pressed.start(pose))
+    assert pressed.now.pressure.numpy() == pytest.approx(np.full(pressed.now.pressure.shape, 0.05 * PENALTY), rel=1e-9)
     assert force[..., 0].sum(dim=0).numpy() == pytest.approx([0, 0, 0.05 * PENALTY * 16], abs=1e-7)
-    assert contact.force[:, 0].numpy() == pytest.approx([0, 0, 0.05 * PENALTY * 16], abs=1e-7)
-    assert [m.item() for m in contact.misfit()] == pytest.approx([0.05, 0.05])
+    assert pressed.now.force[:, 0].numpy() == pytest.approx([0, 0, 0.05 * PENALTY * 16], abs=1e-7)
+    assert [m.item() for m in pressed.misfit()] == pytest.approx([0.05, 0.05])
 
 
 def test_a_shape_above_the_face_exerts_nothing(mesh):
     pressed, pose = against(mesh, 0.2), pose_at(depth=-0.01)
-    assert not pressed.force(pressed.flat(), pose, pressed.contact.start(pose)).any()
-    assert pressed.contact.gap.min() > 0 and pressed.contact.misfit()[0].item() == 0
-    assert not pressed.contact.touched.any()
+    assert not pressed.force(pressed.flat(), pose, pressed.start(pose)).any()
+    assert pressed.now.gap.min() > 0 and pressed.misfit()[0].item() == 0
+    assert not pressed.now.tangent.touched.any()
 
 
 def test_a_multiplier_pulls_the_face_no_further_than_its_traction(mesh):
     """Augmented: t = lambda - penalty * gap, so an exact fit carries lambda without penetration."""
     pressed, pose = against_board(mesh), at()
-    contact, u = pressed.contact, pressed.flat()
-    state = contact.start(pose)
+    u = pressed.flat()
+    state = pressed.start(pose)
     u[:, 2] = -2.0
-    state.multiplier += 0.3
+    state.multiplier.add_(0.3)
     pressed.force(u, pose, state)
-    assert contact.pressure.numpy() == pytest.approx(np.full(contact.pressure.shape, 0.3), abs=1e-9)
+    assert pressed.now.pressure.numpy() == pytest.approx(np.full(pressed.now.pressure.shape, 0.3), abs=1e-9)
     u[:, 2] = -2.0 + 0.3 / PENALTY * 1.01
     assert not pressed.force(u, pose, state).any()
 
@@ -126,11 +133,11 @@ def test_a_multiplier_pulls_the_face_no_further_than_its_traction(mesh):
 def test_augmenting_takes_the_tractions_of_the_marked_members_alone(mesh):
     pressed = Pressed(mesh, *[conditions(MATERIAL, 0.0, Sphere(2.0))] * 2)
     pose = side_by_side(pose_at(), pose_at())
-    state = pressed.contact.start(pose)
+    state = pressed.start(pose)
     pressed.force(pressed.flat(), pose, state)
-    pressed.contact.augment(state, torch.tensor([False, True]))
+    state.augment(pressed.now, torch.tensor([False, True]))
     assert not state.multiplier[..., 0].any()
-    assert torch.equal(state.multiplier[..., 1], pressed.contact.pressure[..., 1])
+    assert torch.equal(state.multiplier[..., 1], pressed.now.pressure[..., 1])
 
 
 @pytest.mark.parametrize("sharp", [0.0, 1.0])
@@ -138,12 +145,12 @@ def test_augmenting_takes_the_tractions_of_the_marked_members_alone(mesh):
 def test_stiffness_is_the_derivative_of_force_where_points_stick_or_slide_freely(mesh, friction, sharp):
     """Without friction or with sticking points the tangent is exact, up to the curvature of the shape times the gap."""
     pressed = against(mesh, friction)
-    contact, pose, u = pressed.contact, pose_at(0.1, 0.2, 0.02), pressed.flat()
-    state = contact.start(pose)
-    contact.sharp.fill_(sharp)
+    pose, u = pose_at(0.1, 0.2, 0.02), pressed.flat()
+    state = pressed.start(pose)
+    pressed.tangent = sharp
     state.gap.zero_()
     pressed.force(u, pose, state)
-    state.anchor.copy_(contact.local)
+    state.anchor.copy_(pressed.now.local)
     p, h = batch(np.random.default_rng(1).normal(size=mesh.nodes.shape)), 1e-7
     difference = (pressed.force(u + h * p, pose, state) - pressed.force(u - h * p, pose, state)) / (2 * h)
     pressed.force(u, pose, state)
@@ -154,23 +161,23 @@ def test_the_stiffness_of_the_faces_is_that_of_the_product(mesh):
     """Blocks are in single precision, as the preconditioner wants them."""
     pressed = against(mesh, 0.3)
     pose, u = pose_at(), pressed.flat()
-    pressed.force(u, pose, pressed.contact.start(pose_at(depth=0.0)))
+    pressed.force(u, pose, pressed.start(pose_at(depth=0.0)))
     p = batch(np.random.default_rng(2).normal(size=mesh.nodes.shape))
     product, assembled = pressed.product(p), torch.zeros_like(p)
     every = torch.arange(len(mesh.outer))
-    blocks = pressed.contact.face_stiffness(every, torch.zeros_like(every)).double()
+    blocks = pressed.surface.face_stiffness(pressed.now.tangent, every, torch.zeros_like(every)).double()
     for nodes, block in zip(mesh.outer, blocks, strict=True):
         assembled[nodes, :, 0] += (block @ p[nodes, :, 0].reshape(-1)).reshape(6, 3)
     assert product.abs().max() > 1
     assert (product - assembled).abs().max() < 1e-6 * product.abs().max()
-    untouched = ~pressed.contact.touched[:, 0]
+    untouched = ~pressed.now.tangent.touched[:, 0]
     assert untouched.any() and not blocks[untouched].any()
 
 
 def test_the_product_in_single_precision_is_that_in_double(mesh):
     pressed = against(mesh, 0.3)
     pose, u = pose_at(), pressed.flat()
-    pressed.force(u, pose, pressed.contact.start(pose_at(depth=0.0)))
+    pressed.force(u, pose, pressed.start(pose_at(depth=0.0)))
     p = batch(np.random.default_rng(2).normal(size=mesh.nodes.shape))
     product, single = pressed.product(p), pressed.product(p.float())
     assert single.dtype == torch.float32
@@ -180,13 +187,13 @@ def test_the_product_in_single_precision_is_that_in_double(mesh):
 def drag(mesh, friction, shift):
     """Press 0.05 mm deep, accept, move the shape sideways; return normal and tangential traction of each point."""
     pressed = against(mesh, friction)
-    contact, u, before = pressed.contact, pressed.flat(), pose_at(depth=0.05)
-    state = contact.start(before)
+    u, before = pressed.flat(), pose_at(depth=0.05)
+    state = pressed.start(before)
     pressed.force(u, before, state)
-    contact.accept(state, before, everyone(before))
+    state.accept(pressed.now, before, everyone(before))
     pressed.force(u, pose_at(x=shift, depth=0.05), state)
-    carries = contact.pressure[..., 0] > 0
-    return contact.pressure[..., 0][carries].numpy(), contact.shear[..., 0][carries].numpy()
+    carries = pressed.now.pressure[..., 0] > 0
+    return pressed.now.pressure[..., 0][carries].numpy(), pressed.now.shear[..., 0][carries].numpy()
 
 
 def test_a_small_shift_sticks_with_the_tangential_stiffness(mesh):
@@ -213,10 +220,10 @@ def test_friction_comes_back_with_the_shape(mesh):
 def test_accepting_leaves_the_unmarked_member_with_its_history(mesh):
     pressed = Pressed(mesh, *[conditions(MATERIAL, 0.2, Sphere(2.0))] * 2)
     pose = side_by_side(pose_at(), pose_at())
-    state = pressed.contact.start(pose)
+    state = pressed.start(pose)
     before = state.copy()
     pressed.force(pressed.flat(), pose, state)
-    pressed.contact.accept(state, pose, torch.tensor([True, False]))
+    state.accept(pressed.now, pose, torch.tensor([True, False]))
     assert torch.equal(state.gap[..., 1], before.gap[..., 1]) and not state.anchor[..., 1].any()
     assert state.gap[..., 0].isfinite().all() and (state.gap[..., 0] == 0).any()
 
@@ -225,7 +232,7 @@ def test_yaw_turns_the_shape_about_its_tip(mesh):
     """A sphere has no direction: turning it changes nothing; its force follows its place."""
     pressed = against(mesh, 0.0)
     plain, turned_ = (
-        pressed.force(pressed.flat(), pose, pressed.contact.start(pose))
+        pressed.force(pressed.flat(), pose, pressed.start(pose))
         for pose in (pose_at(0.3, 0.1), pose_at(0.3, 0.1, yaw=1.1))
     )
     assert (plain - turned_).abs().max() < 1e-7 * plain.abs().max()
@@ -239,7 +246,7 @@ def test_a_sphere_tilted_about_its_centre_presses_the_same(mesh):
     pressed, plain, tilt = against(mesh, 0.0), pose_at(0.3, 0.1), turn_by(0.4, 0.3, -0.2)
     centre = plain.place + torch.tensor([[0.0], [0.0], [2.0]])
     tilted = Pose((centre - 2.0 * tilt[:, 2]).contiguous(), tilt)
-    upright, leaning = (pressed.force(pressed.flat(), pose, pressed.contact.start(pose)) for pose in (plain, tilted))
+    upright, leaning = (pressed.force(pressed.flat(), pose, pressed.start(pose)) for pose in (plain, tilted))
     assert (tilted.place - plain.place).abs().max() > 0.3
     assert upright.abs().max() > 0.1
     assert (upright - leaning).abs().max() < 1e-7 * upright.abs().max()
@@ -263,12 +270,12 @@ def test_an_observer_who_turns_sees_the_forces_turned(mesh, shape):
             )
             for pose in (pose_at(0.1, -0.2, 0.1, yaw=0.3), pose_at(0.13, -0.22, 0.12, yaw=0.3))
         ]
-        state = pressed.contact.start(poses[0])
+        state = pressed.start(poses[0])
         field, along = (batch(value @ turn.numpy().T) for value in (u, p))
         pressed.force(field, poses[0], state)
-        pressed.contact.accept(state, poses[0], everyone(poses[0]))
+        state.accept(pressed.now, poses[0], everyone(poses[0]))
         force = pressed.force(field, poses[1], state)
-        return force[..., 0] @ turn, pressed.product(along)[..., 0] @ turn, pressed.contact.shear
+        return force[..., 0] @ turn, pressed.product(along)[..., 0] @ turn, pressed.now.shear
 
     one = seen(mesh, torch.eye(3, dtype=torch.float64), torch.zeros(3, dtype=torch.float64))
     two = seen(other, torch.as_tensor(Q), torch.as_tensor(shift))
@@ -287,24 +294,24 @@ def test_every_member_has_its_own_shape_friction_modulus_and_pose(mesh):
     poses = [pose_at(0.1, 0.2, 0.1), pose_at(-0.5, 0.0, 0.05), pose_at(0.0, 0.4, 0.15)]
     start = [pose_at(pose.place[0].item(), pose.place[1].item(), 0.0) for pose in poses]
     whole = Pressed(mesh, *members)
-    together = whole.force(whole.flat(), side_by_side(*poses), whole.contact.start(side_by_side(*start)))
+    together = whole.force(whole.flat(), side_by_side(*poses), whole.start(side_by_side(*start)))
     p = np.random.default_rng(3).normal(size=mesh.nodes.shape)
     product = whole.product(batch(p, p, p))
     for column, (member, pose, before) in enumerate(zip(members, poses, start, strict=True)):
         alone = Pressed(mesh, member)
-        force = alone.force(alone.flat(), pose, alone.contact.start(before))
+        force = alone.force(alone.flat(), pose, alone.start(before))
         assert force.abs().max() > 1e-3
         assert (force[..., 0] - together[..., column]).abs().max() < 1e-13 * force.abs().max()
         assert (alone.product(batch(p))[..., 0] - product[..., column]).abs().max() < 1e-12 * product.abs().max()
-        assert whole.contact.force[:, column].numpy() == pytest.approx(alone.contact.force[:, 0].numpy())
-        largest, mean = (m[column].item() for m in whole.contact.misfit())
-        assert (largest, mean) == pytest.approx(tuple(m.item() for m in alone.contact.misfit()), rel=1e-12)
+        assert whole.now.force[:, column].numpy() == pytest.approx(alone.now.force[:, 0].numpy())
+        largest, mean = (m[column].item() for m in whole.misfit())
+        assert (largest, mean) == pytest.approx(tuple(m.item() for m in alone.misfit()), rel=1e-12)
 
 
 def test_tractions_are_proportional_to_the_members_modulus(mesh):
     soft, stiff = (conditions(replace(MATERIAL, youngs_modulus=e), 0.2, Sphere(2.0)) for e in (0.2, 0.8))
     pressed, pose = Pressed(mesh, soft, stiff), side_by_side(pose_at(0.1), pose_at(0.1))
-    force = pressed.force(pressed.flat(), pose, pressed.contact.start(side_by_side(pose_at(), pose_at())))
+    force = pressed.force(pressed.flat(), pose, pressed.start(side_by_side(pose_at(), pose_at())))
     assert (4 * force[..., 0] - force[..., 1]).abs().max() < 1e-12 * force.abs().max()
 
 
@@ -313,7 +320,7 @@ def test_a_thicker_members_face_lies_higher(mesh):
     thick = conditions(MATERIAL, 0.0, Sphere(2.0), thickness=1.1)
     plain, raised = against(mesh, 0.0), Pressed(mesh, thick)
     low, high = pose_at(0.1, 0.2, 0.1), pose_at(0.1, 0.2, 0.1 - 0.2)
-    one = plain.force(plain.flat(), low, plain.contact.start(low))
-    other = raised.force(raised.flat(), high, raised.contact.start(high))
+    one = plain.force(plain.flat(), low, plain.start(low))
+    other = raised.force(raised.flat(), high, raised.start(high))
     assert one.abs().max() > 0.1
     assert (one - other).abs().max() < 1e-9 * one.abs().max()

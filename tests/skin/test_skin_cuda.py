@@ -1,4 +1,4 @@
-"""The same presses on the CPU and on a card: one algorithm, other precision of the preconditioner.
+"""The same presses on the CPU and on a GPU: one algorithm, other precision of the preconditioner.
 
 Solved so tightly that they must find the same; what the default tolerance leaves is `test_skin_tolerance.py`'s.
 """
@@ -25,7 +25,7 @@ from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
 
 pytestmark = [pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")]
-CARD = "cuda:0"
+GPU = "cuda:0"
 
 
 @pytest.fixture(scope="module")
@@ -36,47 +36,47 @@ def held():
 def pair(sensor, settings=EXACT, mesh=None):
     """The same model on both devices."""
     there = SkinModel(sensor, settings, mesh=mesh)
-    return there, SkinModel(sensor, settings, CARD, there.mesh)
+    return there, SkinModel(sensor, settings, GPU, there.mesh)
 
 
-def close(card, cpu):
+def close(gpu, cpu):
     """Forces within 0.2 % of the largest, maps within 0.1 % of the depth, both within the solver's settings."""
     limit = EXACT.solver
-    assert np.abs(card.force - cpu.force).max() < 2e-3 * np.abs(cpu.force).max()
-    assert np.abs(card.surface - cpu.surface).max() < 1e-3 * cpu.depth.max()
-    assert card.residual.max() <= limit.residual
-    assert np.all(card.penetration <= limit.penetration * np.maximum(card.depth, 0.1))
+    assert np.abs(gpu.force - cpu.force).max() < 2e-3 * np.abs(cpu.force).max()
+    assert np.abs(gpu.surface - cpu.surface).max() < 1e-3 * cpu.depth.max()
+    assert gpu.residual.max() <= limit.residual
+    assert np.all(gpu.penetration <= limit.penetration * np.maximum(gpu.depth, 0.1))
 
 
 def test_presses_on_a_slab_agree():
     sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
-    cpu, card = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
+    cpu, gpu = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
     requests = [
         PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.2, 0.4, 0.2, 0.0)),
         PressRequest(Cylinder(1.2, 2.0, 0.5), 0.1, 0.0, 30.0, (0.3,)),
         PressRequest(FlatPunch(1.0, 0.9), -0.1, 0.2, 0.0, (0.3,)),
         PressRequest(Sphere(1.0), -0.4, 0.4, 0.0, (0.3,)),
     ]
-    found = dict(card.solve_many(requests, 4))
+    found = dict(gpu.solve_many(requests, 4))
     for number, request in enumerate(requests):
         close(found[number], cpu.solve(request))
 
 
 def test_presses_on_protrusions_agree():
     settings = replace(EXACT, mesh=MeshSettings(outer=0.9, interior=1.5, protrusion=1.0, tip=None))
-    cpu, card = pair(bumps_sensor(), settings)
+    cpu, gpu = pair(bumps_sensor(), settings)
     request = PressRequest(Sphere(2.0), 0.5, 0.45, 0.0, (0.2, 0.4, 0.2))
-    ours, theirs = card.solve(request), cpu.solve(request)
+    ours, theirs = gpu.solve(request), cpu.solve(request)
     close(ours, theirs)
     assert np.abs(ours.taxel_force - theirs.taxel_force).max() < 2e-3 * theirs.taxel_force.max()
 
 
 def test_a_press_that_diverges_leaves_its_neighbours_alone_on_a_card_too():
     sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
-    cpu, card = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
+    cpu, gpu = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
     good = PressRequest(FlatPunch(1.0, 0.9), 0.2, 0.1, 0.0, (0.15, 0.3))
     crushing = PressRequest(FlatPunch(1.5, 0.9), 0.0, 0.0, 0.0, (1.98,))
-    found = dict(card.solve_many([crushing, good], 2))
+    found = dict(gpu.solve_many([crushing, good], 2))
     assert isinstance(found[0], SolveError) and "no equilibrium" in str(found[0])
     close(found[1], cpu.solve(good))
 
@@ -85,9 +85,9 @@ def test_a_skin_that_sticks_agrees():
     """Down onto it and drawn up again, beside a press elsewhere."""
     slab = slab_sensor(size=4.0, friction=0.2, pixels=9)
     sensor = replace(slab, contact=replace(slab.contact, adhesion=Adhesion("exponential", 5.0, 0.1)))
-    cpu, card = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
+    cpu, gpu = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
     requests = [PressRequest(Sphere(2.0), x, 0.0, 0.0, (0.0, 0.1, -0.05)) for x in (0.0, 0.4)]
-    for request, (_, found) in zip(requests, sorted(card.solve_many(requests, 2), key=lambda one: one[0]), strict=True):
+    for request, (_, found) in zip(requests, sorted(gpu.solve_many(requests, 2), key=lambda one: one[0]), strict=True):
         ours = cpu.solve(request)
         assert ours.force[-1, 2] < 0.0, "drawn up, it pulls"
         close(found, ours)
@@ -97,18 +97,18 @@ def test_an_incompressible_skin_agrees():
     """Volume changes averaged at the corners; without friction, which remembers how steps were halved on the way."""
     slab = slab_sensor(size=4.0, friction=0.0, pixels=9)
     sensor = replace(slab, material=replace(slab.material, poisson_ratio=0.495))
-    cpu, card = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
+    cpu, gpu = pair(sensor, mesh=box_mesh(sensor, 6, 6, 2))
     request = PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.2, 0.4))
-    close(card.solve(request), cpu.solve(request))
+    close(gpu.solve(request), cpu.solve(request))
 
 
 def test_derivatives_agree():
     """Of a path with friction, and of one parameter asked for alone."""
     sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
-    cpu, card = pair(sensor, mesh=box_mesh(sensor, 4, 4, 2))
+    cpu, gpu = pair(sensor, mesh=box_mesh(sensor, 4, 4, 2))
     request = PressRequest(Sphere(1.5), 0.13, -0.21, 0.0, (0.1, 0.2, 0.15))
     for names in (["x", "z", "thickness", "friction", "poisson_ratio"], ["tilt_x"]):
-        both = zip(sensitivities(card, request, names), sensitivities(cpu, request, names), strict=True)
+        both = zip(sensitivities(gpu, request, names), sensitivities(cpu, request, names), strict=True)
         for (_, _, ours), (_, _, theirs) in both:
             for k in range(len(names)):
                 assert np.abs(ours.force[k] - theirs.force[k]).max() < 0.01 * np.abs(theirs.force[k]).max() + 1e-6
@@ -120,34 +120,34 @@ def test_kernels_agree_to_rounding(held):
     u = 0.05 * np.sin(held.mesh.nodes @ np.random.default_rng(1).uniform(-1, 1, (3, 3)))
     p = np.random.default_rng(2).normal(size=u.shape)
     found = []
-    for device in ("cpu", CARD):
+    for device in ("cpu", GPU):
         body = Elasticity(held.mesh, "neo_hookean", device)
         own = conditions(slab_sensor().material, 0.0, device=device).repeat(2)
         field, along = batch(u, 2 * u).to(device), batch(p, p).to(device)
         product = torch.zeros_like(field)
         body.tangent_product(field, along, own, product)
         found.append((body.internal_force(field, own)[0].cpu(), product.cpu(), body.energy(field, own).cpu()))
-    for cpu, card in zip(*found, strict=True):
-        assert (cpu - card).abs().max() < 1e-11 * cpu.abs().max()
+    for cpu, gpu in zip(*found, strict=True):
+        assert (cpu - gpu).abs().max() < 1e-11 * cpu.abs().max()
 
 
 def test_the_dense_inverse_is_a_good_preconditioner_and_its_compliance_is_its_own(held):
     """Half precision costs digits; that the compliance is read off the same rounded matrix costs none."""
     material, m = slab_sensor().material, len(held.loadable)
-    dense = rest_solver(held.mesh, material, held.mesh.bottom, held.loadable, CARD)
+    dense = rest_solver(held.mesh, material, held.mesh.bottom, held.loadable, GPU)
     sparse = SparseRest(held.stiffness, held.free, held.loadable)
     r = held.random(2, 3)
-    ours, theirs = dense.apply(r.to(CARD)).cpu(), sparse.apply(r)
+    ours, theirs = dense.apply(r.to(GPU)).cpu(), sparse.apply(r)
     assert ((ours - theirs).norm(dim=0) < 2e-2 * theirs.norm(dim=0)).all()
     assert not ours[held.held].any()
     # Rows of the same matrix, whether taken by themselves or with the rest.
-    part = dense.loadable(r.to(CARD)).cpu() - ours[held.loadable]
+    part = dense.loadable(r.to(GPU)).cpu() - ours[held.loadable]
     assert part.abs().max() < 1e-5 * ours.abs().max()
-    every = torch.arange(m, device=CARD)[None]
+    every = torch.arange(m, device=GPU)[None]
     matrix = dense.compliance(every)[0].cpu()
     unit = torch.zeros(3 * held.count, 1)
     unit[held.loadable[5]] = 1.0
-    moved = dense.loadable(unit.to(CARD))[:, 0].cpu()
+    moved = dense.loadable(unit.to(GPU))[:, 0].cpu()
     assert (matrix[5] - moved).abs().max() < 1e-3 * moved.abs().max()
     assert torch.equal(matrix, matrix.T)
     assert torch.linalg.eigvalsh(matrix.double()).min() > 0
@@ -158,8 +158,8 @@ def test_the_contact_transfer_is_that_of_the_cpu():
     root = torch.as_tensor(random.normal(size=(2, 2, 150, 150))) / 12
     compliance, stiffness = root @ root.transpose(2, 3) + 0.2 * torch.eye(150)
     moved = torch.as_tensor(random.normal(size=(2, 150))).float()
-    here, there = contact_transfer(2, "cpu"), contact_transfer(2, CARD)
+    here, there = contact_transfer(2, "cpu"), contact_transfer(2, GPU)
     here.put(torch.arange(2), stiffness.float(), compliance.float())
-    there.put(torch.arange(2, device=CARD), stiffness.float().to(CARD), compliance.float().to(CARD))
-    here, there = here.times(moved), there.times(moved.to(CARD)).cpu()
+    there.put(torch.arange(2, device=GPU), stiffness.float().to(GPU), compliance.float().to(GPU))
+    here, there = here.times(moved), there.times(moved.to(GPU)).cpu()
     assert (here - there).abs().max() < 1e-3 * here.abs().max()

@@ -10,7 +10,7 @@ from skin_examples import bumps_sensor, slab_sensor
 from tacdata.errors import SolveError
 from tacdata.sensor import default_sensor
 from tacdata.sensor.sensor import ContactProperties, Skin
-from tacdata.skin.contact.contact import face_quadrature
+from tacdata.skin.contact.contact_surface import face_quadrature
 from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.build import PINNED, MeshSettings, build_mesh, make_mesh, mesh_key, surface
 from tacdata.skin.mesh.coarser import RATIOS, coarser

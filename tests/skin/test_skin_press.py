@@ -33,7 +33,7 @@ def rough(rough_slab):
 
 def internal_force(model, state):
     """Nodal forces [N] of the deformed body, shape (n, 3)."""
-    force, _ = model._body.internal_force(batch(state.displacement), conditions(model.sensor.material, 0.0))
+    force, _ = model.skin.body.internal_force(batch(state.displacement), conditions(model.sensor.material, 0.0))
     return force[..., 0]
 
 
@@ -68,14 +68,14 @@ def test_a_small_depth_follows_hertz_on_a_bonded_layer(fine_slab):
 
 def test_the_support_carries_what_the_indenter_exerts(rough_slab):
     for _, state in rough_slab.states(press((0.3,), 0.4, -0.3)):
-        reaction = internal_force(rough_slab, state)[torch.as_tensor(rough_slab._fixed)].sum(dim=0).numpy()
+        reaction = internal_force(rough_slab, state)[torch.as_tensor(rough_slab.skin.fixed)].sum(dim=0).numpy()
         assert state.force[2] > 0.1
         assert state.force == pytest.approx(reaction, abs=2e-3 * state.force[2])
 
 
 def test_board_and_frame_together_carry_the_indenter(bumps):
     [(_, state)] = bumps.states(press((0.4,), 0.5, 0.45))
-    frame = internal_force(bumps, state)[torch.as_tensor(bumps._fixed), 2].sum().item()
+    frame = internal_force(bumps, state)[torch.as_tensor(bumps.skin.fixed), 2].sum().item()
     assert state.force[2] == pytest.approx(frame + state.taxel_force.sum(), rel=2e-3)
     assert state.taxel_force.argmax() == 3
     assert state.taxel_force[3] > 1.5 * state.taxel_force[0] > 0

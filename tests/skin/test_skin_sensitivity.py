@@ -20,8 +20,8 @@ from tacdata.skin.member.conditions import conditions
 from tacdata.skin.member.pose import turned
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.load_path import Walk
-from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.solve.load_path import LoadPath
+from tacdata.skin.solve.settings import SolverSettings
 
 EGG = Ellipsoid(3.0, 2.0, 1.5)
 PATH = (0.1, 0.2, 0.3, 0.22)
@@ -47,7 +47,7 @@ def press(depths=PATH, indenter=EGG):
 
 def moved(skin, request, name, step, number):
     """A whole press with one parameter moved, none of it by derivatives."""
-    whole = skin._press(number, request)
+    whole = skin.skin.placed(number, request)
     material, rub, shape, thickness = skin.sensor.material, skin.sensor.contact.friction, request.indenter, 1.0
     depths, touch, turn = request.depths, whole.touch.copy(), {"yaw": request.yaw, "tilt_x": 0.0, "tilt_y": 0.0}
     if name in ("x", "y"):
@@ -68,22 +68,22 @@ def moved(skin, request, name, step, number):
         material = replace(material, **{name: getattr(material, name) + step})
     angles = (torch.tensor([np.radians(angle)], dtype=torch.float64) for angle in turn.values())
     return replace(
-        whole, walk=Walk(depths, skin.settings.step, ""), touch=touch, turn=turned(*angles)[..., 0].numpy(),
+        whole, path=LoadPath(depths, skin.settings.step, ""), touch=touch, turn=turned(*angles)[..., 0].numpy(),
         conditions=conditions(material, rub, shape, thickness),
     )
 
 
 def picture(skin, state):
-    return skin._face.depth_map(skin.sensor.map.x, skin.sensor.map.y, state.displacement)
+    return skin.skin.face.depth_map(skin.sensor.map.x, skin.sensor.map.y, state.displacement)
 
 
 def differences(skin, request, names):
     """Of [force, map, taxel forces, closures], by name at every state; all presses at once, each as if alone."""
     steps = [(name, sign * STEPS.get(name, 2e-6)) for name in names for sign in (1, -1)]
     presses = [moved(skin, request, *step, number) for number, step in enumerate(steps)]
-    batch, contacts = skin._batch(request, len(presses))
+    batch = skin.skin.batch(request, len(presses))
     states = [[] for _ in presses]
-    for number, _, state in batch.run(iter(presses), lambda members: skin._gauge.states(members, contacts, True)):
+    for number, _, state in batch.run(presses, skin.skin.reader.states):
         states[number].append((state.force, picture(skin, state), state.taxel_force, state.taxel_closure))
     return {
         name: [[(up - down) / (2 * step) for up, down in zip(*pair, strict=True)] for pair in zip(*both, strict=True)]

@@ -19,7 +19,7 @@ REQUESTS = [
     PressRequest(FlatPunch(1.0, 0.9), -0.1, 0.2, 0.0, (0.3,)),
     PressRequest(Sphere(1.0), -0.4, 0.4, 0.0, (0.3,)),
 ]
-CARD = pytest.param(
+GPU = pytest.param(
     "cuda:0", marks=[pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")]
 )
 
@@ -35,7 +35,7 @@ def exact(sensor):
     return [model.solve(request) for request in REQUESTS]
 
 
-@pytest.mark.parametrize("device", ["cpu", CARD])
+@pytest.mark.parametrize("device", ["cpu", GPU])
 def test_forces_within_three_thousandths_and_maps_within_a_hundredth_of_the_depth(sensor, exact, device):
     """As far as two codes agree on one mesh. This one is coarse: a few faces carry each press."""
     model = SkinModel(sensor, PLAIN, device, box_mesh(sensor, 6, 6, 2))
@@ -48,7 +48,7 @@ def test_forces_within_three_thousandths_and_maps_within_a_hundredth_of_the_dept
         assert np.sqrt(np.mean(np.square(off))) < 2e-3 * reference.depth.max()
 
 
-@pytest.mark.parametrize("device", ["cpu", CARD])
+@pytest.mark.parametrize("device", ["cpu", GPU])
 def test_tighter_settings_come_closer(sensor, exact, device):
     solver = replace(PLAIN.solver, residual=1e-4, penetration=3e-4, mean_penetration=3e-5)
     model = SkinModel(sensor, replace(PLAIN, solver=solver), device, box_mesh(sensor, 6, 6, 2))

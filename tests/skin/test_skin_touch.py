@@ -74,7 +74,7 @@ def test_a_tilted_punch_is_where_its_rotated_distance_says(model):
     request = press(PUNCH, 0.3, tilt_x=3.0, tilt_y=6.0)
     [(_, state)] = model.states(request)
     turn, nodes = rotation(request), np.unique(model.mesh.outer)
-    origin = touch(model.sensor, model._face, request) - [0, 0, 0.3]
+    origin = touch(model.sensor, model.skin.face, request) - [0, 0, 0.3]
     gap = punch_distance((model.mesh.nodes[nodes] + state.displacement[nodes] - origin) @ turn)
     assert gap.min() > -0.03
     assert np.sort(np.abs(gap))[:9].max() < 0.01

@@ -9,7 +9,7 @@ import torch
 from skin_examples import MATERIAL, HeldSlab, batch, joined
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.contact.contact import Contact
+from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.linear import contact_preconditioner
 from tacdata.skin.linear.batched_inverse import inverse, inverse_of_sum
 from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
@@ -35,19 +35,20 @@ def rest(body):
 
 
 def pressed(body, rest, friction, places, moduli):
-    """A contact with one sphere a member, evaluated at rest, and its preconditioner."""
+    """A contact with one sphere a member, with its stiffness at rest, and its preconditioner."""
     nodes, faces = torch.as_tensor(body.mesh.nodes), torch.as_tensor(body.mesh.outer)
-    contact = Contact(nodes, faces, 1, SPHERE.distance_function(), friction > 0, PENALTY, STICK)
+    surface = ContactSurface(nodes, faces, 1, SPHERE.distance_function(), friction > 0, PENALTY, STICK)
     members = joined(*(conditions(replace(MATERIAL, youngs_modulus=e), friction, SPHERE) for e in moduli))
     turn = torch.eye(3, dtype=torch.float64)[:, :, None].repeat(1, 1, len(places))
     pose = Pose(torch.tensor(places, dtype=torch.float64).T.contiguous(), turn)
     u = batch(*[np.zeros_like(body.mesh.nodes)] * len(places))
-    contact.add_force(u, pose, contact.start(pose), members, torch.zeros_like(u))
+    secant = torch.zeros_like(members.modulus)
+    at = surface.add_forces(u, pose, surface.start(pose), members, secant, torch.zeros_like(u)).tangent
     made = ContactPreconditioner(
-        rest, [contact], torch.as_tensor(body.loadable), 3 * body.count, MATERIAL.youngs_modulus
+        rest, [surface], torch.as_tensor(body.loadable), 3 * body.count, MATERIAL.youngs_modulus
     )
-    made.update(members.modulus)
-    return contact, made
+    made.update([at], members.modulus)
+    return (surface, at), made
 
 
 def tangent_times(body, contact, x, moduli):
@@ -55,7 +56,8 @@ def tangent_times(body, contact, x, moduli):
     field = x.double().reshape(body.count, 3, -1)
     r = body.times(x) * torch.tensor(moduli, dtype=torch.float64) / MATERIAL.youngs_modulus
     product = torch.zeros_like(field)
-    contact.add_product(field.contiguous(), product)
+    surface, at = contact
+    surface.add_product(at, field.contiguous(), product)
     r += product.reshape(r.shape)
     r[body.held] = 0
     return r.float()
@@ -75,7 +77,7 @@ def test_members_with_other_contacts_and_moduli_are_inverted_side_by_side(body, 
     """One touches little, one much, one not at all; moduli differ."""
     places, moduli = [(0.1, -0.2, 1.98), (-0.4, 0.3, 1.9), (0.0, 0.0, 2.5)], [0.30, 0.15, 0.90]
     contact, preconditioner = pressed(body, rest, 0.2, places, moduli)
-    touched = contact.touched.sum(dim=0)
+    touched = contact[1].touched.sum(dim=0)
     assert 0 < touched[0] < touched[1] and touched[2] == 0
     x = body.random(5, 6, 7)
     r = tangent_times(body, contact, x, moduli)
@@ -124,11 +126,11 @@ def iterations(product, precondition, r):
 
 
 def test_diagonals_are_those_of_the_faces_stiffness(body, rest):
-    contact, _ = pressed(body, rest, 0.2, [(0.1, -0.2, 1.98), (-0.4, 0.3, 1.9)], [0.30, 0.15])
-    face, member = contact.touched.nonzero().unbind(dim=1)
-    whole = contact.face_stiffness(face, member).diagonal(dim1=1, dim2=2)
+    (surface, at), _ = pressed(body, rest, 0.2, [(0.1, -0.2, 1.98), (-0.4, 0.3, 1.9)], [0.30, 0.15])
+    face, member = at.touched.nonzero().unbind(dim=1)
+    whole = surface.face_stiffness(at, face, member).diagonal(dim1=1, dim2=2)
     assert whole.max() > 0
-    assert (contact.face_diagonal(face, member) - whole).abs().max() < 1e-6 * whole.max()
+    assert (surface.face_diagonal(at, face, member) - whole).abs().max() < 1e-6 * whole.max()
 
 
 def test_without_contact_it_is_the_rest_stiffness_alone(body, rest):
@@ -178,7 +180,7 @@ def test_a_member_put_anew_leaves_its_neighbours_as_they_are(make):
 
 @pytest.mark.parametrize("rows", [40, 130])
 def test_both_formulas_for_the_contact_transfer_agree(rows):
-    """(I + S G)^-1 S, as the CPU has it, is (S^-1 + G)^-1, as a card has it, with a faint stiffness added to S."""
+    """(I + S G)^-1 S, as the CPU has it, is (S^-1 + G)^-1, as a GPU has it, with a faint stiffness added to S."""
     compliance, stiffness = spd(rows, 2, 50.0, seed=1), spd(rows, 2, 30.0, seed=2)
     stiffness[:, : rows // 2] = 0.0  # Most points of a face do not touch.
     stiffness[:, :, : rows // 2] = 0.0

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 import torch
 from scipy.sparse.linalg import splu
 
-from tacdata.skin.contact.contact import face_quadrature
+from tacdata.skin.contact.contact_surface import face_quadrature
 from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 

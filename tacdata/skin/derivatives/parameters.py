@@ -98,7 +98,7 @@ def directions(
         elif name == "friction":
             conditions.friction[column] = 1.0
         elif name == "bonding":
-            continue  # `Tangents` moves the held faces
+            continue  # `PathDerivatives` moves the held faces
         elif name.startswith("indenter/"):
             conditions.indenter[:, column] = _padded(_by_size(indenter, name.removeprefix("indenter/")), device)
         else:

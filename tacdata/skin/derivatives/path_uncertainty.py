@@ -137,7 +137,7 @@ def _slope(model: SkinModel, displacement: np.ndarray) -> float:
     grid = model.sensor.map
 
     def height(x: float, y: float) -> np.ndarray:
-        return model._face.depth_map(grid.x + x, grid.y + y, displacement)
+        return model.skin.face.depth_map(grid.x + x, grid.y + y, displacement)
 
     along = [height(_BESIDE, 0.0) - height(-_BESIDE, 0.0), height(0.0, _BESIDE) - height(0.0, -_BESIDE)]
     return float(np.abs(along).max()) / (2 * _BESIDE)

@@ -10,15 +10,13 @@ import numpy as np
 import torch
 
 from tacdata.errors import SolveError
-from tacdata.skin.contact.contact import board_distance
 from tacdata.skin.derivatives.bonding import Bonding
 from tacdata.skin.derivatives.contact import ConditionsChange
-from tacdata.skin.derivatives.equilibria import TOLERANCE, Slack, Tangents
+from tacdata.skin.derivatives.equilibria import TOLERANCE, PathDerivatives, Slack
 from tacdata.skin.derivatives.parameters import check, directions, known
-from tacdata.skin.derivatives.trail import Trail
+from tacdata.skin.derivatives.recorder import PathRecorder
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.batch import Members
 from tacdata.skin.solve.state import State
 from tacdata.skin.surface.depth_map import DepthRaster
 
@@ -78,34 +76,27 @@ def sensitivities(
             "derivatives of a press into a skin that sticks", "a sensor file without contact/adhesion",
             "sample whole presses (tacdata.skin.derivatives.uncertainty.sampled_spread)",
         )
-    press = model._press(0, request)
-    batch, contacts = model._batch(request, 1)
-    trail, reader = Trail(contacts), _Reader(model, request, names)
+    skin = model.skin
+    press, batch = skin.placed(0, request), skin.batch(request, 1)
+    recorder, reader = PathRecorder(), _Reader(model, request, names)
     touch = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
     along = directions(model.sensor, request.indenter, names, press.conditions, touch)
     at_touch = _without_depth(names, along)
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
-    distances = [request.indenter.distance_function(), board_distance][: len(contacts)]
-    free = torch.as_tensor(~model._fixed, device=model.device).to(torch.float64)[:, None, None]
-    newton = model._batch(request, len(names))[0]._newton  # pyright: ignore
-    tangents = Tangents(newton, distances, free, label, tolerance, _slack(model, names))
-
-    def collect(members: Members) -> list[State]:
-        return model._gauge.states(members, contacts, True)
-
-    for _, depth, state in batch.run(iter([press]), collect):
+    derivatives = PathDerivatives(skin.newton(request), skin.free, label, tolerance, _slack(model, names))
+    for _, depth, state in batch.run([press], skin.reader.states, recorder):
         if isinstance(state, SolveError):
             raise state
-        for milestone in trail.take():
-            tangents.advance(milestone, along if tangents.changes else at_touch)
-        yield depth, state, reader.read(state, tangents, along)
+        for reached in recorder.take():
+            derivatives.advance(reached, along if derivatives.changes else at_touch)
+        yield depth, state, reader.read(state, derivatives, along)
 
 
 def _slack(model: SkinModel, names: list[str]) -> Slack | None:
     """Return how held nodes move with each parameter: with the bonding alone."""
     if "bonding" not in names:
         return None
-    bonding = Bonding(model.mesh, model._fixed)
+    bonding = Bonding(model.mesh, model.skin.fixed)
     own = torch.tensor([name == "bonding" for name in names], dtype=torch.float64, device=model.device)
     return lambda reaction: bonding.slack(reaction) * own
 
@@ -127,16 +118,17 @@ class _Reader:
         grid = model.sensor.map
         self._raster = DepthRaster(model.mesh, grid.x, grid.y, grid.sampling, model.device)
         pixels = np.stack(np.meshgrid(grid.x, grid.y, indexing="ij"), axis=-1).reshape(-1, 2)
-        self._height = model._face.height(pixels).reshape(grid.shape)
+        self._height = model.skin.face.height(pixels).reshape(grid.shape)
         self._nodes = torch.as_tensor(model.mesh.nodes, device=model.device)
 
-    def read(self, state: State, tangents: Tangents, along: ConditionsChange) -> Sensitivity:
+    def read(self, state: State, derivatives: PathDerivatives, along: ConditionsChange) -> Sensitivity:
         """Return the derivatives of one state."""
-        taxel_force = self._taxel_force(tangents)
+        taxel_force = self._taxel_force(derivatives)
         return Sensitivity(
-            tuple(self._names), self._units, self._map(state, tangents.du, along.conditions.thickness),
-            -tangents.changes[0].force.sum(dim=0).T.cpu().numpy(), taxel_force,
-            self._model._gauge.closure(tangents.du).T.cpu().numpy(), self._area(state, taxel_force), tangents.error,
+            tuple(self._names), self._units, self._map(state, derivatives.du, along.conditions.thickness),
+            -derivatives.changes[0].force.sum(dim=0).T.cpu().numpy(), taxel_force,
+            self._model.skin.reader.closure(derivatives.du).T.cpu().numpy(), self._area(state, taxel_force),
+            derivatives.error,
         )
 
     def _map(self, state: State, du: torch.Tensor, thickness: torch.Tensor) -> np.ndarray:
@@ -152,12 +144,10 @@ class _Reader:
         covered = self._raster.measure(base)[1][0].cpu().numpy() > 0
         return slope + covered * self._height * thickness.cpu().numpy()[:, None, None]
 
-    def _taxel_force(self, tangents: Tangents) -> np.ndarray:
-        count = self._model.sensor.taxels.count
-        load = torch.zeros(count, len(self._names), dtype=torch.float64, device=tangents.du.device)
-        if len(tangents.changes) > 1:
-            load.index_add_(0, self._model._gauge._taxel, tangents.changes[1].load)
-        return load.T.cpu().numpy()
+    def _taxel_force(self, derivatives: PathDerivatives) -> np.ndarray:
+        if len(derivatives.changes) == 1:
+            return np.zeros((len(self._names), self._model.sensor.taxels.count))
+        return self._model.skin.reader.taxel_load(derivatives.changes[1].load).T.cpu().numpy()
 
     def _area(self, state: State, taxel_force: np.ndarray) -> np.ndarray:
         """Return the derivative of the contact areas by Hertz's law, shape (p, taxels)."""

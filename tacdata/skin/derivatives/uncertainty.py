@@ -11,7 +11,7 @@ spread of z, and for protrusions that may or may not touch.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +27,7 @@ from tacdata.skin.solve.state import State
 
 if TYPE_CHECKING:
     from tacdata.skin.model import SkinModel
-    from tacdata.skin.solve.batch import Press
+    from tacdata.skin.solve.batch import PlacedPress
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,9 @@ def sampled_spread(
         return [(depth, _joined(one, other)) for (depth, one), other in zip(drawn, beside, strict=True)]
     moves = np.random.default_rng(seed).normal(size=(samples, len(spreads))) * list(spreads.values())
     presses = (_moved(model, request, k, dict(zip(spreads, values, strict=True))) for k, values in enumerate(moves))
-    batch, contacts = model._batch(request, min(capacity, samples))
+    batch = model.skin.batch(request, min(capacity, samples))
     found: list[list[State]] = [[] for _ in range(samples)]
-    for number, _, state in batch.run(presses, lambda members: model._gauge.states(members, contacts, True)):
+    for number, _, state in batch.run(presses, model.skin.reader.states):
         if isinstance(state, SolveError):
             raise state
         found[number].append(state)
@@ -147,16 +147,14 @@ def _checked(model: SkinModel, request: PressRequest, spreads: Mapping[str, floa
     return spreads
 
 
-def _moved(model: SkinModel, request: PressRequest, number: int, moves: dict[str, float]) -> Press:
+def _moved(model: SkinModel, request: PressRequest, number: int, moves: dict[str, float]) -> PlacedPress:
     """Return the press with its parameters moved."""
-    press = model._press(number, request)
+    press = model.skin.placed(number, request)
     names, values = list(moves), torch.tensor(list(moves.values()), dtype=torch.float64, device=model.device)
     pose = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
     along = directions(model.sensor, request.indenter, names, press.conditions, pose)
-    own = Conditions(*(
-        getattr(press.conditions, name) + (getattr(along.conditions, name) * values).sum(dim=-1, keepdim=True)
-        for name in ("law", "modulus", "thickness", "friction", "indenter")
-    ))
+    pairs = ((getattr(press.conditions, f.name), getattr(along.conditions, f.name)) for f in fields(Conditions))
+    own = Conditions(*(value + (change * values).sum(dim=-1, keepdim=True) for value, change in pairs))
     place = (along.pose.place * values).sum(dim=-1).cpu().numpy()
     # A place too low is a press too deep, on a path that starts where the indenter touches.
     place[2] -= moves.get("z", 0.0)
@@ -164,8 +162,8 @@ def _moved(model: SkinModel, request: PressRequest, number: int, moves: dict[str
     turn = press.turn + (along.pose.turn * values).sum(dim=-1).cpu().numpy()
     # The nearest rotation.
     left, _, right = np.linalg.svd(turn)
-    walk = replace(press.walk, depths=depths)
-    return replace(press, walk=walk, touch=press.touch + place, turn=left @ right, conditions=own)
+    path = replace(press.path, depths=depths)
+    return replace(press, path=path, touch=press.touch + place, turn=left @ right, conditions=own)
 
 
 def _spread_of(model: SkinModel, states: list[State]) -> Uncertainty:

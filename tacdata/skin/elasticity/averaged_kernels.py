@@ -3,7 +3,7 @@
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Kernels of a body whose volume changes are averaged at the corners (`tacdata.skin.elasticity.averaged_volume`).
 
-Each element reads its nodes once and adds to them once: on a card it is these accesses that cost, not the arithmetic.
+Each element reads its nodes once and adds to them once: on a GPU it is these accesses that cost, not the arithmetic.
 """
 
 from functools import cache
@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from tacdata.skin.constitutive import kinematics
-from tacdata.skin.elasticity.element_functions import element_functions
+from tacdata.skin.elasticity.element_functions import constant_data, element_data, element_functions
 from tacdata.skin.materials import load_law
 
 _BEARABLE = 1.0
@@ -28,6 +28,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
     volume = kinematics.volume(real)
     cofactor_change, volume_change = volume.cofactor_change, volume.change
     cross, shifted = volume.cross, volume.shifted
+    ElementData, ConstantData = element_data(real), constant_data(real)
     of_element = element_functions(real)
     gather, slope, gradient, add = of_element.gather, of_element.slope, of_element.gradient, of_element.add
     constants, stretch, Nodal = of_element.constants, of_element.stretch, of_element.Nodal
@@ -35,124 +36,123 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
     Four = wp.types.vector(4, real)
 
     @wp.func
-    def at_corners(field: wp.array2d(dtype=real), corners: wp.array2d(dtype=wp.int32), e: int, b: int):
+    def at_corners(field: wp.array2d(dtype=real), mesh: ElementData, e: int, b: int):
         values = Four()
         for a in range(4):
-            values[a] = field[corners[e, a], b]
+            values[a] = field[mesh.corners[e, a], b]
         return values
 
     @wp.func
-    def at_point(values: Four, shapes: wp.array2d(dtype=real), q: int):
+    def at_point(values: Four, mesh: ElementData, q: int):
         value = real(0.0)
         for a in range(4):
-            value += shapes[q, a] * values[a]
+            value += mesh.shapes[q, a] * values[a]
         return value
 
     @wp.kernel(module="unique", enable_backward=False)
-    def swelling(
-        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), corners: wp.array2d(dtype=wp.int32),
-        shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real), weights: wp.array2d(dtype=real),
-        slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), sums: wp.array2d(dtype=real),
+    def dilatation(
+        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, sums: wp.array2d(dtype=real),
     ):
+        """Volume change of one element, weighted by its corners' shape functions."""
         e, b = wp.tid()
-        values, s = gather(u, tets, e, b), stretch(slab, thickness, e, b)
+        values, s = gather(u, mesh, e, b), stretch(mesh, own, e, b)
         total = Four()
         for q in range(4):
-            H = gradient(values, slopes, e, q, s)
-            j = volume_change(H, cofactor_change(H)) * (weights[e, q] * s)
+            H = gradient(values, mesh, e, q, s)
+            j = volume_change(H, cofactor_change(H)) * (mesh.weights[e, q] * s)
             for a in range(4):
-                total[a] = total[a] + shapes[q, a] * j
+                total[a] = total[a] + mesh.shapes[q, a] * j
         for a in range(4):
-            wp.atomic_add(sums, corners[e, a], b, total[a])
+            wp.atomic_add(sums, mesh.corners[e, a], b, total[a])
 
     @wp.kernel(module="unique", enable_backward=False)
-    def swelling_change(
-        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32),
-        corners: wp.array2d(dtype=wp.int32), shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real),
-        weights: wp.array2d(dtype=real), slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real),
+    def dilatation_change(
+        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
         sums: wp.array2d(dtype=real),
     ):
+        """The same for the change of volume change along ``p``."""
         e, b = wp.tid()
-        values, along = gather(u, tets, e, b), gather(p, tets, e, b)
-        s, total = stretch(slab, thickness, e, b), Four()
+        values, along = gather(u, mesh, e, b), gather(p, mesh, e, b)
+        s, total = stretch(mesh, own, e, b), Four()
         for q in range(4):
-            cof = shifted(cofactor_change(gradient(values, slopes, e, q, s)), real(1.0))
-            j = wp.ddot(cof, gradient(along, slopes, e, q, s)) * (weights[e, q] * s)
+            cof = shifted(cofactor_change(gradient(values, mesh, e, q, s)), real(1.0))
+            j = wp.ddot(cof, gradient(along, mesh, e, q, s)) * (mesh.weights[e, q] * s)
             for a in range(4):
-                total[a] = total[a] + shapes[q, a] * j
+                total[a] = total[a] + mesh.shapes[q, a] * j
         for a in range(4):
-            wp.atomic_add(sums, corners[e, a], b, total[a])
+            wp.atomic_add(sums, mesh.corners[e, a], b, total[a])
 
     @wp.kernel(module="unique", enable_backward=False)
     def force(
-        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), corners: wp.array2d(dtype=wp.int32),
-        shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real), weights: wp.array2d(dtype=real),
-        slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), m: wp.array2d(dtype=real),
+        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
         average: wp.array2d(dtype=real), smallest: wp.array(dtype=real), total: wp.array3d(dtype=real),
     ):
+        """Nodal forces of one element, and the smallest det F."""
         e, b = wp.tid()
-        values, result, c = gather(u, tets, e, b), Nodal(), constants(m, b)
-        s, kappa, averages = stretch(slab, thickness, e, b), bulk_of(c), at_corners(average, corners, e, b)
+        values, result, c = gather(u, mesh, e, b), Nodal(), constants(own, b)
+        s, kappa, averages = stretch(mesh, own, e, b), bulk_of(c), at_corners(average, mesh, e, b)
         least = real(1.0e30)
         for q in range(4):
-            H = gradient(values, slopes, e, q, s)
+            H = gradient(values, mesh, e, q, s)
             least = wp.min(least, wp.determinant(wp.identity(n=3, dtype=real) + H))
             K = cofactor_change(H)
-            excess = kappa * (at_point(averages, shapes, q) - volume_change(H, K))
-            P = (stress_of(H, c) + excess * shifted(K, real(1.0))) * (weights[e, q] * s)
+            excess = kappa * (at_point(averages, mesh, q) - volume_change(H, K))
+            P = (stress_of(H, c) + excess * shifted(K, real(1.0))) * (mesh.weights[e, q] * s)
             for a in range(10):
-                f = P * slope(slopes, e, q, a, s)
+                f = P * slope(mesh, e, q, a, s)
                 for i in range(3):
                     result[a, i] = result[a, i] + f[i]
         wp.atomic_min(smallest, b, least)
-        add(result, tets, e, b, total)
+        add(result, mesh, e, b, total)
 
     @wp.kernel(module="unique", enable_backward=False)
     def product(
-        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32),
-        corners: wp.array2d(dtype=wp.int32), shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real),
-        weights: wp.array2d(dtype=real), slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real),
-        m: wp.array2d(dtype=real), average: wp.array2d(dtype=real), change: wp.array2d(dtype=real),
-        modulus: wp.array(dtype=real), total: wp.array3d(dtype=real),
+        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
+        average: wp.array2d(dtype=real), change: wp.array2d(dtype=real), total: wp.array3d(dtype=real),
     ):
+        """Tangent stiffness of one element times nodal displacements ``p``.
+
+        1. Averaged volume change at the point, and its change along ``p``.
+        2. Change of the law's stress, and of the pressure by which the average differs from the point's own.
+        3. Nodal forces.
+        """
         e, b = wp.tid()
-        values, along = gather(u, tets, e, b), gather(p, tets, e, b)
-        result, c, s = Nodal(), constants(m, b), stretch(slab, thickness, e, b)
-        averages, changes = at_corners(average, corners, e, b), at_corners(change, corners, e, b)
+        values, along = gather(u, mesh, e, b), gather(p, mesh, e, b)
+        result, c, s = Nodal(), constants(own, b), stretch(mesh, own, e, b)
+        averages, changes = at_corners(average, mesh, e, b), at_corners(change, mesh, e, b)
         kappa = bulk_of(c)
-        most = bearable * modulus[b] / kappa
+        most = bearable * own.modulus[b] / kappa
         for q in range(4):
-            H, D = gradient(values, slopes, e, q, s), gradient(along, slopes, e, q, s)
+            H, D = gradient(values, mesh, e, q, s), gradient(along, mesh, e, q, s)
             K = cofactor_change(H)
             cof = shifted(K, real(1.0))
             # Half-way through Newton's method pressures are far beyond any that will stay, and would turn the tangent
             # indefinite.
-            excess = wp.clamp(at_point(averages, shapes, q), -most, most) - volume_change(H, K)
-            onward = at_point(changes, shapes, q) - wp.ddot(cof, D)
+            excess = wp.clamp(at_point(averages, mesh, q), -most, most) - volume_change(H, K)
+            onward = at_point(changes, mesh, q) - wp.ddot(cof, D)
             dP = tangent_of(H, D, c) + kappa * (onward * cof + excess * cross(shifted(H, real(1.0)), D))
-            dP = dP * (weights[e, q] * s)
+            dP = dP * (mesh.weights[e, q] * s)
             for a in range(10):
-                f = dP * slope(slopes, e, q, a, s)
+                f = dP * slope(mesh, e, q, a, s)
                 for i in range(3):
                     result[a, i] = result[a, i] + f[i]
-        add(result, tets, e, b, total)
+        add(result, mesh, e, b, total)
 
     @wp.kernel(module="unique", enable_backward=False)
     def energy(
-        u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), corners: wp.array2d(dtype=wp.int32),
-        shapes: wp.array2d(dtype=real), slopes: wp.array4d(dtype=real), weights: wp.array2d(dtype=real),
-        slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), m: wp.array2d(dtype=real),
+        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
         average: wp.array2d(dtype=real), total: wp.array(dtype=real),
     ):
+        """Strain energy of one element."""
         e, b = wp.tid()
-        values, c = gather(u, tets, e, b), constants(m, b)
-        s, averages = stretch(slab, thickness, e, b), at_corners(average, corners, e, b)
+        values, c = gather(u, mesh, e, b), constants(own, b)
+        s, averages = stretch(mesh, own, e, b), at_corners(average, mesh, e, b)
         for q in range(4):
-            H = gradient(values, slopes, e, q, s)
+            H = gradient(values, mesh, e, q, s)
             j = volume_change(H, cofactor_change(H))
-            extra = real(0.5) * bulk_of(c) * j * (at_point(averages, shapes, q) - j)
-            wp.atomic_add(total, b, (energy_of(H, c) + extra) * (weights[e, q] * s))
+            extra = real(0.5) * bulk_of(c) * j * (at_point(averages, mesh, q) - j)
+            wp.atomic_add(total, b, (energy_of(H, c) + extra) * (mesh.weights[e, q] * s))
 
     return SimpleNamespace(
-        swelling=swelling, swelling_change=swelling_change, force=force, product=product, energy=energy
+        dilatation=dilatation, dilatation_change=dilatation_change, force=force, product=product, energy=energy
     )

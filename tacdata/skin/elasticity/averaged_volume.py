@@ -15,6 +15,7 @@ Q = sum_i (1 - D^-1 M)^i D^-1, symmetric and positive at any number of correctio
 """
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,15 +23,14 @@ import torch
 import warp as wp
 
 from tacdata.skin.elasticity.averaged_kernels import averaged_kernels
+from tacdata.skin.elasticity.element_functions import constant_data
 from tacdata.skin.member.conditions import Conditions
-from tacdata.skin.member.warp_arrays import handed
+from tacdata.skin.member.warp_arrays import REAL, argument, filled
 from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 _CORRECTIONS = 3
 """Steps of Richardson's iteration; each takes two orders of the element's size off the error of lumping."""
-
-_REAL = {torch.float32: wp.float32, torch.float64: wp.float64}
 
 
 @cache
@@ -54,16 +54,19 @@ def _mass_kernel(real: type) -> wp.Kernel:
 class AveragedVolume:
     """Forces, tangent and energy of a mesh with averaged volume changes."""
 
-    def __init__(self, mesh: SkinMesh, law: str, slab: np.ndarray, device: str = "cpu") -> None:
+    def __init__(
+        self, mesh: SkinMesh, law: str, slab: np.ndarray, data: dict[torch.dtype, Any], device: str = "cpu"
+    ) -> None:
         """Prepare the averages.
 
         Args:
             mesh: The mesh.
             law: File name in tacdata/skin/materials.
             slab: Which elements stretch with the slab's thickness, shape (e,), bool.
+            data: The mesh as kernels take it (`element_functions.element_data`), by precision.
             device: "cpu" or "cuda:0".
         """
-        slopes, weights = mesh.shape_gradients()
+        _, weights = mesh.shape_gradients()
         corner, tets = np.unique(mesh.tets[:, :4], return_inverse=True)
         self._count, self._law, self._device, self._elements = len(corner), law, device, len(mesh.tets)
         tets = tets.reshape(-1, 4)
@@ -72,94 +75,76 @@ class AveragedVolume:
         pattern.sort_indices()
         values = [_on_pattern(m, pattern) for m in mass]
         lumped = np.stack([np.asarray(m.sum(axis=1)).ravel() for m in mass])
-        self._indices = [
-            wp.array(a.astype(np.int32), dtype=wp.int32, device=device)
-            for a in (mesh.tets, tets, slab, pattern.indptr, pattern.indices)
+        self._data = data
+        self._pattern = [
+            wp.array(a.astype(np.int32), dtype=wp.int32, device=device) for a in (pattern.indptr, pattern.indices)
         ]
-        self._numbers = {
+        self._mass = {
             dtype: [
-                wp.array(np.ascontiguousarray(a), dtype=real, device=device)
-                for a in (corner_shapes(), slopes, weights, np.stack(values), lumped)
+                wp.array(np.ascontiguousarray(a), dtype=real, device=device) for a in (np.stack(values), lumped)
             ]
-            for dtype, real in _REAL.items()
+            for dtype, real in REAL.items()
         }
-        self._seen: tuple | None = None
 
-    def add_force(
-        self, u: torch.Tensor, conditions: Conditions, smallest: torch.Tensor, force: torch.Tensor
-    ) -> None:
-        """Add the internal forces [N] at displacements ``u`` [mm], both of shape (n, 3, b); lower ``smallest``, shape
-        (b,), to the smallest det F [1]."""
-        own = conditions.to(u.dtype)
-        self._launch("force", u, (), own, own.law, self._average_at(u, own), smallest, force)
-
-    def average(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor:
+    def dilatation(self, u: torch.Tensor, own: Conditions) -> torch.Tensor:
         """Return the averaged J - 1 at the corners [1], shape (c, b)."""
-        return self._average_at(u, conditions.to(u.dtype))
+        return self._average(self._sums("dilatation", (u,), own), own)
+
+    def add_force(self, u: torch.Tensor, own: Conditions, smallest: torch.Tensor, force: torch.Tensor) -> None:
+        """Add the internal forces [N] at displacements ``u`` [mm], both of shape (n, 3, b).
+
+        Args:
+            u: Displacements.
+            own: Conditions, in the precision of ``u``.
+            smallest: Lowered to the smallest det F [1], shape (b,).
+            force: Receives the forces.
+        """
+        self._launch("force", (u,), own, self.dilatation(u, own), smallest, force)
 
     def add_product(
-        self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor,
-        average: torch.Tensor | None = None,
+        self, u: torch.Tensor, p: torch.Tensor, own: Conditions, dilatation: torch.Tensor, product: torch.Tensor
     ) -> None:
-        """Add K(u) p [N]; all of shape (n, 3, b) and of one precision; ``average``: that at ``u``, if known."""
-        own = conditions.to(u.dtype)
-        change = self._average(self._sums("swelling_change", u, (p,), own), own)
-        known = self._kept(u, own) if average is None else average
-        self._launch("product", u, (p,), own, own.law, known, change, own.modulus, product)
+        """Add K(u) p [N]; all of shape (n, 3, b) and of one precision; ``dilatation``: that at ``u``."""
+        change = self._average(self._sums("dilatation_change", (u, p), own), own)
+        self._launch("product", (u, p), own, dilatation, change, product)
 
-    def add_energy(self, u: torch.Tensor, conditions: Conditions, total: torch.Tensor) -> None:
+    def add_energy(self, u: torch.Tensor, own: Conditions, total: torch.Tensor) -> None:
         """Add the strain energy [N mm], shape (b,)."""
-        own = conditions.to(u.dtype)
-        self._launch("energy", u, (), own, own.law, self._average_at(u, own), total)
+        self._launch("energy", (u,), own, self.dilatation(u, own), total)
 
-    def _kept(self, u: torch.Tensor, own: Conditions) -> torch.Tensor:
-        """Return `_average_at`, kept while it is asked for at one state: conjugate gradients ask many times."""
-        state, versions = (u, own.thickness), (u._version, own.thickness._version)
-        seen = self._seen
-        if seen is None or seen[1] != versions or seen[0][0] is not u or seen[0][1] is not own.thickness:
-            seen = self._seen = (state, versions, self._average_at(u, own))
-        return seen[2]
-
-    def _average_at(self, u: torch.Tensor, own: Conditions) -> torch.Tensor:
-        """Return the averaged J - 1 at the corners, shape (c, b)."""
-        return self._average(self._sums("swelling", u, (), own), own)
-
-    def _sums(self, name: str, u: torch.Tensor, more: tuple[torch.Tensor, ...], own: Conditions) -> torch.Tensor:
-        sums = torch.zeros(self._count, u.shape[2], dtype=u.dtype, device=u.device)
-        self._launch(name, u, more, own, sums)
+    def _sums(self, name: str, fields: tuple[torch.Tensor, ...], own: Conditions) -> torch.Tensor:
+        sums = torch.zeros(self._count, fields[0].shape[2], dtype=fields[0].dtype, device=fields[0].device)
+        self._launch(name, fields, own, sums)
         return sums
 
     def _average(self, sums: torch.Tensor, own: Conditions) -> torch.Tensor:
         """Return Q times sums over the corners' surroundings, shape (c, b)."""
-        numbers, average = self._numbers[sums.dtype], torch.zeros_like(sums)
+        average = torch.zeros_like(sums)
         for _ in range(_CORRECTIONS + 1):
             after = torch.empty_like(sums)
             wp.launch(
-                _mass_kernel(_REAL[sums.dtype]), dim=tuple(sums.shape),
-                inputs=[*self._indices[3:], *numbers[3:], *map(handed, (own.thickness, sums, average))],
-                outputs=[handed(after)], device=self._device,
+                _mass_kernel(REAL[sums.dtype]), dim=tuple(sums.shape),
+                inputs=[*self._pattern, *self._mass[sums.dtype], *map(argument, (own.thickness, sums, average))],
+                outputs=[argument(after)], device=self._device,
             )
             average = after
         return average
 
-    def _launch(
-        self, name: str, u: torch.Tensor, more: tuple[torch.Tensor, ...], own: Conditions, *rest: torch.Tensor
-    ) -> None:
-        """Run a kernel; ``rest`` follows the thickness, its last one receives the result."""
-        tets, corners, slab = self._indices[:3]
+    def _launch(self, name: str, fields: tuple[torch.Tensor, ...], own: Conditions, *rest: torch.Tensor) -> None:
+        """Run a kernel on fields; the last of ``rest`` receives the result."""
+        dtype = fields[0].dtype
+        real = REAL[dtype]
+        constants = filled(constant_data(real), law=own.law, modulus=own.modulus, thickness=own.thickness)
         wp.launch(
-            getattr(averaged_kernels(self._law, _REAL[u.dtype]), name), dim=(self._elements, u.shape[2]),
-            inputs=[
-                *map(handed, (u, *more)), tets, corners, *self._numbers[u.dtype][:3], slab,
-                *map(handed, (own.thickness, *rest)),
-            ],
-            device=self._device,
+            getattr(averaged_kernels(self._law, real), name), dim=(self._elements, fields[0].shape[2]),
+            inputs=[*map(argument, fields), self._data[dtype], constants, *map(argument, rest)], device=self._device,
         )
 
 
 def averaged_stiffness(mesh: SkinMesh, bulk_modulus: float) -> sp.csr_matrix:
-    """Return the volumetric stiffness at rest [N/mm], shape (3n, 3n), by the lumped average alone: as far as a
-    preconditioner must know it.
+    """Return the volumetric stiffness at rest [N/mm], shape (3n, 3n), by the lumped average alone.
+
+    That is as far as a preconditioner must know it.
 
     Args:
         mesh: The mesh.

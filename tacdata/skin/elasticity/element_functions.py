@@ -1,10 +1,14 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
 # pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
-"""What every element kernel does: read an element's nodes, form the displacement gradient, add forces to the nodes."""
+"""What every element kernel is made of: the mesh and the members as structs, gather, gradient, scatter.
+
+Indices: e an element, q a point of its quadrature rule, a a node of it, b a batch member.
+"""
 
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
@@ -12,58 +16,90 @@ from tacdata.skin.constitutive import kinematics
 
 
 @cache
+def element_data(real: type) -> Any:
+    """Return the struct of what never changes: the mesh in one precision."""
+
+    @wp.struct
+    class ElementData:
+        tets: wp.array2d(dtype=wp.int32)  # nodes, (e, 10)
+        corners: wp.array2d(dtype=wp.int32)  # number of each corner among all corners, (e, 4)
+        shapes: wp.array2d(dtype=real)  # linear shape functions of the corners at the points, (q, 4)
+        slopes: wp.array4d(dtype=real)  # gradients of the shape functions [1/mm], (e, q, 10, 3)
+        weights: wp.array2d(dtype=real)  # volume of the points [mm^3], (e, q)
+        slab: wp.array(dtype=wp.int32)  # 1 where the element stretches with the slab's thickness, (e,)
+
+    return ElementData
+
+
+@cache
+def constant_data(real: type) -> Any:
+    """Return the struct of the members' constants in one precision."""
+
+    @wp.struct
+    class ConstantData:
+        law: wp.array2d(dtype=real)  # numbers of the law, (8, b)
+        modulus: wp.array(dtype=real)  # Young's modulus [MPa], (b,)
+        thickness: wp.array(dtype=real)  # of the slab over that of the mesh [1], (b,)
+
+    return ConstantData
+
+
+@cache
 def element_functions(real: type) -> SimpleNamespace:
     """Return Warp functions in one precision.
 
-    ``gather(u, tets, e, b)``: an element's nodal values; ``slope(slopes, e, q, a, s)``: gradient of a shape function;
-    ``gradient(values, slopes, e, q, s)``: of nodal values; ``add(values, tets, e, b, total)``: onto the nodes;
-    ``constants(m, b)``: a member's law; ``stretch(slab, thickness, e, b)``: of the element by the member's thickness.
-    ``Nodal``: type of an element's nodal values.
+    - ``gather(u, mesh, e, b)``: an element's nodal values, of the type ``Nodal``
+    - ``slope(mesh, e, q, a, s)``: gradient of a shape function
+    - ``gradient(values, mesh, e, q, s)``: gradient of nodal values
+    - ``add(values, mesh, e, b, total)``: scatter nodal values onto the nodes
+    - ``constants(own, b)``: the numbers of a member's law
+    - ``stretch(mesh, own, e, b)``: stretch s of the element by the member's thickness
     """
+    ElementData, ConstantData = element_data(real), constant_data(real)
     Parameters = kinematics.parameters(real)
     vec3, mat33 = wp.types.vector(3, real), kinematics.matrix(real)
     Nodal = wp.types.matrix((10, 3), real)
 
     @wp.func
-    def gather(u: wp.array3d(dtype=real), tets: wp.array2d(dtype=wp.int32), e: int, b: int):
+    def gather(u: wp.array3d(dtype=real), mesh: ElementData, e: int, b: int):
         values = Nodal()
         for a in range(10):
-            n = tets[e, a]
+            n = mesh.tets[e, a]
             for i in range(3):
                 values[a, i] = u[n, i, b]
         return values
 
     @wp.func
-    def slope(slopes: wp.array4d(dtype=real), e: int, q: int, a: int, s: real):
-        return vec3(slopes[e, q, a, 0], slopes[e, q, a, 1], slopes[e, q, a, 2] / s)
+    def slope(mesh: ElementData, e: int, q: int, a: int, s: real):
+        return vec3(mesh.slopes[e, q, a, 0], mesh.slopes[e, q, a, 1], mesh.slopes[e, q, a, 2] / s)
 
     @wp.func
-    def gradient(values: Nodal, slopes: wp.array4d(dtype=real), e: int, q: int, s: real):
+    def gradient(values: Nodal, mesh: ElementData, e: int, q: int, s: real):
         H = mat33()
         for a in range(10):
-            g = slope(slopes, e, q, a, s)
+            g = slope(mesh, e, q, a, s)
             H += wp.outer(vec3(values[a, 0], values[a, 1], values[a, 2]), g)
         return H
 
     @wp.func
-    def add(values: Nodal, tets: wp.array2d(dtype=wp.int32), e: int, b: int, total: wp.array3d(dtype=real)):
+    def add(values: Nodal, mesh: ElementData, e: int, b: int, total: wp.array3d(dtype=real)):
         for a in range(10):
-            n = tets[e, a]
+            n = mesh.tets[e, a]
             for i in range(3):
                 wp.atomic_add(total, n, i, b, values[a, i])
 
     @wp.func
-    def constants(m: wp.array2d(dtype=real), b: int):
+    def constants(own: ConstantData, b: int):
         values = Parameters()
         for k in range(8):
-            values[k] = m[k, b]
+            values[k] = own.law[k, b]
         return values
 
     @wp.func
-    def stretch(slab: wp.array(dtype=wp.int32), thickness: wp.array(dtype=real), e: int, b: int):
+    def stretch(mesh: ElementData, own: ConstantData, e: int, b: int):
         s = real(1.0)
-        if slab[e] == 1:
-            s = thickness[b]
+        if mesh.slab[e] == 1:
+            s = own.thickness[b]
         return s
 
     return SimpleNamespace(

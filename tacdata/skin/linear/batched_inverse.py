@@ -11,7 +11,7 @@ import warp as wp
 
 from tacdata.skin.linear.pivot_kernel import ROWS, invert_in_place
 from tacdata.skin.linear.sweep_kernels import sweep_kernels
-from tacdata.skin.member.warp_arrays import handed
+from tacdata.skin.member.warp_arrays import argument
 
 _STRIP = 256
 """Columns that are brought up to date by one product: the wider, the more are above the diagonal, for nothing."""
@@ -97,4 +97,4 @@ def _blocks(rows: int) -> int:
 def _launch(name: str, kept: torch.Tensor, other: torch.Tensor, dim: tuple[int, ...], *values: object) -> None:
     if kept.numel():
         kernel = getattr(sweep_kernels(kept.dtype, other.dtype), name)
-        wp.launch(kernel, dim=dim, inputs=[*map(handed, values)], device=str(kept.device))
+        wp.launch(kernel, dim=dim, inputs=[*map(argument, values)], device=str(kept.device))

@@ -7,12 +7,14 @@ conjugate-gradient iterations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import torch
 
-from tacdata.skin.contact.contact import Contact
+from tacdata.skin.contact.contact_forces import ContactTangent
+from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.linear.contact_transfer import DenseTransfer, contact_transfer
 from tacdata.skin.linear.coupled_dofs import coupling
 from tacdata.skin.linear.rest_stiffness import RestSolver
@@ -24,13 +26,17 @@ _STEP = 256
 """Rows by which the room for members' touched degrees of freedom grows."""
 
 _STALE = {"cpu": 0.1, "cuda": 0.3}
-"""Change of a member's contact stiffness, over its norm, from which on its share is prepared anew [1]; on a card that
+"""Change of a member's contact stiffness, over its norm, from which on its share is prepared anew [1]; on a GPU that
 costs more than the conjugate gradients it saves."""
 
 _WEAK = {"cpu": 0.0, "cuda": 0.1}
 """Contact stiffness of a degree of freedom times its compliance in the free body from which on a share knows it [1]. At
-the contact's edge are many that hardly feel it: conjugate gradients bear them, while a card's inversions grow with the
+the contact's edge are many that hardly feel it: conjugate gradients bear them, while a GPU's inversions grow with the
 cube of their number."""
+
+
+_Contacts = list[tuple[ContactSurface, ContactTangent]]
+"""Each contact surface with its present stiffness."""
 
 
 @dataclass(frozen=True)
@@ -62,26 +68,26 @@ class ContactPreconditioner:
     """Approximate inverse of the tangent for every member of a batch."""
 
     def __init__(
-        self, rest: RestSolver, contacts: list[Contact], loadable: torch.Tensor, size: int, modulus: float
+        self, rest: RestSolver, surfaces: Sequence[ContactSurface], loadable: torch.Tensor, size: int, modulus: float
     ) -> None:
-        """Bind K0^-1 and the contacts.
+        """Bind K0^-1 and the contact surfaces.
 
         Args:
             rest: K0^-1 of the nominal material.
-            contacts: Whose stiffness is added.
+            surfaces: Whose stiffness is added.
             loadable: Degrees of freedom that contact may load, shape (m,), int64.
             size: Number of degrees of freedom, 3n.
             modulus: Young's modulus [MPa] of the nominal material.
         """
         self.rest: Any = rest
         """K0^-1, as it was given."""
-        self._rest, self._contacts, self._modulus, self._size = rest, contacts, modulus, size
+        self._rest, self._surfaces, self._modulus, self._size = rest, tuple(surfaces), modulus, size
         count, device = len(loadable), loadable.device
         self._dof = torch.cat([loadable, torch.tensor([size], device=device)])
         number = torch.full((size,), count, dtype=torch.int64, device=device)
         number[loadable] = torch.arange(count, device=device)
         axes = torch.arange(3, device=device)
-        self._numbers = [number[(3 * c.faces.long()[:, :, None] + axes).reshape(-1, 18)] for c in contacts]
+        self._numbers = [number[(3 * c.faces.long()[:, :, None] + axes).reshape(-1, 18)] for c in surfaces]
         """Number among the loadable of each face's degrees of freedom, shape (f, 18)."""
         self._first, self._reach = coupling([numbers.cpu().numpy() for numbers in self._numbers], count)
         self._scale = torch.empty(0)
@@ -93,23 +99,28 @@ class ContactPreconditioner:
         self._prepared: list[torch.Tensor] = []
         """Contact stiffness that each member's share was prepared from, by contact."""
 
-    def update(self, modulus: torch.Tensor) -> None:
-        """Take the contact stiffness that was evaluated last; ``modulus``: each member's [MPa], shape (b,).
+    def update(self, contacts: Sequence[ContactTangent], modulus: torch.Tensor) -> None:
+        """Prepare for the present contact stiffness.
 
         A member whose stiffness has hardly changed keeps its share: conjugate gradients bear the difference.
+
+        Args:
+            contacts: Stiffness of each contact.
+            modulus: Young's modulus of each member [MPa], shape (b,).
         """
         self._scale = (self._modulus / modulus).to(torch.float32)
         batch, count, device = len(modulus), len(self._dof) - 1, modulus.device
-        stale = self._stale([contact.weighted_stiffness() for contact in self._contacts], batch)
+        both = list(zip(self._surfaces, contacts, strict=True))
+        stale = self._stale([surface.weighted_stiffness(contact) for surface, contact in both], batch)
         if not bool(stale.any()):
             return
         touched = torch.zeros(batch, count + 1, dtype=torch.bool, device=device)
-        pairs = [(contact.touched & stale).nonzero().unbind(dim=1) for contact in self._contacts]
+        pairs = [(contact.touched & stale).nonzero().unbind(dim=1) for contact in contacts]
         for numbers, (face, member) in zip(self._numbers, pairs, strict=True):
             touched[member[:, None], numbers[face]] = True
         touched[:, count] = False
         if _WEAK[device.type]:
-            touched &= self._weight(pairs, batch) > _WEAK[device.type]
+            touched &= self._weight(both, pairs, batch) > _WEAK[device.type]
         members = stale.nonzero()[:, 0]
         counts, order = touched[members].sum(dim=1).sort()
         members = members[order]
@@ -120,18 +131,18 @@ class ContactPreconditioner:
             member = members[start : start + _GROUP]
             most = sizes[min(start + _GROUP, len(sizes)) - 1]
             self._which[member] = count
-            self._prepare(member, most, max(leads[start : start + _GROUP]), touched[member], pairs)
+            self._prepare(member, most, max(leads[start : start + _GROUP]), touched[member], both, pairs)
 
-    def _weight(self, pairs: list[tuple[torch.Tensor, ...]], batch: int) -> torch.Tensor:
+    def _weight(self, both: _Contacts, pairs: list[tuple[torch.Tensor, ...]], batch: int) -> torch.Tensor:
         """Return the contact stiffness of degrees of freedom times their compliance [1], shape (b, count + 1)."""
         count, device = len(self._dof) - 1, self._dof.device
         if not len(self._own):
             own = self._rest.compliance(torch.arange(count, device=device)[:, None])[:, 0, 0]
             self._own = torch.cat([own, torch.zeros(1, device=device)])
         weight = torch.zeros(batch, count + 1, device=device)
-        for contact, numbers, (face, member) in zip(self._contacts, self._numbers, pairs, strict=True):
+        for (surface, contact), numbers, (face, member) in zip(both, self._numbers, pairs, strict=True):
             flat = member[:, None] * (count + 1) + numbers[face]
-            weight.view(-1).scatter_add_(0, flat.flatten(), contact.face_diagonal(face, member).flatten())
+            weight.view(-1).scatter_add_(0, flat.flatten(), surface.face_diagonal(contact, face, member).flatten())
         return weight * self._own * self._scale[:, None]
 
     def _stale(self, stiffness: list[torch.Tensor], batch: int) -> torch.Tensor:
@@ -154,12 +165,12 @@ class ContactPreconditioner:
     def _widen(self, most: int) -> None:
         """Make room for members that touch ``most`` degrees of freedom."""
         if most > self._which.shape[1]:
-            # In steps, as what is recorded of a card's iterations must be recorded anew.
+            # In steps, as what is recorded of a GPU's iterations must be recorded anew.
             more = -(-most // _STEP) * _STEP - self._which.shape[1]
             self._which = torch.nn.functional.pad(self._which, (0, more), value=len(self._dof) - 1)
 
     def _prepare(
-        self, member: torch.Tensor, most: int, lead: int, touched: torch.Tensor,
+        self, member: torch.Tensor, most: int, lead: int, touched: torch.Tensor, both: _Contacts,
         pairs: list[tuple[torch.Tensor, ...]],
     ) -> None:
         """Prepare members that touch at most ``most`` degrees of freedom, ``lead`` of them among the `_first`;
@@ -174,14 +185,14 @@ class ContactPreconditioner:
         row_of = torch.full((len(self._scale),), -1, dtype=torch.int64, device=device)
         row_of[member] = torch.arange(size, device=device)
         stiffness = torch.zeros(size, most + 1, most + 1, dtype=torch.float32, device=device)
-        for contact, numbers, (face, owner) in zip(self._contacts, self._numbers, pairs, strict=True):
+        for (surface, contact), numbers, (face, owner) in zip(both, self._numbers, pairs, strict=True):
             mine = row_of[owner] >= 0
             face, owner = face[mine], owner[mine]
             row = row_of[owner]
             place = slot[row[:, None], numbers[face]]
-            # By flat index: sums over several indices are sorted first, which takes a card milliseconds.
+            # By flat index: sums over several indices are sorted first, which takes a GPU milliseconds.
             flat = (row[:, None, None] * (most + 1) + place[:, :, None]) * (most + 1) + place[:, None, :]
-            stiffness.view(-1).scatter_add_(0, flat.flatten(), contact.face_stiffness(face, owner).flatten())
+            stiffness.view(-1).scatter_add_(0, flat.flatten(), surface.face_stiffness(contact, face, owner).flatten())
         compliance = self._rest.compliance(which) * self._scale[member][:, None, None]
         # A slot that stands for nothing must not make the compliance singular.
         compliance.diagonal(dim1=1, dim2=2).add_((which == count).to(torch.float32))
@@ -190,7 +201,7 @@ class ContactPreconditioner:
         self._transfer.put(member, whole, compliance, lead, self._reach)
 
     def share(self) -> Share:
-        """Return what `update` prepared, on a card."""
+        """Return what `update` prepared, on a GPU."""
         if not isinstance(self._transfer, DenseTransfer):
             raise TypeError("the CPU's shares are factors, not tensors")
         own = (self._which < len(self._dof) - 1).sum(dim=1).to(torch.int32)

@@ -40,7 +40,7 @@ class Transfer(Protocol):
 
 
 def contact_transfer(batch: int, device: str) -> Transfer:
-    """Return the operator for ``batch`` members on "cpu" or a card."""
+    """Return the operator for ``batch`` members on "cpu" or a GPU."""
     return FactoredTransfer(batch) if device == "cpu" else DenseTransfer(batch, device)
 
 
@@ -86,7 +86,7 @@ class DenseTransfer:
     """(S^-1 + G)^-1: both that are inverted are symmetric and positive, so no pivoting is needed.
 
     What is touched but carries no load makes S singular; it is given a stiffness that the body does not feel. Its
-    inverse is then large, so all is done in double precision, in which a card multiplies matrices as fast as in single.
+    inverse is then large, so all is done in double precision, in which a GPU multiplies matrices as fast as in single.
     """
 
     _BLOCK = 256

@@ -24,7 +24,7 @@ def parts(faces: np.ndarray, count: int) -> np.ndarray:
 def in_order(loadable: np.ndarray, mesh: SkinMesh) -> np.ndarray:
     """Return degrees of freedom (3 node + axis) in an order that keeps parts together: the outer face's come first.
 
-    A card's contact shares are the cheaper the nearer those that are coupled stand; the CPU's are sparse anyway.
+    On a GPU contact shares are the cheaper the nearer coupled ones stand. On the CPU they are sparse anyway.
 
     Args:
         loadable: What to order, shape (m,).

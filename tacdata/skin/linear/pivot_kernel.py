@@ -1,7 +1,7 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
 # pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
-"""Many small symmetric positive definite matrices inverted at once on a card, each by one block of threads.
+"""Many small symmetric positive definite matrices inverted at once on a GPU, each by one block of threads.
 
 A matrix stays in the registers of its block's 256 threads, eight rows by eight columns each; by sweeps (Goodnight 1979,
 The American Statistician 33, 149) every step needs one row of it, which goes through shared memory. Libraries' batched
@@ -13,7 +13,7 @@ from functools import cache
 import torch
 import warp as wp
 
-from tacdata.skin.member.warp_arrays import handed
+from tacdata.skin.member.warp_arrays import argument
 
 ROWS = 128
 """Size of the matrices."""
@@ -77,9 +77,9 @@ def _kernel(real: type, name: str) -> wp.Kernel:
 
 
 def invert_in_place(matrices: torch.Tensor) -> None:
-    """Invert symmetric positive definite matrices on a card, shape (b, 128, 128), contiguous."""
+    """Invert symmetric positive definite matrices on a GPU, shape (b, 128, 128), contiguous."""
     kind = (wp.float64, "double") if matrices.dtype == torch.float64 else (wp.float32, "float")
     wp.launch(
-        _kernel(*kind), dim=(len(matrices), _THREADS), inputs=[handed(matrices.view(-1))],
+        _kernel(*kind), dim=(len(matrices), _THREADS), inputs=[argument(matrices.view(-1))],
         device=str(matrices.device), block_dim=_THREADS,
     )

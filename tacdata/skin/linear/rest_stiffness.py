@@ -81,7 +81,7 @@ class RestSolver(Protocol):
 def rest_solver(
     mesh: SkinMesh, material: Material, fixed: np.ndarray, loadable: np.ndarray, device: str, averaged: bool = False
 ) -> RestSolver:
-    """Prepare K0^-1: a sparse factor on the CPU, the dense inverse on a card.
+    """Prepare K0^-1: a sparse factor on the CPU, the dense inverse on a GPU.
 
     Args:
         mesh: The skin.
@@ -92,7 +92,7 @@ def rest_solver(
         averaged: Whether the body's volume changes are averaged at the corners.
 
     Raises:
-        SolveError: If the inverse does not fit onto the card.
+        SolveError: If the inverse does not fit into the GPU's memory.
     """
     # A K0 with averages costs a sparse factor several times the fill, and saves no iterations (decision 0016).
     known = averaged and device != "cpu"
@@ -146,7 +146,7 @@ class SparseRest:
 
 
 class DenseRest:
-    """Inverse of the rest stiffness as a full matrix on a card: one product serves a whole batch.
+    """Inverse of the rest stiffness as a full matrix on a GPU: one product serves a whole batch.
 
     Scaled to a unit diagonal and rounded to half precision, at half the memory and several times the rate of single.
     What is rounded is a preconditioner; what must hold exactly is that the Woodbury identity sees the same matrix. So
@@ -156,7 +156,7 @@ class DenseRest:
     _SHIFT = 2e-4
     """Added to the unit diagonal, so that rounding (2^-12) leaves the matrix positive [1]."""
     _ALIGNED = 64
-    """Rows are padded to a multiple of this: a card's library falls back to kernels of half the rate where rows do not
+    """Rows are padded to a multiple of this: its library falls back to kernels of half the rate where rows do not
     begin at multiples of 16 bytes."""
     _LARGEST = 1024.0
     """To which right-hand sides are scaled, clear of both ends of half precision."""

@@ -9,13 +9,13 @@ from types import SimpleNamespace
 import torch
 import warp as wp
 
-_REAL = {torch.float32: wp.float32, torch.float64: wp.float64}
+from tacdata.skin.member.warp_arrays import REAL
 
 
 @cache
 def sweep_kernels(kept: torch.dtype, other: torch.dtype) -> SimpleNamespace:
     """Compile the kernels for matrices of one precision that are read from or written to such of another."""
-    real, real_other = _REAL[kept], _REAL[other]
+    real, real_other = REAL[kept], REAL[other]
 
     @wp.kernel(module="unique", enable_backward=False)
     def widen(given: wp.array3d(dtype=real_other), rows: int, a: wp.array3d(dtype=real)):

@@ -6,28 +6,17 @@ from dataclasses import dataclass
 
 import torch
 
+from tacdata.skin.member.columns import Columns
 
-@dataclass
-class Pose:
-    """Pose of a shape in the sensor's frame."""
+
+@dataclass(frozen=True)
+class Pose(Columns):
+    """Pose of a shape in the sensor's frame; one column a batch member."""
 
     place: torch.Tensor
     """Place of the shape's origin [mm], shape (3, b)."""
     turn: torch.Tensor
     """Rotation from the shape's frame to the sensor's, shape (3, 3, b)."""
-
-    def put(self, which: torch.Tensor, other: Pose) -> None:
-        """Take the members marked in ``which``, shape (b,), bool, from another pose."""
-        self.place.copy_(torch.where(which, other.place, self.place))
-        self.turn.copy_(torch.where(which, other.turn, self.turn))
-
-    def take(self, which: torch.Tensor) -> Pose:
-        """Return some members, by index."""
-        return Pose(self.place.index_select(-1, which), self.turn.index_select(-1, which))
-
-    def copy(self) -> Pose:
-        """Return a copy that shares nothing."""
-        return Pose(self.place.clone(), self.turn.clone())
 
 
 def turned(yaw: torch.Tensor, tilt_x: torch.Tensor, tilt_y: torch.Tensor) -> torch.Tensor:

@@ -19,7 +19,18 @@ _FLAT = 1e-6
 
 @dataclass(frozen=True)
 class SkinMesh:
-    """Stress-free skin in the sensor's frame. Corner nodes first in every element (`tacdata.skin.mesh.elements`)."""
+    """Mesh of the stress-free skin in the sensor's frame; quadratic tetrahedra with named faces.
+
+    Corner nodes come first in every element (`tacdata.skin.mesh.elements`).
+
+    >>> from tacdata.sensor import default_sensor
+    >>> from tacdata.skin.mesh.build import MeshSettings, build_mesh
+    >>> mesh = build_mesh(default_sensor(), MeshSettings())  # ships with the package
+    >>> mesh.nodes.shape, mesh.tets.shape
+    ((13696, 3), (7512, 10))
+    >>> bool((mesh.volumes() > 0).all())
+    True
+    """
 
     nodes: np.ndarray
     """Node positions [mm], shape (n, 3)."""

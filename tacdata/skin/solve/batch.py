@@ -1,4 +1,4 @@
-"""Many presses at once: every column of the batch walks its own load path, and takes the next press when it is done.
+"""Many presses at once: every column of the batch follows its own load path, and takes the next press when it is done.
 
 No press waits for another: in each Newton iteration one member may be far from its state while another has just found
 its own and is sent on to the next depth.
@@ -14,11 +14,14 @@ import numpy as np
 import torch
 
 from tacdata.errors import SolveError
+from tacdata.skin.contact.contact_forces import ContactForces
+from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
-from tacdata.skin.solve.load_path import Walk
-from tacdata.skin.solve.loading_states import PassedStates
-from tacdata.skin.solve.newton import Balance, Newton
+from tacdata.skin.solve.configuration import Configuration
+from tacdata.skin.solve.load_path import LoadPath
+from tacdata.skin.solve.loading_states import LoadingStates
+from tacdata.skin.solve.newton import Newton, Residual
 
 _WILD = 0.3
 """Volume ratio det F below which an extrapolated start is not used [1]."""
@@ -31,12 +34,12 @@ _AWAY = 1e3
 
 
 @dataclass(frozen=True)
-class Press:
-    """One press as the batch sees it."""
+class PlacedPress:
+    """One press as the batch takes it."""
 
     number: int
     """By which its states are told apart."""
-    walk: Walk
+    path: LoadPath
     """Its depths."""
     touch: np.ndarray
     """Place of the indenter's origin at depth 0 [mm], shape (3,)."""
@@ -47,23 +50,28 @@ class Press:
 
 
 @dataclass(frozen=True)
-class Members:
-    """Columns of the batch that have just found their state."""
+class Equilibria:
+    """Columns of the batch that have just reached a state that is wanted."""
 
     column: torch.Tensor
     """Their indices, shape (k,)."""
     u: torch.Tensor
     """Displacements [mm], shape (n, 3, k)."""
-    error: np.ndarray
+    relative: np.ndarray
     """Out-of-balance force over the contact force [1], shape (k,)."""
     penetration: np.ndarray
     """Largest penetration [mm], shape (k,)."""
-    spent: list[int]
-    """Newton iterations since the state before."""
+    newton: list[int]
+    """Newton iterations since the state before, each."""
+    contacts: tuple[ContactForces, ...]
+    """Forces of each contact, of all columns of the batch."""
 
 
-Collect = Callable[[Members], list[Any]]
-"""Makes of every member's state what is to be kept of it."""
+Collect = Callable[[Equilibria], list[Any]]
+"""Makes of every column's state what is to be kept of it."""
+
+Observe = Callable[[Configuration], None]
+"""Is told the columns that have just reached an equilibrium, wanted or not, before their history moves on."""
 
 
 class Batch:
@@ -73,73 +81,92 @@ class Batch:
         """Make an idle batch.
 
         Args:
-            newton: Solves; its contacts are the indenter's and, if the skin stands on one, the board's.
+            newton: Solves; its surfaces are the indenter's and, if the skin stands on one, the board's.
             idle: Conditions of one idle column.
             nodes: Nodes of the mesh.
             capacity: Number of columns.
             floor: Height of the board [mm].
         """
         self._newton, device = newton, idle.law.device
-        self._conditions = idle.repeat(capacity)
-        self._u = torch.zeros(nodes, 3, capacity, dtype=torch.float64, device=device)
-        self._base, self._accepted = torch.zeros_like(self._u), torch.zeros_like(self._u)
-        self._rate = torch.zeros_like(self._u)
-        self._passed = PassedStates((nodes, 3, capacity), str(device))
+        u = torch.zeros(nodes, 3, capacity, dtype=torch.float64, device=device)
         eye = torch.eye(3, dtype=torch.float64, device=device)[:, :, None].repeat(1, 1, capacity)
-        heights = (_AWAY, floor)[: len(newton.contacts)]
-        self._poses = [Pose(self._row([0.0, 0.0, height]).repeat(1, capacity), eye.clone()) for height in heights]
-        self._states = [contact.start(pose) for contact, pose in zip(newton.contacts, self._poses, strict=True)]
-        self._multipliers = [state.multiplier.clone() for state in self._states]
-        self._presses: list[Press | None] = [None] * capacity
+        heights = (_AWAY, floor)[: len(newton.surfaces)]
+        places = (torch.tensor([0.0, 0.0, height], dtype=torch.float64, device=device) for height in heights)
+        poses = tuple(Pose(place[:, None].repeat(1, capacity), eye.clone()) for place in places)
+        histories = tuple(surface.start(pose) for surface, pose in zip(newton.surfaces, poses, strict=True))
+        self._at = Configuration(u, idle.repeat(capacity), poses, histories, torch.zeros_like(u[0, 0]))
+        self._base, self._accepted = torch.zeros_like(u), torch.zeros_like(u)
+        self._rate = torch.zeros_like(u)
+        self._loading = LoadingStates((nodes, 3, capacity), str(device))
+        self._multipliers = [history.multiplier.clone() for history in histories]
+        self._presses: list[PlacedPress | None] = [None] * capacity
         self._before = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
         self.cg = 0
         """Conjugate-gradient iterations so far."""
-        self.ticks = 0
+        self.newton_iterations = 0
         """Newton iterations of the batch so far."""
 
-    def run(self, presses: Iterable[Press], collect: Collect) -> Iterator[tuple[int, float, Any]]:
-        """Walk through presses; yield ``(number, depth, state)`` as found, the state as `collect` makes it.
+    def run(
+        self, presses: Iterable[PlacedPress], collect: Collect, observe: Observe | None = None
+    ) -> Iterator[tuple[int, float, Any]]:
+        """Solve presses; yield ``(number, depth, state)`` as found.
 
         A press that fails yields its `SolveError` in place of a state, and no more.
 
+        Args:
+            presses: What to solve, taken as columns become free.
+            collect: Makes the states that are yielded.
+            observe: Is told of every equilibrium on the way, from the touch on, if given.
+
         Raises:
-            SolveError: If so many columns do not fit into a card's memory.
+            SolveError: If so many columns do not fit into a GPU's memory.
         """
         try:
-            yield from self._run(presses, collect)
+            waiting = iter(presses)
+            yield from self._fill(waiting, observe)
+            while any(press is not None for press in self._presses):
+                yield from self._iterate(waiting, collect, observe)
         except torch.OutOfMemoryError as error:
-            nodes, _, count = self._u.shape
+            nodes, _, count = self._at.u.shape
             raise SolveError(
                 f"{count} presses at a time on a mesh of {nodes} nodes",
-                f"as many as the memory of {self._u.device} holds",
+                f"as many as the memory of {self._at.u.device} holds",
                 "ask for fewer at a time, or coarsen the mesh",
             ) from error
 
-    def _run(self, presses: Iterable[Press], collect: Collect) -> Iterator[tuple[int, float, Any]]:
-        waiting = iter(presses)
-        yield from self._fill(waiting)
-        while any(press is not None for press in self._presses):
-            now = self._settled()
-            verdicts = self._judge(now)
-            yield from self._collect(verdicts, now, collect)
-            failed = self._mask(verdicts, "failed")
-            yield from self._retreat(verdicts)
-            changed, augment = failed | self._mask(verdicts, "found"), self._mask(verdicts, "augment")
-            if changed.any():
-                yield from self._fill(waiting)
-                self._start(changed)
-            if augment.any():
-                which = self._tensor(augment)
-                for contact, state in zip(self._newton.contacts, self._states, strict=True):
-                    contact.augment(state, which)
-            if (changed | augment).any():
-                now = self._rebalance(now, changed | augment)
-            self._step(now)
+    def _iterate(
+        self, waiting: Iterator[PlacedPress], collect: Collect, observe: Observe | None
+    ) -> Iterator[tuple[int, float, Any]]:
+        """Do one Newton iteration of every column.
 
-    def _settled(self) -> Balance:
+        1. Evaluate the forces; shorten steps that went astray.
+        2. Judge every column: found, failed, augment, go on.
+        3. Accept what is found; hand out the states that are wanted; send columns on, or give them the next press.
+        4. Take failed columns back to their last equilibrium, for a smaller step.
+        5. Augment multipliers where penetration asks for it.
+        6. Evaluate again what has changed, and take a Newton step.
+        """
+        now = self._settled()
+        verdicts = self._judge(now)
+        yield from self._collect(verdicts, now, collect, observe)
+        failed = self._mask(verdicts, "failed")
+        yield from self._retreat(verdicts)
+        changed, augment = failed | self._mask(verdicts, "found"), self._mask(verdicts, "augment")
+        if changed.any():
+            yield from self._fill(waiting, observe)
+            self._start(changed)
+        if augment.any():
+            which = self._tensor(augment)
+            for history, contact in zip(self._at.histories, now.contacts, strict=True):
+                history.augment(contact, which)
+        if (changed | augment).any():
+            now = self._updated(now, changed | augment)
+        self._step(now)
+
+    def _settled(self) -> Residual:
         """Evaluate the forces, shortening steps that went astray."""
-        now = self._balance()
-        step = self._u - self._base
+        now, at = self._newton.residual(self._at), self._at
+        step = at.u - self._base
         for _ in range(_HALVINGS):
             # After a start there is no step to shorten.
             bad = self._newton.is_bad(self._before, now) & torch.isfinite(self._before)
@@ -147,60 +174,63 @@ class Batch:
             if not marks.any():
                 break
             step = torch.where(bad, step / _SHORTER, step)
-            self._u = torch.where(bad, self._base + step, self._u)
-            now = self._rebalance(now, marks)
+            at.u = torch.where(bad, self._base + step, at.u)
+            now = self._updated(now, marks)
         return now
 
-    def _balance(self) -> Balance:
-        return self._newton.balance(self._u, self._poses, self._states, self._conditions)
+    def _updated(self, now: Residual, changed: np.ndarray) -> Residual:
+        which = torch.as_tensor(changed.nonzero()[0], device=self._at.u.device)
+        return self._newton.updated(now, self._at, which)
 
-    def _rebalance(self, now: Balance, changed: np.ndarray) -> Balance:
-        which = torch.as_tensor(changed.nonzero()[0], device=self._u.device)
-        return self._newton.rebalance(now, self._u, self._poses, self._states, self._conditions, which)
-
-    def _judge(self, now: Balance) -> list[str]:
-        figures = torch.stack([now.error, now.penetration, now.mean_penetration, now.volume]).cpu().numpy()
+    def _judge(self, now: Residual) -> list[str]:
+        figures = torch.stack([now.relative, now.penetration, now.mean_penetration, now.volume]).cpu().numpy()
         self._figures = figures
         settings = self._newton.settings
         rows = figures.T.tolist()
         return [
-            "idle" if press is None else press.walk.judge(error, penetration, mean, volume, settings)
+            "idle" if press is None else press.path.judge(error, penetration, mean, volume, settings)
             for press, (error, penetration, mean, volume) in zip(self._presses, rows, strict=True)
         ]
 
-    def _collect(self, verdicts: list[str], now: Balance, collect: Collect) -> Iterator[tuple[int, float, Any]]:
+    def _collect(
+        self, verdicts: list[str], now: Residual, collect: Collect, observe: Observe | None
+    ) -> Iterator[tuple[int, float, Any]]:
         """Accept the states found and hand out those that are wanted."""
         found = [column for column, verdict in enumerate(verdicts) if verdict == "found"]
         if not found:
             return
-        walks = {column: self._press(column).walk for column in found}
-        turned = [(walk.attempt - walk.depth) * walk.direction < 0 for walk in walks.values()]
-        moved = self._values({column: walk.attempt - walk.depth for column, walk in walks.items()})
+        paths = {column: self._press(column).path for column in found}
+        turned = [(path.attempt - path.depth) * path.direction < 0 for path in paths.values()]
+        moved = self._values({column: path.attempt - path.depth for column, path in paths.items()})
         straight = self._values({column: not back for column, back in zip(found, turned, strict=True)}) > 0
         which = self._tensor(self._mask(verdicts, "found"))
-        for contact, state, pose in zip(self._newton.contacts, self._states, self._poses, strict=True):
-            contact.accept(state, pose, which)
-        for kept, state in zip(self._multipliers, self._states, strict=True):
-            kept.copy_(torch.where(which, state.multiplier, kept))
-        rate = torch.where(straight & (moved != 0), (self._u - self._accepted) / moved, 0.0)
+        at = self._at
+        if observe:
+            observe(at.take(torch.as_tensor(found, device=at.u.device)))
+        for history, contact, pose in zip(at.histories, now.contacts, at.poses, strict=True):
+            history.accept(contact, pose, which)
+        for kept, history in zip(self._multipliers, at.histories, strict=True):
+            kept.copy_(torch.where(which, history.multiplier, kept))
+        rate = torch.where(straight & (moved != 0), (at.u - self._accepted) / moved, 0.0)
         self._rate = torch.where(which & ((moved != 0) | ~straight), rate, self._rate)
-        self._accepted = torch.where(which, self._u, self._accepted)
-        depth = self._values({column: walk.attempt for column, walk in walks.items()})
-        self._passed.add(which, depth, self._u)
-        wanted = [column for column, walk in walks.items() if walk.found()]
+        self._accepted = torch.where(which, at.u, self._accepted)
+        self._loading.add(which, self._values({column: path.attempt for column, path in paths.items()}), at.u)
+        wanted = [column for column, path in paths.items() if path.found()]
         if wanted:
-            columns = torch.as_tensor(wanted, device=self._u.device)
-            error, penetration = self._figures[0, wanted], self._figures[1, wanted]
-            spent = [self._press(column).walk.spent for column in wanted]
-            states = collect(Members(columns, self._u[:, :, columns], error, penetration, spent))
+            columns = torch.as_tensor(wanted, device=at.u.device)
+            relative, penetration = self._figures[0, wanted], self._figures[1, wanted]
+            spent = [self._press(column).path.spent for column in wanted]
+            states = collect(
+                Equilibria(columns, at.u[:, :, columns], relative, penetration, spent, now.contacts)
+            )
             for column, state in zip(wanted, states, strict=True):
                 press = self._press(column)
-                press.walk.spent = 0
-                yield press.number, press.walk.depth, state
-        self._release([column for column, walk in walks.items() if walk.finished])
-        for walk in walks.values():
-            if not walk.finished:
-                walk.go_on()
+                press.path.spent = 0
+                yield press.number, press.path.depth, state
+        self._release([column for column, path in paths.items() if path.finished])
+        for path in paths.values():
+            if not path.finished:
+                path.go_on()
 
     def _retreat(self, verdicts: list[str]) -> Iterator[tuple[int, float, SolveError]]:
         """Take failed members back to their last state, for a smaller step."""
@@ -208,78 +238,85 @@ class Batch:
         if not failed.any():
             return
         which = self._tensor(failed)
-        for kept, state in zip(self._multipliers, self._states, strict=True):
-            state.multiplier.copy_(torch.where(which, kept, state.multiplier))
+        for kept, history in zip(self._multipliers, self._at.histories, strict=True):
+            history.multiplier.copy_(torch.where(which, kept, history.multiplier))
         for column in failed.nonzero()[0].tolist():
             press = self._press(column)
             try:
-                press.walk.halve()
+                press.path.halve()
             except SolveError as error:
                 self._release([column])
-                yield press.number, press.walk.depth, error
+                yield press.number, press.path.depth, error
 
-    def _fill(self, waiting: Iterator[Press]) -> Iterator[tuple[int, float, SolveError]]:
+    def _fill(self, waiting: Iterator[PlacedPress], observe: Observe | None) -> Iterator[tuple[int, float, SolveError]]:
         """Put waiting presses into idle columns, the indenter just touching."""
-        taken: dict[int, Press] = {}
+        taken: dict[int, PlacedPress] = {}
         for column, press in enumerate(self._presses):
             if press is None and (one := next(waiting, None)) is not None:
                 self._presses[column] = taken[column] = one
         if taken:
-            new, device = np.isin(np.arange(len(self._presses)), list(taken)), self._u.device
+            at, device = self._at, self._at.u.device
+            new = np.isin(np.arange(len(self._presses)), list(taken))
             which = torch.as_tensor(list(taken), device=device)
-            self._conditions.put_all(which, [press.conditions for press in taken.values()])
+            at.conditions.put(which, Conditions.joined([press.conditions for press in taken.values()]))
             touch, turn = ([getattr(press, name) for press in taken.values()] for name in ("touch", "turn"))
-            self._poses[0].place[:, which] = torch.as_tensor(np.stack(touch, axis=-1), device=device).double()
-            self._poses[0].turn[:, :, which] = torch.as_tensor(np.stack(turn, axis=-1), device=device).double()
-            for field in (self._u, self._base, self._accepted, self._rate):
+            at.poses[0].place[:, which] = torch.as_tensor(np.stack(touch, axis=-1), device=device).double()
+            at.poses[0].turn[:, :, which] = torch.as_tensor(np.stack(turn, axis=-1), device=device).double()
+            for field in (at.u, self._base, self._accepted, self._rate):
                 field.index_fill_(-1, which, 0.0)
-            self._passed.forget(self._tensor(new))
-            own, flat = self._conditions.take(which), self._u[:, :, which]
-            for contact, state, pose, kept in zip(
-                self._newton.contacts, self._states, self._poses, self._multipliers, strict=True
-            ):
-                contact.sharp = contact.sharp.index_fill(0, which, 0.0)
-                here = pose.take(which)
-                twin = contact.twin(here, which)
-                first = twin.start(here)
-                twin.add_force(flat, here, first, own, torch.zeros_like(flat))
-                twin.accept(first, here, torch.ones_like(which, dtype=torch.bool))
-                state.set(which, first)
+            self._loading.forget(self._tensor(new))
+            at.friction_tangent.index_fill_(0, which, 0.0)
+            for history, first in zip(at.histories, self._touched(which, observe), strict=True):
+                history.put(which, first)
+            for kept in self._multipliers:
                 kept.index_fill_(-1, which, 0.0)
             self._start(new)
         yield from ()
+
+    def _touched(self, which: torch.Tensor, observe: Observe | None) -> tuple[ContactHistory, ...]:
+        """Return the histories of columns, by index, whose indenter just touches the undeformed skin."""
+        here, surfaces = self._at.take(which), self._newton.surfaces
+        here.histories = tuple(surface.start(pose) for surface, pose in zip(surfaces, here.poses, strict=True))
+        contacts = self._newton.add_contact_forces(here, torch.zeros_like(here.u))
+        if observe:
+            observe(here.copy())
+        everyone = torch.ones_like(which, dtype=torch.bool)
+        for history, contact, pose in zip(here.histories, contacts, here.poses, strict=True):
+            history.accept(contact, pose, everyone)
+        return here.histories
 
     def _start(self, changed: np.ndarray) -> None:
         """Move the changed columns' indenters to the depth to try, and start from a guess of the displacements."""
         busy = {column: press for column, press in enumerate(self._presses) if press is not None and changed[column]}
         which = self._tensor(changed)
-        depth = self._values({column: press.walk.depth for column, press in busy.items()})
-        attempt = self._values({column: press.walk.attempt for column, press in busy.items()})
-        heights = self._values({c: float(press.touch[2]) - press.walk.attempt for c, press in busy.items()})
-        moved, place = self._values(dict.fromkeys(busy, 1.0)) > 0, self._poses[0].place
+        depth = self._values({column: press.path.depth for column, press in busy.items()})
+        attempt = self._values({column: press.path.attempt for column, press in busy.items()})
+        heights = self._values({c: float(press.touch[2]) - press.path.attempt for c, press in busy.items()})
+        moved, place = self._values(dict.fromkeys(busy, 1.0)) > 0, self._at.poses[0].place
         place[2] = torch.where(moved, heights, place[2])
         guess = self._accepted + self._rate * (attempt - depth)
-        beyond = attempt >= self._passed.deepest
+        beyond = attempt >= self._loading.deepest
         if not bool((beyond | ~which).all()):
-            back = self._passed.at(attempt) + (self._accepted - self._passed.at(depth))
+            back = self._loading.at(attempt) + (self._accepted - self._loading.at(depth))
             guess = torch.where(beyond, guess, back)
         columns = which.nonzero()[:, 0]
         chosen = guess.index_select(-1, columns)
-        volume = self._newton.body.internal_force(chosen, self._conditions.take(columns))[1]
+        volume = self._newton.body.internal_force(chosen, self._at.conditions.take(columns))[1]
         chosen = torch.where(volume < _WILD, self._accepted.index_select(-1, columns), chosen)
-        self._u = self._u.index_copy(-1, columns, chosen)
+        self._at.u = self._at.u.index_copy(-1, columns, chosen)
         self._before = torch.where(which, torch.inf, self._before)
 
-    def _step(self, now: Balance) -> None:
+    def _step(self, now: Residual) -> None:
         """Take one Newton step."""
         busy = self._tensor(np.array([press is not None for press in self._presses]))
         if not bool(busy.any()):
             return
-        self._newton.sharpen(now.error)
-        step, used = self._newton.step(self._u, now.residual, self._conditions, busy)
-        self.cg, self.ticks = self.cg + used, self.ticks + 1
-        self._base, self._before = self._u, now.size
-        self._u = self._u + step
+        at = self._at
+        at.friction_tangent = self._newton.friction_tangent(now)
+        step, used = self._newton.step(at, now, busy)
+        self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
+        self._base, self._before = at.u, now.norm
+        at.u = at.u + step
 
     def _release(self, columns: list[int]) -> None:
         """Make columns idle."""
@@ -287,15 +324,15 @@ class Batch:
             return
         for column in columns:
             self._presses[column] = None
-        which = torch.as_tensor(columns, device=self._u.device)
-        self._poses[0].place[2, which] = _AWAY
-        for state, kept in zip(self._states, self._multipliers, strict=True):
-            state.multiplier.index_fill_(-1, which, 0.0)
+        which = torch.as_tensor(columns, device=self._at.u.device)
+        self._at.poses[0].place[2, which] = _AWAY
+        for history, kept in zip(self._at.histories, self._multipliers, strict=True):
+            history.multiplier.index_fill_(-1, which, 0.0)
             kept.index_fill_(-1, which, 0.0)
-        for field in (self._u, self._base, self._accepted, self._rate):
+        for field in (self._at.u, self._base, self._accepted, self._rate):
             field.index_fill_(-1, which, 0.0)
 
-    def _press(self, column: int) -> Press:
+    def _press(self, column: int) -> PlacedPress:
         press = self._presses[column]
         if press is None:
             raise IndexError(f"column {column} is idle")
@@ -305,13 +342,9 @@ class Batch:
         return np.array([v == verdict for v in verdicts])
 
     def _tensor(self, mask: np.ndarray) -> torch.Tensor:
-        return torch.as_tensor(mask, device=self._u.device)
+        return torch.as_tensor(mask, device=self._at.u.device)
 
     def _values(self, by_column: dict[int, float]) -> torch.Tensor:
         values = np.zeros(len(self._presses))
         values[list(by_column)] = list(by_column.values())
-        return torch.as_tensor(values, device=self._u.device)
-
-    def _row(self, values: Any) -> torch.Tensor:
-        return torch.as_tensor(np.asarray(values, dtype=float), device=self._u.device)[:, None]
-
+        return torch.as_tensor(values, device=self._at.u.device)

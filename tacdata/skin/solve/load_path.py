@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from tacdata.errors import SolveError
-from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.solve.settings import SolverSettings
 
 _LEAST_STEP = 0.01
 """Load step below which a press is given up [mm]."""
@@ -20,8 +20,8 @@ measured, 20 takes a fifth more iterations with a sphere, 200 twice as many with
 
 
 @dataclass
-class Walk:
-    """A load path, in bounded steps that are halved where no equilibrium is found."""
+class LoadPath:
+    """The depths of one press, reached in bounded steps that are halved where no equilibrium is found."""
 
     depths: tuple[float, ...]
     """Depths of the states wanted [mm]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 
-class PassedStates:
+class LoadingStates:
     """For every member of a batch, the displacements at the depths it passed on its way down."""
 
     def __init__(self, shape: tuple[int, int, int], device: str) -> None:

@@ -6,16 +6,21 @@ its neighbours along.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 
-from tacdata.skin.contact.contact import Contact, ContactState
+from tacdata.skin.contact.contact_forces import ContactForces
+from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear.cg import Stopping, conjugate_gradients
 from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
-from tacdata.skin.linear.cuda_cg import CardGradients
-from tacdata.skin.member.conditions import Conditions
-from tacdata.skin.member.pose import Pose
+from tacdata.skin.linear.cuda_cg import CudaConjugateGradients
+from tacdata.skin.linear.tangent import Linearization, Tangent
+from tacdata.skin.member.columns import Columns
+from tacdata.skin.solve.configuration import Configuration
+from tacdata.skin.solve.settings import SolverSettings
 
 _LEAST_VOLUME = 0.1
 """Volume ratio det F below which a Newton step is shortened [1]."""
@@ -32,35 +37,14 @@ _WORK = torch.float32
 
 
 @dataclass(frozen=True)
-class SolverSettings:
-    """When an equilibrium counts as found."""
+class Residual(Columns):
+    """How far each batch member is from equilibrium, and its contact forces."""
 
-    residual: float = 5e-4
-    """Out-of-balance force over the largest contact force, Euclidean norms over the nodes [1]."""
-    penetration: float = 3e-3
-    """Largest |gap| of a point that carries load over the indentation depth [1]."""
-    mean_penetration: float = 3e-4
-    """Mean |gap|, weighted by the load that points carry, over the indentation depth [1]; the force is off by about one
-    and a half times as much."""
-    forcing: float = 0.1
-    """Relative tolerance of the conjugate gradients in a Newton iteration [1]; loose, as an evaluation costs one."""
-    newton_limit: int = 60
-    """Newton iterations per state before giving up."""
-    patience: int = 12
-    """Newton iterations without progress after which a state is given up, so that the path can try a smaller step."""
-    cg_limit: int = 400
-    """Conjugate-gradient iterations per Newton iteration."""
-
-
-@dataclass
-class Balance:
-    """The forces at the present displacements, one entry a member."""
-
-    residual: torch.Tensor
+    force: torch.Tensor
     """Out-of-balance forces on free nodes [N], shape (n, 3, b)."""
-    size: torch.Tensor
+    norm: torch.Tensor
     """Their Euclidean norm [N], shape (b,)."""
-    error: torch.Tensor
+    relative: torch.Tensor
     """The same over that of the contact forces [1], shape (b,)."""
     volume: torch.Tensor
     """Smallest det F [1], shape (b,)."""
@@ -68,146 +52,87 @@ class Balance:
     """Largest |gap| of points that carry load [mm], shape (b,)."""
     mean_penetration: torch.Tensor
     """The same, its mean weighted by the load [mm], shape (b,): of the contact where it is largest."""
+    contacts: tuple[ContactForces, ...]
+    """Of each contact."""
 
 
 class Newton:
-    """One body and its contacts."""
+    """Residual and Newton step of one body and its contacts."""
 
     def __init__(
-        self, body: Elasticity, contacts: list[Contact], fixed: torch.Tensor, preconditioner: ContactPreconditioner,
-        settings: SolverSettings,
+        self, body: Elasticity, surfaces: Sequence[ContactSurface], fixed: torch.Tensor,
+        preconditioner: ContactPreconditioner, settings: SolverSettings,
     ) -> None:
         """Bind the parts; ``fixed`` marks held nodes, shape (n,), bool."""
-        self.body, self.contacts, self.preconditioner, self.settings = body, contacts, preconditioner, settings
+        self.body, self.surfaces, self.preconditioner, self.settings = body, tuple(surfaces), preconditioner, settings
+        self.tangent = Tangent(body, surfaces)
         self._free = (~fixed).to(torch.float64)[:, None, None]
         self._free_work = self._free.to(_WORK)
-        self._card = None if fixed.device.type == "cpu" else CardGradients(body, contacts, preconditioner)
+        self._cuda = None if fixed.device.type == "cpu" else CudaConjugateGradients(self.tangent, preconditioner)
 
-    def balance(
-        self, u: torch.Tensor, poses: list[Pose], states: list[ContactState], conditions: Conditions
-    ) -> Balance:
-        """Evaluate forces at ``u`` [mm], shape (n, 3, b)."""
-        internal, volume = self.body.internal_force(u, conditions)
-        external = torch.zeros_like(u)
-        for contact, pose, state in zip(self.contacts, poses, states, strict=True):
-            contact.add_force(u, pose, state, conditions, external)
+    def residual(self, at: Configuration) -> Residual:
+        """Evaluate the forces of all members."""
+        internal, volume = self.body.internal_force(at.u, at.conditions)
+        external = torch.zeros_like(at.u)
+        contacts = self.add_contact_forces(at, external)
         # Without contact there is no force to compare with: E times a tenth of a millimetre squared stands in.
-        scale = torch.linalg.vector_norm(external, dim=(0, 1)).maximum(0.01 * conditions.modulus)
-        residual = (external - internal) * self._free
-        size = torch.linalg.vector_norm(residual, dim=(0, 1))
-        largest, mean = zip(*(contact.misfit() for contact in self.contacts), strict=True)
-        penetration, mean = torch.stack(largest).amax(dim=0), torch.stack(mean).amax(dim=0)
-        return Balance(residual, size, size / scale, volume, penetration, mean)
+        scale = torch.linalg.vector_norm(external, dim=(0, 1)).maximum(0.01 * at.conditions.modulus)
+        force = (external - internal) * self._free
+        norm = torch.linalg.vector_norm(force, dim=(0, 1))
+        gaps = [surface.penetration(now) for surface, now in zip(self.surfaces, contacts, strict=True)]
+        largest, mean = (torch.stack(values).amax(dim=0) for values in zip(*gaps, strict=True))
+        return Residual(force, norm, norm / scale, volume, largest, mean, contacts)
 
-    def rebalance(
-        self, now: Balance, u: torch.Tensor, poses: list[Pose], states: list[ContactState], conditions: Conditions,
-        which: torch.Tensor,
-    ) -> Balance:
-        """Evaluate anew where something has changed.
+    def add_contact_forces(self, at: Configuration, total: torch.Tensor) -> tuple[ContactForces, ...]:
+        """Add the contacts' nodal forces on the skin [N] to ``total``, shape (n, 3, b); return them by contact."""
+        return tuple(
+            surface.add_forces(at.u, pose, history, at.conditions, at.friction_tangent, total)
+            for surface, pose, history in zip(self.surfaces, at.poses, at.histories, strict=True)
+        )
 
-        Args:
-            now: What was evaluated last; it may be changed.
-            u: Displacements [mm], shape (n, 3, b).
-            poses: Of the contacts' shapes.
-            states: Of the contacts.
-            conditions: Of all members.
-            which: Members of which something has changed, by index, shape (k,).
+    def updated(self, now: Residual, at: Configuration, which: torch.Tensor) -> Residual:
+        """Return the residual of all members after a change of some, by index, shape (k,).
 
-        Returns:
-            The forces of all members.
+        On a GPU, where few have changed, these alone are evaluated, and ``now`` is changed in place.
         """
-        if self._card is None or 2 * len(which) > u.shape[2]:
-            return self.balance(u, poses, states, conditions)
-        everyone, few = self.contacts, [pose.take(which) for pose in poses]
-        self.contacts = [contact.twin(pose, which) for contact, pose in zip(everyone, few, strict=True)]
-        try:
-            part = self.balance(
-                u.index_select(-1, which), few, [state.take(which) for state in states], conditions.take(which)
-            )
-            for contact, twin in zip(everyone, self.contacts, strict=True):
-                contact.join(twin, which)
-        finally:
-            self.contacts = everyone
-        for field in fields(now):
-            getattr(now, field.name).index_copy_(-1, which, getattr(part, field.name))
+        if self._cuda is None or 2 * len(which) > at.u.shape[2]:
+            return self.residual(at)
+        now.put(which, self.residual(at.take(which)))
         return now
 
-    def sharpen(self, error: torch.Tensor) -> None:
-        """Choose friction's stiffness for the next evaluation: the tangent only where Newton's method is at home."""
-        for contact in self.contacts:
-            contact.sharp = (error < _NEAR).to(torch.float64)
+    def friction_tangent(self, now: Residual) -> torch.Tensor:
+        """Return 1 for members near the solution, where friction enters by its tangent, else 0; shape (b,)."""
+        return (now.relative < _NEAR).to(torch.float64)
 
-    def is_bad(self, before: torch.Tensor, now: Balance) -> torch.Tensor:
-        """Return which members' step went astray, shape (b,): residual grown beyond twice, or an element inverted."""
-        return ~(now.size <= 2.0 * before) | ~(now.volume >= _LEAST_VOLUME)
+    def is_bad(self, before: torch.Tensor, now: Residual) -> torch.Tensor:
+        """Return which members' step failed, shape (b,): residual more than doubled, or an element nearly inverted."""
+        return ~(now.norm <= 2.0 * before) | ~(now.volume >= _LEAST_VOLUME)
 
-    def step(
-        self, u: torch.Tensor, residual: torch.Tensor, conditions: Conditions, wanted: torch.Tensor
-    ) -> tuple[torch.Tensor, int]:
-        """Solve K(u) x = r at the state last evaluated.
+    def step(self, at: Configuration, now: Residual, wanted: torch.Tensor) -> tuple[torch.Tensor, int]:
+        """Solve K x = r, loosely.
 
         Args:
-            u: Displacements [mm], shape (n, 3, b).
-            residual: r [N], shape (n, 3, b).
-            conditions: Of the members.
+            at: Where the tangent is taken.
+            now: The residual there.
             wanted: Members to solve for, shape (b,), bool; others get 0.
 
         Returns:
             x [mm], shape (n, 3, b), float64, and the number of iterations.
         """
-        self.preconditioner.update(conditions.modulus)
-        size = torch.linalg.vector_norm(residual, dim=(0, 1)).clamp_min(1e-30)
-        r = torch.where(wanted, residual / size, 0.0).to(_WORK)
-        u, conditions, tolerance = u.to(_WORK), conditions.to(_WORK), self.settings.forcing
-        if self._card:
-            limit = self.settings.cg_limit
-            x, used = self._card.solve(u, r, conditions, wanted, tolerance, limit, _STRAGGLERS, _LONG)
+        contacts = [forces.tangent for forces in now.contacts]
+        self.preconditioner.update(contacts, at.conditions.modulus)
+        size = torch.linalg.vector_norm(now.force, dim=(0, 1)).clamp_min(1e-30)
+        r = torch.where(wanted, now.force / size, 0.0).to(_WORK)
+        here = self.tangent.at(at.u.to(_WORK), at.conditions, contacts)
+        stopping = Stopping(self.settings.forcing, self.settings.cg_limit, _STRAGGLERS, _LONG)
+        if self._cuda:
+            x, used = self._cuda.solve(here, r, wanted, stopping)
         else:
-            x, used = self._conjugate_gradients(u, r, conditions, tolerance)
+            x, used = conjugate_gradients(lambda p: self.product(here, p), self.preconditioner.apply, r, stopping)
         return x.to(torch.float64) * size, used
 
-    def product(self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions) -> torch.Tensor:
-        """Return the tangent times ``p`` [N] on free nodes, shape (n, 3, b), at the state last evaluated."""
+    def product(self, here: Linearization, p: torch.Tensor) -> torch.Tensor:
+        """Return the tangent times ``p`` [N] on free nodes, shape (n, 3, b)."""
         result = torch.zeros_like(p)
-        self.body.tangent_product(u, p, conditions, result)
-        for contact in self.contacts:
-            contact.add_product(p, result)
+        self.tangent.add_product(here, p, result)
         return result * (self._free_work if p.dtype == _WORK else self._free)
-
-    def _conjugate_gradients(
-        self, u: torch.Tensor, r: torch.Tensor, conditions: Conditions, tolerance: float
-    ) -> tuple[torch.Tensor, int]:
-        """Solve to a relative tolerance in the preconditioned norm; members stop by themselves.
-
-        A member whose tangent turns out indefinite keeps what it has, or the preconditioned residual if it has
-        nothing.
-        """
-        x = torch.zeros_like(r)
-        z = self.preconditioner.apply(r)
-        p = z.clone()
-        rho = _dot(r, z)
-        goal = rho * tolerance**2
-        going = rho > 0
-        iteration, patient = 0, int(_STRAGGLERS * int(going.sum()))
-        for iteration in range(1, self.settings.cg_limit + 1):
-            q = self.product(u, p, conditions)
-            curvature = _dot(p, q)
-            if iteration == 1:
-                x = torch.where(going & (curvature <= 0), z, x)
-            going = going & (curvature > 0)
-            alpha = torch.where(going, rho / curvature, 0.0)
-            x.addcmul_(p, alpha)
-            r = r - alpha * q
-            z = self.preconditioner.apply(r)
-            rho_new = _dot(r, z)
-            going = going & (rho_new > goal)
-            left = int(going.sum())
-            if not left or (iteration >= _LONG and left <= patient):
-                break
-            p = z + torch.where(going, rho_new / rho, 0.0) * p
-            rho = rho_new
-        return x, iteration
-
-
-def _dot(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-    return (a * b).flatten(0, 1).sum(dim=0)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from tacdata.skin.contact.contact import Contact
+from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.mesh.skin_mesh import SkinMesh
-from tacdata.skin.solve.batch import Members
+from tacdata.skin.solve.batch import Equilibria
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,19 @@ class State:
     """Newton iterations since the state before."""
 
 
-class Gauge:
+class StateReader:
     """Reads states off a batch."""
 
-    def __init__(self, mesh: SkinMesh, taxels: int, device: str) -> None:
-        """Prepare sums over ``taxels`` protrusions."""
-        self._taxels = taxels
+    def __init__(self, mesh: SkinMesh, taxels: int, board: ContactSurface | None, device: str) -> None:
+        """Prepare sums over the protrusions.
+
+        Args:
+            mesh: The skin.
+            taxels: Number of protrusions.
+            board: What they stand on, if anything; then the second contact of every batch is that with it.
+            device: "cpu" or "cuda:0".
+        """
+        self._taxels, self._board = taxels, board
         self._taxel = torch.as_tensor(mesh.protrusion_taxel, device=device).long()
         faces = mesh.protrusions
         taxel = np.repeat(mesh.protrusion_taxel, faces.shape[1])
@@ -54,26 +61,30 @@ class Gauge:
         """Return the mean downward displacement of each protrusion's rim [mm], shape (taxels, k); ``u``: (n, 3, k)."""
         return -self._rim @ u[:, 2]
 
-    def states(self, members: Members, contacts: list[Contact], with_displacement: bool) -> list[State]:
-        """Return the states of some members of the batch as last evaluated."""
-        column = members.column
-        force = -contacts[0].force[:, column]
+    def taxel_load(self, load: torch.Tensor) -> torch.Tensor:
+        """Return the sum over each protrusion of what its faces carry, shape (taxels, k); ``load``: (f, k)."""
+        total = torch.zeros(self._taxels, load.shape[1], dtype=torch.float64, device=load.device)
+        return total.index_add_(0, self._taxel, load)
+
+    def states(self, found: Equilibria, with_displacement: bool = True) -> list[State]:
+        """Return the states that columns of a batch have reached, displacements only if they are wanted."""
+        column = found.column
+        force = -found.contacts[0].force[:, column]
         load = torch.zeros(self._taxels, len(column), dtype=torch.float64, device=force.device)
         area = torch.zeros_like(load)
-        if len(contacts) > 1:
-            board = contacts[1]
-            pressure, weights = board.pressure[:, :, column], board.weights[:, :, None]
+        if self._board:
+            pressure, weights = found.contacts[1].pressure[:, :, column], self._board.weights[:, :, None]
             load.index_add_(0, self._taxel, (pressure * weights).sum(dim=1))
             area.index_add_(0, self._taxel, ((pressure > 0) * weights).sum(dim=1))
         force, load, area, closure = (
-            value.T.cpu().numpy() for value in (force, load, area, self.closure(members.u))
+            value.T.cpu().numpy() for value in (force, load, area, self.closure(found.u))
         )
         nothing = np.empty((0, 3))
-        u = members.u.permute(2, 0, 1).cpu().numpy() if with_displacement else [nothing] * len(column)
+        u = found.u.permute(2, 0, 1).cpu().numpy() if with_displacement else [nothing] * len(column)
         return [
             State(
-                u[k], force[k], load[k], closure[k], area[k], float(members.error[k]), float(members.penetration[k]),
-                members.spent[k],
+                u[k], force[k], load[k], closure[k], area[k], float(found.relative[k]), float(found.penetration[k]),
+                found.newton[k],
             )
             for k in range(len(column))
         ]

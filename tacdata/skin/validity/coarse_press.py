@@ -13,13 +13,14 @@ from tacdata.skin.validity.mesh_error import Figures
 if TYPE_CHECKING:
     from tacdata.skin.solve.state import State
 
-class Walker(Protocol):
+
+class PressSolver(Protocol):
     """What solves presses: `tacdata.skin.model.SkinModel`."""
 
-    def walk(
+    def states_many(
         self, requests: list[PressRequest], capacity: int = 1
     ) -> Iterator[tuple[int, float, State | SolveError]]:
-        """As `SkinModel.walk`."""
+        """As `SkinModel.states_many`."""
         ...
 
     def figures(self, depths: Sequence[float], states: list[State]) -> Figures:
@@ -47,7 +48,7 @@ def loading(request: PressRequest) -> PressRequest:
     return replace(request, depths=tuple(depths))
 
 
-def press_coarsely(model: Walker, requests: list[PressRequest], capacity: int = 1) -> list[CoarsePress]:
+def press_coarsely(model: PressSolver, requests: list[PressRequest], capacity: int = 1) -> list[CoarsePress]:
     """Solve the loading branches of presses of one shape of indenter on the coarser mesh.
 
     Args:
@@ -61,7 +62,7 @@ def press_coarsely(model: Walker, requests: list[PressRequest], capacity: int = 
     numbers = [k for k, request in enumerate(requests) if loading(request).depths]
     found = [[model.figures([], [])] for _ in requests]
     remarks = [""] * len(requests)
-    for index, depth, state in model.walk([loading(requests[k]) for k in numbers], capacity):
+    for index, depth, state in model.states_many([loading(requests[k]) for k in numbers], capacity):
         number = numbers[index]
         if isinstance(state, SolveError):
             remarks[number] = f"the coarser mesh gave up: {state.given}"

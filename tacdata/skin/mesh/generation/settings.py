@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class MeshSettings:
     """Target edge lengths [mm].
 
-    The default ones meet, with some 13,800 nodes, what independent solutions differ by: force 1 %, each protrusion 5 %
-    of the largest (`tests/skin/test_skin_reference.py`; decision 0014).
+    The default ones give some 13,700 nodes. Solutions then differ from independent ones by 1 % in force, and by 5 % of
+    the largest in each protrusion's force (`tests/skin/test_skin_reference.py`, decision 0014).
 
     Example:
         >>> from tacdata.skin.mesh.generation.settings import MeshSettings

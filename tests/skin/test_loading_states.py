@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tacdata.skin.solve.loading_states import PassedStates
+from tacdata.skin.solve.loading_states import LoadingStates
 
 NODES, MEMBERS = 5, 3
 BOTH = torch.tensor([True, True, False])
@@ -22,7 +22,7 @@ def depths(*values):
 @pytest.fixture
 def passed():
     """Members 0 and 1 in use, 2 idle."""
-    made = PassedStates((NODES, 3, MEMBERS), "cpu")
+    made = LoadingStates((NODES, 3, MEMBERS), "cpu")
     made.forget(BOTH)
     return made
 

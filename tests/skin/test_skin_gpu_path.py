@@ -1,42 +1,43 @@
-"""Whole presses on the CPU by a card's way: shrinking batches, dense shares, forces anew where something changed."""
+"""Whole presses on the CPU by a GPU's way: shrinking batches, dense shares, forces anew where something changed."""
 
 import numpy as np
 import pytest
 from skin_examples import PLAIN, box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin import model
+from tacdata.skin import meshed_skin
 from tacdata.skin.linear import contact_preconditioner
 from tacdata.skin.linear.contact_transfer import DenseTransfer
 from tacdata.skin.linear.coupled_dofs import in_order
-from tacdata.skin.linear.cuda_cg import CardGradients
+from tacdata.skin.linear.cuda_cg import CudaConjugateGradients
 from tacdata.skin.linear.rest_stiffness import DenseRest, rest_stiffness
 from tacdata.skin.mesh.build import MeshSettings, build_mesh
+from tacdata.skin.meshed_skin import MeshedSkin
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.newton import Newton
 
 
 @pytest.fixture
-def as_on_a_card(monkeypatch):
-    """Makes models take a card's way from now on."""
+def as_on_a_gpu(monkeypatch):
+    """Makes models take a GPU's way from now on."""
 
     def switch():
         begin = Newton.__init__
 
-        def newton(self, body, contacts, fixed, preconditioner, settings):
-            begin(self, body, contacts, fixed, preconditioner, settings)
-            self._card = CardGradients(body, contacts, preconditioner)
+        def newton(self, body, surfaces, fixed, preconditioner, settings):
+            begin(self, body, surfaces, fixed, preconditioner, settings)
+            self._cuda = CudaConjugateGradients(self.tangent, preconditioner)
 
         def rest(mesh, material, fixed, loadable, device, averaged):
             return DenseRest(
                 rest_stiffness(mesh, material, averaged), np.flatnonzero(~np.repeat(fixed, 3)), loadable, device
             )
 
-        loadable = SkinModel._loadable.func
-        monkeypatch.setattr(SkinModel, "_loadable", property(lambda own: in_order(loadable(own), own.mesh)))
+        loadable = MeshedSkin.loadable.func
+        monkeypatch.setattr(MeshedSkin, "loadable", property(lambda own: in_order(loadable(own), own.mesh)))
         monkeypatch.setattr(Newton, "__init__", newton)
-        monkeypatch.setattr(model, "rest_solver", rest)
+        monkeypatch.setattr(meshed_skin, "rest_solver", rest)
         monkeypatch.setattr(contact_preconditioner, "contact_transfer", lambda members, device: DenseTransfer(members))
         monkeypatch.setitem(contact_preconditioner._WEAK, "cpu", contact_preconditioner._WEAK["cuda"])
 
@@ -46,7 +47,7 @@ def as_on_a_card(monkeypatch):
 def walked(sensor, mesh, requests):
     """Every press's states, in the order of its depths."""
     states: dict[int, list] = {number: [] for number in range(len(requests))}
-    for number, _, state in SkinModel(sensor, PLAIN, mesh=mesh).walk(requests, 4):
+    for number, _, state in SkinModel(sensor, PLAIN, mesh=mesh).states_many(requests, 4):
         states[number].append(state)
     return states
 
@@ -54,27 +55,27 @@ def walked(sensor, mesh, requests):
 def both_ways_agree(sensor, mesh, requests, switch):
     plain = walked(sensor, mesh, requests)
     switch()
-    card = walked(sensor, mesh, requests)
+    gpu = walked(sensor, mesh, requests)
     for number, request in enumerate(requests):
-        assert len(card[number]) == len(request.depths)
+        assert len(gpu[number]) == len(request.depths)
         largest = max(np.abs(state.force).max() for state in plain[number])
-        for ours, theirs in zip(card[number], plain[number], strict=True):
+        for ours, theirs in zip(gpu[number], plain[number], strict=True):
             assert np.abs(ours.force - theirs.force).max() < 1e-3 * largest
             difference = ours.displacement - theirs.displacement
             assert np.sqrt((difference**2).mean()) < 2e-4 * max(request.depths)
             assert ours.residual <= PLAIN.solver.residual
 
 
-def test_presses_on_a_slab_agree(as_on_a_card):
+def test_presses_on_a_slab_agree(as_on_a_gpu):
     sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
     places = [(1.0, -0.4, 0.4), (1.2, 0.3, 0.3), (1.5, 0.0, 0.0), (2.0, 0.1, 0.5), (1.0, 0.0, 0.2)]
     requests = [PressRequest(Sphere(radius), x, y, 0.0, (0.15, 0.3)) for radius, x, y in places]
     requests.insert(2, PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.2, 0.4, 0.2, 0.0)))
-    both_ways_agree(sensor, box_mesh(sensor, 6, 6, 2), requests, as_on_a_card)
+    both_ways_agree(sensor, box_mesh(sensor, 6, 6, 2), requests, as_on_a_gpu)
 
 
-def test_presses_on_protrusions_agree(as_on_a_card):
+def test_presses_on_protrusions_agree(as_on_a_gpu):
     sensor = bumps_sensor()
     mesh = build_mesh(sensor, MeshSettings(outer=0.9, interior=1.5, protrusion=1.0, tip=None))
     requests = [PressRequest(Sphere(2.0), x, 0.45, 0.0, (0.2, 0.4)) for x in (0.5, -0.3)]
-    both_ways_agree(sensor, mesh, requests, as_on_a_card)
+    both_ways_agree(sensor, mesh, requests, as_on_a_gpu)

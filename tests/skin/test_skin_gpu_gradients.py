@@ -1,4 +1,4 @@
-"""Conjugate gradients as a card runs them, here on the CPU: fused kernels, half precision, a batch that shrinks."""
+"""Conjugate gradients as a GPU runs them, here on the CPU: fused kernels, half precision, a batch that shrinks."""
 
 import numpy as np
 import pytest
@@ -6,15 +6,18 @@ import torch
 from skin_examples import MATERIAL, HeldSlab, batch, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.contact.contact import Contact
+from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.elasticity.body import Elasticity
 from tacdata.skin.linear import contact_preconditioner, cuda_cg
+from tacdata.skin.linear.cg import Stopping, conjugate_gradients
 from tacdata.skin.linear.contact_transfer import DenseTransfer
-from tacdata.skin.linear.cuda_cg import CardGradients
+from tacdata.skin.linear.cuda_cg import CudaConjugateGradients
 from tacdata.skin.linear.rest_stiffness import DenseRest
 from tacdata.skin.member.conditions import conditions
 from tacdata.skin.member.pose import Pose
-from tacdata.skin.solve.newton import Newton, SolverSettings
+from tacdata.skin.solve.configuration import Configuration
+from tacdata.skin.solve.newton import Newton
+from tacdata.skin.solve.settings import SolverSettings
 
 MEMBERS = 40
 SPHERE = Sphere(2.0)
@@ -30,7 +33,7 @@ def problem(held, monkeypatch):
     """Spheres pressed in differently deep, some not touching; right-hand sides of norm 1."""
     monkeypatch.setattr(contact_preconditioner, "contact_transfer", lambda members, device: DenseTransfer(members))
     nodes, faces = torch.as_tensor(held.mesh.nodes), torch.as_tensor(held.mesh.outer)
-    contact = Contact(nodes, faces, 1, SPHERE.distance_function(), True, 1e3, 30.0)
+    surface = ContactSurface(nodes, faces, 1, SPHERE.distance_function(), True, 1e3, 30.0)
     own = conditions(slab_sensor().material, 0.2, SPHERE).repeat(MEMBERS)
     depth = torch.linspace(-0.1, 0.25, MEMBERS, dtype=torch.float64)
     place = torch.stack([depth, -depth, 2.0 - depth])
@@ -41,40 +44,42 @@ def problem(held, monkeypatch):
     body = Elasticity(held.mesh, "neo_hookean")
     rest = DenseRest(held.stiffness, held.free, held.loadable, "cpu")
     preconditioner = contact_preconditioner.ContactPreconditioner(
-        rest, [contact], torch.as_tensor(held.loadable), 3 * held.count, MATERIAL.youngs_modulus
+        rest, [surface], torch.as_tensor(held.loadable), 3 * held.count, MATERIAL.youngs_modulus
     )
-    newton = Newton(body, [contact], torch.as_tensor(held.mesh.bottom), preconditioner, SolverSettings())
-    newton.balance(u, [pose], [contact.start(pose)], own)
-    preconditioner.update(own.modulus)
+    newton = Newton(body, [surface], torch.as_tensor(held.mesh.bottom), preconditioner, SolverSettings())
+    at = Configuration(u, own, (pose,), (surface.start(pose),), torch.zeros(MEMBERS, dtype=torch.float64))
+    contacts = [contact.tangent for contact in newton.residual(at).contacts]
+    preconditioner.update(contacts, own.modulus)
     r = held.random(*range(MEMBERS)).reshape(held.count, 3, MEMBERS)
-    return newton, u.float(), r / r.norm(dim=(0, 1)), own.to(torch.float32)
+    return newton, newton.tangent.at(u.float(), own, contacts), r / r.norm(dim=(0, 1))
 
 
 def solve(problem, wanted=None, tolerance=1e-3, stragglers=0.0, long=8):
-    newton, u, r, own = problem
+    newton, at, r = problem
     wanted = torch.ones(MEMBERS, dtype=torch.bool) if wanted is None else wanted
-    solver = CardGradients(newton.body, newton.contacts, newton.preconditioner)
-    return solver.solve(u, torch.where(wanted, r, 0.0), own, wanted, tolerance, 200, stragglers, long)
+    solver = CudaConjugateGradients(newton.tangent, newton.preconditioner)
+    return solver.solve(at, torch.where(wanted, r, 0.0), wanted, Stopping(tolerance, 200, stragglers, long))
 
 
 def test_every_member_is_solved(problem):
-    newton, u, r, own = problem
+    newton, at, r = problem
     x, _ = solve(problem)
-    left = (newton.product(u, x, own) - r).norm(dim=(0, 1))
+    left = (newton.product(at, x) - r).norm(dim=(0, 1))
     assert left.max() < 5e-3
-    plain, _ = newton._conjugate_gradients(u, r, own, 1e-3)
+    apply = newton.preconditioner.apply
+    plain, _ = conjugate_gradients(lambda p: newton.product(at, p), apply, r, Stopping(1e-3, 400, 0.3))
     assert ((x - plain).norm(dim=(0, 1)) < 5e-3 * plain.norm(dim=(0, 1))).all()
 
 
 def test_a_batch_that_shrinks_finds_what_one_that_does_not_finds(problem, monkeypatch):
     shrunk, _ = solve(problem)
-    widths, iterate = [], CardGradients._iterate
+    widths, iterate = [], CudaConjugateGradients._iterate
 
     def watched(me, now):
         widths.append(now.width)
         iterate(me, now)
 
-    monkeypatch.setattr(CardGradients, "_iterate", watched)
+    monkeypatch.setattr(CudaConjugateGradients, "_iterate", watched)
     again, _ = solve(problem)
     assert widths[0] == MEMBERS and widths[-1] < MEMBERS, "it did shrink"
     monkeypatch.setattr(cuda_cg, "_SHRINK", 0.0)
@@ -99,9 +104,9 @@ def test_stragglers_are_cut_short(problem):
 
 
 def test_an_indefinite_tangent_gives_the_preconditioned_residual(problem, monkeypatch):
-    newton, _, r, _ = problem
+    newton, _, r = problem
 
-    def negative(body, u, p, conditions, product, swelling=None):
+    def negative(body, u, p, conditions, product, dilatation=None):
         product.sub_(1e3 * p)
 
     monkeypatch.setattr(Elasticity, "tangent_product", negative)

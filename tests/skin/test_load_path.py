@@ -5,8 +5,8 @@ import math
 import pytest
 
 from tacdata.errors import SolveError
-from tacdata.skin.solve.load_path import Walk
-from tacdata.skin.solve.newton import SolverSettings
+from tacdata.skin.solve.load_path import LoadPath
+from tacdata.skin.solve.settings import SolverSettings
 
 LIMIT = SolverSettings()
 GOOD = (LIMIT.residual / 2, 0.0, 0.0, 1.0)
@@ -14,7 +14,7 @@ GOOD = (LIMIT.residual / 2, 0.0, 0.0, 1.0)
 
 
 def walk(*depths, longest=0.25):
-    return Walk(depths, longest, "sphere at (1, 2) mm")
+    return LoadPath(depths, longest, "sphere at (1, 2) mm")
 
 
 def path(way):
@@ -37,7 +37,7 @@ def test_steps_are_bounded_and_end_at_the_depths_wanted():
 
 
 def test_the_first_step_onto_an_edge_is_a_short_one():
-    way = Walk((0.6,), 0.25, "flat punch", first=0.06)
+    way = LoadPath((0.6,), 0.25, "flat punch", first=0.06)
     assert path(way)[0] == pytest.approx([0.06, 0.18, 0.42, 0.6])
 
 

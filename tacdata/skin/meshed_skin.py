@@ -1,0 +1,154 @@
+"""A sensor's skin on one mesh, ready to be pressed: all that presses have in common and none of them changes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import torch
+
+from tacdata.errors import SolveError
+from tacdata.sensor import Sensor
+from tacdata.skin.adhesions import load_adhesion_law
+from tacdata.skin.contact.adhesion import AdhesiveSurface
+from tacdata.skin.contact.contact_surface import ContactSurface
+from tacdata.skin.contact.first_touch import rotation, touch
+from tacdata.skin.contact.kernels import board_distance
+from tacdata.skin.elasticity.body import Elasticity
+from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
+from tacdata.skin.linear.coupled_dofs import in_order
+from tacdata.skin.linear.rest_stiffness import RestSolver, rest_solver
+from tacdata.skin.materials import load_law
+from tacdata.skin.member.conditions import Conditions, conditions
+from tacdata.skin.mesh.build import build_mesh
+from tacdata.skin.mesh.skin_mesh import SkinMesh
+from tacdata.skin.press import PressRequest
+from tacdata.skin.solve.batch import Batch, PlacedPress
+from tacdata.skin.solve.load_path import LoadPath
+from tacdata.skin.solve.newton import Newton
+from tacdata.skin.solve.settings import ModelSettings, SolverSettings
+from tacdata.skin.solve.state import StateReader
+from tacdata.skin.surface.outer_face import OuterFace
+
+_TIP = 0.4
+"""Height of a protrusion's tip region, over its radius, that the preconditioner knows as possible contact [1]. Contact
+beyond costs iterations, not accuracy."""
+
+_FIRST = 0.3
+"""Longest first load step over the smallest radius of curvature of the shape [1]."""
+
+_LIFT = 0.5
+"""Longest load step upward over the range of adhesion [1]."""
+
+_JUMP = (200, 40)
+"""Newton iterations per state, and without progress, that a jump into contact or off it may take."""
+
+
+class MeshedSkin:
+    """Mesh, body, board and rest stiffness of one sensor on one device; makes the batches that solve presses."""
+
+    def __init__(
+        self, sensor: Sensor, settings: ModelSettings, device: str = "cpu", mesh: SkinMesh | None = None
+    ) -> None:
+        """Mesh the skin (from the cache if possible); arguments as of `tacdata.skin.model.SkinModel`.
+
+        Raises:
+            SolveError: If the geometry cannot be meshed or nothing holds the skin.
+        """
+        self.sensor, self.settings, self.device = sensor, settings, device
+        load_law(sensor.material.law)  # a name that is none is refused before seconds go into a mesh
+        if sensor.contact.adhesion:
+            load_adhesion_law(sensor.contact.adhesion.law)
+        self.mesh = mesh or build_mesh(sensor, settings.mesh)
+        self.fixed = self.mesh.fixed(sensor.contact.bonded, sensor.contact.rim_width)
+        """Nodes that are held, shape (n,), bool."""
+        if not self.fixed.any():
+            raise SolveError(
+                "no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file"
+            )
+        near = sensor.material.poisson_ratio >= settings.averaged_from
+        self._averaged = near and load_law(sensor.material.law).splits_volume
+        self._nodes = torch.as_tensor(self.mesh.nodes, device=device)
+        self.body = Elasticity(self.mesh, sensor.material.law, device, self._averaged)
+        self.board = self._board() if sensor.contact.board and len(self.mesh.protrusions) else None
+        """What the protrusions stand on, if they do."""
+        self.reader = StateReader(self.mesh, sensor.taxels.count, self.board, device)
+        self.face = OuterFace(self.mesh)
+
+    @cached_property
+    def loadable(self) -> np.ndarray:
+        """Degrees of freedom that contact may load: the outer face, all axes; the protrusions' tips, vertically."""
+        outer = np.unique(self.mesh.outer)
+        dofs = (3 * outer[~self.fixed[outer]][:, None] + np.arange(3)).ravel()
+        if self.board:
+            bumps = np.unique(self.mesh.protrusions)
+            tips = bumps[self.mesh.nodes[bumps, 2] < (_TIP - 1) * self.sensor.skin.protrusion_radius]
+            dofs = np.concatenate([dofs, 3 * tips[~self.fixed[tips]] + 2])
+        return np.unique(dofs) if self.device == "cpu" else in_order(np.unique(dofs), self.mesh)
+
+    @cached_property
+    def rest(self) -> RestSolver:
+        """The inverse of the stiffness at rest; costs seconds, once."""
+        material = self.sensor.material
+        return rest_solver(self.mesh, material, self.fixed, self.loadable, self.device, self._averaged)
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """The skin of one batch member, under nothing."""
+        return conditions(self.sensor.material, self.sensor.contact.friction, device=self.device)
+
+    @property
+    def free(self) -> torch.Tensor:
+        """1 for nodes that are not held, else 0, shape (n, 1, 1), float64."""
+        return torch.as_tensor(~self.fixed, device=self.device).to(torch.float64)[:, None, None]
+
+    def placed(self, number: int, request: PressRequest) -> PlacedPress:
+        """Return a press as a batch takes it: its load path, its indenter at depth 0, its conditions."""
+        adhesion = self.sensor.contact.adhesion
+        path = LoadPath(
+            request.depths, self.settings.step, f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm",
+            _FIRST * request.indenter.sharpest, _LIFT * adhesion.range if adhesion else math.inf,
+        )
+        origin, own = touch(self.sensor, self.face, request), self.conditions.pressed_by(request.indenter)
+        return PlacedPress(number, path, origin, rotation(request), own)
+
+    def surfaces(self, request: PressRequest) -> tuple[ContactSurface, ...]:
+        """Return the contact surfaces of presses by the shape of ``request``: the outer face's, then the board's."""
+        outer = torch.as_tensor(self.mesh.outer, device=self.device)
+        distance, contact = request.indenter.distance_function(), self.sensor.contact
+        rough, penalty, stick = contact.friction > 0, self.settings.penalty, self.settings.stick
+        if contact.adhesion:
+            pressed = AdhesiveSurface(self._nodes, outer, distance, rough, penalty, stick, contact.adhesion)
+        else:
+            pressed = ContactSurface(self._nodes, outer, 1, distance, rough, penalty, stick)
+        return (pressed, self.board) if self.board else (pressed,)
+
+    def newton(self, request: PressRequest) -> Newton:
+        """Return what solves presses by the shape of ``request``; its preconditioner is for one batch at a time."""
+        surfaces = self.surfaces(request)
+        fixed, loadable = (torch.as_tensor(value, device=self.device) for value in (self.fixed, self.loadable))
+        size, modulus = 3 * len(self.mesh.nodes), self.sensor.material.youngs_modulus
+        preconditioner = ContactPreconditioner(self.rest, surfaces, loadable, size, modulus)
+        return Newton(self.body, surfaces, fixed, preconditioner, self._solver)
+
+    def batch(self, request: PressRequest, capacity: int) -> Batch:
+        """Return an idle batch for presses by the shape of ``request``, so many at a time."""
+        idle, floor = self.conditions.pressed_by(request.indenter), -self.sensor.skin.protrusion_tip
+        return Batch(self.newton(request), idle, len(self.mesh.nodes), capacity, floor)
+
+    def _board(self) -> ContactSurface:
+        bumps = torch.as_tensor(self.mesh.protrusions, device=self.device)
+        flat: Any = board_distance  # a Warp function, though its decorator's type does not say so
+        return ContactSurface(self._nodes, bumps, 2, flat, False, self.settings.penalty, 0.0)
+
+    @property
+    def _solver(self) -> SolverSettings:
+        """The settings; where the skin sticks, with the steps that a jump takes."""
+        solver = self.settings.solver
+        if self.sensor.contact.adhesion is None:
+            return solver
+        limit, patience = (max(a, b) for a, b in zip((solver.newton_limit, solver.patience), _JUMP, strict=True))
+        return replace(solver, newton_limit=limit, patience=patience)

@@ -1,0 +1,49 @@
+"""Numerical settings of the skin model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from tacdata.skin.mesh.generation.settings import MeshSettings
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """When an equilibrium counts as found."""
+
+    residual: float = 5e-4
+    """Out-of-balance force over the largest contact force, Euclidean norms over the nodes [1]."""
+    penetration: float = 3e-3
+    """Largest |gap| of a point that carries load over the indentation depth [1]."""
+    mean_penetration: float = 3e-4
+    """Mean |gap|, weighted by the load that points carry, over the indentation depth [1]; the force is off by about one
+    and a half times as much."""
+    forcing: float = 0.1
+    """Relative tolerance of the conjugate gradients in a Newton iteration [1]; loose, as an evaluation costs one."""
+    newton_limit: int = 60
+    """Newton iterations per state before giving up."""
+    patience: int = 12
+    """Newton iterations without progress after which a state is given up, so that the path can try a smaller step."""
+    cg_limit: int = 400
+    """Conjugate-gradient iterations per Newton iteration."""
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """Discretization and solver of the skin model."""
+
+    mesh: MeshSettings = field(default_factory=MeshSettings)
+    solver: SolverSettings = field(default_factory=SolverSettings)
+    penalty: float = 1000.0
+    """Contact penalty over Young's modulus [1/mm]."""
+    stick: float = 30.0
+    """Tangential stiffness of sticking points over Young's modulus [1/mm]."""
+    step: float = 0.25
+    """Longest load step [mm]."""
+    averaged_from: float = 0.0
+    """Poisson's ratio from which on volume changes are averaged at the corners [1]: 0 always, 0.5 never.
+
+    See `tacdata.skin.elasticity.averaged_volume`. Laws whose volumetric part is no term of its own take volume changes
+    at the points in any case."""
+    error_estimate: bool = True
+    """Whether `SkinModel.solve` also presses a coarser mesh, to say how far the mesh leaves the result off."""
