@@ -21,7 +21,7 @@ from tacdata.skin.mesh.generation.true_volume import volume_error
 from tacdata.skin.mesh.skin_mesh import quality
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.state import State
+from tacdata.skin.solve.equilibrium import Equilibrium
 from tacdata.skin.validity import fineness
 from tacdata.skin.validity.mesh_error import Figures, NumericalError
 from tacdata.transduction import Loads, TaxelReadings, Transducer
@@ -35,7 +35,7 @@ class CaseAnswer:
     """What solved it."""
     request: PressRequest
     """The press."""
-    states: list[State]
+    states: list[Equilibrium]
     """One for each depth of the request."""
     seconds: list[float]
     """Time of each state [s]."""

@@ -27,10 +27,10 @@ from tacdata.skin.mesh.build import build_mesh
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.batch import Batch, PlacedPress
+from tacdata.skin.solve.equilibrium import StateReader
 from tacdata.skin.solve.load_path import LoadPath
 from tacdata.skin.solve.newton import Newton
 from tacdata.skin.solve.settings import ModelSettings, SolverSettings
-from tacdata.skin.solve.state import StateReader
 from tacdata.skin.surface.outer_face import OuterFace
 
 _TIP = 0.4
@@ -70,9 +70,10 @@ class MeshedSkin:
                 "no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file"
             )
         near = sensor.material.poisson_ratio >= settings.averaged_from
-        self._averaged = near and load_law(sensor.material.law).splits_volume
+        self.averaged = near and load_law(sensor.material.law).splits_volume
+        """Whether volume changes are averaged at the corners."""
         self._nodes = torch.as_tensor(self.mesh.nodes, device=device)
-        self.body = Elasticity(self.mesh, sensor.material.law, device, self._averaged)
+        self.body = Elasticity(self.mesh, sensor.material.law, device, self.averaged)
         self.board = self._board() if sensor.contact.board and len(self.mesh.protrusions) else None
         """What the protrusions stand on, if they do."""
         self.reader = StateReader(self.mesh, sensor.taxels.count, self.board, device)
@@ -93,7 +94,7 @@ class MeshedSkin:
     def rest(self) -> RestSolver:
         """The inverse of the stiffness at rest; costs seconds, once."""
         material = self.sensor.material
-        return rest_solver(self.mesh, material, self.fixed, self.loadable, self.device, self._averaged)
+        return rest_solver(self.mesh, material, self.fixed, self.loadable, self.device, self.averaged)
 
     @cached_property
     def conditions(self) -> Conditions:

@@ -21,8 +21,8 @@ from tacdata.skin.mesh.coarser import blind_spot, companion_mesh, edge_ratio
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.meshed_skin import MeshedSkin
 from tacdata.skin.press import PressRequest
+from tacdata.skin.solve.equilibrium import Equilibrium
 from tacdata.skin.solve.settings import ModelSettings
-from tacdata.skin.solve.state import State
 from tacdata.skin.validity import fineness
 from tacdata.skin.validity.coarse_press import CoarsePress, press_coarsely
 from tacdata.skin.validity.mesh_error import Figures, NumericalError, estimate
@@ -39,6 +39,8 @@ class SkinModel:
 
     >>> from tacdata.indenters.sphere import Sphere
     >>> from tacdata.sensor import default_sensor
+    >>> from tacdata.skin.model import SkinModel
+    >>> from tacdata.skin.press import PressRequest
     >>> model = SkinModel(default_sensor())
     >>> len(model.mesh.nodes), model.remarks
     (13696, ())
@@ -101,7 +103,7 @@ class SkinModel:
 
     def states_many(
         self, requests: Iterable[PressRequest], capacity: int = 1, with_displacement: bool = True
-    ) -> Iterator[tuple[int, float, State | SolveError]]:
+    ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
         """Solve presses of one shape of indenter, many at a time.
 
         Args:
@@ -128,8 +130,8 @@ class SkinModel:
         yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement))
         self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
 
-    def states(self, request: PressRequest) -> Iterator[tuple[float, State]]:
-        """Yield ``(depth, State)`` for each requested depth, solving the path between them in bounded steps.
+    def states(self, request: PressRequest) -> Iterator[tuple[float, Equilibrium]]:
+        """Yield ``(depth, Equilibrium)`` for each requested depth, solving the path between them in bounded steps.
 
         Raises:
             SolveError: If a state is not reached even with small steps, with the reason.
@@ -185,7 +187,7 @@ class SkinModel:
         """
         for numbers in _by_shape(requests):
             chosen = [requests[number] for number in numbers]
-            rows: dict[int, list[State]] = {number: [] for number in numbers}
+            rows: dict[int, list[Equilibrium]] = {number: [] for number in numbers}
             began = time.perf_counter()
             beside = [coarse[k] for k in numbers] if coarse else self.solve_coarsely(chosen, capacity)
             for index, _, state in self.states_many(chosen, capacity):
@@ -199,7 +201,7 @@ class SkinModel:
                     seconds, began = time.perf_counter() - began, time.perf_counter()
                     yield number, self._answer(requests[number], rows.pop(number), beside[index], seconds)
 
-    def figures(self, depths: Sequence[float], states: list[State]) -> Figures:
+    def figures(self, depths: Sequence[float], states: list[Equilibrium]) -> Figures:
         """Return what states (with displacements) at depths [mm] say."""
         grid = self.sensor.map
         maps = [self.skin.face.depth_map(grid.x, grid.y, state.displacement, grid.sampling) for state in states]
@@ -229,7 +231,7 @@ class SkinModel:
         return estimate(self.sensor, fine, coarse.figures, half, ratio, "; ".join(filter(None, remarks)))
 
     def _answer(
-        self, request: PressRequest, states: list[State], coarse: CoarsePress | None, seconds: float
+        self, request: PressRequest, states: list[Equilibrium], coarse: CoarsePress | None, seconds: float
     ) -> PathSolution | SolveError:
         try:
             return self._solution(request, states, coarse, seconds)
@@ -237,7 +239,7 @@ class SkinModel:
             return error
 
     def _solution(
-        self, request: PressRequest, states: list[State], coarse: CoarsePress | None, seconds: float
+        self, request: PressRequest, states: list[Equilibrium], coarse: CoarsePress | None, seconds: float
     ) -> PathSolution:
         parameters = {
             "indenter": request.indenter.document, "x": request.x, "y": request.y, "yaw": request.yaw,

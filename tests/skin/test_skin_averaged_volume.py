@@ -114,9 +114,9 @@ def force(model, depth=0.15):
 
 
 def test_models_average_from_their_settings_ratio_on():
-    assert not pressed(0.47, 3, 1)._averaged
-    assert pressed(0.48, 3, 1)._averaged
-    assert pressed(0.45, 3, 1, averaged_from=0.0)._averaged
+    assert not pressed(0.47, 3, 1).skin.averaged
+    assert pressed(0.48, 3, 1).skin.averaged
+    assert pressed(0.45, 3, 1, averaged_from=0.0).skin.averaged
 
 
 def test_two_meshes_agree_at_every_poisson_ratio():

@@ -20,13 +20,13 @@ from tacdata.errors import SolveError
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.derivatives.contact import ConditionsChange, ContactChange, ContactPoint, contact_change
-from tacdata.skin.linear.block_gcr import Space
+from tacdata.skin.linear.block_gcr import KrylovSpace
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.solve.configuration import Configuration
 from tacdata.skin.solve.newton import Newton, Residual
 
 TOLERANCE = 1e-5
-"""Error of the linear solves, as `tacdata.skin.linear.block_gcr.Solution` counts it [1]."""
+"""Error of the linear solves, as `tacdata.skin.linear.block_gcr.GcrSolution` counts it [1]."""
 
 _LAW_STEP = 1e-5
 """Step of the central difference of internal forces by a law's numbers, over these [1]."""
@@ -160,7 +160,7 @@ class PathDerivatives:
             body.tangent_product(u, p, own, result, dilatation)
             return (result - point.contact_product(p.to(torch.float64))) * free
 
-        space = Space(product, self._newton.preconditioner.apply)
+        space = KrylovSpace(product, self._newton.preconditioner.apply)
         for _ in range(_AUGMENTATIONS if augmented else 1):
             still = point.changes(torch.zeros_like(at.u), self._history)
             rhs = (torch.stack([change.force for change in still]).sum(dim=0) - internal) * free

@@ -17,7 +17,7 @@ from tacdata.skin.derivatives.parameters import check, directions, known
 from tacdata.skin.derivatives.recorder import PathRecorder
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.state import State
+from tacdata.skin.solve.equilibrium import Equilibrium
 from tacdata.skin.surface.depth_map import DepthRaster
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Sensitivity:
 
 def sensitivities(
     model: SkinModel, request: PressRequest, parameters: Sequence[str], tolerance: float = TOLERANCE
-) -> Iterator[tuple[float, State, Sensitivity]]:
+) -> Iterator[tuple[float, Equilibrium, Sensitivity]]:
     """Yield the requested states of a press with their derivatives, in the order of its depths.
 
     Derivatives are those of the whole load path, friction's history included, at the load steps that are taken; where a
@@ -121,7 +121,7 @@ class _Reader:
         self._height = model.skin.face.height(pixels).reshape(grid.shape)
         self._nodes = torch.as_tensor(model.mesh.nodes, device=model.device)
 
-    def read(self, state: State, derivatives: PathDerivatives, along: ConditionsChange) -> Sensitivity:
+    def read(self, state: Equilibrium, derivatives: PathDerivatives, along: ConditionsChange) -> Sensitivity:
         """Return the derivatives of one state."""
         taxel_force = self._taxel_force(derivatives)
         return Sensitivity(
@@ -131,7 +131,7 @@ class _Reader:
             derivatives.error,
         )
 
-    def _map(self, state: State, du: torch.Tensor, thickness: torch.Tensor) -> np.ndarray:
+    def _map(self, state: Equilibrium, du: torch.Tensor, thickness: torch.Tensor) -> np.ndarray:
         """Return the derivative of the map: the skin moves under the pixels, and a thicker slab lies higher."""
         rise = self._nodes[:, 2].clamp_min(0.0)
         moves = du.clone()
@@ -149,7 +149,7 @@ class _Reader:
             return np.zeros((len(self._names), self._model.sensor.taxels.count))
         return self._model.skin.reader.taxel_load(derivatives.changes[1].load).T.cpu().numpy()
 
-    def _area(self, state: State, taxel_force: np.ndarray) -> np.ndarray:
+    def _area(self, state: Equilibrium, taxel_force: np.ndarray) -> np.ndarray:
         """Return the derivative of the contact areas by Hertz's law, shape (p, taxels)."""
         material = self._model.sensor.material
         own = {"youngs_modulus": 1 / material.youngs_modulus}

@@ -8,6 +8,7 @@ from tacdata.skin.solve.configuration import Configuration
 class PathRecorder:
     """Keeps what `Batch.run` tells its observer; the first of a press is the touch, without load.
 
+    >>> from tacdata.skin.derivatives.recorder import PathRecorder
     >>> recorder = PathRecorder()
     >>> recorder("an equilibrium")
     >>> recorder.take(), recorder.take()

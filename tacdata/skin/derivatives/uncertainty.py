@@ -23,7 +23,7 @@ from tacdata.skin.derivatives.press import Sensitivity, sensitivities
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.state import State
+from tacdata.skin.solve.equilibrium import Equilibrium
 
 if TYPE_CHECKING:
     from tacdata.skin.model import SkinModel
@@ -71,7 +71,7 @@ def propagate(sensitivity: Sensitivity, spreads: Mapping[str, float]) -> Uncerta
 
 def uncertainties(
     model: SkinModel, request: PressRequest, spreads: Mapping[str, float] | None = None
-) -> Iterator[tuple[float, State, Uncertainty]]:
+) -> Iterator[tuple[float, Equilibrium, Uncertainty]]:
     """Yield the requested states of a press with their standard deviations to first order.
 
     Args:
@@ -123,7 +123,7 @@ def sampled_spread(
     moves = np.random.default_rng(seed).normal(size=(samples, len(spreads))) * list(spreads.values())
     presses = (_moved(model, request, k, dict(zip(spreads, values, strict=True))) for k, values in enumerate(moves))
     batch = model.skin.batch(request, min(capacity, samples))
-    found: list[list[State]] = [[] for _ in range(samples)]
+    found: list[list[Equilibrium]] = [[] for _ in range(samples)]
     for number, _, state in batch.run(presses, model.skin.reader.states):
         if isinstance(state, SolveError):
             raise state
@@ -166,7 +166,7 @@ def _moved(model: SkinModel, request: PressRequest, number: int, moves: dict[str
     return replace(press, path=path, touch=press.touch + place, turn=left @ right, conditions=own)
 
 
-def _spread_of(model: SkinModel, states: list[State]) -> Uncertainty:
+def _spread_of(model: SkinModel, states: list[Equilibrium]) -> Uncertainty:
     figures = model.figures([0.0] * len(states), states)
     closure = np.array([state.taxel_closure for state in states])
     values = (figures.surface, figures.force, figures.taxel_force, closure)

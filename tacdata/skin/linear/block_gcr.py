@@ -24,7 +24,7 @@ _ENOUGH = 0.5
 
 
 @dataclass(frozen=True)
-class Solution:
+class GcrSolution:
     """What was found."""
 
     x: torch.Tensor
@@ -36,7 +36,7 @@ class Solution:
     """Products with the matrix."""
 
 
-class Space:
+class KrylovSpace:
     """Directions z and what the matrix makes of them, w = A z, these orthonormal; for one matrix."""
 
     def __init__(self, product: Field, precondition: Field, most: int = 400) -> None:
@@ -52,13 +52,13 @@ class Space:
         self._count = 0
         self._products = 0
 
-    def solve(self, rhs: torch.Tensor, guess: torch.Tensor, tolerance: float, limit: int = 300) -> Solution:
+    def solve(self, rhs: torch.Tensor, guess: torch.Tensor, tolerance: float, limit: int = 300) -> GcrSolution:
         """Solve A x = rhs.
 
         Args:
             rhs: Right-hand sides, shape (n, 3, b), float64.
             guess: Where to start, likewise.
-            tolerance: Error at which all must arrive, as `Solution` counts it [1].
+            tolerance: Error at which all must arrive, as `GcrSolution` counts it [1].
             limit: Products with the matrix before giving up.
         """
         there = _norm(rhs) > 0
@@ -71,7 +71,7 @@ class Space:
             error = torch.where(there, _norm(z) * size / _norm(x).clamp_min(1e-300), 0.0)
             used = self._products - began
             if bool((error <= tolerance).all()) or used >= limit:
-                return Solution(x, error, used)
+                return GcrSolution(x, error, used)
             x = x + self._correction(x, residual / size, size, tolerance, limit - used) * size
 
     def _times(self, p: torch.Tensor) -> torch.Tensor:

@@ -15,7 +15,7 @@ from tacdata.skin.linear import cuda_cg_kernels as kernels
 from tacdata.skin.linear.cg import Stopping
 from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
 from tacdata.skin.linear.cuda_cg_columns import ActiveColumns
-from tacdata.skin.linear.tangent import Linearization, Tangent
+from tacdata.skin.linear.tangent import Linearization, TangentStiffness
 from tacdata.skin.member.warp_arrays import argument
 
 _ROOM = 256.0
@@ -32,7 +32,7 @@ _STRIDE = 2
 class CudaConjugateGradients:
     """Solves with the tangent of one body and its contacts."""
 
-    def __init__(self, tangent: Tangent, preconditioner: ContactPreconditioner) -> None:
+    def __init__(self, tangent: TangentStiffness, preconditioner: ContactPreconditioner) -> None:
         """Bind the parts; the preconditioner's rest state is a `tacdata.skin.linear.rest_stiffness.DenseRest`."""
         self._tangent, self._preconditioner = tangent, preconditioner
         self._columns_of: dict[int, ActiveColumns] = {}

@@ -28,7 +28,7 @@ class Linearization(Columns):
     """`Elasticity.dilatation` at ``u``."""
 
 
-class Tangent:
+class TangentStiffness:
     """K as an operator. It holds what never changes; the state is an argument."""
 
     def __init__(self, body: Elasticity, surfaces: Sequence[ContactSurface]) -> None:

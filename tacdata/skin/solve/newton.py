@@ -17,7 +17,7 @@ from tacdata.skin.elasticity.body import Elasticity
 from tacdata.skin.linear.cg import Stopping, conjugate_gradients
 from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
 from tacdata.skin.linear.cuda_cg import CudaConjugateGradients
-from tacdata.skin.linear.tangent import Linearization, Tangent
+from tacdata.skin.linear.tangent import Linearization, TangentStiffness
 from tacdata.skin.member.columns import Columns
 from tacdata.skin.solve.configuration import Configuration
 from tacdata.skin.solve.settings import SolverSettings
@@ -65,7 +65,7 @@ class Newton:
     ) -> None:
         """Bind the parts; ``fixed`` marks held nodes, shape (n,), bool."""
         self.body, self.surfaces, self.preconditioner, self.settings = body, tuple(surfaces), preconditioner, settings
-        self.tangent = Tangent(body, surfaces)
+        self.tangent = TangentStiffness(body, surfaces)
         self._free = (~fixed).to(torch.float64)[:, None, None]
         self._free_work = self._free.to(_WORK)
         self._cuda = None if fixed.device.type == "cpu" else CudaConjugateGradients(self.tangent, preconditioner)

@@ -11,7 +11,7 @@ from tacdata.skin.press import PressRequest
 from tacdata.skin.validity.mesh_error import Figures
 
 if TYPE_CHECKING:
-    from tacdata.skin.solve.state import State
+    from tacdata.skin.solve.equilibrium import Equilibrium
 
 
 class PressSolver(Protocol):
@@ -19,11 +19,11 @@ class PressSolver(Protocol):
 
     def states_many(
         self, requests: list[PressRequest], capacity: int = 1
-    ) -> Iterator[tuple[int, float, State | SolveError]]:
+    ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
         """As `SkinModel.states_many`."""
         ...
 
-    def figures(self, depths: Sequence[float], states: list[State]) -> Figures:
+    def figures(self, depths: Sequence[float], states: list[Equilibrium]) -> Figures:
         """As `SkinModel.figures`."""
         ...
 

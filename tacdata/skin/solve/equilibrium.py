@@ -13,7 +13,7 @@ from tacdata.skin.solve.batch import Equilibria
 
 
 @dataclass(frozen=True)
-class State:
+class Equilibrium:
     """One equilibrium."""
 
     displacement: np.ndarray
@@ -66,7 +66,7 @@ class StateReader:
         total = torch.zeros(self._taxels, load.shape[1], dtype=torch.float64, device=load.device)
         return total.index_add_(0, self._taxel, load)
 
-    def states(self, found: Equilibria, with_displacement: bool = True) -> list[State]:
+    def states(self, found: Equilibria, with_displacement: bool = True) -> list[Equilibrium]:
         """Return the states that columns of a batch have reached, displacements only if they are wanted."""
         column = found.column
         force = -found.contacts[0].force[:, column]
@@ -82,7 +82,7 @@ class StateReader:
         nothing = np.empty((0, 3))
         u = found.u.permute(2, 0, 1).cpu().numpy() if with_displacement else [nothing] * len(column)
         return [
-            State(
+            Equilibrium(
                 u[k], force[k], load[k], closure[k], area[k], float(found.relative[k]), float(found.penetration[k]),
                 found.newton[k],
             )

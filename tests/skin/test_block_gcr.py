@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tacdata.skin.linear.block_gcr import Space
+from tacdata.skin.linear.block_gcr import KrylovSpace
 
 N = 40
 
@@ -45,7 +45,7 @@ def test_every_column_is_as_exact_as_asked(tolerance):
     """1e-9 is beyond single precision: residuals are taken anew in double."""
     a, rough = matrix()
     seen, rhs = Counted(a, rough), fields(1, 4)
-    found = Space(seen.product, seen.precondition).solve(rhs, torch.zeros_like(rhs), tolerance)
+    found = KrylovSpace(seen.product, seen.precondition).solve(rhs, torch.zeros_like(rhs), tolerance)
     wanted = exact(a, rhs)
     off = torch.linalg.vector_norm(found.x - wanted, dim=(0, 1)) / torch.linalg.vector_norm(wanted, dim=(0, 1))
     assert (off < 2 * tolerance).all() and (found.error <= tolerance).all()
@@ -56,11 +56,11 @@ def test_later_right_hand_sides_profit_from_the_space():
     first = fields(1, 3)
     second = first @ torch.tensor([[1.0, 0.5, 0.0], [0.0, 1.0, -0.5], [0.2, 0.0, 1.0]]).double() + 1e-4 * fields(2, 3)
     shared, alone = Counted(a, rough), Counted(a, rough)
-    space = Space(shared.product, shared.precondition)
+    space = KrylovSpace(shared.product, shared.precondition)
     space.solve(first, torch.zeros_like(first), 1e-4)
     before = shared.columns
     with_space = space.solve(second, torch.zeros_like(second), 1e-4)
-    without = Space(alone.product, alone.precondition).solve(second, torch.zeros_like(second), 1e-4)
+    without = KrylovSpace(alone.product, alone.precondition).solve(second, torch.zeros_like(second), 1e-4)
     assert shared.columns - before < 0.6 * alone.columns
     assert torch.allclose(with_space.x, without.x, atol=1e-3)
 
@@ -72,8 +72,8 @@ def test_columns_that_are_there_ask_for_nothing_more():
     guess = exact(a, rhs)
     guess[:, :, 2] = 0.0
     seen, whole = Counted(a, rough), Counted(a, rough)
-    found = Space(seen.product, seen.precondition).solve(rhs, guess, 1e-4)
-    Space(whole.product, whole.precondition).solve(rhs, torch.zeros_like(rhs), 1e-4)
+    found = KrylovSpace(seen.product, seen.precondition).solve(rhs, guess, 1e-4)
+    KrylovSpace(whole.product, whole.precondition).solve(rhs, torch.zeros_like(rhs), 1e-4)
     assert seen.columns < 0.6 * whole.columns and (found.error <= 1e-4).all()
 
 
@@ -81,7 +81,7 @@ def test_equal_columns_and_those_without_a_right_hand_side():
     a, rough = matrix()
     seen, rhs = Counted(a, rough), fields(4, 1).repeat(1, 1, 3)
     rhs[:, :, 1] = 0.0
-    found = Space(seen.product, seen.precondition).solve(rhs, torch.ones_like(rhs), 1e-6)
+    found = KrylovSpace(seen.product, seen.precondition).solve(rhs, torch.ones_like(rhs), 1e-6)
     assert not found.x[:, :, 1].any() and found.error[1] == 0
     assert torch.allclose(found.x[:, :, 0], found.x[:, :, 2], rtol=1e-5)
     assert torch.allclose(found.x, exact(a, rhs), atol=1e-5)
@@ -90,12 +90,12 @@ def test_equal_columns_and_those_without_a_right_hand_side():
 def test_a_small_space_begins_anew():
     a, rough = matrix()
     seen, rhs = Counted(a, rough), fields(5, 4)
-    found = Space(seen.product, seen.precondition, most=8).solve(rhs, torch.zeros_like(rhs), 1e-6)
+    found = KrylovSpace(seen.product, seen.precondition, most=8).solve(rhs, torch.zeros_like(rhs), 1e-6)
     assert (found.error <= 1e-6).all()
 
 
 def test_what_does_not_converge_says_how_far_it_is():
     a, _ = matrix()
     seen, rhs = Counted(a, torch.eye(3 * N)), fields(6, 2)
-    found = Space(seen.product, seen.precondition).solve(rhs, torch.zeros_like(rhs), 1e-8, limit=4)
+    found = KrylovSpace(seen.product, seen.precondition).solve(rhs, torch.zeros_like(rhs), 1e-8, limit=4)
     assert found.products >= 4 and (found.error > 1e-8).any()
