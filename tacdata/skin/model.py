@@ -19,9 +19,9 @@ from tacdata.skin.contact.first_touch import reach
 from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.mesh.coarser import blind_spot, companion_mesh, edge_ratio
 from tacdata.skin.mesh.skin_mesh import SkinMesh
-from tacdata.skin.meshed_skin import MeshedSkin
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.equilibrium import Equilibrium
+from tacdata.skin.solve.meshed_skin import MeshedSkin
 from tacdata.skin.solve.settings import ModelSettings
 from tacdata.skin.validity import fineness
 from tacdata.skin.validity.coarse_press import CoarsePress, press_coarsely

@@ -5,16 +5,16 @@ import pytest
 from skin_examples import PLAIN, box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin import meshed_skin
 from tacdata.skin.linear import contact_preconditioner
 from tacdata.skin.linear.contact_transfer import DenseTransfer
 from tacdata.skin.linear.coupled_dofs import in_order
 from tacdata.skin.linear.cuda_cg import CudaConjugateGradients
 from tacdata.skin.linear.rest_stiffness import DenseRest, rest_stiffness
 from tacdata.skin.mesh.build import MeshSettings, build_mesh
-from tacdata.skin.meshed_skin import MeshedSkin
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
+from tacdata.skin.solve import meshed_skin
+from tacdata.skin.solve.meshed_skin import MeshedSkin
 from tacdata.skin.solve.newton import Newton
 
 
