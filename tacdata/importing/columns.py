@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.units import factor, split_unit
+from tacdata.importing.units import composed, factor, split_unit
 
 Selector = str | int | list[Any]
 
@@ -30,6 +30,8 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
     if isinstance(selector, list):
         found = [name for entry in selector for name in select(table, entry, where)]
         return list(dict.fromkeys(found))
+    if isinstance(selector, str):
+        selector = composed(selector)
     names = list(table.columns)
     if len(names) == 1 and table.inner(names[0]):
         names = [f"{names[0]}[{k}]" for k in range(table.inner(names[0]))]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tacdata.errors import FormatError, UsageError
+from tacdata.importing.units import composed
 
 
 @dataclass(frozen=True)
@@ -87,11 +88,11 @@ def _matches(source: Path, pattern: str) -> list[tuple[dict[str, str], Path]]:
         seen.add(name)
         return f"(?P<{name}>[^/]+?)"
 
-    tokens = re.split(r"(\*\*/|\*|\{\w+\})", pattern)
+    tokens = re.split(r"(\*\*/|\*|\{\w+\})", composed(pattern))
     regex = "".join(re.sub(r"^(\*\*/|\*|\{\w+\})$", part, t) if k % 2 else re.escape(t) for k, t in enumerate(tokens))
     found = []
     for path in sorted(p for p in source.rglob("*") if p.is_file()):
-        if match := re.fullmatch(regex, path.relative_to(source).as_posix()):
+        if match := re.fullmatch(regex, composed(path.relative_to(source).as_posix())):
             found.append((match.groupdict(), path))
     return sorted(found, key=lambda item: [_natural(value) for value in item[0].values()])
 

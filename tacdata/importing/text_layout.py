@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tacdata.errors import FormatError
-from tacdata.importing.units import split_unit
+from tacdata.importing.units import composed, split_unit
 
 COMMENTS = ("#", "%", "//")
 SHEET_ERRORS = (
@@ -156,7 +156,7 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
     titles = rows[0] if looks_like_units else rows[-1]
     names: list[str] = []
     for k, title in enumerate(titles):
-        name = title.lstrip("\ufeff").strip() or str(k)
+        name = composed(title.lstrip("\ufeff").strip()) or str(k)
         while name in names:
             name += "'"
         names.append(name)

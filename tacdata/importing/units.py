@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
 from tacdata.errors import FormatError
 
@@ -32,6 +33,11 @@ FACTORS: dict[str, dict[str, float]] = {
 OTHERS = {"pf", "ff", "nf", "v", "mv", "uv", "count", "counts", "lsb", "adc", "ut", "mt", "gauss", "kpa", "pa", "mpa",
           "degc", "c", "k", "ohm", "kohm", "a", "ma", "hz", "1", "raw", "%"}  # fmt: skip
 """Units that are recognized behind a column's name but not converted."""
+
+
+def composed(text: str) -> str:
+    """Return a text in Unicode's composed form (NFC): some systems write an umlaut as two characters."""
+    return unicodedata.normalize("NFC", text)
 
 
 def plain(unit: str) -> str:

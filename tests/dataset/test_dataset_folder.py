@@ -307,6 +307,8 @@ def test_maps_are_made_once_and_anew_after_a_change(tmp_path: Path, own_cache: P
         (lambda root: (root / folder.INFO).unlink(), UsageError, "info.json is missing"),
         (lambda root: (root / folder.INFO).write_text("{"), FormatError, "unreadable"),
         (lambda root: edit_info(root, codebase_version="v2.1"), FormatError, "LeRobot format v2.1"),
+        (lambda root: edit_info(root, codebase_version="v2.1"), FormatError, "convert_dataset_v21_to_v30"),
+        (lambda root: edit_info(root, fps=29.97), FormatError, "29.97 frames a second"),
         (lambda root: edit_info(root, total_episodes=7), FormatError, "describes 3 episodes"),
         (
             lambda root: edit_info(root, features={"action": {}}),
@@ -331,6 +333,14 @@ def test_damaged_and_foreign_folders_are_refused_in_words(tmp_path: Path, damage
     with pytest.raises(kind, match=word) as caught:
         read_dataset(root)
     assert caught.value.remedy
+
+
+def test_a_rate_written_with_a_point_is_the_same_rate(tmp_path: Path) -> None:
+    root = packed(tmp_path / "d")
+    rate = read_dataset(root).fps
+    edit_info(root, fps=float(rate))
+    found = read_dataset(root).fps
+    assert found == rate and isinstance(found, int)
 
 
 def edit_info(root: Path, **changes) -> None:

@@ -629,3 +629,30 @@ def test_a_schedule_may_go_up_at_another_speed(tmp_path):
     _, (episode,) = imported(tmp_path, path)
     spans = {phase.name: (phase.end_ns - phase.start_ns) * 1e-9 for phase in episode.phases}
     assert spans["press"] == pytest.approx(2.0) and spans["release"] == pytest.approx(0.5)
+
+
+def test_umlauts_that_look_the_same_are_the_same(tmp_path):
+    """A Mac writes an umlaut in a file's name as two characters, a mapping typed elsewhere as one."""
+    time, depth, _, signals = press_data(channels=1)
+    lines = ["t,Weg_u\u0308ber_Null,cap0"]
+    lines += [f"{a:.3f},{b:.4f},{c:.4f}" for a, b, c in zip(time, depth, signals[:, 0], strict=True)]
+    (tmp_path / "Pru\u0308fling_7.csv").write_text("\n".join(lines) + "\n")
+    path = mapping(
+        tmp_path, measured=None,
+        files={"data": {"path": "Pr\u00fcfling_{n}.csv", "time": {"column": "t", "unit": "s"}}},
+        taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
+        position={"file": "data", "depth": {"column": "Weg_\u00fcber_Null", "unit": "mm"}},
+    )  # fmt: skip
+    _, (episode,) = imported(tmp_path, path)
+    assert episode.press.depth == pytest.approx(depth.max(), abs=1e-3)
+
+
+def test_recordings_joined_into_one_file_are_told_apart_in_words(tmp_path):
+    """`cat a.mcap b.mcap`: nothing of the second would be read, and nobody told."""
+    wide_csv(tmp_path / "wide.csv", press_data())
+    made, _ = imported(tmp_path, mapping(tmp_path))
+    (file,) = sorted(made.folder.glob("*.mcap"))
+    joined = tmp_path / "joined.mcap"
+    joined.write_bytes(2 * file.read_bytes())
+    with pytest.raises(FormatError, match=f"another one begins at byte {file.stat().st_size}"):
+        read_episode(joined)

@@ -89,17 +89,24 @@ def read_info(root: Path) -> dict[str, Any]:
     try:
         info = json.loads((root / INFO).read_text())
         version = info["codebase_version"]
+        if isinstance(info["fps"], float) and info["fps"].is_integer():
+            info["fps"] = int(info["fps"])  # JSON knows no difference between 30 and 30.0
         complete = all(isinstance(info[key], int) for key in ("fps", "total_episodes", "total_frames"))
         complete = complete and isinstance(info["features"], dict) and bool(info["data_path"])
     except (ValueError, KeyError, TypeError) as error:
         raise FormatError(
             f"{root / INFO} is unreadable: {error!r}", "LeRobot's info.json", "pack the session again"
         ) from None
+    if isinstance(info["fps"], float):
+        raise FormatError(
+            f"{root / INFO}: {info['fps']:g} frames a second", "a whole number of frames a second, as LeRobot has it",
+            "write the rate that the timestamps have as a whole number, or pack the session again",
+        )  # fmt: skip
     if not complete or str(version).split(".")[0] != CODEBASE_VERSION.split(".")[0]:
         raise FormatError(
             f"{root / INFO}: LeRobot format {version}" if complete else f"{root / INFO} lacks counts or features",
             f"LeRobot format {CODEBASE_VERSION}",
-            "convert it with lerobot's own converter, or pack the session again",
+            "convert it with lerobot (python -m lerobot.scripts.convert_dataset_v21_to_v30), or pack the session again",
         )
     return info
 

@@ -166,6 +166,9 @@ def walk(path: Path, damage: list[str]) -> Iterator[Any]:
     Args:
         path: The file.
         damage: Takes what could not be read, in words.
+
+    Raises:
+        FormatError: If another recording follows the end of the first.
     """
     for block in _blocks(path, damage):
         if not isinstance(block, ChunkContent):
@@ -202,8 +205,17 @@ def _blocks(path: Path, damage: list[str]) -> Iterator[Any]:
             except Exception as error:  # damaged lengths raise any of the parser's errors
                 damage.append(f"an unreadable record at byte {at} is left out ({type(error).__name__})")
             ended = head[0] == Opcode.FOOTER
-        if ended and head[:1] == bytes([Opcode.FOOTER]) and stream.read() != MAGIC:
-            damage.append("the closing magic is missing")
+        if ended and head[:1] == bytes([Opcode.FOOTER]):
+            end = stream.tell() + len(MAGIC)
+            closing = stream.read(2 * len(MAGIC))
+            if closing == 2 * MAGIC:
+                raise FormatError(
+                    f"{path} is several recordings joined: another one begins at byte {end} of {size}",
+                    "one recording a file",
+                    f"take them apart (head -c {end} for the first, tail -c +{end + 1} for the rest)",
+                )
+            if closing != MAGIC:
+                damage.append("the closing magic is missing")
 
 
 def _plausible(opcode: int, length: int) -> bool:
