@@ -9,6 +9,9 @@ import pytest
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "closed_loop" / "closed_loop.py"
 
 
+@pytest.mark.long(
+    "tacdata/commands", "tacdata/virtual_rig", "examples/closed_loop", reason="two rounds of recording and judging"
+)
 @pytest.mark.timeout(1200)
 def test_play_hidden_in_the_virtual_rig_is_found_by_the_presses_that_the_first_verdict_asks_for(tmp_path):
     spec = importlib.util.spec_from_file_location("closed_loop", EXAMPLE)
