@@ -97,13 +97,12 @@ def run(
             say=lambda words: print(f"  {words}", flush=True),
             watch=watch,
             interruption=interruption,
+            ask=lambda question: _answer(question).lower() in ("y", "yes"),
         )
         try:
             session = recorder.run(confirm)
-        except KeyboardInterrupt:
-            kept = f"what was recorded is in {out}\n  next:    the same command with --resume"
-            nothing = "nothing was moved or written"
-            print(f"interrupted: motion stopped; {kept if out.exists() else nothing}", file=sys.stderr)
+        except KeyboardInterrupt as error:
+            print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
             raise typer.Exit(130) from None
         finally:
             chosen.keep(out)

@@ -11,6 +11,9 @@ import typer
 from tacdata.commands.command import PIPELINE
 
 if TYPE_CHECKING:
+    from tacdata.recording.live.guarded_motion import GuardedMotion
+    from tacdata.recording.live.interruption import Interruption
+    from tacdata.recording.live.rig_devices import RigDevices
     from tacdata.registration import RegistrationSettings
     from tacdata.rig import Rig
     from tacdata.sensor import Sensor
@@ -49,8 +52,8 @@ def run(
     _check(settings, skin, target)
     try:
         document, text = _measure(bench, skin, settings, specimen, yes)
-    except KeyboardInterrupt:
-        print("interrupted: motion stopped, nothing was written", file=sys.stderr)
+    except KeyboardInterrupt as error:
+        print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
         raise typer.Exit(130) from None
     from tacdata import documents
 
@@ -95,26 +98,48 @@ def _measure(
     rig: Rig, sensor: Sensor, settings: RegistrationSettings, specimen: dict[str, Any], yes: bool
 ) -> tuple[dict[str, Any], str]:
     """Open the devices, ask, and carry the procedure out; return the file's document and the result in words."""
-    from tacdata.errors import UsageError
+    from tacdata.recording.live.ending import ending
+    from tacdata.recording.live.guarded_motion import GuardedMotion
     from tacdata.recording.live.interruption import Interruption
     from tacdata.recording.live.rig_devices import RigDevices
+
+    with Interruption() as interruption:
+        devices = RigDevices.of(rig)
+        motion = GuardedMotion(devices.cnc, rig.clock, interruption)
+        try:
+            return _touch(rig, sensor, settings, specimen, yes, devices, motion, interruption)
+        except BaseException as error:
+            data = ("nothing was written",)
+            error.add_note(ending(motion, devices.cnc.position_lost, data, "the same command"))
+            raise
+
+
+def _touch(
+    rig: Rig, sensor: Sensor, settings: RegistrationSettings, specimen: dict[str, Any], yes: bool,
+    devices: RigDevices, motion: GuardedMotion, interruption: Interruption,
+) -> tuple[dict[str, Any], str]:  # fmt: skip
+    from tacdata.errors import UsageError
+    from tacdata.recording.live.lost_position import require_found, why_lost
     from tacdata.registration.guarded_probe import guarded_probe
     from tacdata.registration.procedure import described, register
     from tacdata.registration.result import document_of
     from tacdata.registration.touch_off import LIFT_SPEED
 
-    with Interruption() as interruption, RigDevices.of(rig).opened() as devices:
+    safe = rig.registration.origin[2] + max(3.0, settings.above + 1.0)
+    with devices.opened():
         controller = devices.cnc.settings()
         print(described(sensor, rig.registration, settings))
+        for caution in devices.cnc.cautions:
+            print(f"caution: {caution}")
         if controller.get("$22") == "0":
             print(
                 "caution: homing is switched off ($22=0): the registration holds until the controller is switched off"
             )
-        if not yes and _answer("Move now? [y/N] ").lower() not in ("y", "yes"):
+        if not yes and not _agreed("Move now? [y/N] "):
             raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
+        require_found(why_lost(devices.cnc), safe, _agreed)
         _mount(rig, specimen)
-        safe = rig.registration.origin[2] + max(3.0, settings.above + 1.0)
-        with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption) as probe:
+        with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption, motion) as probe:
             found = register(probe, sensor, rig.registration, settings, say=lambda text: print(f"  {text}", flush=True))
     return document_of(found, rig, sensor, specimen, controller), found.text
 
@@ -127,14 +152,14 @@ def _mount(rig: Rig, specimen: dict[str, Any]) -> None:
         return
     from tacdata.errors import UsageError
 
-    if _answer(f"Mounted: a sphere of radius {specimen['radius']:g} mm? [y/N] ").lower() not in ("y", "yes"):
+    if not _agreed(f"Mounted: a sphere of radius {specimen['radius']:g} mm? [y/N] "):
         raise UsageError("the indenter was not mounted", "yes", "nothing was moved; start again when it sits")
 
 
-def _answer(question: str) -> str:
-    """Ask on the terminal; no answer (the input is closed) is an empty one."""
+def _agreed(question: str) -> bool:
+    """Ask on the terminal; no answer (the input is closed) is a no."""
     try:
-        return input(question).strip()
+        return input(question).strip().lower() in ("y", "yes")
     except EOFError:
         print()
-        return ""
+        return False

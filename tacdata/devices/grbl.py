@@ -85,18 +85,14 @@ class Grbl(MotionController):
             link.start()
             greet(link, self.baud)
             state = self._make_ready(link)
-            if link.fresh_status(ANSWER).state.split(":")[0] == "Alarm":
+            is_locked = link.fresh_status(ANSWER).state.split(":")[0] == "Alarm"
+            if is_locked:
                 if not self.home_first:
                     raise locked(link, self._answers)
                 self.home()
                 self._read(link)
             self._cautions = straighten(link)
-            self._found_at_opening(link)
-            self._found = {
-                "banner": link.welcome or f"none, the board was not reset by opening; $I says {self._version}",
-                "reset_at_opening": "yes" if link.resets else "no",
-                "state_at_opening": state,
-            }
+            self._remember_opening(link, state, is_locked)
             link.take_statuses()
             link.poll()
         except BaseException:
@@ -301,8 +297,15 @@ class Grbl(MotionController):
         answers.limits("$12", 1.0, self.port)
         answers.limits("$11", 60.0, self.port)
 
-    def _found_at_opening(self, link: GrblLink) -> None:
-        """Remember if the position counts from an unknown place: a board without homing that has just been reset."""
+    def _remember_opening(self, link: GrblLink, state: str, homed: bool) -> None:
+        """Keep what was found; a board without homing that was just reset counts from an unknown place."""
+        position = link.last.position if link.last is not None else np.full(3, np.nan)
+        self._found = {
+            "banner": link.welcome or f"none, the board was not reset by opening; $I says {self._version}",
+            "reset_at_opening": "yes" if link.resets else "no", "state_at_opening": state,
+            "homed_at_opening": "yes" if homed else "no",
+            "position_at_opening": ",".join(f"{value:.3f}" for value in position + 0.0),
+        }  # fmt: skip
         if link.resets and not self._answers.homing:
             self._lost = "the controller was reset when its port was opened, so it counts from where it stands now"
 

@@ -16,16 +16,26 @@ from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.files.writer import EpisodeWriter, Header
 from tacdata.recording.live.detection_process import Detect
+from tacdata.recording.live.ending import ending, on_disk
 from tacdata.recording.live.guarded_motion import WATCH, GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
+from tacdata.recording.live.lost_position import Ask, require_found, why_lost
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion import sync_tap as tap_motion
 from tacdata.recording.motion.preflight import Preflight, preflight, safe_height
 from tacdata.recording.motion.press_steps import Position, Step, steps
 from tacdata.recording.motion.trapezoid import AxisLimits
-from tacdata.recording.session import Session, create_session, refresh, resume_session
+from tacdata.recording.session import (
+    Session,
+    create_session,
+    find_position,
+    lose_position,
+    read_session,
+    refresh,
+    resume_session,
+)
 from tacdata.recording.sync_tap import delays
 from tacdata.recording.sync_tap.session_delays import add_sync, changes, latencies
 from tacdata.rig import Rig
@@ -61,6 +71,7 @@ class Recorder:
         say: Callable[[str], None] | None = None,
         watch: Watch | None = None,
         interruption: Interruption | None = None,
+        ask: Ask = lambda question: False,
     ) -> None:
         """Prepare; nothing is opened, created or moved.
 
@@ -77,6 +88,7 @@ class Recorder:
             sync_tap: Begin with touches that measure each stream's constant latency.
             say: Called with messages for a person.
             watch: Called with a sample of the data (`live_feed`); must return at once.
+            ask: Puts a question to a person that no --yes answers; by default nobody says yes.
             interruption: Holds Ctrl-C back while the guide moves; without it, Python raises it anywhere.
         """
         self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(out), resume
@@ -87,7 +99,7 @@ class Recorder:
         self._interruption = interruption or Interruption()
         self._motion = GuardedMotion(self.devices.cnc, rig.clock, self._interruption)
         self._tap = tap_motion.touch(plan, sensor) if sync_tap else None
-        self._say, self._watch = say or (lambda words: None), watch
+        self._say, self._watch, self._ask = say or (lambda words: None), watch, ask
         self._latencies: dict[str, StreamLatency] = {}
 
     def run(self, confirm: Callable[[Preflight], bool]) -> Session:
@@ -111,6 +123,19 @@ class Recorder:
         wanted = session.remaining if session else tuple(press.index for press in self.plan.presses)
         if session and not wanted:
             return session
+        try:
+            return self._open_and_record(session, wanted, confirm)
+        except BaseException as error:
+            lost = self.devices.cnc.position_lost
+            with suppress(TacdataError):  # the fault itself must be reported first
+                if lost and self.out.exists():
+                    lose_position(read_session(self.out), lost)
+            error.add_note(self._ending(lost))
+            raise
+
+    def _open_and_record(
+        self, session: Session | None, wanted: tuple[int, ...], confirm: Callable[[Preflight], bool]
+    ) -> Session:
         with self.devices.opened() as devices:
             cnc = devices.cnc
             limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))
@@ -118,10 +143,14 @@ class Recorder:
             summary = preflight(self.plan, self.sensor, self.rig, limits, wanted, *bounds, self._tap)
             if not confirm(summary):
                 raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
+            remembered = session.position_lost if session else ""
+            require_found(why_lost(cnc, remembered, session is not None), self._height, self._ask)
             session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
+            session = find_position(session)
             with RigStreams(
-                devices, self.rig.cameras, self._motion.stop, self._detect, self._watch, self.rig.fingers
-            ) as streams:
+                devices, self.rig.cameras, self._motion.stop, self._detect, self._watch, self.rig.fingers,
+                self._motion.off_path,
+            ) as streams:  # fmt: skip
                 try:
                     with self._interruption.kept():
                         self._record_all(session, streams, limits, summary, wanted)
@@ -131,6 +160,10 @@ class Recorder:
                     raise
             session = refresh(session)
         return session
+
+    def _ending(self, lost: str) -> str:
+        again = "the same command" + (" with --resume" if self.out.exists() else "")
+        return ending(self._motion, lost, on_disk(self.out, len(self.plan.presses)), again)
 
     def _existing_session(self) -> Session | None:
         if self.resume:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -147,17 +146,19 @@ class GuardedProbe(Probe):
 
 @contextmanager
 def guarded_probe(
-    rig: Rig, devices: RigDevices, height: float, speed: float, interruption: Interruption | None = None
-) -> Iterator[GuardedProbe]:
+    rig: Rig, devices: RigDevices, height: float, speed: float, interruption: Interruption | None = None,
+    motion: GuardedMotion | None = None,
+) -> Iterator[GuardedProbe]:  # fmt: skip
     """Yield a probe on open devices, lifted to ``height`` [mm, machine] at ``speed`` [mm/s].
 
     On any fault the motion stops first; then the indenter is lifted straight up. A Ctrl-C held back by ``interruption``
-    is noticed within 20 ms.
+    is noticed within 20 ms. What came of it is said by the ``motion``'s `ending`.
     """
     interruption = interruption or Interruption()
-    motion = GuardedMotion(devices.cnc, rig.clock, interruption)
+    motion = motion or GuardedMotion(devices.cnc, rig.clock, interruption)
     without_cameras = replace(devices, cameras={})
-    with RigStreams(without_cameras, {}, motion.stop) as streams, interruption.kept():
+    off_path = motion.off_path
+    with RigStreams(without_cameras, {}, motion.stop, off_path=off_path) as streams, interruption.kept():
         probe = GuardedProbe(rig, devices, streams, motion, height, interruption)
         try:
             probe.rise(speed)
@@ -179,4 +180,4 @@ def _free(probe: GuardedProbe, motion: GuardedMotion, streams: RigStreams, heigh
     if not probe.stopped:  # a fault while the guide stood still: the hold must be released first
         with suppress(TacdataError):
             motion.drive((), probe.position, streams, None)
-    print(motion.lift(height, speed), file=sys.stderr)
+    motion.lift(height, speed)

@@ -93,7 +93,8 @@ class Controller(MotionController):
         if now - self._told < 100_000_000:
             return []
         self._told = now
-        return [CncStatus(now, self.clock.now_ns(), "Idle", np.round(self.position(), 3), 0.0)]
+        position = np.round(self.position(), 3)
+        return [CncStatus(now, self.clock.now_ns(), "Idle", position, 0.0)]
 
     def feed_hold(self):
         with self._lock:

@@ -150,3 +150,22 @@ def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(be
     assert result.returncode == 0, result.stderr
     assert "2 of 2" in result.stdout
     assert len(file_names.unfinished(out)) == 1, "what the kill left is put aside, not overwritten"
+
+
+def test_a_computer_that_stood_still_in_mid_press_lifts_and_says_so(bench, virtual, tmp_path):
+    out = tmp_path / "session"
+    child = subprocess.Popen(bench, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    while height(virtual) > -0.2:
+        time.sleep(0.002)
+    os.kill(child.pid, signal.SIGSTOP)
+    time.sleep(4.0)
+    os.kill(child.pid, signal.SIGCONT)
+    _, said = child.communicate(timeout=60)
+    assert child.returncode == 4, said
+    assert "this computer stood still for" in said
+    assert "partly lost" in said
+    assert "tip:    the indenter was lifted off the skin" in said
+    assert height(virtual) == pytest.approx(CLEARANCE, abs=0.01)
+    again = subprocess.run([*bench, "--resume"], capture_output=True, text=True, check=False)
+    assert again.returncode == 0, again.stderr
+    assert len(file_names.finished(out)) == 2

@@ -18,6 +18,7 @@ from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.camera_stream import CameraStream
 from tacdata.recording.live.detection_process import Detect
 from tacdata.recording.live.live_feed import LiveFeed, Watch
+from tacdata.wire.patience import Patience
 
 BOARD = "taxel board"
 """Name of a single board in messages."""
@@ -140,14 +141,14 @@ class DeviceStreams(ABC):
         return {name: device.counts for name, device in (self._boards | self._cameras).items()}
 
     def _run(self, name: str, read: Callable[[], int]) -> None:
-        heard = time.monotonic()
+        patience = Patience(self.silence)
         while not self._stop.is_set():
             self._passes[name] = self._passes.get(name, 0) + 1
             try:
                 if count := read():
-                    heard = time.monotonic()
+                    patience.restart()
                     self._delivered(name, count)
-                elif time.monotonic() - heard > self.silence:
+                elif patience.over():
                     self._silent(name)
             except TacdataError as error:
                 return self._broken(name, error)

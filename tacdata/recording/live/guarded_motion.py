@@ -8,13 +8,15 @@ import time
 import numpy as np
 
 from tacdata.clock import Clock
-from tacdata.devices.device import MotionController
-from tacdata.errors import TacdataError
+from tacdata.devices.device import CncStatus, MotionController
+from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.rig_streams import RigStreams
-from tacdata.recording.motion.move_times import Command
+from tacdata.recording.motion.allowed_path import AllowedPath
+from tacdata.recording.motion.move_times import Command, report_resolution
 from tacdata.recording.motion.press_steps import Position, Step
+from tacdata.recording.motion.trapezoid import AxisLimits
 
 WATCH = 0.02
 """Interval at which the motion is watched for faults and Ctrl-C [s of real time]."""
@@ -22,6 +24,9 @@ MARGIN = 15.0
 """Time allowed for coming to rest at the end of a path before it counts as hung [s of the host's clock]."""
 LETTING_GO = 10.0
 """Time allowed for a stopped motion's thread to end [s of real time]."""
+
+STALL = 3.0
+"""Time that this computer may stand still while the guide moves [s of real time]: suspended, or a closed lid."""
 
 
 class GuardedMotion:
@@ -33,6 +38,16 @@ class GuardedMotion:
         self._halted = threading.Event()
         self._rest: Position | None = None  # where it stands after a stop; None: it runs, or does not obey
         self._why = "nothing was stopped"
+        self._path: AllowedPath | None = None
+        self._at: Position | None = None  # where the last path ended
+        self._lifted = ""
+
+    def off_path(self, status: CncStatus) -> DeviceError | None:
+        """Return what is wrong with where a report says the guide is, by the moves that were sent; or None."""
+        found = self._path.off(status) if self._path else None
+        if found and self._path:
+            self._path.forget()  # it was noticed; from now on reports say where it comes to rest
+        return found
 
     def stop(self) -> None:
         """Send a feed hold now, and no further step. Thread-safe."""
@@ -56,10 +71,14 @@ class GuardedMotion:
         """
         failure: list[BaseException] = []
         work = threading.Thread(target=self._carry_out, args=(path, start, writer, failure), daemon=True)
+        self._allowed.stand(start, self._clock.now_ns())
+        self._at = None
         try:
             work.start()
+            looked = time.monotonic()
             while work.is_alive():
                 work.join(WATCH)
+                looked = _look_again(looked)
                 self._interruption.check()
                 if streams.fault:
                     break
@@ -71,19 +90,31 @@ class GuardedMotion:
             self.stop()
             self._let_go(work)
             raise
-        return next((step.target for step in reversed(path) if step.target), start)
+        self._at = next((step.target for step in reversed(path) if step.target), start)
+        return self._at
+
+    @property
+    def _allowed(self) -> AllowedPath:
+        if self._path is None:
+            cnc = self._cnc
+            limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))
+            self._path = AllowedPath(limits, float(np.linalg.norm(report_resolution(cnc.settings()))))
+        return self._path
 
     def _let_go(self, work: threading.Thread) -> None:
         """After a stop: wait until the motion's thread sends nothing more, then empty the controller's queue."""
-        self._rest = None
+        self._rest, self._why, self._lifted = None, "interrupted while it was being stopped", ""
         work.join(LETTING_GO)
         if work.is_alive():
             self._why = "the motion's thread does not end"
             return
+        self._allowed.forget()
         try:
             self._rest = self._cnc.abandon()
         except TacdataError as error:
             self._why = error.given
+        else:
+            self._allowed.stand(self._rest, self._clock.now_ns())
 
     def _carry_out(
         self,
@@ -102,25 +133,68 @@ class GuardedMotion:
                 before, phase = position, step.phase
                 if step.target is None:
                     done = self._cnc.dwell(step.seconds)
+                    self._allowed.rested(done.acknowledged_ns)
                 else:
+                    self._allowed.move(step.target, step.speed, self._clock.now_ns())
                     done, position = self._cnc.move(step.target, step.speed), step.target
                 if writer:
                     times = done.sent_ns, done.acknowledged_ns
                     ends = np.array(before, float), np.array(position, float)
                     writer.motion(Command(phase, *ends, step.speed, step.seconds, *times, done.line))
             self._cnc.wait_idle(MARGIN)
+            self._allowed.rested(self._clock.now_ns())
         except BaseException as error:  # handed to the watching thread, which raises it
             failure.append(error)
 
     def lift(self, height: float, speed: float) -> str:
         """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; return the result as a sentence."""
+        self._lifted = "the indenter was not lifted (interrupted); free it by hand"
+        self._lifted = self._lift(height, speed)
+        return self._lifted
+
+    def _lift(self, height: float, speed: float) -> str:
         if self._rest is None:
             return f"the indenter was not lifted ({self._why}); free it by hand"
         x, y, z = self._rest
         try:
             if z < height:
+                self._allowed.move((x, y, height), speed, self._clock.now_ns())
                 self._cnc.move((x, y, height), speed)
                 self._cnc.wait_idle(MARGIN + (height - z) / speed)
         except TacdataError as error:
-            return f"the indenter was not lifted: {error.given}"
+            return f"the indenter was not lifted: {error.given}; free it by hand"
+        self._at = x, y, max(z, height)
         return f"the indenter was lifted off the skin, straight up from {z:.3f} to {max(z, height):.3f} mm"
+
+    @property
+    def ending(self) -> tuple[str, ...]:
+        """What a person must know last, a line each: does it move, where does it stand, was the tip lifted?"""
+        if self._path is None:
+            if not self._cnc.moved:
+                return ("motion: nothing was moved",)
+            lost = self._cnc.position_lost
+            return (f"motion: the machine moved while homing{f', and {lost}: its position is lost' if lost else ''}",)
+        if self._lifted or self._halted.is_set():
+            tip = self._lifted or "the indenter was not lifted; free it by hand"
+            if self._rest is None:
+                return (f"motion: NOT KNOWN to have stopped ({self._why}); if it moves, press the emergency stop",
+                        f"tip:    {tip}")  # fmt: skip
+            return f"motion: stopped at {_text(self._rest)} mm", f"tip:    {tip}"
+        return (f"motion: at rest at {_text(self._at)} mm" if self._at else "motion: NOT KNOWN to have stopped",)
+
+
+def _look_again(looked: float) -> float:
+    """Return the present time [s]; raise if this computer stood still since it ``looked``."""
+    now = time.monotonic()
+    if now - looked > STALL:
+        raise DeviceError(
+            f"this computer stood still for {now - looked:.1f} s while the guide moved (suspended, a closed lid, or "
+            "far too busy); what the devices sent meanwhile is partly lost",
+            f"at most {STALL:g} s",
+            "keep it awake while it records; the press is repeated by --resume",
+        )
+    return now
+
+
+def _text(position: Position) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in position) + ")"

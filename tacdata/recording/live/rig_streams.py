@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.devices.device import CncStatus
 from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.clocks.polled_clock import PolledClock, polled_clock
@@ -34,6 +35,7 @@ class RigStreams(DeviceStreams):
         detect: Detect | None = None,
         watch: Watch | None = None,
         fingers: dict[str, Any] | None = None,
+        off_path: Callable[[CncStatus], TacdataError | None] = lambda status: None,
     ) -> None:
         """Prepare the threads.
 
@@ -44,9 +46,10 @@ class RigStreams(DeviceStreams):
             detect: Searches an image for the cube; without it images are only stored.
             watch: Called with a sample of the data.
             fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
+            off_path: Called with every status report; returns what is wrong with it (`GuardedMotion.off_path`).
         """
         super().__init__({"": devices.board}, devices.cameras, cameras, fingers, detect, watch)
-        self._cnc, self._on_fault = devices.cnc, on_fault
+        self._cnc, self._on_fault, self._off_path = devices.cnc, on_fault, off_path
         self._fault: TacdataError | None = None
         self._trips: deque[tuple[int, int]] = deque(maxlen=TRIPS)
         self.frames = 0
@@ -99,6 +102,9 @@ class RigStreams(DeviceStreams):
         statuses = self._cnc.statuses()
         with self._lock:
             for status in statuses:
+                if wrong := self._off_path(status):
+                    self._on_fault()  # after an earlier fault too: the lift may be what goes astray
+                    self._fault = self._fault or wrong
                 x, y, z = status.position.tolist()
                 self.position = (x, y, z)
                 self._trips.append((status.sent_ns, status.arrival_ns))

@@ -1,0 +1,32 @@
+"""The last lines on the screen when a session broke off: motion, tip, data, and what comes next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tacdata.recording.files import file_names
+from tacdata.recording.live.guarded_motion import GuardedMotion
+
+
+def ending(motion: GuardedMotion, lost: str, data: tuple[str, ...], command: str) -> str:
+    """Return the lines.
+
+    Args:
+        motion: What moved.
+        lost: Why the position is not known, in words; empty if it is.
+        data: What is on the disk, a line each.
+        command: How to go on.
+    """
+    first = "find its zero again (home it, or touch off), then " if lost else ""
+    position = (f"zero:   LOST: {lost}",) if lost else ()
+    lines = (*motion.ending, *position, *(f"data:   {line}" for line in data), f"then:   {first}{command}")
+    return "\n".join(f"  {line}" for line in lines)
+
+
+def on_disk(folder: Path, presses: int) -> tuple[str, ...]:
+    """Say what a session's folder holds of so many ``presses``."""
+    if not folder.exists():
+        return ("nothing was written",)
+    broken = file_names.unfinished(folder)
+    lines = (f"{len(file_names.finished(folder))} of {presses} presses are complete in {folder}",)
+    return (*lines, f"broken off, readable: {', '.join(path.name for path in broken[-3:])}") if broken else lines

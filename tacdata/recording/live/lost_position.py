@@ -1,0 +1,53 @@
+"""A position that was lost stays lost until a person says that it was found again; --yes does not say so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tacdata.devices.device import MotionController
+from tacdata.errors import DeviceError
+
+Ask = Callable[[str], bool]
+"""Puts a question to a person; True only for a yes that was given to this very question."""
+
+
+def why_lost(cnc: MotionController, remembered: str = "", resumed: bool = False) -> str:
+    """Return why the position of an opened controller is not known, in words; empty if it is.
+
+    Args:
+        cnc: The controller.
+        remembered: Why a session lost it, if it did.
+        resumed: Whether earlier recordings rest on the same machine zero.
+    """
+    said = cnc.settings()
+    if said.get("homed_at_opening") == "yes":
+        return ""
+    at_zero = said.get("position_at_opening") == "0.000,0.000,0.000" and said.get("$22") == "0"
+    if at_zero and resumed and not (remembered or cnc.position_lost):
+        return "the controller says (0, 0, 0) mm, as one does that has just been switched on"
+    return remembered or cnc.position_lost
+
+
+def require_found(why: str, height: float, ask: Ask) -> None:
+    """Ask whether a position that was lost was found again.
+
+    Args:
+        why: Why it was lost, in words; with an empty one nothing is asked.
+        height: Where the first move ends, straight up [mm, machine].
+        ask: Puts the question.
+
+    Raises:
+        DeviceError: If nobody says yes.
+    """
+    question = (
+        f"THE POSITION WAS LOST: {why}.\n"
+        f"Has the machine been homed, or its zero found again by a touch-off, since then? And is the way straight up "
+        f"free, to machine height {height:.2f} mm? [y/N] "
+    )
+    if why and not ask(question):
+        raise DeviceError(
+            f"the position is not known: {why}",
+            "a machine that was homed or touched off since, and a free way straight up",
+            "free the tip by hand, home the machine or set its zero again, then start again and say so when asked "
+            "(--yes does not)",
+        )

@@ -1,0 +1,128 @@
+"""Where the guide may be at each moment, by what it was sent; every status report is compared with it."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.devices.device import CncStatus
+from tacdata.errors import DeviceError
+from tacdata.recording.motion.trapezoid import AxisLimits, Trapezoid
+
+TOLERANCE = 0.05
+"""Distance from the path that is still on it [mm], beyond the resolution of a report."""
+EARLY = (1.05, 0.05)
+"""By how much a move may seem to run ahead: this many times the time since it was sent, and so much more [s]. A
+controller's own clock is good to a per cent; a move whose feed was damaged on the line runs far ahead."""
+KEPT = 256
+"""Moves that are remembered [count]: a busy host reads a report after several moves of a fast clock have ended."""
+
+
+@dataclass
+class _Leg:
+    """One move that was sent, from rest to rest."""
+
+    profile: Trapezoid
+    sent_ns: int
+    """No report before it can be of this move [ns]."""
+    ended_ns: int | None = None
+    """Host time by which it is known to have ended [ns]."""
+
+
+class AllowedPath:
+    """The moves that may be under way.
+
+    One thread sends and another one reads reports: a move is entered before it is sent. A report that was asked for
+    at q and came at r may show every move sent before r and not known to have ended before q, and of each move only
+    the part that its speed allows since it was sent. On a host that stalls, an answer may belong to a query that was
+    given up; so q is that of the report before.
+
+    Example:
+        ``path.stand((0, 0, 0), now); path.move((0, 0, -5), 1.0, now); path.off(status)``
+    """
+
+    def __init__(self, limits: AxisLimits, resolution: float) -> None:
+        """Begin without a known place; ``resolution`` [mm] is what a report at rest may be off."""
+        self._limits, self._tolerance = limits, TOLERANCE + resolution
+        self._legs: list[_Leg] = []
+        self._since_ns = self._asked_ns = 0
+        self._lock = threading.Lock()
+
+    def stand(self, position: tuple[float, float, float], now_ns: int) -> None:
+        """Take that the guide stands at ``position`` [mm]; nothing else is allowed until a move is sent.
+
+        Where the moves so far lead there, they are kept: a report of one of them may still be read. Else reports that
+        were asked for before ``now_ns`` are not judged.
+        """
+        here = np.array(position, float)
+        with self._lock:
+            if self._legs and np.allclose(self._legs[-1].profile.target, here, atol=1e-6):
+                return
+            self._since_ns = now_ns
+            self._legs = [_Leg(self._limits.straight_move(here, here, 1.0), now_ns, now_ns)]
+
+    def forget(self) -> None:
+        """Take that nobody knows where the guide is: everything is allowed until `stand`."""
+        with self._lock:
+            self._legs = []
+
+    def move(self, target: tuple[float, float, float], speed: float, now_ns: int) -> None:
+        """Allow a straight move to ``target`` [mm] at ``speed`` [mm/s] that is about to be sent."""
+        with self._lock:
+            if self._legs:
+                start = self._legs[-1].profile.target
+                profile = self._limits.straight_move(start, np.array(target, float), speed)
+                self._legs.append(_Leg(profile, now_ns))
+
+    def rested(self, now_ns: int) -> None:
+        """Take that every move so far has ended where it should."""
+        with self._lock:
+            for leg in self._legs:
+                leg.ended_ns = leg.ended_ns or now_ns
+            for leg in self._legs[:-KEPT]:
+                self._since_ns = max(self._since_ns, leg.ended_ns or now_ns)
+            self._legs = self._legs[-KEPT:]
+
+    def off(self, status: CncStatus) -> DeviceError | None:
+        """Return what is wrong with where a report says the guide is, or None."""
+        with self._lock:
+            asked_ns, self._asked_ns = min(self._asked_ns, status.sent_ns), status.sent_ns
+            sent = [leg for leg in self._legs if leg.sent_ns <= status.arrival_ns] or self._legs[:1]
+        if not sent or asked_ns < self._since_ns:
+            return None
+        # Whatever was sent last, and what may have run since the query; of a move that had ended, only its end.
+        legs = [leg for leg in sent if leg is sent[-1] or leg.ended_ns is None or leg.ended_ns >= asked_ns]
+        nearest, distance = None, np.inf
+        for leg in legs:
+            off, ahead = self._distance(leg, asked_ns, status)
+            if off <= self._tolerance and not ahead:
+                return None
+            if off < distance:
+                nearest, distance = leg, off
+        leg = nearest or legs[-1]
+        ways = f"from {_text(leg.profile.start)} to {_text(leg.profile.target)} mm"
+        ahead = distance <= self._tolerance
+        how = f"farther on its way {ways} than its speed allows" if ahead else f"{distance:.2f} mm off its way {ways}"
+        return DeviceError(
+            f"the guide reports {_text(status.position)} mm, {how}",
+            f"at most {self._tolerance:.2f} mm off the way that it was sent, at the speed that it was given",
+            "look where it stands: a line was damaged on its way (check cable and ground), something bends the "
+            "coordinates ($G), or steps were lost; home or touch off if it does not stand where it says",
+        )
+
+    def _distance(self, leg: _Leg, asked_ns: int, status: CncStatus) -> tuple[float, bool]:
+        """Return how far off the move a report lies [mm], and whether it lies farther along than time allows."""
+        profile, position = leg.profile, status.position
+        if not profile.length or (leg.ended_ns is not None and leg.ended_ns < asked_ns):
+            return float(np.linalg.norm(position - profile.target)), False
+        along = min(max(float(profile.progress(position[None])[0]), 0.0), profile.length)
+        on = profile.start + along / profile.length * (profile.target - profile.start)
+        since = EARLY[0] * (status.arrival_ns - leg.sent_ns) * 1e-9 + EARLY[1]
+        ahead = along > float(profile.distance(np.array([since]))[0]) + self._tolerance
+        return float(np.linalg.norm(position - on)), ahead
+
+
+def _text(position: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in position) + ")"

@@ -1,0 +1,221 @@
+"""What a controller, its line or another hand does wrong in mid-press: hold, lift, file closed, words; or no move."""
+
+import re
+import threading
+import time
+
+import numpy as np
+import pytest
+from recording_examples import SENSOR, plan
+
+from tacdata.errors import DeviceError
+from tacdata.recording import read_session
+from tacdata.recording.files import file_names
+from tacdata.recording.files.reader import read_recording
+from tacdata.recording.recorder import Recorder
+from tacdata.rig import read_rig
+from tacdata.virtual_rig.rig import VirtualRig
+from tacdata.virtual_rig.world.mounting import mount
+
+SPEED = 10.0
+CLEARANCE = 3.0
+
+
+@pytest.fixture
+def virtual(tmp_path):
+    rig = VirtualRig(tmp_path / "rig", SPEED, seed=5, camera=False)
+    rig.start()
+    yield rig
+    rig.stop()
+
+
+def recorder(virtual, out, **options):
+    rig = read_rig(virtual.path)
+    return Recorder(
+        rig, SENSOR, plan(2), out,
+        mount=lambda press: mount(rig.document, press.indenter.document, press.yaw), **options,
+    )  # fmt: skip
+
+
+def place(virtual):
+    """Where the indenter is: x, y, and its height above the skin's nominal face [mm]."""
+    at = virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000)
+    return at - [0.0, 0.0, read_rig(virtual.path).registration.origin[2]]
+
+
+def on_the_skin(virtual, act):
+    def wait():
+        while place(virtual)[2] > -0.2:
+            time.sleep(0.002)
+        act()
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def once(pattern, change):
+    """What the wire does to the first line that matches."""
+    left = [1]
+
+    def wire(line):
+        if left and re.search(pattern, line):
+            left.pop()
+            return change(line)
+        return line
+
+    return wire
+
+
+class Deepest:
+    """Follows the indenter; `height` is the lowest so far [mm], `sideways` how far it went from where it began."""
+
+    def __init__(self, virtual):
+        self.virtual, self.height, self.sideways = virtual, np.inf, 0.0
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._follow, daemon=True)
+
+    def _follow(self):
+        begin = place(self.virtual)
+        while not self._stop.wait(0.001):
+            at = place(self.virtual)
+            self.height = min(self.height, at[2])
+            self.sideways = max(self.sideways, float(np.linalg.norm(at[:2] - begin[:2])))
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception):
+        self._stop.set()
+        self._thread.join()
+
+
+def broken_off(out):
+    """Return the notes of the recording that was broken off."""
+    (broken,) = file_names.unfinished(out)
+    return read_recording(broken).episode.notes
+
+
+def test_an_answer_lost_in_mid_press_ends_in_a_lift_and_words(virtual, tmp_path):
+    out = tmp_path / "session"
+    lost = once("^ok$", lambda text: None)
+    on_the_skin(virtual, lambda: virtual.controller.inject_wire(to_host=lost))
+    begun = time.monotonic()
+    with pytest.raises(DeviceError, match="stands idle and still owes an answer") as raised:
+        recorder(virtual, out).run(lambda summary: True)
+    assert time.monotonic() - begun < 30
+    assert place(virtual)[2] == pytest.approx(CLEARANCE, abs=0.01)
+    assert any("lifted off the skin" in note for note in broken_off(out))
+    last = "\n".join(raised.value.__notes__)
+    assert re.search(r"motion: stopped at .*\n  tip:    the indenter was lifted off the skin, straight up", last)
+    assert re.search(r"data:   0 of 2 presses are complete .*\n  data:   broken off, readable: episode-000000", last)
+    assert last.endswith("then:   the same command with --resume")
+    assert recorder(virtual, out, resume=True).run(lambda summary: True).remaining == ()
+
+
+def test_a_pendant_that_takes_over_leaves_the_tip_and_says_so(virtual, tmp_path):
+    out = tmp_path / "session"
+    on_the_skin(virtual, virtual.controller.inject_pendant)
+    with pytest.raises(DeviceError, match="pendant has taken control") as raised:
+        recorder(virtual, out).run(lambda summary: True)
+    assert "the indenter was not lifted (a pendant has control of the machine); free it by hand" in (
+        "\n".join(raised.value.__notes__)
+    )
+    assert any("not lifted" in note for note in broken_off(out))
+
+
+DAMAGED = [
+    ("F60.000", lambda line: re.sub(r"Z-(\d)(\d)", lambda m: f"Z-{int(m[1]) + 1}{m[2]}", line), "deeper"),
+    ("F60.000", lambda line: re.sub(r"Y-(\d)(\d)", lambda m: f"Y-{int(m[1]) + 1}{m[2]}", line), "sideways"),
+    ("F60.000", lambda line: line.replace("F60", "F860"), "too fast"),
+]
+
+
+@pytest.mark.parametrize(("which", "change", "kind"), DAMAGED, ids=[kind for *_, kind in DAMAGED])
+def test_a_line_that_arrives_changed_is_noticed_at_the_next_report(virtual, tmp_path, which, change, kind):
+    out = tmp_path / "session"
+    virtual.controller.inject_wire(to_controller=once(which, change))
+    with Deepest(virtual) as followed, pytest.raises(DeviceError, match="the guide reports") as raised:
+        recorder(virtual, out).run(lambda summary: True)
+    assert ("than its speed allows" if kind == "too fast" else "mm off its way") in raised.value.given
+    # 1 mm/s, a report each 125 ms of the clock; what a busy host adds is ten times as long for the rig.
+    assert followed.height > -0.8 - 1.5
+    assert place(virtual)[2] == pytest.approx(CLEARANCE, abs=0.01)
+    assert any("lifted off the skin" in note for note in broken_off(out))
+    assert recorder(virtual, out, resume=True).run(lambda summary: True).remaining == ()
+
+
+def test_a_release_that_ends_elsewhere_is_noticed(virtual, tmp_path):
+    def upward(line):
+        return re.sub(r"Z-(\d)(\d)", lambda m: f"Z-{int(m[1]) - 1}{m[2]}", line)
+
+    lines = []
+
+    def wire(line):
+        if "F60.000" in line:
+            lines.append(line)
+            return upward(line) if len(lines) == 2 else line
+        return line
+
+    virtual.controller.inject_wire(to_controller=wire)
+    with pytest.raises(DeviceError, match="mm off its way"):
+        recorder(virtual, tmp_path / "session").run(lambda summary: True)
+    assert place(virtual)[2] > CLEARANCE - 0.01
+
+
+def unlock(virtual):
+    """What a person does in a terminal after a hard limit: reset, $X."""
+    virtual.controller.machine.reset(virtual.clock.now_ns())
+    virtual.controller.machine.alarm = None
+
+
+def test_a_lost_position_is_remembered_until_a_person_says_that_it_was_found(virtual, tmp_path):
+    out = tmp_path / "session"
+    on_the_skin(virtual, virtual.controller.inject_alarm)
+    with pytest.raises(DeviceError, match="hard limit") as raised:
+        recorder(virtual, out).run(lambda summary: True)
+    assert "hard limit" in read_session(out).position_lost
+    last = "\n".join(raised.value.__notes__)
+    assert "the indenter was not lifted" in last
+    assert "zero:   LOST" in last
+    assert "find its zero again (home it, or touch off), then the same command with --resume" in last
+    unlock(virtual)
+    asked = []
+    for _ in range(2):
+        with Deepest(virtual) as followed, pytest.raises(DeviceError, match="position is not known"):
+            recorder(virtual, out, resume=True, ask=lambda question: asked.append(question)).run(lambda summary: True)
+        assert followed.sideways == 0.0
+        assert followed.height == place(virtual)[2], "nothing moved"
+    assert "straight up free" in asked[0]
+    session = recorder(virtual, out, resume=True, ask=lambda question: True).run(lambda summary: True)
+    assert session.remaining == ()
+    assert session.position_lost == ""
+
+
+def test_a_power_cycle_in_mid_press_is_no_ground_to_stand_on(virtual, tmp_path):
+    out = tmp_path / "session"
+    virtual.controller.settings.update({"$22": "0", "$20": "0"})
+    on_the_skin(virtual, virtual.controller.inject_brown_out)
+    with pytest.raises(DeviceError, match="position is lost"):
+        recorder(virtual, out).run(lambda summary: True)
+    assert np.allclose(virtual.controller.machine.error, virtual.controller.position_at(virtual.clock.now_ns()))
+    with Deepest(virtual) as followed, pytest.raises(DeviceError, match="position is not known"):
+        recorder(virtual, out, resume=True).run(lambda summary: True)
+    assert followed.sideways == 0.0
+    assert "--yes does not" in str(_refusal(virtual, out))
+
+
+def _refusal(virtual, out):
+    with pytest.raises(DeviceError) as raised:
+        recorder(virtual, out, resume=True).run(lambda summary: True)
+    return raised.value
+
+
+def test_a_machine_at_its_power_on_zero_is_not_believed_on_resuming(virtual, tmp_path):
+    out = tmp_path / "session"
+    with pytest.raises(RuntimeError):
+        recorder(virtual, out, progress=lambda *_: (_ for _ in ()).throw(RuntimeError)).run(lambda summary: True)
+    virtual.controller.settings.update({"$22": "0", "$20": "0"})
+    machine = virtual.controller.machine
+    machine.brown_out(virtual.clock.now_ns())
+    with pytest.raises(DeviceError, match=r"says \(0, 0, 0\) mm, as one does that has just been switched on"):
+        recorder(virtual, out, resume=True).run(lambda summary: True)
