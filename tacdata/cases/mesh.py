@@ -19,8 +19,8 @@ _FINEST, _COARSEST = 0.15, 0.4
 """Bounds of the edge length under the press [mm]."""
 
 _FEATURE, _ALLOWANCE = 0.15, 0.12
-"""The edge length under the press is this share of the indenter's sharpest curvature, plus this [mm]: about a third of
-the contact radius that a sphere has at a twentieth of its radius."""
+"""The edge length under the press is this share of the indenter's smallest radius of curvature, plus this [mm]. That is
+about a third of a sphere's contact radius at a depth of a twentieth of its radius."""
 
 _MARGIN = 0.4
 """How far beyond the contact the mesh stays fine [mm]."""

@@ -1,10 +1,9 @@
 """How the faces that are held move if what holds them gives way a little.
 
-A bond of compliance c [mm/MPa] lets a held face move by u = -c t, t the traction that the bond exerts on the skin: a
+A bond of compliance c [mm/MPa] lets a held face move by u = -c t, with t the traction that it exerts on the skin. A
 film of glue of thickness h and stiffness M has c = h / M (Goland and Reissner, J. Appl. Mech. 11 (1944) A17). Held
-faces are the limit c = 0, and du/dc there is -t itself: the traction that does the same work on the faces' shape
-functions as the nodal reactions.
-"""
+faces are the limit c = 0, and du/dc there is -t. It is found from the nodal reactions: both do the same work on the
+faces' shape functions. """
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 Every point keeps its status (open, sticking, slipping, just reached); within one, tractions are smooth. Unlike the
 solver's stiffness, which is kept symmetric, the derivative holds the turn of the normal and the change of friction's
-disc with pressure. The curvature of the shape and the change of its distance with its sizes are taken by
-central differences of its distance function: they alone, so that the derivative is linear in its direction.
+disc with pressure. The curvature of the shape, and the change of its distance with its sizes, are central
+differences of the distance function. Nothing else is, so that the derivative is linear in its direction.
 """
 
 from __future__ import annotations

@@ -23,11 +23,11 @@ UNITS = {
 }
 """Units of the parameters that every press has.
 
-x, y, z: the indenter's place in the sensor's frame; z is up, so that a lower z is a deeper press. yaw, tilt_x, tilt_y:
-its turn about its own axis, then about the sensor's x and y, at its origin. thickness: of the slab, the depth still
-counted from its outer face, so that the indenter rises along; where it stays in place, subtract the
-derivative by z. bonding: the compliance of what holds the held faces (`tacdata.skin.derivatives.bonding`), 0 in the
-model."""
+- x, y, z: place of the indenter in the sensor's frame. z is up: a lower z is a deeper press.
+- yaw, tilt_x, tilt_y: rotation about the indenter's own axis, then about the sensor's x and y, at its origin.
+- thickness: of the slab. The depth still counts from the outer face, so that the indenter rises with it. For an
+  indenter that stays in place, subtract the derivative by z.
+- bonding: compliance of what holds the held faces (`tacdata.skin.derivatives.bonding`), 0 in the model."""
 
 _STEP = 1e-5
 """Step of the central differences that turn a parameter into the numbers of a law or a shape, over its size [1]."""

@@ -1,8 +1,8 @@
 """Standard deviations of a whole path, at a part of its cost: a coarser mesh, and the loading branch alone.
 
-What the spreads make of a press depends little on the mesh: for a sphere of 3 mm radius, 1 mm deep in the default skin,
-the standard deviations on the companion mesh differ from those on the mesh itself by 9 to 13 % of their root mean
-square over the map, 1 to 3 % in the force; those of unloading from those of loading at the same depth by 1 %
+Standard deviations depend little on the mesh. For a sphere of 3 mm radius, 1 mm deep in the default skin, those on the
+companion mesh differ by 9 to 13 % of their root mean square over the map, and by 1 to 3 % in the force. Those of
+unloading differ from those of loading at the same depth by 1 %
 (`pytest --long=all -s -k matter_little` measures it again).
 """
 
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 _INDENTER = "indenter/"
 
 _STEEPER = 2.0
-"""How many times steeper than the map itself, or than 45 degrees by half, a derivative by place may be [1]; those by
+"""How many times steeper than the map itself, or than a slope of 0.5, a derivative by place may be [1]. Derivatives by
 height and thickness are 1 under the tip and less elsewhere."""
 
 _BESIDE = 0.02
 """How far beside a pixel's centre its slope is taken [mm]: a punch's edge is steep within a part of a pixel."""
 
 _TOLERANCE = 1e-2
-"""Error of the derivatives' linear solves [1]: standard deviations of maps are those of 1e-5 within 0.5 % of their root
-mean square, of forces within 0.2 % (0.8 % by the bonding alone), of protrusions' loads within 7 % of the largest (a
-sphere, an ellipsoid), at a quarter of the time; the mesh makes more of a difference."""
+"""Error of the derivatives' linear solves [1]. It takes a quarter of the time of 1e-5. Against 1e-5, standard
+deviations of maps differ by 0.5 % of their root mean square, of forces by 0.2 %, of protrusions' loads by 7 % of the
+largest (a sphere, an ellipsoid). The mesh makes more of a difference."""
 
 _SAMPLES = 12
 """Presses drawn where derivatives are of no use; they tell a standard deviation to 20 %."""
@@ -83,9 +83,9 @@ def check_spreads(sensor: Sensor, indenter: Indenter) -> None:
 def with_uncertainty(model: SkinModel, request: PressRequest, solution: PathSolution) -> PathSolution:
     """Return a solution with the standard deviations that the sensor file's spreads give it.
 
-    To first order on the companion; where derivatives are not found there or of no use (under a sharp cone), on the
-    mesh itself; where neither helps (at a punch's edge, perhaps), sampled on the companion. Unchanged, but for a remark
-    in its provenance, if the file states none or no way succeeds.
+    Three ways are tried in turn: to first order on the companion, to first order on the mesh itself, and sampled on the
+    companion. A sharp cone may need the second, a punch's edge the third. Without spreads, or where no way succeeds,
+    the solution is unchanged but for a remark in its provenance.
 
     Args:
         model: That solved it; its companion is taken where there is one.
@@ -112,8 +112,8 @@ def _first_order(model: SkinModel, request: PressRequest, spreads: dict[str, flo
     """Return depths and standard deviations by derivatives.
 
     Raises:
-        SolveError: If they are not found, or are steeper than the shape that they belong to: where a sharp tip is about
-            to slip on a coarse mesh, they hold for next to no change.
+        SolveError: If they are not found, or are much steeper than the map. Where a sharp tip is about to slip on a
+            coarse mesh, they hold for next to no change.
     """
     found = []
     for depth, state, sensitivity in sensitivities(model, request, list(spreads), _TOLERANCE):

@@ -45,8 +45,9 @@ class Sensitivity:
     taxel_closure: np.ndarray
     """Of the downward displacement of each protrusion's rim [mm/unit], shape (p, taxels)."""
     taxel_area: np.ndarray
-    """Of each protrusion's contact area [mm^2/unit], shape (p, taxels), by Hertz's A ~ (F (1 - nu^2) / E)^(2/3), so to
-    some tens of per cent: the area itself is counted in quadrature points and has no derivative."""
+    """Of each protrusion's contact area [mm^2/unit], shape (p, taxels), to some tens of per cent.
+
+    By Hertz's A ~ (F (1 - nu^2) / E)^(2/3): the area itself is counted in quadrature points and has no derivative."""
     error: float
     """Largest error of the linear solves up to here, over what they found [1]."""
 
@@ -56,7 +57,7 @@ def sensitivities(
 ) -> Iterator[tuple[float, Equilibrium, Sensitivity]]:
     """Yield the requested states of a press with their derivatives, in the order of its depths.
 
-    Derivatives are those of the whole load path, friction's history included, at the load steps that are taken; where a
+    Derivatives are those of the whole load path, at the load steps that are taken and with friction's history. Where a
     part of the skin just touches or just slips, they are one-sided.
 
     Args:

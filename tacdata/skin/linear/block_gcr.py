@@ -16,8 +16,8 @@ Field = Callable[[torch.Tensor], torch.Tensor]
 """From fields (n, 3, b) to fields (n, 3, b)."""
 
 _INDEPENDENT = 1e-3
-"""Least length of a direction beside the longest of its block, of what stands across the others [1]: shorter ones are
-mostly rounding, and come again, longer, in a later block if they are needed."""
+"""Least length of a direction, once the others are projected out, over the longest of its block [1]. Shorter ones are
+mostly rounding. If they are needed, they come again, longer, in a later block."""
 
 _ENOUGH = 0.5
 """Share of the tolerance to which the error is brought in single precision before the residual is taken anew [1]."""
@@ -81,8 +81,17 @@ class KrylovSpace:
     def _correction(
         self, x: torch.Tensor, residual: torch.Tensor, size: torch.Tensor, tolerance: float, most: int
     ) -> torch.Tensor:
-        """Return what brings residuals of unit length, of which x is off by ``size`` times, shape (b,), to the
-        tolerance, by at most so many products; directions are added for those alone that are not there yet."""
+        """Return the correction of x over ``size`` that brings the error to the tolerance.
+
+        Directions are added only for right-hand sides that are not there yet.
+
+        Args:
+            x: Present solution, shape (n, 3, b).
+            residual: Of unit length, shape (n, 3, b).
+            size: Lengths of the residuals, shape (b,).
+            tolerance: As of `solve` [1].
+            most: Products at most.
+        """
         shape, extent = residual.shape, _norm(x) / size
         left = residual.to(torch.float32).reshape(-1, shape[2])
         found = torch.zeros_like(left)

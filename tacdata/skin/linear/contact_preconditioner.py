@@ -1,8 +1,9 @@
 """The preconditioner of the tangent: rest stiffness plus the present contact stiffness, by the Woodbury identity.
 
-(K0 + C S C^T)^-1 = K0^-1 (1 - C (I + S G)^-1 S C^T K0^-1), with S the contact stiffness on the degrees of freedom that
-C picks and G = C^T K0^-1 C their compliance. Stiff contact, which K0 alone knows nothing of, then costs no
-conjugate-gradient iterations.
+    (K0 + C S C^T)^-1 = K0^-1 (1 - C (I + S G)^-1 S C^T K0^-1)
+
+C picks the degrees of freedom in contact, S is the contact stiffness on them, and G = C^T K0^-1 C their compliance.
+Stiff contact, which K0 alone knows nothing of, then costs no conjugate-gradient iterations.
 """
 
 from __future__ import annotations

@@ -43,8 +43,8 @@ def coupling(numbers: list[np.ndarray], count: int) -> tuple[int, int]:
         count: Number of degrees of freedom.
 
     Returns:
-        So many that come first may all be coupled with each other; those that follow only with others that are less far
-        from them than the second number.
+        How many, from the first on, may all be coupled with each other; and a distance. Those that follow are coupled
+        only with others nearer to them than this distance.
     """
     first = max((int(own[own < count].max(initial=-1)) + 1 for own in numbers[:1]), default=0)
     reach = 0

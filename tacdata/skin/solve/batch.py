@@ -1,7 +1,7 @@
 """Many presses at once: every column of the batch follows its own load path, and takes the next press when it is done.
 
-No press waits for another: in each Newton iteration one member may be far from its state while another has just found
-its own and is sent on to the next depth.
+No press waits for another. In a Newton iteration one member may be far from its state, while another has just found its
+own and is sent on to the next depth.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ _SHALLOW = 0.1
 """Depth that stands in for shallower ones where penetration is judged [mm]."""
 
 _AUGMENT = 60
-"""Residual, over the one allowed, from which on multipliers are brought up to date if penetration asks for it [1]:
-measured, 20 takes a fifth more iterations with a sphere, 200 twice as many with a sharp punch."""
+"""Residual, over the one allowed, below which multipliers are augmented if penetration asks for it [1]. Measured: 20
+takes a fifth more iterations with a sphere, 200 twice as many with a sharp punch."""
 
 
 @dataclass

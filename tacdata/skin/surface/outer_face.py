@@ -1,7 +1,7 @@
 """From displacements of the outer face to the depth map, and point location on the undeformed outer face.
 
-Maps are exact to the quadratic triangles of the outer face: point-sampled at pixel centres or averaged over pixels
-(`tacdata.skin.surface.depth_map`, which also takes many states at once, on CUDA too).
+Maps are exact to the quadratic triangles of the outer face. Pixels are sampled at their centres or averaged. For many
+states at once, or on a GPU, see `tacdata.skin.surface.depth_map`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Whether a law stays stable under the usual tests: work of every further incompressible stretch is positive.
 
-Drucker's criterion as finite-element codes apply it (Abaqus Analysis User's Guide, "Hyperelastic behavior of rubberlike
-materials", Drucker stability): d tau : d eps > 0 for every isochoric change of the principal logarithmic strains,
-along uniaxial, equibiaxial and planar paths.
+Drucker's criterion as finite-element codes apply it: d tau : d eps > 0 for every isochoric change of the principal
+logarithmic strains, along uniaxial, equibiaxial and planar paths (Abaqus Analysis User's Guide, "Hyperelastic behavior
+of rubberlike materials", Drucker stability).
 """
 
 from __future__ import annotations

@@ -1,18 +1,21 @@
 """How far the mesh leaves a result from the exact one: the same press on a coarser mesh.
 
-Richardson's argument: a quantity solved with edges of length h is off by C h^p, with edges of r h by C (r h)^p, so from
-the difference d of the two follows the error at h, |d| / (r^p - 1) (Richardson, Phil. Trans. R. Soc. A 210 (1911)
-307-357; Roache, J. Fluids Eng. 116 (1994) 405-413). The force follows it: a coarser mesh is stiffer. A pixel of the
-map does not: which way it is off depends on how the elements lie there, and the errors of two irregular meshes are
-correlated by rho only. The mean square of their difference is then e^2 (r^2p + 1 - 2 rho r^p), which is Richardson's
-for rho = 1. It is taken over the neighbourhood that the contact couples, because at a pixel where the two meshes
-happen to agree the error does not vanish: the estimate is a standard deviation.
+Richardson's extrapolation: with edges of length h a quantity is off by C h^p, with edges of r h by C (r h)^p. From the
+difference d of the two follows the error at h, |d| / (r^p - 1) (Richardson, Phil. Trans. R. Soc. A 210 (1911) 307-357;
+Roache, J. Fluids Eng. 116 (1994) 405-413).
 
-Orders and correlation were measured on a slab of 6 x 6 x 2 mm under a sphere of 2 mm radius, on eight meshes with edges
-of 0.87 to 0.30 mm at depths of 0.25 to 0.75 mm, against the finest. Since volume changes are averaged
-(`benchmarks/skin_error_ladder.py`, structured meshes of 1.0 to 0.5 mm against 0.375 mm): orders of 1.6 to 1.8 for the
-map and 1.3 to 3.4 for the force; the stated error of the map is 0.5 to 1.7 times the true one (median 0.9, 94 % of the
-pixels or more within twice), that of the force 0.8 to 7 times (median 2; more where the true one crosses zero).
+The force follows it: a coarser mesh is stiffer. A pixel of the map does not. Its sign of error depends on how the
+elements lie there, and the errors of two irregular meshes have a correlation rho below 1. The mean square of their
+difference is e^2 (r^2p + 1 - 2 rho r^p), which is Richardson's for rho = 1. It is taken over the neighbourhood that the
+contact couples: where two meshes happen to agree at a pixel, the error is not 0. The estimate is a standard deviation.
+
+Orders and correlation were measured on a slab of 6 x 6 x 2 mm under a sphere of 2 mm radius, 0.25 to 0.75 mm deep.
+Eight meshes with edges of 0.87 to 0.30 mm were compared with the finest. With averaged volume changes (structured
+meshes of 1.0 to 0.5 mm against 0.375 mm, `benchmarks/skin_error_ladder.py`):
+
+- orders of 1.6 to 1.8 for the map, 1.3 to 3.4 for the force
+- stated over true error of the map: 0.5 to 1.7, median 0.9; 94 % of the pixels are within a factor of two
+- stated over true error of the force: 0.8 to 7, median 2; most where the true one crosses zero
 """
 
 from __future__ import annotations
@@ -90,8 +93,8 @@ def estimate(
         sensor: Gives the places of pixels and taxels.
         fine: All states of the press; loading first.
         coarse: Those states of the loading branch that a coarser mesh reached, a subset of the depths of ``fine``.
-            Others take the estimate at their depth, between these linearly, beyond the last in proportion to the depth;
-            if there are none, all of the depth and of the force is in doubt.
+            At other depths the estimate is interpolated, and beyond the last it grows with the depth. If there are
+            none, the error is the whole depth and the whole force.
         reach: Half width of the contact at the deepest state [mm].
         ratio: Edge length of the coarser mesh over that of the finer [1].
         remark: Carried along.

@@ -30,5 +30,6 @@ class MeshSettings:
     envelope: float = 1e-3
     """fTetWild's envelope over the bounding box's diagonal [1]."""
     focus: tuple[float, ...] | None = None
-    """A disc of the outer face to refine: x, y, radius, edge length [mm]; a fifth number leaves out a disc of that
-    radius in its middle, where the mesh grows coarser again: a punch is sharp at its edge alone."""
+    """A disc of the outer face to refine: x, y, radius, edge length [mm].
+
+    A fifth number leaves out a disc of that radius in its middle: a punch is sharp at its edge alone."""
