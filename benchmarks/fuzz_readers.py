@@ -1,0 +1,201 @@
+"""Whether damaged files end in words: each reader gets thousands of truncated, flipped, emptied and foreign files.
+
+A reader must return, or raise one of our own errors. Anything else is a fault, and is listed with its seed.
+
+    python benchmarks/fuzz_readers.py [--tries N] [--only NAME ...] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import io
+import json
+import logging
+import os
+import tempfile
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from tacdata.errors import TacdataError
+
+KINDS = ("cut", "flip", "zero", "insert", "swap", "empty", "foreign")
+"""Kinds of damage: cut off, bytes flipped, zeroed or inserted, two parts swapped, emptied, a file of another kind."""
+
+
+def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], object]]]:
+    """Return a whole file of each kind, its ending, and its reader."""
+    import trimesh
+    from scipy.io import savemat
+
+    from tacdata import documents
+    from tacdata.importing.formats.source_format import read_table
+    from tacdata.indenters import from_document
+    from tacdata.plans import read_plan
+    from tacdata.recording.files.reader import read_recording
+    from tacdata.replay.robot import read_robot
+    from tacdata.sensor import default_sensor, read_sensor
+
+    rng = np.random.default_rng(0)
+    columns = {"t": np.arange(200) * 0.02, "cap0": rng.normal(20, 1, 200), "cap1": rng.normal(20, 1, 200)}
+    found: dict[str, tuple[bytes, str, Callable[[Path], object]]] = {}
+
+    def table(path: Path) -> object:
+        return read_table(path, {})
+
+    lines = [",".join(columns), *(",".join(f"{v:.5f}" for v in row) for row in zip(*columns.values(), strict=True))]
+    text = "\n".join(lines).encode()
+    found["csv"] = text, ".csv", table
+    found["csv.gz"] = gzip.compress(text, mtime=0), ".csv.gz", table
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **columns)
+    found["npz"] = stream.getvalue(), ".npz", table
+    stream = io.BytesIO()
+    np.save(stream, columns["cap0"])
+    found["npy"] = stream.getvalue(), ".npy", table
+    savemat(folder / "a.mat", columns, do_compression=True)
+    found["mat"] = (folder / "a.mat").read_bytes(), ".mat", table
+    import pyarrow as pa
+    from pyarrow import feather, parquet
+
+    parquet.write_table(pa.table(columns), folder / "a.parquet")
+    feather.write_feather(pa.table(columns), folder / "a.feather")
+    found["parquet"] = (folder / "a.parquet").read_bytes(), ".parquet", table
+    found["feather"] = (folder / "a.feather").read_bytes(), ".feather", table
+    from openpyxl import Workbook
+
+    book = Workbook()
+    for row in zip(*columns.values(), strict=True):
+        book.active.append([float(v) for v in row])
+    book.save(folder / "a.xlsx")
+    found["xlsx"] = (folder / "a.xlsx").read_bytes(), ".xlsx", table
+    plan = {
+        "version": "1.0", "name": "p", "indenters": {"ball": {"shape": "sphere", "radius": 2.0}},
+        "motion": {"clearance": 2.0, "travel_speed": 10.0, "approach_speed": 2.0, "press_speed": 1.0, "hold": 0.5,
+                   "rest": 0.5},
+        "presses": [{"indenter": "ball", "x": 0.0, "y": 0.0, "depth": 1.0}],
+    }  # fmt: skip
+    documents.write(folder / "plan.yaml", plan, "plan")
+    documents.write(folder / "sensor.json", default_sensor().document, "sensor")
+    found["plan"] = (folder / "plan.yaml").read_bytes(), ".yaml", read_plan
+    found["sensor"] = (folder / "sensor.json").read_bytes(), ".json", read_sensor
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=2.0)
+    for ending in (".stl", ".ply", ".obj"):
+        ball.export(folder / f"ball{ending}")
+
+        def solid(path: Path) -> object:
+            return from_document({"shape": "mesh", "file": path.name}, "plan", path.parent)
+
+        found[ending[1:]] = (folder / f"ball{ending}").read_bytes(), ending, solid
+    urdf = '<?xml version="1.0"?><robot name="a"><link name="b"/><link name="c"/><joint name="j" type="revolute">' \
+           '<parent link="b"/><child link="c"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    (folder / "robot.yaml").write_text(
+        "version: '1.0'\nname: a\nurdf: a.urdf\nfingers: {index: {link: c}}\n"
+    )
+
+    def robot(path: Path) -> object:
+        path.replace(folder / "a.urdf")
+        return read_robot(folder / "robot.yaml")
+
+    found["urdf"] = urdf.encode(), ".urdf", robot
+    found["mcap"] = _recording(folder), ".mcap", read_recording
+    return found
+
+
+def _recording(folder: Path) -> bytes:
+    """Return a recording, imported from a table."""
+    from tacdata.importing.imported_session import import_session
+
+    time = np.arange(0, 4, 0.02)
+    depth = np.interp(time, [0, 1, 2, 3, 4], [-0.5, -0.5, 1.0, 1.0, -0.5])
+    rows = [f"{t:.3f},{d:.4f},{20 + max(d, 0):.4f}" for t, d in zip(time, depth, strict=True)]
+    source = folder / "source"
+    source.mkdir()
+    (source / "a.csv").write_text("\n".join(["t,depth,cap0", *rows]))
+    mapping = folder / "mapping.yaml"
+    mapping.write_text(
+        "version: '1.2'\nname: a\nfiles: {data: {path: a.csv, time: {column: t, unit: s}}}\nsensor: {name: s}\n"
+        "taxels: {file: data, columns: [cap0], unit: pF}\n"
+        "position: {file: data, depth: {column: depth, unit: mm}}\n"
+    )
+    made = import_session(source, mapping, folder / "session")
+    return next(iter(sorted(made.folder.glob("*.mcap")))).read_bytes()
+
+
+def damaged(data: bytes, kind: str, others: list[bytes], rng: np.random.Generator) -> bytes:
+    """Return a file with one kind of damage."""
+    broken, at = bytearray(data), int(rng.integers(len(data)))
+    match kind:
+        case "cut":
+            return bytes(broken[:at])
+        case "flip":
+            for place in rng.integers(len(data), size=int(rng.integers(1, 9))):
+                broken[place] ^= int(rng.integers(1, 256))
+        case "zero":
+            broken[at : at + 64] = bytes(len(broken[at : at + 64]))
+        case "insert":
+            broken[at:at] = rng.bytes(int(rng.integers(1, 64)))
+        case "swap":
+            other = int(rng.integers(len(data)))
+            broken[at : at + 32], broken[other : other + 32] = broken[other : other + 32], broken[at : at + 32]
+        case "empty":
+            return b""
+        case "foreign":
+            return others[int(rng.integers(len(others)))]
+    return bytes(broken)
+
+
+def main() -> None:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tries", type=int, default=10_000)
+    parser.add_argument("--only", nargs="*", default=[])
+    parser.add_argument("--json", type=Path)
+    chosen = parser.parse_args()
+    warnings.simplefilter("ignore")
+    logging.disable(logging.CRITICAL)
+    result = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
+        known = examples(folder)
+        others = [data for data, _, _ in known.values()]
+        for what, (data, ending, read) in known.items():
+            if chosen.only and what not in chosen.only:
+                continue
+            whole = folder / f"whole{ending}"
+            whole.write_bytes(data)
+            read(whole)
+            counts: Counter[str] = Counter()
+            faults: dict[str, int] = {}
+            for seed in range(chosen.tries):
+                rng = np.random.default_rng(seed)
+                # A name of its own: readers may remember what they read under one.
+                path = folder / f"damaged_{seed}{ending}"
+                path.write_bytes(damaged(data, KINDS[seed % len(KINDS)], others, rng))
+                try:
+                    read(path)
+                    counts["read"] += 1
+                except TacdataError:
+                    counts["refused"] += 1
+                except Exception as error:
+                    counts["fault"] += 1
+                    where = traceback.extract_tb(error.__traceback__)[-1]
+                    faults.setdefault(f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}", seed)
+                path.unlink(missing_ok=True)
+            result[what] = {**counts, "faults": faults}
+            print(f"{what:<8} {chosen.tries} tries: {counts['read']} read, {counts['refused']} refused in words, "
+                  f"{counts['fault']} faults", flush=True)  # fmt: skip
+            for words, seed in faults.items():
+                print(f"    {words} (first with seed {seed})", flush=True)
+    if chosen.json:
+        chosen.json.write_text(json.dumps(result, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
