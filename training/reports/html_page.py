@@ -1,93 +1,88 @@
-"""One HTML file with everything inside: text, tables, and pictures as data."""
+"""An HTML file with everything inside: text, tables, and pictures as data (`page.html.j2` says how it looks)."""
 
 from __future__ import annotations
 
 import base64
-import html
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
 from io import BytesIO
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #1b1f24; margin: 2rem auto; max-width: 72rem; padding: 0 1rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; border-bottom: 1px solid #d0d7de; }
-h3 { font-size: 1.05rem; margin-top: 1.5rem; }
-table { border-collapse: collapse; margin: .6rem 0 1rem; font-variant-numeric: tabular-nums; font-size: .88rem; }
-th, td { padding: .2rem .55rem; border-bottom: 1px solid #e4e8ec; text-align: right; }
-th:first-child, td:first-child { text-align: left; } th { border-bottom: 1px solid #6e7781; }
-img { max-width: 100%; } p.note { color: #57606a; font-size: .85rem; } td.better { font-weight: 600; }
-"""
+from jinja2 import Environment, PackageLoader, Template
+from markdown_it import MarkdownIt
+from markupsafe import Markup
 
 
 class HtmlPage:
     """A page that grows from top to bottom; `text` gives the finished file."""
 
-    def __init__(self, title: str) -> None:
-        """Start a page."""
-        self._title, self._parts = title, [f"<h1>{html.escape(title)}</h1>"]
+    def __init__(self, title: str, badge: str = "") -> None:
+        """Start a page; a badge is a word above the title, such as a verdict's status."""
+        self._title, self._badge = title, badge
+        self._parts: list[tuple[str, dict[str, Any]]] = []
 
     def heading(self, words: str, level: int = 2) -> None:
         """Add a heading."""
-        self._parts.append(f"<h{level}>{html.escape(words)}</h{level}>")
+        self._add("heading", words=words, level=level)
 
     def paragraph(self, words: str, note: bool = False) -> None:
         """Add a paragraph; a note is set smaller."""
-        self._parts.append(f"<p{' class=note' if note else ''}>{html.escape(words)}</p>")
+        self._add("paragraph", words=words, note=note)
 
-    def table(self, heads: list[str], rows: list[list[str]], bold: Callable[[int, int], bool] | None = None) -> None:
-        """Add a table of cells as text.
+    def table(
+        self,
+        heads: Sequence[str],
+        rows: Sequence[Sequence[Any]],
+        bold: Callable[[int, int], bool] = lambda row, column: False,
+        words: bool = False,
+    ) -> None:
+        """Add a table.
 
         Args:
             heads: Titles of the columns.
             rows: Rows of as many cells.
             bold: Called with row and column; says which cells are set bold.
+            words: Cells are words, set to the left; else numbers, set to the right.
         """
-        lines = ["<table>", _row("th", heads)]
-        for number, cells in enumerate(rows):
-            marks = [" class=better" if bold and bold(number, k) else "" for k in range(len(cells))]
-            lines.append(_row("td", cells, marks))
-        self._parts.append("\n".join([*lines, "</table>"]))
+        marked = [[(cell, bold(number, k)) for k, cell in enumerate(row)] for number, row in enumerate(rows)]
+        self._add("table", heads=heads, rows=marked, words=words)
+
+    def items(self, lines: Sequence[str], note: bool = False) -> None:
+        """Add a list."""
+        self._add("items", lines=lines, note=note)
+
+    def tiles(self, tiles: Sequence[tuple[str, str]]) -> None:
+        """Add figures in large print, each a name and a value."""
+        self._add("tiles", tiles=tiles)
 
     def markdown(self, text: str) -> None:
-        """Add a page of our own Markdown: headings, paragraphs, list items and tables, nothing else."""
-        table: list[list[str]] = []
-        for line in [*text.splitlines(), ""]:
-            if line.startswith("|"):
-                cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
-                if not all(re.fullmatch(r":?-+:?", cell) for cell in cells):
-                    table.append([cell.replace("`", "") for cell in cells])
-                continue
-            if table:
-                self.table(table[0], table[1:])
-                table = []
-            if line.startswith("#"):
-                level = len(line) - len(line.lstrip("#"))
-                self.heading(line.lstrip("# ").replace("`", ""), min(level + 1, 6))
-            elif line.strip():
-                self.paragraph(line.removeprefix("- ").replace("`", ""))
+        """Add Markdown, its headings one level lower."""
+        converter = MarkdownIt("js-default")
+        tokens = converter.parse(text)
+        for token in tokens:
+            if token.type.startswith("heading"):
+                token.tag = f"h{min(int(token.tag[1:]) + 1, 6)}"
+        self._add("html", html=Markup(converter.renderer.render(tokens, converter.options, {})))
 
     def picture(self, draw: Callable[[BinaryIO], object], words: str) -> None:
         """Add a PNG that ``draw`` writes to a stream; ``words`` say what it shows."""
         stream = BytesIO()
         draw(stream)
-        data = base64.b64encode(stream.getvalue()).decode("ascii")
-        if data:
-            told = html.escape(words, quote=True)
-            self._parts.append(f'<figure><img alt="{told}" src="data:image/png;base64,{data}"></figure>')
+        if stream.getvalue():
+            self._add("picture", words=words, data=base64.b64encode(stream.getvalue()).decode("ascii"))
             self.paragraph(words, note=True)
+
+    def _add(self, kind: str, **part: Any) -> None:
+        self._parts.append((kind, part))
 
     @property
     def text(self) -> str:
         """The file."""
-        head = f'<meta charset="utf-8"><title>{html.escape(self._title)}</title><style>{STYLE}</style>'
-        body = "\n".join(self._parts)
-        return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
+        return _template().render(title=self._title, badge=self._badge, parts=self._parts)
 
 
-def _row(kind: str, cells: list[str], marks: list[str] | None = None) -> str:
-    inside = (
-        f"<{kind}{mark}>{html.escape(cell)}</{kind}>"
-        for cell, mark in zip(cells, marks or [""] * len(cells), strict=True)
-    )
-    return f"<tr>{''.join(inside)}</tr>"
+@cache
+def _template() -> Template:
+    sources = PackageLoader("training", "reports")
+    environment = Environment(loader=sources, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return environment.get_template("page.html.j2")
