@@ -106,6 +106,30 @@ def test_what_has_changed_is_evaluated_once_an_iteration(model, monkeypatch):
     assert mixed and most == 1
 
 
+def test_an_observer_is_told_every_equilibrium_from_the_touch_on(model):
+    """With the history that it was found with; depths between those wanted are told, too."""
+    told, placed = [], [model.skin.placed(k, PressRequest(Sphere(1.5), 0.3 * k, 0.0, 0.0, (0.4,))) for k in range(2)]
+    batch = model.skin.batch(PRESSES[0], 2)
+    found = list(batch.run(placed, lambda new: [new.u[..., k] for k in range(len(new.column))], told.append))
+    touch, *others = told
+    assert touch.u.shape[2] == 2 and not touch.u.any() and not touch.histories[0].multiplier.any()
+    assert sum(at.u.shape[2] for at in others) > len(found) == 2
+    [first, *_, last] = others
+    assert torch.isfinite(first.histories[0].gap).all() and last.histories[0].multiplier.any()
+    assert any(torch.equal(last.u[..., -1], u) for _, _, u in found)
+
+
+def test_what_presses_share_does_not_change_while_they_are_solved(model):
+    """Mesh, body, surfaces and tangent hold the same objects before and after."""
+    newton = model.skin.newton(PRESSES[0])
+    shared = [model.skin.mesh, model.skin.body, newton.tangent, *newton.surfaces, newton]
+    before = [dict(vars(one)) for one in shared]
+    batch = Batch(newton, model.skin.conditions.pressed_by(PRESSES[0].indenter), len(model.mesh.nodes), 1, 0.0)
+    [_] = batch.run([model.skin.placed(0, PRESSES[1])], model.skin.reader.states)
+    for one, kept in zip(shared, before, strict=True):
+        assert vars(one).keys() == kept.keys() and all(vars(one)[name] is kept[name] for name in kept)
+
+
 def test_displacements_are_left_out_where_not_wanted(model):
     [(_, _, state)] = model.states_many(PRESSES[1:2], with_displacement=False)
     assert state.displacement.size == 0 and state.force[2] > 0

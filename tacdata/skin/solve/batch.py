@@ -184,7 +184,6 @@ class Batch:
 
     def _judge(self, now: Residual) -> list[str]:
         figures = torch.stack([now.relative, now.penetration, now.mean_penetration, now.volume]).cpu().numpy()
-        self._figures = figures
         settings = self._newton.settings
         rows = figures.T.tolist()
         return [
@@ -218,7 +217,7 @@ class Batch:
         wanted = [column for column, path in paths.items() if path.found()]
         if wanted:
             columns = torch.as_tensor(wanted, device=at.u.device)
-            relative, penetration = self._figures[0, wanted], self._figures[1, wanted]
+            relative, penetration = torch.stack([now.relative, now.penetration])[:, columns].cpu().numpy()
             spent = [self._press(column).path.spent for column in wanted]
             states = collect(
                 Equilibria(columns, at.u[:, :, columns], relative, penetration, spent, now.contacts)
