@@ -3,8 +3,8 @@
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """The isochoric invariants I1bar = J^(-2/3) I1 and I2bar = J^(-4/3) I2, their derivatives and second derivatives.
 
-Notation as in `kinematics.py`. With C = F^T F = c (I + D), D traceless, both invariants follow from D alone:
-det(C)/c^3 = 1 - q with q = D:D/2 - det D, so that I1bar = 3 (1 - q)^(-1/3) without a difference of numbers near 3.
+Notation as in `kinematics.py`. With C = F^T F = c (I + D), D traceless, both invariants follow from D alone. With
+q = D:D/2 - det D it holds that det(C)/c^3 = 1 - q. So I1bar = 3 (1 - q)^(-1/3), without a difference of numbers near 3.
 """
 
 from functools import cache

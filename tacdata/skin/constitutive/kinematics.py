@@ -30,8 +30,11 @@ def parameters(real: type) -> type:
 def volume(real: type) -> SimpleNamespace:
     """Return Warp functions of the volume change.
 
-    ``cofactor_change(H)`` = K; ``change(H, K)`` = j, NaN where J <= 0, so that every law is NaN for a state turned
-    inside out; ``cross(A, B)`` = A x B; ``scale(j)`` = J^(-2/3); ``shifted(A, d)`` = A + d I.
+    - ``cofactor_change(H)`` = K
+    - ``change(H, K)`` = j, NaN where J <= 0: so every law is NaN for a state turned inside out
+    - ``cross(A, B)`` = A x B
+    - ``scale(j)`` = J^(-2/3)
+    - ``shifted(A, d)`` = A + d I
     """
     mat33 = matrix(real)
     nan = wp.constant(real(float("nan")))

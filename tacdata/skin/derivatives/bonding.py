@@ -3,7 +3,8 @@
 A bond of compliance c [mm/MPa] lets a held face move by u = -c t, with t the traction that it exerts on the skin. A
 film of glue of thickness h and stiffness M has c = h / M (Goland and Reissner, J. Appl. Mech. 11 (1944) A17). Held
 faces are the limit c = 0, and du/dc there is -t. It is found from the nodal reactions: both do the same work on the
-faces' shape functions. """
+faces' shape functions.
+"""
 
 from __future__ import annotations
 

@@ -3,15 +3,15 @@
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Volume change averaged at the corners of the elements, so that quadratic tetrahedra do not lock.
 
-Four points an element ask for as many volumes as the nodes have motions to give: near incompressibility the mesh is too
-stiff. Here the part kappa/2 (J - 1)^2 of the law is taken not of J - 1 at the points but of its projection onto
-functions that are linear in every element and continuous: there is one volume to keep for each corner. That is Taylor
-and Hood's mixed element (1973), Computers & Fluids 1, 73, with its pressure eliminated:
+Four points an element constrain as many volumes as the nodes have motions to give. Near incompressibility the mesh is
+then too stiff. Here the part kappa/2 (J - 1)^2 of the law is taken of a projection of J - 1: onto functions that are
+continuous and linear in every element. So there is one volume to keep for each corner. That is Taylor and Hood's mixed
+element (Computers & Fluids 1 (1973) 73) with its pressure eliminated:
 
-    energy = sum_q w (W - kappa/2 j^2) + kappa/2 b^T Q b,   b_a = sum_q w N_a j,   j = J - 1,
+    energy = sum_q w (W - kappa/2 j^2) + kappa/2 b^T Q b,   b_a = sum_q w N_a j,   j = J - 1
 
-with Q an approximate inverse of the mass matrix M of the N_a: the lumped mass D, corrected by Richardson's iteration,
-Q = sum_i (1 - D^-1 M)^i D^-1, symmetric and positive at any number of corrections.
+Q is an approximate inverse of the mass matrix M of the N_a: the lumped mass D, corrected by Richardson's iteration,
+Q = sum_i (1 - D^-1 M)^i D^-1. It is symmetric and positive at any number of corrections.
 """
 
 from functools import cache

@@ -3,7 +3,7 @@
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Internal forces of the skin and their linearization, matrix-free, for a batch of states of one mesh.
 
-Fields are laid out (nodes, 3, batch), the batch innermost: neighbouring threads of a GPU then read neighbouring
+Fields are laid out (nodes, 3, batch), the batch innermost. Neighbouring threads of a GPU then read neighbouring
 numbers, and a field is the right-hand side of a matrix product as it stands.
 """
 

@@ -1,7 +1,7 @@
 """Members in work by conjugate gradients on a GPU, in tensors that stay where they are.
 
-As they stay, an iteration can be recorded once as a graph and then be replayed: launching its two dozen kernels one by
-one takes the host longer than the GPU takes to run them.
+So an iteration can be recorded once as a CUDA graph and then be replayed. Launching its two dozen kernels one by one
+takes the host longer than the GPU takes to run them.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Many small symmetric positive definite matrices inverted at once on a GPU, each by one block of threads.
 
-A matrix stays in the registers of its block's 256 threads, eight rows by eight columns each; by sweeps (Goodnight 1979,
-The American Statistician 33, 149) every step needs one row of it, which goes through shared memory. Libraries' batched
-factorizations and triangular solves of this size take some fifty times as long.
+A matrix stays in the registers of its block's 256 threads, eight rows by eight columns each. Every step of a sweep
+(Goodnight, The American Statistician 33 (1979) 149) needs one row of it, which goes through shared memory. Libraries'
+batched factorizations and triangular solves of this size take some fifty times as long.
 """
 
 from functools import cache

@@ -4,10 +4,12 @@
 """The Warp kernel that finds the height of deformed quadratic triangles above sample points.
 
 One thread takes one triangle of one state. Seen from above, a quadratic triangle is the map
-x(xi, eta) = a + b xi + c eta + d xi^2 + e xi eta + f eta^2; for every sample under its Bezier hull Newton's method
-solves x(xi, eta) = sample, and the greatest height wins (a z-buffer), so of several sheets the uppermost is kept.
-A triangle whose Jacobian determinant keeps its sign holds a sample at most once; where it does not, or bends strongly,
-the search starts from 16 places.
+
+    x(xi, eta) = a + b xi + c eta + d xi^2 + e xi eta + f eta^2
+
+For every sample under its Bezier hull, Newton's method solves x(xi, eta) = sample. The greatest height wins (a
+z-buffer), so that of several sheets the uppermost is kept. A triangle whose Jacobian determinant keeps its sign holds a
+sample at most once. Where it does not, or where the triangle bends strongly, the search starts from 16 places.
 """
 
 from __future__ import annotations
