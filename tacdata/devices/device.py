@@ -18,15 +18,19 @@ import numpy as np
 
 from tacdata import registry
 from tacdata.clock import Clock
-from tacdata.errors import UsageError
+from tacdata.errors import DeviceError, UsageError
 from tacdata.wire.delivered import CncStatus, StreamCounts, TaxelFrame
 
 ROOM, BASE = "tacdata.devices", "device"
 
 __all__ = [
-    "BASE", "ROOM", "Camera", "CncStatus", "Device", "ImageFrame", "Motion", "MotionController", "StreamCounts",
-    "TaxelBoard", "TaxelFrame", "create",
+    "BASE", "ROOM", "Camera", "CncStatus", "Device", "ImageFrame", "Motion", "MotionController", "StandsStill",
+    "StreamCounts", "TaxelBoard", "TaxelFrame", "create",
 ]  # fmt: skip
+
+
+class StandsStill(DeviceError):
+    """A machine that has come to rest, and whose motion cannot be abandoned."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.clock import Clock
-from tacdata.devices.device import CncStatus, Motion, MotionController
+from tacdata.devices.device import CncStatus, Motion, MotionController, StandsStill
 from tacdata.errors import DeviceError, UsageError
 from tacdata.wire.grbl.lines import BRAKING, MOVING, OPENED_AGAIN
 from tacdata.wire.grbl.link import GrblLink
@@ -213,13 +213,17 @@ class Grbl(MotionController):
         link = self._opened()
         self._target, self._ends_ns = None, 0
         status = self._rest(link)
+        stands = "stands at (" + ", ".join(f"{value:.2f}" for value in status.position) + ") mm"
         if link.pendant:
-            raise DeviceError(
-                "a pendant has control of the machine", "one master",
+            raise StandsStill(
+                f"a pendant has control of the machine, which {stands}", "one master",
                 "give control back at the pendant and look where the tip stands",
             )  # fmt: skip
         if status.state.startswith("Door") and status.state not in OPENED_AGAIN:
-            raise DeviceError("the safety door is open", "a closed door", "close it; --resume lifts the tip first")
+            raise StandsStill(
+                f"the safety door is open; the machine {stands}", "a closed door",
+                "close it; the next start lifts the tip first",
+            )  # fmt: skip
         link.soft_reset(ANSWER)
         link.rearm()
         link.command("", ANSWER)  # after refusing a line, grblHAL refuses every line until an empty one
@@ -264,8 +268,7 @@ class Grbl(MotionController):
         self._ends_ns = max(self._ends_ns, self.clock.now_ns()) + round(seconds * 1e9)
 
     def _duration(self, position: np.ndarray, speed: float) -> float:
-        """Return the longest duration of a move from where the queued ones end [s]: no axis faster than its own limits.
-        """
+        """Return the longest duration of a move from where the queued ones end [s], within the axis limits."""
         last = self._opened().last
         start = self._target if self._target is not None else last.position if last else position
         length = float(np.linalg.norm(position - start))

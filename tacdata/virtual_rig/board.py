@@ -78,6 +78,11 @@ class VirtualBoard:
             self._thread.join(timeout=2.0)
         self.port.close()
 
+    def inject_readings(self, change: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Fault: from now on the board sends ``change(readings)`` [counts], shape (channels,)."""
+        read = self._read
+        self._read = lambda sampled_ns: change(read(sampled_ns))
+
     def _run(self) -> None:
         while not self._stopped.is_set():
             now = self.clock.now_ns()

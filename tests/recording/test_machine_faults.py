@@ -32,7 +32,7 @@ def virtual(tmp_path):
 def recorder(virtual, out, **options):
     rig = read_rig(virtual.path)
     return Recorder(
-        rig, SENSOR, plan(2), out,
+        rig, SENSOR, options.pop("plan", plan(2)), out,
         mount=lambda press: mount(rig.document, press.indenter.document, press.yaw), **options,
     )  # fmt: skip
 
@@ -117,9 +117,9 @@ def test_a_pendant_that_takes_over_leaves_the_tip_and_says_so(virtual, tmp_path)
     on_the_skin(virtual, virtual.controller.inject_pendant)
     with pytest.raises(DeviceError, match="pendant has taken control") as raised:
         recorder(virtual, out).run(lambda summary: True)
-    assert "the indenter was not lifted (a pendant has control of the machine); free it by hand" in (
-        "\n".join(raised.value.__notes__)
-    )
+    last = "\n".join(raised.value.__notes__)
+    assert "motion: stopped (a pendant has control of the machine, which stands at" in last
+    assert re.search(r"tip:    the indenter was not lifted \(a pendant .*\); free it by hand", last)
     assert any("not lifted" in note for note in broken_off(out))
 
 
@@ -219,3 +219,40 @@ def test_a_machine_at_its_power_on_zero_is_not_believed_on_resuming(virtual, tmp
     machine.brown_out(virtual.clock.now_ns())
     with pytest.raises(DeviceError, match=r"says \(0, 0, 0\) mm, as one does that has just been switched on"):
         recorder(virtual, out, resume=True).run(lambda summary: True)
+
+
+def frozen():
+    kept = []
+
+    def change(readings):
+        kept.append(readings)
+        return kept[0]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (frozen, "no channel has changed for .* the board repeats one frame"),
+        (lambda: lambda readings: np.full(24, 65535.0), "all 24 channels have read 65535 counts, their limit"),
+        (lambda: lambda readings: np.zeros(24), "all 24 channels have read 0 counts, their limit"),
+    ],
+    ids=["frozen", "saturated", "dead"],
+)
+def test_readings_that_cannot_be_stop_the_press_within_two_seconds(virtual, tmp_path, change, words):
+    out = tmp_path / "session"
+    begun = []
+
+    def break_board():
+        virtual.board.inject_readings(change())
+        begun.append(virtual.clock.now_ns())
+
+    long = plan(2, hold=20.0)
+    on_the_skin(virtual, break_board)
+    with pytest.raises(DeviceError, match=words):
+        recorder(virtual, out, plan=long).run(lambda summary: True)
+    assert place(virtual)[2] == pytest.approx(CLEARANCE, abs=0.01)
+    counts = read_recording(file_names.unfinished(out)[0]).episode.taxels
+    after = (counts.arrival_ns[-1] - begun[0]) * 1e-9
+    assert after < 20.0, "long before the hold would have ended: the rest is this machine's load, ten times for the rig"

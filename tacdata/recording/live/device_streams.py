@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
-from tacdata.devices.device import Camera, ImageFrame, StreamCounts, TaxelBoard
+from tacdata.devices.device import Camera, ImageFrame, StreamCounts, TaxelBoard, TaxelFrame
 from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.polled_clock import PolledClock
@@ -78,6 +78,9 @@ class DeviceStreams(ABC):
     @abstractmethod
     def _delivered(self, name: str, count: int) -> None:
         """Called when a stream has delivered ``count`` frames, images or reports."""
+
+    def _read(self, stream: str, frames: list[TaxelFrame]) -> None:  # noqa: B027 - most have no opinion
+        """Look at the frames of a board, which are stored already; may raise."""
 
     def __enter__(self) -> DeviceStreams:
         """Start the threads."""
@@ -170,6 +173,7 @@ class DeviceStreams(ABC):
                         self._sink.taxels(frame, sample_ns, name)
                 if self._feed and frames:
                     self._feed.taxels(frames[-1].arrival_ns, frames[-1].counts)
+            self._read(stream, frames)
             return len(frames)
 
         return read

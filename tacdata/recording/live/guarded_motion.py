@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 from tacdata.clock import Clock
-from tacdata.devices.device import CncStatus, MotionController
+from tacdata.devices.device import CncStatus, MotionController, StandsStill
 from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.interruption import Interruption
@@ -25,6 +25,8 @@ MARGIN = 15.0
 LETTING_GO = 10.0
 """Time allowed for a stopped motion's thread to end [s of real time]."""
 
+REASON = 1.0
+"""How long a stream that stopped the motion may take to give its reason [s of real time]."""
 STALL = 3.0
 """Time that this computer may stand still while the guide moves [s of real time]: suspended, or a closed lid."""
 
@@ -40,7 +42,7 @@ class GuardedMotion:
         self._why = "nothing was stopped"
         self._path: AllowedPath | None = None
         self._at: Position | None = None  # where the last path ended
-        self._lifted = ""
+        self._lifted, self._still = "", False
 
     def off_path(self, status: CncStatus) -> DeviceError | None:
         """Return what is wrong with where a report says the guide is, by the moves that were sent; or None."""
@@ -82,8 +84,9 @@ class GuardedMotion:
                 self._interruption.check()
                 if streams.fault:
                     break
-            if failure and streams.fault is None:
-                time.sleep(WATCH)  # a stream that stopped the motion is about to give the reason
+            end = time.monotonic() + (REASON if self._halted.is_set() else WATCH)
+            while failure and streams.fault is None and time.monotonic() < end:
+                time.sleep(WATCH / 2)  # a stream that stopped the motion is about to give the reason
             if streams.fault or failure:
                 raise streams.fault or failure[0]
         except BaseException:
@@ -104,6 +107,7 @@ class GuardedMotion:
     def _let_go(self, work: threading.Thread) -> None:
         """After a stop: wait until the motion's thread sends nothing more, then empty the controller's queue."""
         self._rest, self._why, self._lifted = None, "interrupted while it was being stopped", ""
+        self._still = False
         work.join(LETTING_GO)
         if work.is_alive():
             self._why = "the motion's thread does not end"
@@ -112,7 +116,7 @@ class GuardedMotion:
         try:
             self._rest = self._cnc.abandon()
         except TacdataError as error:
-            self._why = error.given
+            self._why, self._still = error.given, isinstance(error, StandsStill)
         else:
             self._allowed.stand(self._rest, self._clock.now_ns())
 
@@ -176,6 +180,8 @@ class GuardedMotion:
             return (f"motion: the machine moved while homing{f', and {lost}: its position is lost' if lost else ''}",)
         if self._lifted or self._halted.is_set():
             tip = self._lifted or "the indenter was not lifted; free it by hand"
+            if self._still:
+                return f"motion: stopped ({self._why})", f"tip:    {tip}"
             if self._rest is None:
                 return (f"motion: NOT KNOWN to have stopped ({self._why}); if it moves, press the emergency stop",
                         f"tip:    {tip}")  # fmt: skip

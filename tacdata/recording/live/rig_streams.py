@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.devices.device import CncStatus
+from tacdata.devices.device import CncStatus, TaxelFrame
 from tacdata.errors import DeviceError, TacdataError
+from tacdata.recording.check.channel_health import reading_limits
 from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.clocks.polled_clock import PolledClock, polled_clock
 from tacdata.recording.live.detection_process import Detect
 from tacdata.recording.live.device_streams import BOARD, POLL, DeviceStreams
 from tacdata.recording.live.live_feed import Watch
+from tacdata.recording.live.reading_health import ReadingHealth
 from tacdata.recording.live.rig_devices import RigDevices
 
 TRIPS = 4096
@@ -56,6 +58,7 @@ class RigStreams(DeviceStreams):
         """Taxel frames received since the start."""
         self.position: tuple[float, float, float] | None = None
         """Latest reported machine position [mm]."""
+        self._health = ReadingHealth(reading_limits(devices.board.describe()))
         self._work["motion controller"] = self._read_status
 
     def __enter__(self) -> RigStreams:
@@ -88,6 +91,15 @@ class RigStreams(DeviceStreams):
     def _delivered(self, name: str, count: int) -> None:
         if name == BOARD:
             self.frames += count
+
+    def _read(self, stream: str, frames: list[TaxelFrame]) -> None:
+        for frame in frames:
+            if words := self._health.take(frame.arrival_ns, frame.counts):
+                raise DeviceError(
+                    f"{stream}: {words}", "readings that live",
+                    "check the board's supply, its ribbon cable and firmware, then start again; a session goes on "
+                    "with --resume",
+                )  # fmt: skip
 
     def _silent(self, name: str) -> None:
         raise DeviceError(

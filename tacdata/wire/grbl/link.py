@@ -125,11 +125,11 @@ class GrblLink:
 
     def hold(self) -> None:
         """Send ``!``; until `rearm` no line goes out, and everyone who waits for an answer gets an error."""
+        self._held = True  # first: a report of it may come before this thread goes on
         try:
             self._write(b"!")
         finally:
             with self._changed:
-                self._held = True
                 self._changed.notify_all()
 
     def rearm(self) -> None:

@@ -1,0 +1,51 @@
+"""Readings that cannot be, and those that may: told apart within two seconds at any rate."""
+
+import numpy as np
+import pytest
+
+from tacdata.recording.live.reading_health import ReadingHealth
+
+LIMITS = (0.0, 65535.0)
+
+
+def told_after(frames, rate):
+    """Return when something is said [s], or None."""
+    health = ReadingHealth(LIMITS)
+    for index, counts in enumerate(frames):
+        if health.take(round(index / rate * 1e9), np.asarray(counts, float)):
+            return index / rate
+    return None
+
+
+def live(seconds, rate, step=1.0, noise=5.0, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.round((9000 + rng.normal(0, noise, (round(seconds * rate), 24))) / step) * step
+
+
+@pytest.mark.parametrize("rate", [30, 100, 1000])
+@pytest.mark.parametrize("what", ["frozen", "high", "low"])
+def test_told_within_two_seconds(rate, what):
+    before = live(4, rate)
+    last = {"frozen": before[-1], "high": np.full(24, 65535.0), "low": np.zeros(24)}[what]
+    told = told_after([*before, *[last] * (5 * rate)], rate)
+    assert told is not None
+    assert 4 < told < 6
+
+
+@pytest.mark.parametrize("noise", [5.0, 0.5, 0.2])
+def test_a_live_board_is_never_accused(noise):
+    assert told_after(live(120, 100, noise=noise), 100) is None
+
+
+def test_coarse_readings_that_rest_by_nature_are_not_called_frozen():
+    assert told_after(live(300, 30, step=64.0, noise=12.0, seed=3), 30) is None
+
+
+def test_a_board_that_never_changed_is_judged_by_the_check_not_here():
+    assert told_after([np.full(24, 9000.0)] * 3000, 30) is None
+
+
+def test_one_channel_at_its_limit_is_no_reason_to_stop():
+    frames = live(30, 30)
+    frames[100:, 3] = 65535.0
+    assert told_after(frames, 30) is None
