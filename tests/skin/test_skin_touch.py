@@ -17,7 +17,7 @@ from tacdata.indenters.ring import Ring
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor.sensor import ContactProperties, Skin
 from tacdata.skin.contact import first_touch as touching
-from tacdata.skin.contact.first_touch import reach, rise, room, rotation, touch
+from tacdata.skin.contact.first_touch import reach, rise, rotation, thickness_at, touch
 from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
@@ -100,7 +100,7 @@ def test_a_press_on_a_curved_pad_starts_at_its_local_height():
     height = 2.0 - 10.0 + np.sqrt(10.0**2 - 2.0**2)
     found = touch(CURVED, OuterFace(box_mesh(slab_sensor(size=8.0), 4, 4, 1)), request)
     assert found == pytest.approx([2.0, 0.0, height], abs=1e-12)
-    assert room(CURVED, request) == pytest.approx(height)
+    assert thickness_at(CURVED, request) == pytest.approx(height)
     # The face falls away towards the rim and rises towards the middle.
     flat = replace(CURVED, skin=Skin(8.0, 8.0, 2.0, 0.0))
     assert reach(flat, request) == pytest.approx(Sphere(2.0).footprint(0.3, 0.0))

@@ -95,7 +95,7 @@ def reach(sensor: Sensor, request: PressRequest) -> tuple[float, float]:
     return float(np.abs(place[0, within]).max()), float(np.abs(place[1, within]).max())
 
 
-def room(sensor: Sensor, request: PressRequest) -> float:
+def thickness_at(sensor: Sensor, request: PressRequest) -> float:
     """Return the thickness of the skin under (x, y) [mm]: what a depth must stay below."""
     skin = sensor.skin
     height = float(skin.outer_height(request.x, request.y))

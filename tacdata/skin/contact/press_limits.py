@@ -6,7 +6,7 @@ import numpy as np
 
 from tacdata.errors import SolveError
 from tacdata.sensor import Sensor
-from tacdata.skin.contact.first_touch import reach, room
+from tacdata.skin.contact.first_touch import reach, thickness_at
 from tacdata.skin.press import PressRequest
 
 _STEEPEST = 30.0
@@ -37,7 +37,7 @@ def check_press(request: PressRequest, sensor: Sensor) -> None:
             f"press at ({request.x:g}, {request.y:g}) mm, the skin spans {skin.size_x:g} x {skin.size_y:g} mm",
             "a place on the skin", "move the press",
         )
-    thick = room(sensor, request)
+    thick = thickness_at(sensor, request)
     if max(request.depths) >= thick:
         raise SolveError(
             f"depth {max(request.depths):g} mm in a skin {thick:.3g} mm thick at ({request.x:g}, {request.y:g}) mm",
