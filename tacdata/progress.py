@@ -44,6 +44,7 @@ def console() -> Console:
 
 def bars(*columns: str | ProgressColumn, **options: Any) -> Progress:
     """Return rich's progress bars, with its arguments."""
+    from rich.console import Console
     from rich.progress import Progress
 
-    return Progress(*columns, disable=_quiet, **options)
+    return Progress(*columns, console=Console(quiet=True) if _quiet else None, disable=_quiet, **options)

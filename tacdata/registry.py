@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import pkgutil
+from importlib.util import find_spec
 from types import ModuleType
 
 from tacdata.errors import UsageError
@@ -22,8 +23,9 @@ def names(room: str, base: str) -> list[str]:
         >>> registry.names("tacdata.indenters", "indenter")[:3]
         ['cone', 'cylinder', 'ellipsoid']
     """
-    package = importlib.import_module(room)
-    return sorted(m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in (base, "__init__"))
+    spec = find_spec(room)  # the room itself may need a package that is not installed
+    places = spec.submodule_search_locations if spec else None
+    return sorted(m.name for m in pkgutil.iter_modules(places) if m.name not in (base, "__init__")) if places else []
 
 
 def folders(room: str) -> tuple[str, ...]:

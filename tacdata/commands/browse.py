@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from viewers.browse.episode_list import EpisodeList
@@ -34,7 +35,7 @@ def run(
     web: Annotated[
         bool, typer.Option("--web", help="A page on this machine: list, viewer, step from worst to next.")
     ] = False,
-) -> None:
+) -> Result:
     """List, filter and sort episodes; flag bad ones, which training then leaves out; step through them in a browser."""
     from viewers.browse.flagging import flag_episode, unflag_episode
     from viewers.browse.list_sources import episodes_at
@@ -45,18 +46,19 @@ def run(
             print(f"set aside: {flag_episode(whole, flag, reason)}")
         if unflag is not None:
             print(f"taken back: {unflag_episode(whole, unflag)}")
-        return
+        return Result({"set_aside": flag, "taken_back": unflag})
     chosen = episodes_at(path, labels, predictions)
     for condition in where or ():
         chosen = chosen.where(condition)
     chosen = chosen.by(sort)
     if web:
         _serve(chosen, labels, predictions)
-        return
+        return Result(None)
     _print(chosen, most, predictions is not None)
     if chosen.entries:
         more = f" --predictions {predictions}" if predictions else ""
-        print(f"next: tacdata view {path} --episode {chosen.entries[0].number}{more}")
+        say(f"next: tacdata view {path} --episode {chosen.entries[0].number}{more}")
+    return Result({"episodes": chosen.entries, "remarks": chosen.remarks})
 
 
 def _print(chosen: EpisodeList, most: int, scored: bool) -> None:

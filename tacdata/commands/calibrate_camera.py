@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.tags.board import CharucoBoard
@@ -32,14 +33,15 @@ def run(
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT [px] asked of a live camera.")] = "1280x720",
     views: Annotated[int, typer.Option(min=8, max=200, help="Views wanted of a live camera or video.")] = 30,
     model: Annotated[str, typer.Option(help="auto, k1k2p1p2, k1k2p1p2k3 or rational.")] = "auto",
-) -> None:
+) -> Result:
     """Estimate a camera's intrinsics from images, a video or a live camera; --draw makes the board."""
     from tacdata.errors import UsageError
     from tacdata.tags.board import read_board
 
     if draw:
         shape = {"columns": columns, "rows": rows, "square": square, "marker": marker, "dictionary": dictionary}
-        return _draw(draw, board, shape, paper)
+        _draw(draw, board, shape, paper)
+        return Result({"board": board, "picture": draw})
     if source is None or out is None:
         raise UsageError("neither --draw nor --source with --out", "one of them", "see tacdata calibrate-camera --help")
     from tacdata.tags.calibration.intrinsics import MODELS
@@ -56,7 +58,7 @@ def run(
     return _calibrate(picker, pattern, source, model, out, picture)
 
 
-def _calibrate(picker: ViewPicker, board: CharucoBoard, source: str, model: str, out: Path, picture: Path) -> None:
+def _calibrate(picker: ViewPicker, board: CharucoBoard, source: str, model: str, out: Path, picture: Path) -> Result:
     import cv2
     import yaml
 
@@ -64,7 +66,7 @@ def _calibrate(picker: ViewPicker, board: CharucoBoard, source: str, model: str,
     from tacdata.tags.calibration.intrinsics import calibrate
     from tacdata.tags.calibration.picture import draw_calibration
 
-    print(f"{picker.seen} images, the board in {picker.with_board}, {len(picker.views)} views taken", flush=True)
+    say(f"{picker.seen} images, the board in {picker.with_board}, {len(picker.views)} views taken")
     picker.check_board()
     found = calibrate(picker.views, board, picker.size or (0, 0), model)
     now = datetime.now(UTC).isoformat(timespec="seconds")
@@ -86,8 +88,10 @@ def _calibrate(picker: ViewPicker, board: CharucoBoard, source: str, model: str,
         f"{found.model}; rms {found.rms:.3f} px over {kept} views, {found.held_out_rms:.3f} px on views held out; "
         f"corners in {found.coverage:.0%} of the image"
     )
-    print(f"written to {out} and {picture}\nnext: put this into the camera's entry of the rig file\n")
-    print(yaml.safe_dump({"intrinsics": found.intrinsics}, sort_keys=False, default_flow_style=None), end="")
+    print(f"written to {out} and {picture}")
+    say("next: put this into the camera's entry of the rig file\n")
+    say(yaml.safe_dump({"intrinsics": found.intrinsics}, sort_keys=False, default_flow_style=None).rstrip())
+    return Result(document)
 
 
 def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper: str) -> None:
@@ -111,7 +115,7 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
         sheet.save(target, dpi=(DPI, DPI))
     documents.write(board, wanted.document, "calibration_board")
     print(f"{target} is to be printed at 100 %; measure its squares and correct square and marker in {board}")
-    print(f"next: tacdata calibrate-camera --board {board} --source IMAGES --out camera.yaml")
+    say(f"next: tacdata calibrate-camera --board {board} --source IMAGES --out camera.yaml")
 
 
 def _look_through(source: Path, board: CharucoBoard, wanted: int) -> ViewPicker:
@@ -139,7 +143,7 @@ def _watch(source: str, board: CharucoBoard, size: str, wanted: int) -> ViewPick
         raise UsageError(f"size {size!r}", "WIDTHxHEIGHT, for example 1280x720", "correct --size")
     shape = {"width": int(parts[0]), "height": int(parts[1])}
     picker = ViewPicker(board)
-    print("Show the board to every part of the image, tilted to all sides, and hold it still. Ctrl-C ends.")
+    say("Show the board to every part of the image, tilted to all sides, and hold it still. Ctrl-C ends.")
     with OpencvCamera(Clock.start(), source, shape) as camera:
         try:
             while len(picker.views) < wanted:
@@ -148,7 +152,7 @@ def _watch(source: str, board: CharucoBoard, size: str, wanted: int) -> ViewPick
                 for image in images[-2:]:
                     if picker.take(image.image, f"image {image.sequence}"):
                         share = coverage_of(picker.views, (shape["width"], shape["height"]))
-                        print(f"  view {len(picker.views)} of {wanted}, {share:.0%} of the image", flush=True)
+                        say(f"  view {len(picker.views)} of {wanted}, {share:.0%} of the image")
         except KeyboardInterrupt:
             print()
     return picker

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.camera_world import CameraWorld
@@ -31,7 +32,7 @@ def run(
     ] = None,
     camera: Annotated[str, typer.Option(help="With --board: name of the camera.")] = "camera",
     frame: Annotated[str, typer.Option(help="With --board: name of the world.")] = "board",
-) -> None:
+) -> Result:
     """Find where a camera stands: by a robot that carries a tag cube (hand-eye), or by a board on the table."""
     import numpy as np
 
@@ -51,7 +52,8 @@ def run(
             "neither --pairs nor --board with --images and --calibration", "one of them",
             "see tacdata calibrate-world --help",
         )  # fmt: skip
-    documents.write(out, found.document(datetime.now(UTC).isoformat(timespec="seconds")), "camera_world")
+    document = found.document(datetime.now(UTC).isoformat(timespec="seconds"))
+    documents.write(out, document, "camera_world")
     x, y, z = found.matrix[:3, 3]
     place, turn = found.residual
     print(f"camera {found.camera} stands at {x:.4f}, {y:.4f}, {z:.4f} m in {found.frame!r} ({found.method})")
@@ -60,7 +62,9 @@ def run(
         print(f"it is known to {1000 * found.spread[0]:.2f} mm and {np.degrees(found.spread[1]):.3f} deg")
     for remark in found.remarks:
         print(f"note: {remark}")
-    print(f"written to {out}\nnext: put  world: {out.name}  into the camera's entry of the demo rig file")
+    print(f"written to {out}")
+    say(f"next: put  world: {out.name}  into the camera's entry of the demo rig file")
+    return Result(document)
 
 
 def _by_board(board: Path, images: Path, calibration: Path, camera: str, frame: str) -> CameraWorld:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
 
 ORDER = 42
 PANEL = PIPELINE
@@ -18,7 +18,7 @@ def run(
     out: Annotated[
         Path | None, typer.Option(help="New folder for card.md and coverage.png; else only printed.")
     ] = None,
-) -> None:
+) -> Result:
     """Say what is inside a dataset: sensor, indenters, coverage, model version, origin of the labels, known gaps."""
     from tacdata import documents
     from tacdata.dataset import card, coverage_picture
@@ -34,3 +34,4 @@ def run(
         documents.write_text(out / "card.md", text)
         coverage_picture.draw(out / card.PICTURE, found)
         print(f"written: {out / 'card.md'}, {card.PICTURE}")
+    return Result({"card": text})

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
+from tacdata.errors import Exit
+from tacdata.progress import say
+
+if TYPE_CHECKING:
+    from tacdata.recording.check.report import Report
 
 ORDER = 20
 PANEL = PIPELINE
@@ -18,21 +23,25 @@ def run(
     out: Annotated[
         Path | None, typer.Option(help="Folder for check.json and check.png; default: the session's.")
     ] = None,
-) -> None:
+) -> Result:
     """Check every stream for gaps, noise, stuck channels and missing tags; exit 0 if usable, 1 if not."""
+    report = checked(path, out or (path if path.is_dir() else path.parent))
+    if path.is_dir() and report.usable:
+        say(f"next: tacdata label {path}")
+    return Result(report.document, Exit.DONE if report.usable else Exit.UNFIT)
+
+
+def checked(path: Path, folder: Path) -> Report:
+    """Check a recording or session, say what was found, and leave it in a folder, with a picture."""
     from tacdata import documents
     from tacdata.recording.check.report import check
     from viewers.pictures.check import draw
 
     report = check(path)
-    folder = out or (path if path.is_dir() else path.parent)
     stem = "check" if path.is_dir() else f"{path.stem}.check"
     print(report.text, flush=True)  # whatever becomes of the files beside it
     documents.write(folder / f"{stem}.json", report.document, "check")
     if report.episodes:
         draw(report, folder / f"{stem}.png")
         print(f"picture: {folder / f'{stem}.png'}")
-    if not report.usable:
-        raise typer.Exit(1)
-    if path.is_dir():
-        print(f"next: tacdata label {path}")
+    return report

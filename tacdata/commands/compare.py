@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import UsageError
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def run(
     picture: Annotated[Path | None, typer.Option(help="Write one page (.png) instead of opening a window.")] = None,
     video: Annotated[Path | None, typer.Option(help="Write a film (.mp4 or .gif) instead of opening a window.")] = None,
     web: Annotated[bool, typer.Option("--web", help="Serve Rerun's web viewer on this machine.")] = False,
-) -> None:
+) -> Result:
     """Show two label versions, two networks, or models and measurement beside each other and as difference."""
     from viewers import comparison, showing
 
@@ -49,9 +49,9 @@ def run(
         scene = comparison.predictions_at(path, predictions, episode)
     else:
         scene = _models(path, spec or [], episode)
-    said = (line for line in scene.summary.splitlines() if line.startswith("- "))
-    print("\n".join(line.removeprefix("- ").replace("**", "") for line in said))
+    print("\n".join(scene.found))
     showing.show(scene, output)
+    return Result({"compared": scene.title, "found": scene.found, "written": [f for f in (save, picture, video) if f]})
 
 
 def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata import progress
+from tacdata.commands.command import TOOLS, Result
 
 ORDER = 160
 PANEL = TOOLS
@@ -29,14 +30,12 @@ def run(
     fem: Annotated[
         bool, typer.Option("--fem", help="Start from finite elements: tacdata surrogate first, into OUT-base.")
     ] = False,
-) -> None:
+) -> Result:
     """Find where recordings and a model disagree, and name the missing effect, or say why not."""
-    from rich.console import Console
-
     from tacdata.discrepancy.model.spec import read_spec
     from tacdata.discrepancy.run import run as judge
 
-    console = Console(stderr=True)
+    console = progress.console()
     if fem:
         spec = _solved(recordings, spec, out)
     model = read_spec(spec)
@@ -45,6 +44,7 @@ def run(
     print("base: " + ("a response fitted to these recordings" if spec is None else str(spec)))
     print(written.text, end="")
     console.print(f"written: {written.folder}", markup=False, highlight=False, soft_wrap=True)
+    return Result(written.verdict)
 
 
 def _solved(recordings: list[Path], spec: Path | None, out: Path) -> Path:

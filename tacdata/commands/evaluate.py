@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata import progress
+from tacdata.commands.command import PIPELINE, Result
 
 ORDER = 60
 PANEL = PIPELINE
@@ -24,13 +25,11 @@ def run(
     ] = None,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
-) -> None:
+) -> Result:
     """Score a network on its test episodes (or on another dataset): table, JSON, picture, predictions.
 
     On the dataset that it was trained on only the test episodes count; another dataset counts as a whole.
     """
-    from rich.progress import Progress
-
     from tacdata.errors import UsageError
     from training.frames.data import read_frames
     from training.inference import checkpoint
@@ -45,7 +44,7 @@ def run(
     if dataset is None and not recorded.is_dir():
         raise UsageError(f"the dataset {recorded} of {network} is not there", "a dataset folder", "give --dataset")
     frames = read_frames(dataset or recorded)
-    with Progress(transient=True) as bar:
+    with progress.bars(transient=True) as bar:
         task = bar.add_task("predict", total=None)
         evaluation = evaluate(
             trained,
@@ -58,3 +57,4 @@ def run(
     print(markdown(evaluation.document))
     print(f"scores      {place.scores / report.JSON}, {report.SHEET}, {report.PICTURE}")
     print(f"predictions {place.predictions}")
+    return Result(evaluation.document)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
+from tacdata.errors import Exit
 
 if TYPE_CHECKING:
     from tacdata.replay.targets import FingertipTargets
@@ -32,7 +33,7 @@ def run(
     with_guesses: Annotated[
         bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
     ] = False,
-) -> None:
+) -> Result:
     """Write fingertip targets, direct or compensated by touch, in a format that a robot reads."""
     from tacdata.demonstrations.compensation import read_gains
     from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks
@@ -60,8 +61,9 @@ def run(
     for words in limits:
         print(f"note: {words}")
     print(f"written to {out} ({form}), poses in frame {episodes[0].frame!r}")
-    if limits and writer.needs_robot:
-        raise typer.Exit(1)
+    told = [{"recording": t.recording, "kind": t.kind, "targets": len(t.time_ns), "notes": _notes(t)} for t in episodes]
+    unfit = bool(limits) and writer.needs_robot
+    return Result({"targets": told, "limits": limits, "folder": out}, Exit.UNFIT if unfit else Exit.DONE)
 
 
 def _notes(targets: FingertipTargets) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
 
 ORDER = 163
 PANEL = TOOLS
@@ -19,7 +19,7 @@ def run(
     dataset: Annotated[
         Path | None, typer.Option(help="Compare on this dataset's readings instead of random ones.")
     ] = None,
-) -> None:
+) -> Result:
     """Write a network as ONNX, with normalization and clipping inside; kept only if it answers like torch."""
     import numpy as np
     import torch
@@ -40,3 +40,4 @@ def run(
     made = export(trained, out, readings)
     print(f"{made.path}: differs from torch by at most {made.difference:.1e} mm on {made.windows} windows")
     print(f"input windows (frames, {len(trained.network.offsets)}, {trained.sensor.taxels.count}) of tared counts")
+    return Result(made)

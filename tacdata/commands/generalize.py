@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +38,7 @@ def run(
     idle_share: Annotated[float, typer.Option(help="Share of the frames out of contact an epoch takes.")] = 1.0,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
-) -> None:
+) -> Result:
     """Hold out episodes, shapes, sites, depths, rates and specimens in turn; train, score, and report them together.
 
     A split that the dataset does not allow, for example by specimen where there is one, is named with the reason.
@@ -73,17 +74,16 @@ def run(
     for name, reason in impossible.items():
         print(f"split {name} is not possible: {reason}")
     print(f"report: {out / REPORT}")
+    scores = {run_name(o.settings): o.evaluation.document for o in outcomes if o.evaluation}
+    return Result({"runs": scores, "not_possible": impossible, "report": out / REPORT})
 
 
 def _announced(settings: TrainingSettings) -> Callable[[Progress], None]:
-    print(f"split {settings.split}, seed {settings.seed}:", flush=True)
+    say(f"split {settings.split}, seed {settings.seed}:")
 
     def show(progress: Progress) -> None:
         line = progress.finished
         if line and (line["epoch"] % 10 == 0 or line["epoch"] == progress.epochs):
-            print(
-                f"  epoch {line['epoch']} of {progress.epochs}, validation loss {line['validation_loss']:.5f}",
-                flush=True,
-            )
+            say(f"  epoch {line['epoch']} of {progress.epochs}, validation loss {line['validation_loss']:.5f}")
 
     return show

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.grasping.lessons import Lesson
@@ -28,7 +29,7 @@ def run(
     repeats: Annotated[int, typer.Option(min=1, max=200, help="Trials at each place with each strategy.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Decides every draw: oranges, fingertips, noise, weights.")] = 0,
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads of the training.")] = None,
-) -> None:
+) -> Result:
     """Grasp an orange at eight places by three strategies, through the skin model and a trained network.
 
     A network is trained on solved presses of other spheres and ellipsoids. Every trial goes through readings alone.
@@ -56,11 +57,12 @@ def run(
     picture.save(found, out / PICTURE)
     print("\n".join(result.lines(found)))
     print(f"written to {out / RESULT} and {out / PICTURE}")
+    return Result(found)
 
 
 def _told(done: int, of: int) -> None:
     if done % 20 == 0:
-        print(f"{done} of {of} trials", flush=True)
+        say(f"{done} of {of} trials")
 
 
 def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | None) -> Path:
@@ -78,10 +80,7 @@ def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | N
 
     def told(progress: Progress) -> None:
         if (line := progress.finished) is not None:
-            print(
-                f"epoch {progress.epoch} of {progress.epochs}: validation loss {line['validation_loss']:.5f}",
-                flush=True,
-            )
+            say(f"epoch {progress.epoch} of {progress.epochs}: validation loss {line['validation_loss']:.5f}")
 
     begun = (run / "last.safetensors").is_file()
     train(frames, TrainingSettings(seed=seed, epochs=epochs), run, "auto", begun, threads, told)

@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
+from tacdata.errors import Exit
+from tacdata.progress import say
 
 ORDER = 15
 PANEL = PIPELINE
@@ -22,31 +24,29 @@ def run(
     propose: Annotated[
         Path | None, typer.Option(help="Without --mapping: a mapping to start from, to be written here.")
     ] = None,
-) -> None:
+) -> Result:
     """Turn measured data of another rig into recordings that every other verb reads, by a mapping file."""
     from tacdata.errors import UsageError
     from tacdata.importing.imported_session import import_session
 
     if mapping is None:
-        _inspect(source, propose)
-        return
+        return _inspect(source, propose)
     if out is None or propose is not None:
         raise UsageError(
             "--mapping without --out" if out is None else "--mapping with --propose",
             "--mapping FILE --out SESSION, or --propose FILE alone", "add --out, or leave --propose out",
         )  # fmt: skip
-    made = import_session(source, mapping, out, progress=lambda text: print(text, flush=True))
+    made = import_session(source, mapping, out, progress=say)
     for note in made.notes:
         print(f"note: {note}")
     for text in made.refused:
         print(f"left out: {text}")
     print(f"{made.recordings} recordings in {made.folder}" + f", {len(made.refused)} left out" * bool(made.refused))
-    print(f"next: tacdata check {made.folder}")
-    if made.refused:
-        raise typer.Exit(3)
+    say(f"next: tacdata check {made.folder}")
+    return Result(made, Exit.FORMAT if made.refused else Exit.DONE)
 
 
-def _inspect(source: Path, propose: Path | None) -> None:
+def _inspect(source: Path, propose: Path | None) -> Result:
     from tacdata import documents
     from tacdata.errors import UsageError
     from tacdata.importing.proposal import described, proposed_mapping
@@ -55,9 +55,11 @@ def _inspect(source: Path, propose: Path | None) -> None:
         raise UsageError(f"{propose} exists", "a new file; nothing is overwritten", "choose another --propose")
     tables, text = described(source)
     print(text)
+    mapping = proposed_mapping(source, tables)
     if propose is None:
-        print(f"next: tacdata import {source} --propose mapping.yaml")
-        return
-    documents.write(propose, proposed_mapping(source, tables), "import_mapping")
+        say(f"next: tacdata import {source} --propose mapping.yaml")
+        return Result({"mapping": mapping})
+    documents.write(propose, mapping, "import_mapping")
     print(f"a mapping to start from is in {propose}; correct it by hand, its guesses are guesses")
-    print(f"next: tacdata import {source} --mapping {propose} --out SESSION")
+    say(f"next: tacdata import {source} --mapping {propose} --out SESSION")
+    return Result({"mapping": mapping, "written": propose})

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import SolveError, UsageError
+from tacdata.progress import bars, say
 
 if TYPE_CHECKING:
     from label_farm.labelling import LabellingSummary
@@ -50,7 +51,7 @@ def run(
         str, typer.Option(help="Solve on a Dask cluster: tcp://HOST:PORT of its scheduler, or `here` to start one.")
     ] = "",
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
-) -> None:
+) -> Result:
     """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
     from functools import partial
 
@@ -84,7 +85,7 @@ def run(
         engine=dask_engine(dask) if dask else Pool,
     )
     if hint := "" if dask else idle_gpus(device or ()):
-        print(hint)
+        say(hint)
     skin = read_sensor(sensor) if sensor else None
     labels = file_names.folder(session)
     paths = {int(path.stem[-6:]): path for path in recorded.episodes}
@@ -98,23 +99,16 @@ def run(
         finally:
             if flow:
                 flow.say()
-    _report(summary, labels, session)
+    return _report(summary, labels, session)
 
 
 class _Bars:
     """One bar a stage, with the time that remains; a line a press where there is no terminal."""
 
     def __enter__(self) -> _Bars:
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-            TimeElapsedColumn,
-            TimeRemainingColumn,
-        )
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-        self._progress = Progress(
+        self._progress = bars(
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
@@ -141,10 +135,10 @@ class _Bars:
         self._progress.update(self._tasks[stage], completed=done)
         if not sys.stdout.isatty() and stage == "solve" and done:
             left = (time.monotonic() - self._began) * (total - done) / done
-            print(f"  press {done} of {total} solved, about {left:.0f} s left", flush=True)
+            say(f"  press {done} of {total} solved, about {left:.0f} s left")
 
 
-def _report(summary: LabellingSummary, labels: Path, session: Path) -> None:
+def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:
     import statistics
 
     for remark in summary.remarks:
@@ -165,12 +159,14 @@ def _report(summary: LabellingSummary, labels: Path, session: Path) -> None:
     print(f"labels lie in {labels}")
     if summary.failed:
         count = len(summary.failed) + len(summary.written) + len(summary.current)
-        raise SolveError(
+        error = SolveError(
             f"{len(summary.failed)} of {count} episodes have no label",
             "a label for every episode",
             f"read {labels}/episode-*.failure.json; `tacdata label {session} --redo` tries again",
         )
-    print(f"next: tacdata pack {session} --out DATASET")
+        return Result(summary, error)
+    say(f"next: tacdata pack {session} --out DATASET")
+    return Result(summary)
 
 
 def _report_margins(summary: LabellingSummary) -> None:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.live.live_loop import LiveLoop
@@ -33,7 +34,7 @@ def run(
     view: Annotated[str | None, typer.Option(metavar="WHERE", help="Rerun: window, web, or a file (.rrd).")] = None,
     tare: Annotated[float, typer.Option(help="How long nothing touches the skin at the beginning [s].")] = 1.0,
     seconds: Annotated[float | None, typer.Option(help="End after so long [s]; default: Ctrl-C.")] = None,
-) -> None:
+) -> Result:
     """Show depth map and contact centre at the sensor's rate, with their latency; send them to a socket or Rerun."""
     from contextlib import ExitStack
 
@@ -54,7 +55,7 @@ def run(
         window_map(trained), offsets, source.sensor.map, stream_clock(source.board), round(tare * source.rate), causal,
         known.novelty if known else None,
     )  # fmt: skip
-    print(_mode(trained.network.name, max(offsets), causal, source.rate), flush=True)
+    say(_mode(trained.network.name, max(offsets), causal, source.rate))
     with ExitStack() as stack:
         watch = server = None
         if view:
@@ -67,17 +68,18 @@ def run(
             where = f"127.0.0.1:{server.port}"
             print(f"messages: {where}, one line of JSON each (schemas/live_message.schema.json)", flush=True)
         stack.enter_context(source.board)
-        print(f"{source.name}: taring, do not touch the skin", flush=True)
+        say(f"{source.name}: taring, do not touch the skin")
         loop = LiveLoop(source, stream, trained.content_hash, server, watch, maps)
         if sys.stdin.isatty():
             print("Enter tares anew, Ctrl-C ends", flush=True)
             Thread(target=_tare_at_enter, args=(loop,), daemon=True).start()
         with _stopping(loop):
-            loop.run(seconds, lambda words: print(words, flush=True))
+            loop.run(seconds, say)
     figures = loop.meter.figures
     print(figures.text if figures else "no estimate was made")
     lost = source.board.counts.lost
     print(f"board: {source.rate:g} Hz, {lost} frames lost, {loop.skipped} estimates left out as late")
+    return Result({"latency": figures, "rate": source.rate, "lost": lost, "skipped": loop.skipped})
 
 
 def _tare_at_enter(loop: LiveLoop) -> None:

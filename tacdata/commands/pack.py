@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
+from tacdata.progress import say
 
 ORDER = 40
 PANEL = PIPELINE
@@ -24,7 +25,7 @@ def run(
         typer.Option(help="Column of the labels to carry along, such as uncertainty (mm a pixel); give it repeatedly."),
     ] = None,
     model: Annotated[str | None, typer.Option(help="Content hash of the skin model to insist on.")] = None,
-) -> None:
+) -> Result:
     """Write the recordings and their labels as a LeRobot v3 dataset."""
     from tacdata.dataset.flags import carry_flags
     from tacdata.dataset.format.features import asked_for
@@ -43,7 +44,7 @@ def run(
     episodes = (read_episode(path) for path in found.episodes)
 
     def done(episode, reason: str) -> None:
-        print(f"  {episode.path.name}  " + (f"left out: {reason}" if reason else "packed"), flush=True)
+        say(f"  {episode.path.name}  " + (f"left out: {reason}" if reason else "packed"))
 
     packed = pack(episodes, files, out, append=append, sensor=skin, model=model, extra=extra, done=done)
     for name, _ in packed.left_out:
@@ -55,4 +56,5 @@ def run(
     for flag in carry_flags(session, out):
         print(f"  {flag.file}  set aside, training leaves it out: {flag.reason}")
     print(f"{packed.episodes} episodes, {packed.frames} frames in {out}")
-    print(f"next: tacdata train {out}")
+    say(f"next: tacdata train {out}")
+    return Result(packed)

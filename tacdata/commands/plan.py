@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.plans import Plan
@@ -30,7 +31,7 @@ def run(
     ] = None,
     sensor: Annotated[Path | None, typer.Option(help="Sensor file; default: the paper's.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Picture of sites and depths to write (PNG).")] = None,
-) -> None:
+) -> Result:
     """Write a press plan (training, evaluation, diagnostic, or a recipe of yours), with a summary and a picture."""
     from tacdata import documents
     from tacdata.errors import UsageError
@@ -61,7 +62,8 @@ def run(
     if out:
         print(f"{len(plan.presses)} presses with {', '.join(document['indenters'])} in {out}")
     if written := out or (Path(what) if is_plan else None):
-        print(f"next: tacdata record --rig RIG --plan {written} --out SESSION")
+        say(f"next: tacdata record --rig RIG --plan {written} --out SESSION")
+    return Result({"plan": document, "expected": expected, "written": out, "picture": picture})
 
 
 def _document(

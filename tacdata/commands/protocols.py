@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
 
 ORDER = 62
 PANEL = PIPELINE
@@ -20,7 +20,7 @@ def run(
         Path | None, typer.Option(help="Training run or checkpoint; without it only the labels are evaluated.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="New folder for protocols.json and protocols.md.")] = None,
-) -> None:
+) -> Result:
     """Evaluate labels and predictions against the prescribed contact, with the paper's rows beside.
 
     The plan that `tacdata plan evaluation` writes holds 78 depth and 40 position trials; presses whose purpose is
@@ -43,3 +43,4 @@ def run(
         documents.write_text(out / SHEET, markdown(document))
         documents.write(out / JSON, document, "protocols")
         print(f"written: {out / JSON}, {SHEET}")
+    return Result(document)

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata import progress
+from tacdata.commands.command import PIPELINE, Result
+from tacdata.errors import Exit
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,12 +48,12 @@ def run(
         float | None, typer.Option(help="With --demo: length of each; without it Enter or Ctrl-C ends one [s].")
     ] = None,
     demonstrations: Annotated[int, typer.Option(min=1, help="With --demo: how many.")] = 1,
-) -> None:
+) -> Result:
     """Press the sensor as the plan says and record every press to its own MCAP file; or --demo, by hand."""
     if demo:
         unwanted = {"--plan": plan, "--sensor": sensor, "--registration": registration, "--live": live}
-        _by_hand(rig, out, task, seconds, demonstrations, resume, [k for k, v in unwanted.items() if v is not None])
-        return
+        named = [k for k, v in unwanted.items() if v is not None]
+        return _by_hand(rig, out, task, seconds, demonstrations, resume, named)
     if plan is None:
         from tacdata.errors import UsageError
 
@@ -83,7 +86,7 @@ def run(
     else:
         view = nullcontext()
     bar = _Bar()
-    with Interruption() as interruption, view as watch, bar as progress, in_background(look) as detect:
+    with Interruption() as interruption, view as watch, bar as show, in_background(look) as detect:
         recorder = Recorder(
             bench,
             skin,
@@ -92,9 +95,9 @@ def run(
             resume,
             mount=_mounting(bench, bar),
             detect=detect,
-            progress=progress,
+            progress=show,
             sync_tap=sync_tap,
-            say=lambda words: print(f"  {words}", flush=True),
+            say=lambda words: say(f"  {words}"),
             watch=watch,
             interruption=interruption,
             ask=lambda question: _answer(question).lower() in ("y", "yes"),
@@ -103,16 +106,17 @@ def run(
             session = recorder.run(confirm)
         except KeyboardInterrupt as error:
             print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
-            raise typer.Exit(130) from None
+            raise typer.Exit(Exit.INTERRUPTED) from None
         finally:
             chosen.keep(out)
     print(f"{len(session.done)} of {len(session.plan.presses)} presses recorded in {out}")
-    print(f"next: tacdata check {out}")
+    say(f"next: tacdata check {out}")
+    return Result({"session": out, "recorded": len(session.done), "planned": len(session.plan.presses)})
 
 
 def _by_hand(
     rig: Path, out: Path, task: str, seconds: float | None, count: int, resume: bool, unwanted: list[str]
-) -> None:
+) -> Result:
     from tacdata.demonstrations.recording.by_hand import record_by_hand
     from tacdata.errors import UsageError
 
@@ -122,8 +126,10 @@ def _by_hand(
         session = record_by_hand(rig, out, task, seconds, count, resume)
     except KeyboardInterrupt:
         print(f"interrupted: what was recorded is in {out}", file=sys.stderr)
-        raise typer.Exit(130) from None
-    print(f"{len(session.episodes)} demonstrations in {out}\nnext: tacdata track {out}")
+        raise typer.Exit(Exit.INTERRUPTED) from None
+    print(f"{len(session.episodes)} demonstrations in {out}")
+    say(f"next: tacdata track {out}")
+    return Result({"session": out, "demonstrations": [path.name for path in session.episodes]})
 
 
 def _answer(question: str) -> str:
@@ -162,7 +168,7 @@ class _Bar:
     """A progress bar with the time left, counted down between presses, or a line per press without a terminal."""
 
     def __enter__(self) -> Callable[[int, int, float], None]:
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn
 
         bar = self
 
@@ -171,7 +177,7 @@ class _Bar:
                 return f"{bar.left()} left"
 
         columns = (TextColumn("recording"), BarColumn(), MofNCompleteColumn(), TimeLeft())
-        self._progress = Progress(*columns) if sys.stdout.isatty() else None
+        self._progress = progress.bars(*columns) if sys.stdout.isatty() else None
         self._task = None
         self._seconds, self._since = 0.0, time.monotonic()
         return self._show
@@ -189,7 +195,7 @@ class _Bar:
     def _show(self, done: int, wanted: int, seconds: float) -> None:
         self._seconds, self._since = seconds, time.monotonic()
         if self._progress is None:
-            print(f"  press {done} of {wanted} recorded, {self.left()} left", flush=True)
+            say(f"  press {done} of {wanted} recorded, {self.left()} left")
             return
         if self._task is None:
             self._task = self._progress.add_task("", total=wanted)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
 
 ORDER = 120
 PANEL = TOOLS
@@ -16,7 +16,7 @@ PANEL = TOOLS
 def run(
     file: Annotated[Path, typer.Argument(help="The damaged recording (MCAP).")],
     out: Annotated[Path | None, typer.Option(help="Where to write the repaired copy; default beside it.")] = None,
-) -> None:
+) -> Result:
     """Write a repaired copy of a recording that a crash cut off."""
     from tacdata.recording.files.recover import recover
 
@@ -24,3 +24,4 @@ def run(
     for damage in found.damage or ["nothing was wrong with it"]:
         print(f"{file.name}: {damage}")
     print(f"{found.messages} messages and {found.attachments} attachments are in {found.path}")
+    return Result(found)

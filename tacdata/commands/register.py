@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
+from tacdata.errors import Exit
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.recording.live.guarded_motion import GuardedMotion
@@ -39,7 +41,7 @@ def run(
     repeats: Annotated[int, typer.Option(min=1, max=10, help="Slow approaches at each place.")] = 2,
     taxel: Annotated[list[int] | None, typer.Option(help="Taxel of the cross scan; repeat for two or more.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the first move.")] = False,
-) -> None:
+) -> Result:
     """Touch the sensor and find its origin, yaw and tilt in the guide's frame, with uncertainties, into a file."""
     from tacdata.registration import RegistrationSettings
     from tacdata.rig import read_rig
@@ -54,12 +56,13 @@ def run(
         document, text = _measure(bench, skin, settings, specimen, yes)
     except KeyboardInterrupt as error:
         print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
-        raise typer.Exit(130) from None
+        raise typer.Exit(Exit.INTERRUPTED) from None
     from tacdata import documents
 
     documents.write(target, document, "registration")
     print(f"{text}\nwritten to {target}")
-    print(f"next: tacdata record --rig {rig} --registration {target} --plan PLAN --out SESSION")
+    say(f"next: tacdata record --rig {rig} --registration {target} --plan PLAN --out SESSION")
+    return Result(document)
 
 
 def _specimen(name: str) -> dict[str, Any]:
@@ -140,7 +143,7 @@ def _touch(
         require_found(why_lost(devices.cnc), safe, _agreed)
         _mount(rig, specimen)
         with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption, motion) as probe:
-            found = register(probe, sensor, rig.registration, settings, say=lambda text: print(f"  {text}", flush=True))
+            found = register(probe, sensor, rig.registration, settings, say=lambda text: say(f"  {text}"))
     return document_of(found, rig, sensor, specimen, controller), found.text
 
 

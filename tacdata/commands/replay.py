@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
 
 if TYPE_CHECKING:
     from tacdata.replay.scene import ReplayScene
@@ -37,7 +37,7 @@ def run(
     with_guesses: Annotated[
         bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
     ] = False,
-) -> None:
+) -> Result:
     """Replay demonstrated grasps or wipes directly and compensated in MuJoCo, over many seeds."""
     from tacdata import documents
     from tacdata.demonstrations.compensation import read_gains
@@ -71,7 +71,7 @@ def run(
         found = Trials(source, {}, scene).smallest_gain(find_gain)
         print(f"the smallest gain for {find_gain:g} mm is {found:.4f} m/mm for every finger ({source.recording})")
         if gain_from is None:
-            return
+            return Result({"gain": found, "recording": source.recording})
         chosen = {"recording": source.recording, "hash": source.recording_hash, "depth": find_gain}
         known["chosen"] = dict.fromkeys(published, found)
     tried = [Trials(one, known, scene) for one in made]
@@ -90,6 +90,7 @@ def run(
     if out is not None:
         documents.write(out, document, "replay_result")
         print(f"written to {out}")
+    return Result(document)
 
 
 def _tracks(path: Path) -> Path:

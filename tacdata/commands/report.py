@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import PIPELINE
+from tacdata.progress import say
 
 ORDER = 66
 PANEL = PIPELINE
@@ -53,7 +54,7 @@ def run(
             )
         frames = known.setdefault(place, read_frames(place)) if place not in known else known[place]
         scored.append(Scored(network.settings.title, evaluate(network, frames, device, threads), frames))
-        print(f"scored {network.path.parent}", flush=True)
+        say(f"scored {network.path.parent}")
     sheet = markdown(protocols(read_frames(trials), trained[0])) if trials else ""
     documents.write_text(out, page(scored, sheet))
     print(f"report: {out}")

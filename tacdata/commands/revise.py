@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata import progress
+from tacdata.commands.command import TOOLS, Result
+from tacdata.progress import say
 
 ORDER = 162
 PANEL = TOOLS
@@ -35,10 +37,8 @@ def run(
         typer.Option(help="CSV of the tip's true path, if one is known: time_ns, x, y, depth [mm]; else the tag's."),
     ] = None,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
-) -> None:
+) -> Result:
     """Add what a verdict named to the model, show the gap before and after, and plan the next presses."""
-    from rich.console import Console
-
     from label_farm.labelling import FarmSettings
     from label_farm.presses.model import FACTORY
     from tacdata.discrepancy.model.spec import read_spec
@@ -47,7 +47,7 @@ def run(
     from tacdata.revision.revise import CARD, SPEC, RevisionOptions, revise
     from viewers.rerun.gap_recording import write
 
-    console = Console(stderr=True)
+    console = progress.console()
     farm = FarmSettings(factory=factory or FACTORY, uncertainty=uncertainty) if relabel else None
     with console.status("reading") as status:
         wishes = RevisionOptions(farm, store, confirm, presses, Recipe(epochs, network) if retrain else None, truth)
@@ -95,7 +95,8 @@ def run(
         print(f"added: {', '.join(document['added'])} in {out / SPEC}")
     for words in (document["next"]["remark"], *document["next"]["presses"]):
         if words:
-            print(f"next: {words}")
+            say(f"next: {words}")
     if document["next"]["plan"]:
-        print(f"next: tacdata record --rig RIG --plan {out / document['next']['plan']} --out SESSION")
+        say(f"next: tacdata record --rig RIG --plan {out / document['next']['plan']} --out SESSION")
     print(f"card: {out / CARD}")
+    return Result(document)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata import progress
+from tacdata.commands.command import TOOLS, Result
 
 ORDER = 130
 PANEL = TOOLS
@@ -17,14 +19,12 @@ def run(
     case: Annotated[Path, typer.Argument(help="Case file (schemas/case.schema.json).")],
     out: Annotated[Path, typer.Option(help="Folder for NAME.json (forces), NAME.parquet (displacements).")] = Path("."),
     picture: Annotated[bool, typer.Option("--picture", help="Also draw the deepest state into NAME.png.")] = False,
-) -> None:
+) -> Result:
     """Solve one press with the skin model: displacements, forces, readings and their error, as files."""
-    from rich.console import Console
-
     from tacdata import documents
     from tacdata.cases.case import read_case, solve_case
 
-    console = Console(stderr=True)
+    console = progress.console()
     wanted = read_case(case)
     with console.status(f"{wanted.name}: meshing and factorizing") as status:
         report = solve_case(wanted, out, lambda depth: status.update(f"{wanted.name}: {depth:g} mm solved"), picture)
@@ -38,5 +38,6 @@ def run(
         soft_wrap=True,
     )
     for remark in answer["remarks"]:
-        console.print(f"warning: {remark}", markup=False, highlight=False, soft_wrap=True)
+        print(f"warning: {remark}", file=sys.stderr)
     print(report)
+    return Result(answer)

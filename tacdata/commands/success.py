@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
 
 ORDER = 165
 PANEL = TOOLS
@@ -22,7 +22,7 @@ def run(
         list[str] | None, typer.Option(help="Positions that belong together: edge=1,2,7,8; give it repeatedly.")
     ] = None,
     paper: Annotated[bool, typer.Option("--paper", help="The paper's own counts beside.")] = False,
-) -> None:
+) -> Result:
     """Print success rates with 95 % Wilson intervals, by condition, group and position.
 
     A CSV file has the columns condition and success, and may have position and adjustments.
@@ -48,3 +48,4 @@ def run(
         print(success.markdown(found))
     if paper:
         print("\nThe paper's (Exp. 3, on a real robot):\n\n" + success.markdown(success.published_rates()))
+    return Result({"rates": found, "published": success.published_rates() if paper else []})

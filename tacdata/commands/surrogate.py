@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata import progress
+from tacdata.commands.command import TOOLS, Result
 from tacdata.errors import UsageError
+from tacdata.progress import say
 
 ORDER = 158
 PANEL = TOOLS
@@ -27,10 +29,8 @@ def run(
     device: Annotated[str, typer.Option(help="cpu, or a card: cuda:0.")] = "cpu",
     capacity: Annotated[int, typer.Option(min=1, help="Presses in work at a time; about 100 on a card.")] = 1,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what it takes and stop.")] = False,
-) -> None:
+) -> Result:
     """Solve what a session pressed by finite elements: the base that tacdata discrepancy --spec starts from."""
-    from rich.console import Console
-
     from tacdata.skin.mesh.build import MeshSettings
     from tacdata.stages import clock_face
     from tacdata.surrogate import TableSettings, work, written_spec
@@ -38,7 +38,7 @@ def run(
 
     if out.exists():
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
-    console = Console(stderr=True)
+    console = progress.console()
     with console.status("reading") as status:
         what = pressed(recordings)
         status.update("building the skin model")
@@ -51,14 +51,15 @@ def run(
         f"(edges of {mesh.outer:g} mm outside), {left} of them to solve"
         + (f", about {clock_face(ready.expected_seconds)} on one core" if left else "")
     )
+    known = {"presses": ready.presses, "to_solve": left, "seconds": ready.expected_seconds if left else 0.0}
     if dry_run:
-        return
+        return Result(known)
     with console.status("solving") as status:
 
         def told(done: int, of: int, seconds: float) -> None:
             status.update(f"press {done} of {of}, about {clock_face(seconds)} left")
             if not console.is_terminal and done:
-                print(f"  press {done} of {of}, about {clock_face(seconds)} left", flush=True)
+                say(f"  press {done} of {of}, about {clock_face(seconds)} left")
 
         table, off = ready.done(told)
     if off:
@@ -73,4 +74,5 @@ def run(
         )
     spec = written_spec(out, ready, table, off)
     print(f"written: {spec}")
-    print(f"next: tacdata discrepancy {' '.join(map(str, recordings))} --spec {spec} --out VERDICT")
+    say(f"next: tacdata discrepancy {' '.join(map(str, recordings))} --spec {spec} --out VERDICT")
+    return Result({**known, "left_out": off, "uncovered": len(outside), "spec": spec})

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
+from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
@@ -28,7 +29,7 @@ def run(
         typer.Option("--every-image", help="Search all stored images for tags, not those that record had time for."),
     ] = False,
     rate: Annotated[float, typer.Option(help="Rate of the grid [Hz].")] = 30.0,
-) -> None:
+) -> Result:
     """Smooth the fingertip paths of demonstrations, mark gaps, name faults, and add a network's predicted depth."""
     from tacdata.demonstrations.compensation import contact_depth
     from tacdata.demonstrations.paths.second_look import look_again
@@ -42,6 +43,7 @@ def run(
     if not recordings:
         raise UsageError(f"no finished demonstration in {path}", "one or more", "record with tacdata record --demo")
     estimator = _estimator(network) if network else None
+    told = []
     for recording in recordings:
         read = read_demo(recording)
         made = track(look_again(read, _told) if every_image else read, rate, estimator)
@@ -61,15 +63,23 @@ def run(
                 f"  {name:<8} {found.sightings} sightings, {found.outliers} left out, "
                 f"{found.gap.mean():.1%} of the time in gaps{felt}"
             )
+        told.append({
+            "recording": recording.name, "frame": made.frame, "seconds": made.seconds[-1], "remarks": made.remarks,
+            "fingers": {
+                name: {"sightings": t.sightings, "left_out": t.outliers, "gap": t.gap.mean()}
+                for name, t in made.tracks.items()
+            },
+        })  # fmt: skip
         for remark in made.remarks:
             print(f"  note: {remark}")
     hint = "" if network else "  (with --network the targets can be compensated)"
-    print(f"next: tacdata export {path} --out EXPORT{hint}")
+    say(f"next: tacdata export {path} --out EXPORT{hint}")
+    return Result({"recordings": told})
 
 
 def _told(done: int) -> None:
     if done % 100 == 0:
-        print(f"{done} images searched for tags", flush=True)
+        say(f"{done} images searched for tags")
 
 
 def _draw(made: Demonstration, recording: Path) -> None:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
+from tacdata.progress import bars, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,14 +44,13 @@ def run(
     compiled: Annotated[bool, typer.Option("--compile", help="Let torch compile the network; for cards.")] = False,
     tensorboard: Annotated[bool, typer.Option("--tensorboard", help="Metrics for TensorBoard too, in RUN.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the run's last epoch.")] = False,
-) -> None:
+) -> Result:
     """Train a network that maps taxel signals to depth maps; keeps the best and the last epoch.
 
     The same dataset, options and machine give the same network. Ctrl-C keeps all finished epochs; --resume
     goes on from there.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
 
     from training.frames.data import read_frames
     from training.settings import TrainingSettings
@@ -64,7 +64,7 @@ def run(
     frames = read_frames(dataset)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     log = event_log(out) if tensorboard else lambda progress: None
-    with Bar(*columns) as bar:
+    with bars(*columns) as bar:
         show = _listener(bar)
 
         def listen(progress: Progress) -> None:
@@ -76,7 +76,9 @@ def run(
     parts = ", ".join(f"{len(document['split'][part])} {part}" for part in ("train", "validation", "test"))
     print(f"episodes: {parts} (split {document['split']['name']!r})")
     print(f"best epoch {document['epoch']}: validation loss {document['best']['validation_loss']:.5f}")
-    print(f"checkpoint {best.path}\nmetrics    {out / METRICS}\nnext: tacdata evaluate {out}")
+    print(f"checkpoint {best.path}\nmetrics    {out / METRICS}")
+    say(f"next: tacdata evaluate {out}")
+    return Result({**document, "checkpoint": best.path})
 
 
 def _listener(bar: Bar) -> Callable[[Progress], None]:

@@ -202,6 +202,12 @@ class Scene:
     """The board's own time of every taxel frame [ns], shape (n,), int64; empty without one."""
 
     @property
+    def found(self) -> tuple[str, ...]:
+        """The points of the summary as plain text, a line each."""
+        lines = (line for line in self.summary.splitlines() if line.startswith("- "))
+        return tuple(line.removeprefix("- ").replace("**", "") for line in lines)
+
+    @property
     def taxels(self) -> TaxelArray:
         """The taxels of a press: the first array."""
         return self.arrays[0]

@@ -9,6 +9,9 @@ from typing import Annotated
 
 import typer
 
+from tacdata.commands.command import Result
+from tacdata.progress import say
+
 ORDER = 70
 
 
@@ -18,7 +21,7 @@ def run(
         bool, typer.Option(help="Build the model of now to compare with; else the one that was asked for last.")
     ] = True,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
-) -> None:
+) -> Result:
     """Say which episodes are complete, failed, waiting, or stale against the model of now."""
     from label_farm.presses.model import FACTORY, version
     from tacdata.dataset import label_states
@@ -42,4 +45,5 @@ def run(
     counted = Counter(entry.state for entry in states)
     print(", ".join(f"{counted[name]} {name}" for name in ("complete", "stale", "failed", "waiting")))
     if counted["stale"]:
-        print("next: label the sessions again (--redo) into a new dataset; what did not change is not solved again")
+        say("next: label the sessions again (--redo) into a new dataset; what did not change is not solved again")
+    return Result({"episodes": states, "counts": counted})

@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
+from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
+from tacdata.progress import say
 
 ORDER = 35
 
@@ -19,7 +21,7 @@ def run(
     token: service.Token = "",
     wait: Annotated[bool, typer.Option("--wait", help="Go on until the submission is finished.")] = False,
     redo: Annotated[bool, typer.Option("--redo", help="Replace labels that were made from something else.")] = False,
-) -> None:
+) -> Result:
     """Bring the labels that are finished into SESSION/labels; run again, it brings what is new."""
     from time import sleep
 
@@ -40,15 +42,18 @@ def run(
     print(f"labels fetched: {len(found.written)}, already here: {len(found.current)}, failed: {len(found.failed)}")
     for episode, reason in sorted(found.failed.items()):
         print(f"  episode {episode}: no label: {reason.splitlines()[0]}")
+    told = {"submission": entry, "fetched": found}
     left = entry["episodes"] - len(found.written) - len(found.current) - len(found.failed)
     if entry["state"] in ("waiting", "planning", "running"):
         print(f"{left} episodes are still to come: the submission is {entry['state']}")
-        print(f"next: tacdata farm fetch {number} {session} --wait")
+        say(f"next: tacdata farm fetch {number} {session} --wait")
     elif found.failed:
-        raise SolveError(
+        error = SolveError(
             f"{len(found.failed)} of {entry['episodes']} episodes have no label",
             "a label for every episode",
             f"read {session}/labels/episode-*.failure.json; `tacdata farm submit --redo` tries again",
         )
+        return Result(told, error)
     else:
-        print(f"next: tacdata pack {session} --out DATASET")
+        say(f"next: tacdata pack {session} --out DATASET")
+    return Result(told)

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
 
 ORDER = 50
@@ -16,10 +17,11 @@ def run(
     priority: Annotated[int, typer.Argument(min=-1000, max=1000, help="Larger comes first.")],
     url: service.Url = service.DEFAULT,
     token: service.Token = "",
-) -> None:
+) -> Result:
     """Change a submission's priority; its waiting presses move at once."""
     from label_farm.remote.client import Client
 
     client = Client(url, token)
     client.post(f"{client.submission(number)}/priority", {"priority": priority})
     print(f"submission {number} has priority {priority}")
+    return Result({"submission": number, "priority": priority})

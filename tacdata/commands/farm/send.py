@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
+from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
+from tacdata.progress import say
 
 ORDER = 15
 
@@ -19,7 +21,7 @@ def run(
     to: Annotated[
         str, typer.Option(help="Where it is to lie, from the service's root on; else the folder's name.")
     ] = "",
-) -> None:
+) -> Result:
     """Send a session's recordings to the service; run again, it goes on. Not needed where it sees the same disk."""
     from shlex import quote
 
@@ -29,4 +31,5 @@ def run(
     name = to or session.resolve().name
     sent = send(Client(url, token), session, name)
     print(f"files sent: {sent.files} ({sent.size / 1e6:.1f} MB), already there: {sent.there}")
-    print(f"next: tacdata farm submit {quote(name)}, then tacdata farm fetch NUMBER {quote(str(session))} --wait")
+    say(f"next: tacdata farm submit {quote(name)}, then tacdata farm fetch NUMBER {quote(str(session))} --wait")
+    return Result(sent)

@@ -6,7 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
+from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
+from tacdata.progress import say
 
 ORDER = 30
 
@@ -16,7 +18,7 @@ def run(
     url: service.Url = service.DEFAULT,
     token: service.Token = "",
     wait: Annotated[bool, typer.Option("--wait", help="Until the submission is finished; needs its number.")] = False,
-) -> None:
+) -> Result:
     """Say what was submitted, how far it is, who works, and why presses failed."""
     from time import sleep
 
@@ -27,8 +29,9 @@ def run(
     if wait and not number:
         raise UsageError("--wait without a submission", "the number of one", "see `tacdata farm status`")
     if not number:
-        _all(client.get("/api/state"))
-        return
+        state = client.get("/api/state")
+        _all(state)
+        return Result(state)
     entry = client.get(client.submission(number))
     while wait and entry["state"] in ("waiting", "planning", "running"):
         sleep(1.0)
@@ -40,13 +43,15 @@ def run(
         print(f"  {entry['reason']}")
     if entry["state"] == "refused" or (wait and entry["failed"]):
         refused = entry["state"] == "refused"
-        raise SolveError(
+        error = SolveError(
             f"submission {number} " + ("is refused" if refused else f"left {entry['failed']} episodes without a label"),
             "a label for every episode", "mend what is said above and submit again",
         )  # fmt: skip
+        return Result(entry, error)
     if entry["state"] == "done":
         print(f"labels lie in {entry['session']}/labels under the service's root; on another computer:")
-        print(f"next: tacdata farm fetch {number} SESSION")
+        say(f"next: tacdata farm fetch {number} SESSION")
+    return Result(entry)
 
 
 def _line(entry: dict[str, Any]) -> None:

@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
+from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
+from tacdata.progress import say
 
 ORDER = 20
 
@@ -28,7 +30,7 @@ def run(
     tolerance: Annotated[float, typer.Option(min=0.0, help="As of `tacdata label` [mm].")] = 0.005,
     load_step: Annotated[float, typer.Option(help="Largest depth step while loading [mm].")] = 0.25,
     unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
-) -> None:
+) -> Result:
     """Ask for the labels of a session and walk away; `tacdata farm status` says how far they are."""
     from label_farm.remote.client import Client
 
@@ -39,4 +41,5 @@ def run(
     }  # fmt: skip
     filed = Client(url, token).post("/api/submissions", wish)
     print(f"submission {filed['id']} of {session} is filed")
-    print(f"next: tacdata farm status {filed['id']}, or open {url} in a browser")
+    say(f"next: tacdata farm status {filed['id']}, or open {url} in a browser")
+    return Result(filed)

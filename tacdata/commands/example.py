@@ -1,0 +1,39 @@
+"""A first look, without a rig."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands import check
+from tacdata.commands.command import TOOLS, Result
+from tacdata.progress import say
+
+ORDER = 100
+PANEL = TOOLS
+PICTURE = "press.png"
+
+
+def run(
+    out: Annotated[Path, typer.Argument(help="New folder for the recording and its pictures.")] = Path("example"),
+) -> Result:
+    """Copy a small recording that ships with tacdata, check it and draw one press of it."""
+    from tacdata.example import DEEPEST, copy_session
+    from viewers.pictures.backend import PictureBackend
+    from viewers.source import scene_at
+
+    report = check.checked(copy_session(out), out)
+    scene = scene_at(out, episode=DEEPEST)
+    print(f"press {DEEPEST}: {scene.found[0]}")
+    for line in scene.found[1:]:
+        print(f"  {line}")
+    PictureBackend(out / PICTURE).draw(scene)
+    print(f"picture: {out / PICTURE}")
+    say(f"next: open {out / PICTURE}, then")
+    say(f"  tacdata browse {out}               list its presses")
+    say(f"  tacdata view {out} --episode 0     look at one in 3D (pip install 'tacdata[view]')")
+    say("  tacdata demo                       the whole pipeline (pip install 'tacdata[all]')")
+    return Result({"check": report.document, "press": {"number": DEEPEST, "found": scene.found}, "folder": out,
+                   "picture": out / PICTURE})  # fmt: skip
