@@ -26,6 +26,8 @@ def copy_session(out: Path) -> Path:
         shutil.copytree(SESSION, out)
     except OSError as error:
         raise DeviceError(
-            f"copying the example to {out} failed: {error}", "a place to write, on a disk with room", "name another folder"
+            f"copying the example to {out} failed: {error}",
+            "a place to write, on a disk with room",
+            "name another folder",
         ) from error
     return out

@@ -33,10 +33,11 @@ ROOMS = {
     "tacdata.grasping.pin_presses": "fem",
     "tacdata.dataset.windows": "fem",
     "training": "learn",
+    "viewers.browse.server": "view",
     "viewers.rerun": "view",
     "label_farm.service": "farm",
 }
-"""Rooms, and files of light rooms, that need an extra to be imported at all. Everything else needs the plain install."""
+"""Rooms, and files of light rooms, that need an extra to be imported. Everything else needs the plain install."""
 
 LIGHT = """
 import importlib, json, pkgutil, sys
@@ -101,7 +102,8 @@ def light_distributions():
 def beyond():
     """Top-level modules that a plain install does not bring, as JSON."""
     kept = light_distributions()
-    return json.dumps([m for m, owners in packages_distributions().items() if not {canonical(o) for o in owners} & kept])
+    owners = packages_distributions().items()
+    return json.dumps([module for module, names in owners if not {canonical(name) for name in names} & kept])
 
 
 def run(code, *arguments, **options):
@@ -113,7 +115,6 @@ def run(code, *arguments, **options):
 def test_the_plain_install_brings_nothing_heavy(beyond):
     assert set(json.loads(beyond)) >= HEAVY
     assert not {"numpy", "matplotlib", "mcap", "pyarrow", "cv2", "scipy"} & set(json.loads(beyond))
-
 
 
 def test_every_light_room_can_be_imported_without_the_extras(beyond):
@@ -155,9 +156,8 @@ def test_a_verb_says_the_install_line_of_what_it_lacks(arguments, module, extra,
     code = "from tacdata.cli import main\nsys.argv = ['tacdata', *json.loads(sys.argv[2])]\nmain()"
     run("from tacdata.cli import main\nsys.argv = ['tacdata', 'example', 'first', '-q']\nmain()", beyond, cwd=tmp_path)
     (tmp_path / "case.json").write_text("{}")
-    done = subprocess.run(
-        [sys.executable, "-c", LIGHT + code, beyond, json.dumps(arguments)], capture_output=True, text=True, cwd=tmp_path
-    )
+    command = [sys.executable, "-c", LIGHT + code, beyond, json.dumps(arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == Exit.PACKAGE, done.stderr
     assert f"pip install 'tacdata[{extra}]' (from a clone: pip install '.[{extra}]')" in done.stderr
     assert IMPORTED_AS.get(module, module) in done.stderr

@@ -1,0 +1,43 @@
+"""A first look: the shipped recording is checked and drawn, and stays small."""
+
+import json
+
+from typer.testing import CliRunner
+
+from tacdata import cli
+from tacdata.errors import Exit
+from tacdata.example.shipped import DEEPEST, SESSION
+from tacdata.recording.session import read_session
+
+APP = cli.application()
+
+
+def example(*arguments):
+    return CliRunner().invoke(APP, ["example", *map(str, arguments)])
+
+
+def test_it_checks_and_draws_the_shipped_recording(tmp_path):
+    shown = example(tmp_path / "first", "--json")
+    assert shown.exit_code == Exit.DONE, shown.output
+    found = json.loads(shown.stdout)
+    assert found["check"]["usable"] and not found["check"]["findings"]
+    assert found["press"]["number"] == DEEPEST
+    assert any("label" in line.lower() for line in found["press"]["found"])
+    for name in ("check.png", "press.png"):
+        assert (tmp_path / "first" / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_it_says_what_to_do_next_and_overwrites_nothing(tmp_path):
+    assert "next:" in example(tmp_path / "first").stdout
+    before = sorted(path.name for path in (tmp_path / "first").iterdir())
+    again = example(tmp_path / "first")
+    assert again.exception.exit_code == Exit.USAGE
+    assert sorted(path.name for path in (tmp_path / "first").iterdir()) == before
+
+
+def test_the_shipped_recording_is_small_and_names_no_place_of_its_maker():
+    files = [path for path in SESSION.rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in files) < 2e6
+    assert len(read_session(SESSION).episodes) == 2
+    assert len(list((SESSION / "labels").glob("episode-*.parquet"))) == 2
+    assert not [path for path in files if b"/root/" in path.read_bytes() or b"/home/" in path.read_bytes()]
