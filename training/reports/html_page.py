@@ -10,7 +10,6 @@ from typing import Any, BinaryIO
 
 from jinja2 import Environment, PackageLoader, Template
 from markdown_it import MarkdownIt
-from markupsafe import Markup
 
 
 class HtmlPage:
@@ -62,7 +61,7 @@ class HtmlPage:
         for token in tokens:
             if token.type.startswith("heading"):
                 token.tag = f"h{min(int(token.tag[1:]) + 1, 6)}"
-        self._add("html", html=Markup(converter.renderer.render(tokens, converter.options, {})))
+        self._add("html", html=converter.renderer.render(tokens, converter.options, {}))
 
     def picture(self, draw: Callable[[BinaryIO], object], words: str) -> None:
         """Add a PNG that ``draw`` writes to a stream; ``words`` say what it shows."""
