@@ -205,12 +205,7 @@ class Recorder:
                 raise streams.fault
             self._interruption.check()
             if time.monotonic() > end:
-                silent = "the taxel board" if streams.frames < 2 else "the motion controller"
-                raise DeviceError(
-                    f"nothing received from {silent} within {FIRST_FRAME:g} s",
-                    "a running stream",
-                    "check cable and power",
-                )
+                raise streams.nothing_yet(FIRST_FRAME)
             time.sleep(WATCH)
         end = time.monotonic() + FIRST_SEARCH
         while not streams.searching and not streams.fault and time.monotonic() < end:

@@ -75,10 +75,7 @@ class GuardedProbe(Probe):
             if self._streams.fault:
                 raise self._streams.fault
             if time.monotonic() > end:
-                silent = "the motion controller" if self._streams.position is None else "the taxel board"
-                raise DeviceError(
-                    f"nothing received from {silent} within {PATIENCE:g} s", "a running stream", "check cable and power"
-                )
+                raise self._streams.nothing_yet(PATIENCE)
             time.sleep(LOOK)
         return self._streams.position
 

@@ -1,6 +1,7 @@
 """Whatever the controller owes has a limit, a reason and an ending; what bends coordinates is ended first."""
 
 import re
+import threading
 import time
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from tacdata.clock import Clock
 from tacdata.devices.grbl import Grbl
 from tacdata.errors import DeviceError
+from tacdata.recording.live.guarded_motion import GuardedMotion
 from tacdata.virtual_rig.firmware.controller import Controller
 
 RATE = 8.0
@@ -200,3 +202,17 @@ def test_what_loses_the_position_is_remembered_also_after_closing(rig, byte):
         with pytest.raises(DeviceError):
             driver.wait_idle(20)
     assert "hard limit" in driver.position_lost
+
+
+@pytest.mark.parametrize("rig", [{"homed": False}], indirect=True)
+def test_homing_that_was_broken_off_is_never_said_to_have_moved_nothing(rig):
+    clock, controller, driver = rig
+    controller.settings["$25"] = "60"
+    driver.home_first = True
+    motion = GuardedMotion(driver, clock)
+    assert motion.ending == ("motion: nothing was moved",)
+    threading.Timer(1.0, driver.close).start()
+    with pytest.raises(DeviceError):
+        driver.open()
+    clock.sleep(1)
+    assert motion.ending == ("motion: the machine moved while homing, and homing was broken off: its position is lost",)

@@ -3,12 +3,13 @@
 import re
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from recording_examples import SENSOR, plan
 
-from tacdata.errors import DeviceError
+from tacdata.errors import DeviceError, UsageError
 from tacdata.recording import read_session
 from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
@@ -256,3 +257,35 @@ def test_readings_that_cannot_be_stop_the_press_within_two_seconds(virtual, tmp_
     counts = read_recording(file_names.unfinished(out)[0]).episode.taxels
     after = (counts.arrival_ns[-1] - begun[0]) * 1e-9
     assert after < 20.0, "long before the hold would have ended: the rest is this machine's load, ten times for the rig"
+
+
+@pytest.mark.parametrize(
+    ("flow", "words"),
+    [
+        (lambda data: data[:2] + bytes(len(data[2:])), "no good frame for 3 s, but .* damaged ones"),
+        (None, "its counter stands still; .* frames came with a number already seen"),
+    ],
+    ids=["damaged", "standing counter"],
+)
+def test_a_board_that_sends_nothing_of_use_is_not_said_to_be_silent(virtual, tmp_path, flow, words):
+    def break_board():
+        encode, kept = virtual.board._encoder.encode, []
+
+        def change(*frame):
+            kept.append(encode(*frame))
+            return flow(kept[-1]) if flow else kept[0]
+
+        virtual.board._encoder.encode = change
+
+    on_the_skin(virtual, break_board)
+    with pytest.raises(DeviceError, match=words):
+        recorder(virtual, tmp_path / "session", plan=plan(2, hold=60.0)).run(lambda summary: True)
+    assert place(virtual)[2] == pytest.approx(CLEARANCE, abs=0.01)
+
+
+def test_one_port_named_twice_is_said_to_be_that(virtual, tmp_path):
+    rig = read_rig(virtual.path)
+    (tmp_path / "link").symlink_to(rig.cnc["port"])
+    twice = replace(rig, board={**rig.board, "port": str(tmp_path / "link")})
+    with pytest.raises(UsageError, match=r"both on port .* which are one"):
+        Recorder(twice, SENSOR, plan(2), tmp_path / "session")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 
 from tacdata.devices.device import Camera, MotionController, TaxelBoard, create
+from tacdata.errors import UsageError
 from tacdata.rig import Rig
 
 
@@ -20,7 +22,19 @@ class RigDevices:
 
     @classmethod
     def of(cls, rig: Rig) -> RigDevices:
-        """Build the drivers that the rig file names; nothing is opened yet."""
+        """Build the drivers that the rig file names; nothing is opened yet.
+
+        Raises:
+            UsageError: If controller and board are on one port.
+        """
+        ports = rig.cnc.get("port"), rig.board.get("port")
+        if ports[0] and ports[1] and os.path.realpath(ports[0]) == os.path.realpath(ports[1]):
+            same = ports[0] if ports[0] == ports[1] else f"{ports[0]} and {ports[1]}, which are one"
+            raise UsageError(
+                f"rig {rig.name}: the motion controller and the taxel board are both on port {same}",
+                "a port for each of them",
+                "correct port under cnc or under board in the rig file",
+            )
         cameras = {name: create(entry, Camera, rig.clock) for name, entry in rig.cameras.items()}
         return cls(create(rig.cnc, MotionController, rig.clock), create(rig.board, TaxelBoard, rig.clock), cameras)
 

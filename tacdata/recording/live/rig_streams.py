@@ -22,6 +22,8 @@ from tacdata.recording.live.rig_devices import RigDevices
 
 TRIPS = 4096
 """Round trips of status reports that are kept for the controller's clock [count]."""
+TAXELS = "taxels"
+"""Name of the only board's stream."""
 
 
 class RigStreams(DeviceStreams):
@@ -58,6 +60,7 @@ class RigStreams(DeviceStreams):
         """Taxel frames received since the start."""
         self.position: tuple[float, float, float] | None = None
         """Latest reported machine position [mm]."""
+        self._damage_then = self._damage()
         self._health = ReadingHealth(reading_limits(devices.board.describe()))
         self._work["motion controller"] = self._read_status
 
@@ -83,6 +86,37 @@ class RigStreams(DeviceStreams):
             polled = polled_clock(*np.array(self._trips, np.int64).reshape(-1, 2).T)
         return models if polled is None else {**models, "cnc": polled}
 
+    def nothing_yet(self, seconds: float) -> DeviceError:
+        """Return what to say when board or controller has delivered nothing of use for ``seconds`` [s]."""
+        if self.frames >= 2 and self.position is None:
+            given = f"the motion controller has sent no position for {seconds:g} s"
+            return DeviceError(given, "a running stream", "check cable and power")
+        return self._no_frames(seconds)
+
+    def _no_frames(self, seconds: float) -> DeviceError:
+        repeated, corrupt, garbage = (now - then for now, then in zip(self._damage(), self._damage_then, strict=True))
+        if repeated:
+            return DeviceError(
+                f"taxel board: its counter stands still; {repeated} frames came with a number already seen",
+                "a counter that goes up by one with each frame",
+                "check the board's firmware, and counter in the frame format",
+            )
+        if corrupt or garbage:
+            return DeviceError(
+                f"taxel board: no good frame for {seconds:g} s, but {corrupt} damaged ones and {garbage} bytes that "
+                "belong to none",
+                "a stream of good frames",
+                "check cable, ground and baud rate, then the frame format",
+            )
+        return DeviceError(
+            f"{BOARD}: nothing received for {seconds:g} s", "a stream that goes on",
+            "check cable and power, then start again; a session goes on with --resume",
+        )  # fmt: skip
+
+    def _damage(self) -> tuple[int, int, int]:
+        counts = self._totals()[TAXELS]
+        return counts.repeated, counts.corrupt, counts.garbage_bytes
+
     def _fail(self, error: TacdataError) -> None:
         if self._fault is None:
             self._on_fault()
@@ -91,6 +125,7 @@ class RigStreams(DeviceStreams):
     def _delivered(self, name: str, count: int) -> None:
         if name == BOARD:
             self.frames += count
+            self._damage_then = self._damage()
 
     def _read(self, stream: str, frames: list[TaxelFrame]) -> None:
         for frame in frames:
@@ -102,9 +137,11 @@ class RigStreams(DeviceStreams):
                 )  # fmt: skip
 
     def _silent(self, name: str) -> None:
+        if name == BOARD:
+            raise self._no_frames(self.silence)
         raise DeviceError(
             f"{name}: nothing received for {self.silence:g} s", "a stream that goes on",
-            "check cable and power, then continue with --resume",
+            "check cable and power, then start again; a session goes on with --resume",
         )  # fmt: skip
 
     def _broken(self, name: str, error: TacdataError) -> None:

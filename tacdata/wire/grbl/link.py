@@ -243,7 +243,7 @@ class GrblLink:
         if wrong:
             raise DeviceError(wrong.given, wrong.allowed, wrong.remedy)
         if self._held and not through_hold:
-            raise DeviceError("the motion was stopped by a feed hold", "a running machine", "continue with --resume")
+            raise DeviceError("the motion was stopped by a feed hold", "a running machine", "start again")
 
     def _room(self) -> int:
         return self.rx_bytes - sum(len(line.text) + 1 for line in self._unanswered)
