@@ -1,4 +1,4 @@
-"""What was done to a sensor and what it said, over whole sessions: the table that the chain works on."""
+"""What was done to a sensor and what it read, over whole sessions: the table that the chain works on."""
 
 from __future__ import annotations
 
@@ -138,9 +138,9 @@ class Course:
         off = tip[1:-1] - (1 - share) * tip[:-2] - share * tip[2:]
         off = off / np.sqrt(1 + share**2 + (1 - share) ** 2)
         inner = self.episode[2:] == self.episode[:-2]
-        told = [axis[axis > 1e-9] for axis in np.abs(off[inner]).T]
+        moved = [axis[axis > 1e-9] for axis in np.abs(off[inner]).T]
         least = CORNERS * max(int(inner.sum()), 1)
-        return np.array([MIDDLE * float(np.median(axis)) if len(axis) > least else 0.0 for axis in told])
+        return np.array([MIDDLE * float(np.median(axis)) if len(axis) > least else 0.0 for axis in moved])
 
     @property
     def dither(self) -> float:

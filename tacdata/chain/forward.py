@@ -1,4 +1,4 @@
-"""From a course and an ordered list of effects to what the streams should say."""
+"""From a course and an ordered list of effects to what the streams should read."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Acting(Protocol):
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a model says of every row."""
+    """A model's prediction of every row."""
 
     signal: np.ndarray
     """Readings [the source's unit], shape (n, channels)."""
@@ -66,11 +66,11 @@ class Chain:
 
     @property
     def prediction(self) -> Prediction:
-        """What the model says."""
+        """The model's prediction."""
         return _said(self._runs[-1])
 
     def again(self, effects: Sequence[Acting]) -> Prediction:
-        """Return what the model says with other effects; only what comes after the first that differs is run."""
+        """Return the prediction with other effects; only what comes after the first that differs is run."""
         steps, known = _steps(effects), 0
         while known < min(len(steps), len(self._steps)) and steps[known] is self._steps[known]:
             known += 1

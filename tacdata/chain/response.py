@@ -40,7 +40,7 @@ class Response(ABC):
         """Return the readings of loads, shape (n, channels)."""
 
     def largest(self, signal: np.ndarray) -> float:
-        """Return the largest rise of readings above what is said in the air: the unit of some effects' sizes.
+        """Return the largest rise of readings above those in the air: the unit of some effects' sizes.
 
         Args:
             signal: Readings of all rows, shape (n, channels).
@@ -48,7 +48,7 @@ class Response(ABC):
         return float(np.abs(signal - self.signal(np.zeros_like(signal[:1]))).max())
 
     def rougher(self) -> Response | None:
-        """Return the same response told a little worse, to see how far numerics matter; None where there are none."""
+        """Return the same response with a coarser interpolation, by which numerics are judged; None without one."""
         return None
 
     def features(self, course: Course) -> np.ndarray | None:

@@ -1,4 +1,4 @@
-"""Single readings that cannot be: jumps there and back, and frames that say again what the one before said."""
+"""Single readings that cannot be: jumps there and back, and frames that repeat the one before."""
 
 from __future__ import annotations
 

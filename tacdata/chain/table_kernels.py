@@ -58,7 +58,7 @@ def _cubic(
 
 
 def cubic(table: np.ndarray, place: np.ndarray, through_nodes: bool, columns: int) -> np.ndarray:
-    """Return what a table says at places, shape (n, columns).
+    """Return a table's values at places, shape (n, columns).
 
     Args:
         table: Coefficients of cubic B-splines, or values at nodes; one node more before and two after those that places

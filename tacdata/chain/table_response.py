@@ -168,7 +168,7 @@ class TableResponse(Response):
 
 @dataclass
 class _Answer:
-    """What the table says of one course of poses."""
+    """The table's loads and readings at one course of poses."""
 
     load: np.ndarray
     force: np.ndarray

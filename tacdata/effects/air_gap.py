@@ -32,5 +32,5 @@ class AirGap(Effect):
         return replace(state, signal=idle + np.sign(rise) * np.maximum(np.abs(rise) - lost, 0.0))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

@@ -37,7 +37,7 @@ class Bulge(Effect):
         return replace(state, load=state.load - values["k"] * state.load @ ring)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         if course.centers is None:
             return "the places of the channels are not known"
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

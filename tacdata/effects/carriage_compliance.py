@@ -27,5 +27,5 @@ class CarriageCompliance(Effect):
     apply = given_way
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "no tag was seen" if course.tag is None else ""

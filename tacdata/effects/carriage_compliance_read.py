@@ -19,5 +19,5 @@ class CarriageComplianceRead(CarriageCompliance):
     )
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return super().unjudgeable(course, response) or ("the force is known" if course.force is not None else "")

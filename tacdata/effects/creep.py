@@ -37,5 +37,5 @@ class Creep(Effect):
         return replace(state, load=state.load - values["f"] * late)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a single row an episode" if course.rows <= 2 * course.episodes else ""

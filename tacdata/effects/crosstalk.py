@@ -34,7 +34,7 @@ class Crosstalk(Effect):
         return replace(state, signal=state.signal + values["k"] * both)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         if course.channels < 2:
             return "one channel"
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

@@ -39,7 +39,7 @@ class DepthNodes(Effect):
         return replace(state, signal=state.signal + (state.signal - idle) * wave[:, None])
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         apart = response.spacing
         if apart is not None and apart < CLOSE * course.span:
             return f"depths were solved {apart:.2g} mm apart or closer: what is read between them is off by far less"

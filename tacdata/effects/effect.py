@@ -5,7 +5,7 @@ A file ``tacdata/effects/my_effect.py`` defines one class derived from `Effect`:
 ``grid`` is a shape (a time constant, a width): it is tried at those values and refined later; any other is an
 amplitude, in which the effect is nearly linear around 0.
 
-What an effect is to the search for a missing one is class data, too (its traits): whether presses of one rate can tell
+What an effect is to the search for a missing one is class data, too (its traits): whether presses of one rate show
 it, whether it follows the clock, what it is without a force reading. No other file names effects.
 """
 
@@ -50,7 +50,7 @@ class Parameter:
 
 
 class AtRest(StrEnum):
-    """What becomes of an effect while the tip stands still. Presses of one rate tell it by nothing else."""
+    """What becomes of an effect while the tip stands still. Presses of one rate show nothing else of it."""
 
     CATCHES_UP = "catches up"
     """It is over soon: a delay, a filter."""
@@ -63,7 +63,7 @@ class AtRest(StrEnum):
 
 
 class Growth(StrEnum):
-    """What an effect grows with. Evenly spaced presses do not tell one from the other."""
+    """What an effect grows with. Evenly spaced presses do not separate the two."""
 
     PRESSES = "presses"
     """The number of presses at a place."""
@@ -90,7 +90,7 @@ class LikeGain(StrEnum):
 
 
 class Scale(StrEnum):
-    """Whose lengths an effect stretches. Without a third length, one of the two is not told from the other."""
+    """Whose lengths an effect stretches. Without a third length, the two cannot be separated."""
 
     DRIVE = "drive"
     OBSERVER = "observer"
@@ -115,7 +115,7 @@ class Effect(ABC):
     source: ClassVar[str]
     """Where the equation comes from."""
     experiment: ClassVar[str]
-    """What tells it from its group."""
+    """The experiment that separates it from its group."""
     parameters: ClassVar[tuple[Parameter, ...]]
     """Its numbers."""
     seen_by_tag: ClassVar[bool] = False
@@ -131,15 +131,15 @@ class Effect(ABC):
     mechanism: ClassVar[str] = ""
     """The name it shares with other functional forms of the same thing; empty: its own."""
     at_rest: ClassVar[AtRest | None] = None
-    """For memory of the rate, which needs two rates of pressing or a hold to be told; the same for all forms."""
+    """For memory of the rate, which needs two rates of pressing, or a hold; the same for all forms."""
     grows_with: ClassVar[Growth | None] = None
-    """For what grows from press to press; needs unevenly spaced presses to be told."""
+    """For what grows from press to press; needs unevenly spaced presses."""
     follows_clock: ClassVar[bool] = False
-    """Whether it is told by how episodes follow each other: drifting offsets look like it."""
+    """Whether it shows in how episodes follow each other: drifting offsets look like it."""
     gain: ClassVar[GainKind | None] = None
     """For a gain of the readings."""
     like_gain: ClassVar[LikeGain | None] = None
-    """For what needs a force reading to be told from a common gain."""
+    """For what needs a force reading to be separated from a common gain."""
     scale: ClassVar[Scale | None] = None
     """For a scale of lengths."""
     changes_skin: ClassVar[bool] = False
@@ -177,7 +177,7 @@ class Effect(ABC):
         """
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return in words why such recordings cannot tell of it at all; empty if they may."""
+        """Return in words why such recordings cannot show it at all; empty if they may."""
         return ""
 
     def time_constant(self, values: dict[str, np.ndarray]) -> float:

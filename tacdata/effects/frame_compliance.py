@@ -45,5 +45,5 @@ class FrameCompliance(Effect):
     apply = given_way
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "without a model of force it cannot be told from the response itself" if response.fitted else ""

@@ -31,5 +31,5 @@ class Gain(Effect):
         return replace(state, signal=idle + (state.signal - idle) * (1 + values["e"]))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

@@ -30,5 +30,5 @@ class GapCurvature(Effect):
         return replace(state, signal=idle + rise + values["k"] * rise * np.abs(rise) / max(np.abs(rise).max(), 1e-12))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

@@ -26,9 +26,7 @@ class HysteresisRead(Effect):
         "r = r_e (max(0, F - a (mean of play_w F + w over w up to w_max - F)) / F)^m, F = F_e^(1/m) over its largest, "
         "anew at every touch"
     )
-    source = (
-        "Prandtl-Ishlinskii; Brokate & Sprekels, ch. 2; slipping elements: Iwan, J. Appl. Mech. 34 (1967)"
-    )
+    source = "Prandtl-Ishlinskii; Brokate & Sprekels, ch. 2; slipping elements: Iwan, J. Appl. Mech. 34 (1967)"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
     parameters = (
         Parameter("a", "1", "share of load carried by friction", 0.1, -0.5, 3.0),
@@ -50,5 +48,5 @@ class HysteresisRead(Effect):
         return replace(state, load=state.load * ease[:, None], force=state.force * ease)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "" if response.fitted else "loads are known, whatever reads them"

@@ -44,5 +44,5 @@ class LostSteps(Effect):
         return replace(state, pose=state.pose + np.array([0.0, 0.0, 1.0]) * (values["dz"] * after)[:, None])
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a single episode" if course.episodes < 2 else ""

@@ -33,5 +33,5 @@ class NominalPose(Effect):
         return replace(state, signal=state.signal + change)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "no second observation of the pose (tag) was recorded" if course.tag is None else ""

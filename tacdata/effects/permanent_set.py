@@ -41,5 +41,5 @@ class PermanentSet(Effect):
         return replace(state, load=state.load + load, force=state.force + force)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "no place was pressed twice" if len(set(course.site.tolist())) == course.episodes else ""

@@ -59,6 +59,6 @@ class Poroelasticity(Effect):
         return replace(state, load=both[:, :-1], force=both[:, -1])
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         radii = {tool.radius for tool in course.tools if np.isfinite(tool.radius)}
         return "one radius of indenter: it cannot be told from relaxation" if len(radii) < 2 else ""

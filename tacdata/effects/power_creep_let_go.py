@@ -21,5 +21,5 @@ class PowerCreepLetGo(PowerCreep):
         return let_go(super().apply(state, values))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "loads are not known: read by a transducer of any power" if response.fitted else ""

@@ -36,7 +36,7 @@ class Proximity(Effect):
         return replace(state, signal=state.signal + values["a"] * near[:, None] * pattern)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         if response.fitted:
             return "a fitted response takes up whatever has no memory"
         return "nothing was recorded before touch" if course.tip[:, 2].min() > -0.05 else ""

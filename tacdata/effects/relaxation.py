@@ -39,5 +39,5 @@ class Relaxation(Effect):
         return replace(state, load=both[:, :-1], force=both[:, -1])
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a single row an episode" if course.rows <= 2 * course.episodes else ""

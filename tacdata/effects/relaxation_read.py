@@ -46,5 +46,5 @@ class RelaxationRead(Relaxation):
         return low_pass(load, step, float(values["tau"]))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return super().unjudgeable(course, response) if response.fitted else "loads are known, whatever reads them"

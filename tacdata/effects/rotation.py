@@ -31,5 +31,5 @@ class Rotation(Effect):
         return replace(state, pose=np.stack([x - turn * y, y + turn * x, depth], axis=-1))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

@@ -37,5 +37,5 @@ class ScanSkew(Effect):
         return replace(state, signal=signal)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "one channel" if course.channels < 2 else ""

@@ -29,5 +29,5 @@ class SeatingGap(Effect):
         return replace(state, load=np.sign(state.load) * np.maximum(np.abs(state.load) - lost, 0.0))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

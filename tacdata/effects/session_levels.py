@@ -36,6 +36,6 @@ class SessionLevels(Effect):
         return replace(state, pose=state.pose + np.array([0.0, 0.0, 1.0]) * np.asarray(shift)[:, None])
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         few = int(course.session.max()) + 1
         return f"{few} sessions: a shift from one to the next tells as much" if few < LEAST else ""

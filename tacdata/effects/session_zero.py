@@ -31,5 +31,5 @@ class SessionZero(Effect):
         return replace(state, pose=state.pose + np.array([0.0, 0.0, 1.0]) * shift[:, None])
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a single session" if course.session.max() < 1 else ""

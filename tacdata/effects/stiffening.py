@@ -29,5 +29,5 @@ class Stiffening(Effect):
         return replace(state, load=state.load * more[:, None], force=state.force * more)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

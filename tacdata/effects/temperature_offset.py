@@ -34,7 +34,7 @@ class TemperatureOffset(Effect):
         return replace(state, signal=state.signal + scale * warm[:, None] * values["k"])
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         if course.temperature is None:
             return "no temperature was recorded"
         return "the temperature hardly changed" if np.nanstd(course.temperature) < 0.2 else ""

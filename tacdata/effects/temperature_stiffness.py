@@ -31,7 +31,7 @@ class TemperatureStiffness(Effect):
         return replace(state, load=state.load * more[:, None], force=state.force * more)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         if course.temperature is None:
             return "no temperature was recorded"
         return "the temperature hardly changed" if np.nanstd(course.temperature) < 0.2 else ""

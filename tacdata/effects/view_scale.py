@@ -31,5 +31,5 @@ class ViewScale(Effect):
         return replace(state, view=state.view * (1 + values["s"]))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "" if course.tag is not None else "nothing but the command says where the tip is"

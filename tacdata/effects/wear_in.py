@@ -37,5 +37,5 @@ class WearIn(Effect):
         return replace(state, load=state.load * ease[:, None], force=state.force * ease)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "no place was pressed twice" if len(set(course.site.tolist())) == course.episodes else ""

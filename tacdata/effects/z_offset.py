@@ -33,5 +33,5 @@ class ZOffset(Effect):
         return replace(state, pose=pose)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot tell of it; empty if they may."""
+        """Return why such recordings cannot show it; empty if they may."""
         return "a fitted response takes up whatever has no memory" if response.fitted else ""

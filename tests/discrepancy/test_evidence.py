@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.noise.gram import Noise, whiten
+from tacdata.discrepancy.noise.noise_model import Noise
+from tacdata.discrepancy.noise.whitener import whiten
 
 
 def coloured(white, reduced, noise):

@@ -5,7 +5,7 @@ import pytest
 from pressing import course
 
 from tacdata.discrepancy.noise import offset_random_walk, readings
-from tacdata.discrepancy.noise.gram import Noise
+from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.whitener import Whitener
 
 RATE = 0.05  # noise scales squared a second
@@ -96,7 +96,7 @@ def test_streams_that_say_nothing_when_idle_do_not_spoil_what_others_tell(what):
     reduced = course(episodes=60).reduced
     rise, rest = _quiet_until_pressed(reduced, np.random.default_rng(9))
     whole = readings.relative_scale(rest, rise, reduced)
-    idle = rise[:, 1] <= readings.SHARES[1] * rise.max()
+    idle = rise[:, 1] <= readings.LOAD_EDGES[1] * rise.max()
     rest[idle if "idle" in what or what == "still" else slice(None), 1] = 0.0 if what in ("dead", "still") else np.nan
     told = readings.relative_scale(rest, rise, reduced)
     assert np.isfinite(told).all()

@@ -9,7 +9,7 @@ from tacdata import documents
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.spec import read_spec
-from tacdata.discrepancy.verdict.sealed import ENOUGH, chosen, without_readings
+from tacdata.discrepancy.verdict.sealed import FEWEST_TO_SEAL, chosen, without_readings
 from tacdata.effects import library
 
 FEW = ("latency", "low_pass_filter", "backlash")
@@ -23,7 +23,7 @@ def test_a_tenth_is_sealed_by_name_and_never_a_whole_place():
     assert len(sealed) == 4
     assert np.array_equal(sealed, chosen(course(episodes=24, seed=5)))  # names decide, not readings
     assert len(np.unique(np.delete(made.site, sealed))) == 2
-    assert len(chosen(course(episodes=ENOUGH - 1))) == 0
+    assert len(chosen(course(episodes=FEWEST_TO_SEAL - 1))) == 0
 
 
 def test_an_episode_deeper_than_those_that_stay_open_is_not_sealed():

@@ -1,1 +1,1 @@
-"""Recordings as a course, and what they can and cannot tell."""
+"""Recordings as a course, and checks of what they can carry."""

@@ -11,19 +11,19 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.recording.files.reader import Recording
 
-MISSING = 0.3
+MOST_MISSING = 0.3
 """A channel that lacks a larger share of its readings is left out [1]."""
 DEEPER = 0.01
-"""A tip goes on deeper when it goes by so much of the stroke [1]..."""
-LONG = 3
-"""...over so many readings."""
-FLAT = 12.0
-"""A reading that stops changed by so many times its noise, or its steps, over as much depth just before [1]."""
-SEVERAL = 2
-"""A channel is clipped if it stops so often..."""
-ENOUGH = 10
+"""Clipping: the tip goes on deeper by this share of the stroke..."""
+FEWEST_STOPPED = 3
+"""...over so many readings, at least."""
+FLAT_Z = 12.0
+"""Clipping: a reading that stops changed by so many noises, or steps, over as much depth before [1]."""
+FEWEST_STOPS = 2
+"""Clipping: a channel is clipped if it stops so often..."""
+MANY_STOPPED = 10
 """...or over so many readings."""
-MANY = 64
+MOST_NAMES = 64
 """Names of more channels are not listed."""
 
 
@@ -56,7 +56,7 @@ def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, list[str]]:
     still = np.all([np.fmax.reduce(r.counts) == np.fmin.reduce(r.counts) for r in recorded if len(r.counts)], axis=0)
     for channel, values in enumerate(counts.T):
         good = values[np.isfinite(values)]
-        if len(good) < (1 - MISSING) * len(values):
+        if len(good) < (1 - MOST_MISSING) * len(values):
             notes.append(f"channel {channel}: {100 * (1 - len(good) / len(values)):.0f} % missing, left out")
         elif len(good) == 0 or np.ptp(good) == 0:
             notes.append(f"channel {channel}: always {good[0] if len(good) else 'nothing'}, stuck or dead, left out")
@@ -82,7 +82,7 @@ def _clipped(recorded: Sequence[Readings], channels: list[int]) -> list[str]:
             limit = float(extreme(values))
             steps = np.diff(np.unique(values[np.isfinite(values)]))
             runs = [run for r in recorded for run in _stops(r.counts[:, channel], r.depth, limit, float(steps.min()))]
-            if len(runs) >= SEVERAL or sum(runs) >= ENOUGH:
+            if len(runs) >= FEWEST_STOPS or sum(runs) >= MANY_STOPPED:
                 found.append(f"channel {channel} at {limit:g} ({100 * np.mean(values == limit):.2g} %)")
         if found:
             words.append(
@@ -103,19 +103,19 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
     """
     known = np.isfinite(values) & np.isfinite(depth)
     values, depth = values[known], depth[known]
-    if len(values) < LONG:
+    if len(values) < FEWEST_STOPPED:
         return []
     noise = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], values == limit, [False]]).astype(int)))
     words = []
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         on = float(depth[begin:end].max() - depth[begin])
-        if begin == 0 or end - begin < LONG or on < DEEPER * float(np.ptp(depth)):
+        if begin == 0 or end - begin < FEWEST_STOPPED or on < DEEPER * float(np.ptp(depth)):
             continue
         before = np.flatnonzero(depth[:begin] <= depth[begin] - on)
         at = int(before[-1]) if len(before) else int(np.argmin(depth[:begin]))
         way = float(depth[begin] - depth[at])
-        if way > 0 and abs(limit - values[at]) * min(on / way, 1.0) > FLAT * max(noise, step):
+        if way > 0 and abs(limit - values[at]) * min(on / way, 1.0) > FLAT_Z * max(noise, step):
             words.append(end - begin)
     return words
 
@@ -129,5 +129,6 @@ def in_source(recordings: Sequence[Recording], channels: int) -> list[str]:
         return []
     if len({(p[1], int(p[2]) - k) for k, p in enumerate(parts) if p}) == 1 and all(parts) and channels > 2:
         return [f"channels 0 to {channels - 1} are the source's {names[0]} to {names[-1]}, in this order"]
-    listed = ", ".join(f"{k} {name}" for k, name in enumerate(names[:MANY]))
-    return [f"channels by the names that their source gives them: {listed}" + (", ..." if channels > MANY else "")]
+    listed = ", ".join(f"{k} {name}" for k, name in enumerate(names[:MOST_NAMES]))
+    more = ", ..." if channels > MOST_NAMES else ""
+    return [f"channels by the names that their source gives them: {listed}{more}"]

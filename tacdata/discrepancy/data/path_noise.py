@@ -1,4 +1,4 @@
-"""Where a tip was, told from a position that was measured with noise."""
+"""The tip's path without the noise that its position was measured with."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ import numpy as np
 
 WINDOWS = (2, 4, 8, 16, 32, 64)
 """Rows on either side that a straight line is laid through [1]."""
-SURE = 2.0
-"""Estimates of different windows agree if no farther apart than so many of their standard errors [1]."""
-LEAST = 1e-5
+AGREE_Z = 2.0
+"""Estimates of two windows agree within so many of their standard errors [1]."""
+LEAST_NOISE = 1e-5
 """Less noise is none [mm]."""
 CORNER = 0.02
 """Where a path turns by more between its positions than this share of its stroke, nobody knows how it turned [1]."""
 
-FEW = 20
-"""Fewer positions tell no noise."""
+FEWEST_POSITIONS = 20
+"""Fewer positions estimate no noise."""
 REGULAR = 0.9
 """Share of the steps of a sampled path that are no longer than twice the median [1]."""
 
 
 def without_noise(time_ns: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a path as it was, as well as it can be told, and the noise that it was measured with.
+    """Return a path smoothed, and the noise that it was measured with.
 
     A position that dithers where the tool rests looks like play, which the readings do not follow. Every position is
-    told by a straight line through its neighbours, as many as agree with fewer: the intersection of their confidence
-    intervals (Goldenshluger & Nemirovski, Math. Methods Stat. 6, 1997, 135). Commands have no noise and stay, and so
-    does a path that is given by its corners.
+    estimated by a straight line through its neighbours. The window is the widest that agrees with all narrower ones:
+    intersection of confidence intervals (Goldenshluger & Nemirovski, Math. Methods Stat. 6, 1997, 135). Commands have
+    no noise and stay, and so does a path that is given by its corners.
 
     Args:
         time_ns: Of each position [ns], increasing, shape (n,).
@@ -34,12 +34,12 @@ def without_noise(time_ns: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np
     Returns:
         Positions [mm], shape (n, 3), and the standard deviation of their noise [mm], shape (3,).
     """
-    if len(path) < FEW or not _sampled(time_ns):
+    if len(path) < FEWEST_POSITIONS or not _sampled(time_ns):
         return path, np.zeros(3)
     time = (time_ns - time_ns[0]) * 1e-9
     noise = np.array([_noise(time, axis) for axis in path.T])
-    axes = [_smoothed(time, axis, s) if s > LEAST else axis for axis, s in zip(path.T, noise, strict=True)]
-    return np.column_stack(axes), np.where(noise > LEAST, noise, 0.0)
+    axes = [_smoothed(time, axis, s) if s > LEAST_NOISE else axis for axis, s in zip(path.T, noise, strict=True)]
+    return np.column_stack(axes), np.where(noise > LEAST_NOISE, noise, 0.0)
 
 
 def resolved(tip_ns: np.ndarray, depth: np.ndarray, time_ns: np.ndarray) -> np.ndarray:
@@ -54,7 +54,7 @@ def resolved(tip_ns: np.ndarray, depth: np.ndarray, time_ns: np.ndarray) -> np.n
         depth: Positions [mm], shape (n,).
         time_ns: Times asked for [ns], shape (m,).
     """
-    if len(tip_ns) < FEW or not _sampled(tip_ns):
+    if len(tip_ns) < FEWEST_POSITIONS or not _sampled(tip_ns):
         return np.ones(len(time_ns), dtype=bool)
     step = np.maximum(np.diff(tip_ns) * 1e-9, 1e-12)
     speed = np.diff(depth) / step
@@ -83,13 +83,13 @@ def _noise(time: np.ndarray, values: np.ndarray) -> float:
 
 
 def _smoothed(time: np.ndarray, values: np.ndarray, noise: float) -> np.ndarray:
-    """Return values as the widest windows tell them that agree with all narrower ones, shape (n,)."""
+    """Return values by the widest windows that agree with all narrower ones, shape (n,)."""
     count = len(values)
     middle, mean = time.mean(), values.mean()
     t, y = time - middle, values - mean
     sums = [np.concatenate([[0.0], np.cumsum(s)]) for s in (np.ones(count), t, y, t * t, t * y)]
     result = y.copy()
-    low, high = y - SURE * noise, y + SURE * noise
+    low, high = y - AGREE_Z * noise, y + AGREE_Z * noise
     open_ = np.ones(count, dtype=bool)
     for width in WINDOWS:
         at = np.arange(count)
@@ -100,7 +100,7 @@ def _smoothed(time: np.ndarray, values: np.ndarray, noise: float) -> np.ndarray:
         slope = (sty - st * sy / n) / spread
         away = t - st / n
         line = sy / n + slope * away
-        error = SURE * noise * np.sqrt(1 / n + away * away / spread)
+        error = AGREE_Z * noise * np.sqrt(1 / n + away * away / spread)
         low, high = np.maximum(low, line - error), np.minimum(high, line + error)
         open_ &= (low <= high) & (reach == width)
         result[open_] = line[open_]

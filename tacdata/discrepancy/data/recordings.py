@@ -85,7 +85,7 @@ def course_of(paths: list[Path]) -> Course:
         held = "one recording holds" if len(found) == 1 else f"{len(found)} recordings hold"
         notes.append(f"{held} {len(parts)} strokes; each counts as an episode")
     if any(e.tags for _, e in found) and not views:
-        notes.append("the tag was seen too seldom to tell of the guide: let it be in view during the presses")
+        notes.append("the tag was seen too seldom to check the guide: keep it in view during the presses")
     return _joined(parts, kept, found[0][1], (bool(force), bool(temperature), bool(views)), notes)
 
 

@@ -1,4 +1,4 @@
-"""The measured streams side by side, and what a model says of them."""
+"""The measured streams side by side, and a model's predictions of them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Streams:
         return np.column_stack(parts)[self.rows]
 
     def predicted(self, prediction: Prediction) -> np.ndarray:
-        """Return what a model says at the rows that were read, shape (m, streams)."""
+        """Return a model's prediction at the rows that were read, shape (m, streams)."""
         parts = [prediction.signal[self.rows]]
         if self.force:
             parts.append(prediction.force[self.rows, None])
@@ -57,8 +57,8 @@ class Streams:
         return np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
 
     def rise(self, prediction: Prediction, response: Response) -> np.ndarray:
-        """Return what presses add at the rows that were read, shape (m, streams): readings without what is said in the
-        air, force; 0 for the tag's."""
+        """Return what presses add at the rows that were read, shape (m, streams): readings without their value in
+        the air, force; 0 for the tag's."""
         result = self.predicted(prediction)
         result[:, : self.channels] -= response.signal(np.zeros((1, self.channels)))
         if self.tag:

@@ -10,8 +10,8 @@ from tacdata.discrepancy.data.tip_motion import HOLD, longest_hold, speeds
 
 FEWEST_EPISODES = 8
 """Fewer episodes carry no name: a standard error over them is not known."""
-RATES = 2.5
-"""Rates of pressing must differ by such a factor for lags to be told from play and friction [1]."""
+RATE_RATIO = 2.5
+"""Rates: least ratio that separates lags from play and friction [1]."""
 
 
 def shortcomings(course: Course) -> list[str]:
@@ -46,11 +46,9 @@ def shortcomings(course: Course) -> list[str]:
     remarks += units(course)
     remarks += stuck(course)
     if course.force is None:
-        remarks.append("no force: stiffness and gain, relaxing skin and relaxing taxel cannot be told apart")
+        remarks.append("no force: stiffness and gain, relaxing skin and relaxing taxel cannot be separated")
     if course.tag is None:
-        remarks.append(
-            "no second observation of the pose: the guide and the skin are told apart by their response alone"
-        )
+        remarks.append("no second observation of the pose: guide and skin are separated by their response alone")
     return remarks
 
 
@@ -65,7 +63,7 @@ def one_rate(course: Course) -> bool:
 def _varies(rates: np.ndarray) -> bool:
     known = rates[np.isfinite(rates)]
     low, high = np.quantile(known, [0.1, 0.9]) if len(known) else (0.0, 0.0)
-    return bool(low > 0 and high >= RATES * low)
+    return bool(low > 0 and high >= RATE_RATIO * low)
 
 
 STROKE, RATE, RADIUS, EVERY = (0.02, 60.0), 500.0, 200.0, (2e-5, 5.0)
@@ -89,7 +87,7 @@ def units(course: Course) -> list[str]:
 
 
 def stuck(course: Course) -> list[str]:
-    """Return in words which channels, or the second observation, say nothing in some episodes."""
+    """Return in words which channels, or the second observation, have no information in some episodes."""
     remarks, reduced = [], course.reduced
     episodes = np.unique(reduced.episode)
     still = np.array([np.ptp(reduced.readings[reduced.episode == e], axis=0) == 0 for e in episodes])

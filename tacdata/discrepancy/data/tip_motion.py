@@ -9,11 +9,11 @@ import numpy as np
 from tacdata.chain import Course
 
 HOLD = 0.95
-"""Shortest hold from which relaxation can be told [s]: one of a second, of which readings may miss both ends."""
+"""Shortest hold that shows relaxation [s]: one of a second, of which readings may miss both ends."""
 TOUCHING = 0.02
 """Depth, over the largest of all, from which on a way is one of pressing and not of the way there [1]."""
 LEVELS = 40
-"""Levels of depth between which a speed is told, at most [1]."""
+"""Most levels of depth between which a speed is measured."""
 CLEAR = 10.0
 """Levels lie so many times the path's noise apart at least [1]."""
 STILL = 0.002
@@ -23,7 +23,7 @@ SWAY = 10.0
 LINGERS = 4.0
 """A tip that stands stays in the band so many times as long as one that presses takes through it [1]."""
 DEEP = 0.3
-"""A hold is one deeper than this share of the stroke [1]."""
+"""Hold: deeper than this share of the stroke [1]."""
 STOP = 0.4
 """A stop of a staircase is no shorter [s]."""
 STAIRS = 3

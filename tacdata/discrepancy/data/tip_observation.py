@@ -1,7 +1,7 @@
 """Where a camera, or a second gauge, saw the tip: laid onto the commanded path, episode by episode.
 
 How camera and guide lie to each other is not known, so that a rotation and an offset for a whole session are fitted;
-what is left over is what the guide did otherwise than it was told. A constant error of place is lost by that.
+what is left over is what the guide did otherwise than commanded. A constant error of place is lost by that.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ import numpy as np
 from tacdata.recording import Episode
 
 FEWEST_VIEWS = 30
-"""Views of a session below which its camera tells nothing."""
-NEAR = 150_000_000
+"""Registration: fewer views of a session register no camera."""
+NEAR_NS = 150_000_000
 """A reading farther from any view has none [ns]."""
-LINE = 0.3
-"""Motion whose second direction is shorter than this fixes no rotation: only the depth is seen [mm]."""
-TRIMMED = 4.0
-"""Views farther off than so many robust standard deviations do not take part in the fit [1]."""
+SHORTEST_WAY = 0.3
+"""Registration: motion whose second direction is shorter fixes no rotation, only the depth [mm]."""
+TRIM_Z = 4.0
+"""Registration: views farther off are left out of the fit [robust standard deviations]."""
 GAUGES = ("tag", "displacement", "height", "laser", "gauge", "encoder")
 """Words in the names of measured lengths that are a second observation of the depth."""
 
 
 @dataclass(frozen=True)
 class Views:
-    """What one episode's second observation says."""
+    """One episode's second observation."""
 
     time_ns: np.ndarray
     """Times of the views [ns], shape (p,), int64, increasing."""
@@ -38,12 +38,12 @@ class Views:
         result = np.stack([np.interp(time_ns, self.time_ns, column) for column in self.tip.T], axis=-1)
         behind = np.clip(np.searchsorted(self.time_ns, time_ns), 1, len(self.time_ns) - 1)
         distance = np.minimum(np.abs(time_ns - self.time_ns[behind - 1]), np.abs(time_ns - self.time_ns[behind]))
-        result[distance > NEAR] = np.nan
+        result[distance > NEAR_NS] = np.nan
         return result
 
 
 def second_views(episodes: list[Episode]) -> dict[int, Views]:
-    """Return what a session's episodes saw of the tip, by their place in the list; none if it cannot be told."""
+    """Return what a session's episodes saw of the tip, by their place in the list; none if there are too few."""
     raw = {k: seen for k, e in enumerate(episodes) if (seen := _seen(e)) is not None}
     if sum(len(time) for time, _ in raw.values()) < FEWEST_VIEWS:
         return {}
@@ -97,7 +97,7 @@ def _laid_on(seen: np.ndarray, commanded: np.ndarray) -> tuple[np.ndarray, np.nd
         cross = (seen[kept] - a).T @ (commanded[kept] - b)
         width = np.sqrt(np.linalg.eigvalsh(np.cov((commanded[kept] - b).T))[-2])
         flat = np.count_nonzero(np.ptp(seen[kept], axis=0) > 1e-9) < 2
-        if width < LINE or flat:
+        if width < SHORTEST_WAY or flat:
             line = cross[:, 2] / max(float(np.linalg.norm(cross[:, 2])), 1e-12)
             turn = np.stack([np.zeros(3), np.zeros(3), line])
         else:
@@ -107,5 +107,5 @@ def _laid_on(seen: np.ndarray, commanded: np.ndarray) -> tuple[np.ndarray, np.nd
         offset = b - turn @ a
         distance = np.abs((seen @ turn.T + offset - commanded)[:, 2])
         usual = 1.4826 * float(np.median(distance[kept]))
-        kept = distance <= max(TRIMMED * usual, 1e-6)
+        kept = distance <= max(TRIM_Z * usual, 1e-6)
     return turn, offset

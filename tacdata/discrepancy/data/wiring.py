@@ -9,17 +9,17 @@ from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.data.streams import Streams
 
 FEWEST_TOUCHING = 40
-"""Readings in contact that are needed."""
+"""Wiring: readings in contact that are needed."""
 BETTER = 0.15
-"""By how much another channel must correlate better with a reading than its own [1]."""
+"""Wiring: another channel must correlate better by this much [1]."""
 POOR = 0.85
-"""A channel that correlates with its own prediction so well is the one [1]."""
+"""Wiring: a channel that correlates with its own prediction so well is the right one [1]."""
 INVERTED = -0.6
-"""A channel that correlates so with its own prediction is turned over [1]."""
+"""Wiring: below this correlation a channel is inverted [1]."""
 TURNS = {"mirrored along x": (-1, 1), "mirrored along y": (1, -1), "turned by 180 degrees": (-1, -1)}
 """What may have happened to a whole array -> what becomes of x and y."""
-SHARE = 0.02
-"""Channels that move by a smaller share of the largest tell nothing [1]."""
+LEAST_MOTION = 0.02
+"""Wiring: channels that move by a smaller share of the largest are not checked [1]."""
 
 
 def miswired(course: Course, response: Response) -> list[str]:
@@ -32,12 +32,12 @@ def miswired(course: Course, response: Response) -> list[str]:
     if response.fitted or course.channels < 2:
         return []
     predicted = Streams.of(course).rise(predict(course, response, []), response)[:, : course.channels]
-    touched = np.abs(predicted).max(axis=1) > SHARE * np.abs(predicted).max()
+    touched = np.abs(predicted).max(axis=1) > LEAST_MOTION * np.abs(predicted).max()
     if touched.sum() < FEWEST_TOUCHING:
         return []
     read = course.reduced.readings[touched] - np.median(course.reduced.readings[~touched], axis=0)
     predicted = predicted[touched]
-    moved = np.abs(predicted).max(axis=0) > SHARE * np.abs(predicted).max()
+    moved = np.abs(predicted).max(axis=0) > LEAST_MOTION * np.abs(predicted).max()
     likeness = _likeness(read, predicted)
     likeness[:, ~moved] = 0.0
     own = np.diag(likeness)

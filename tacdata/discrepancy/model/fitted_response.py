@@ -9,33 +9,33 @@ from scipy.interpolate import BSpline
 
 from tacdata.chain import Course, Response
 
-FEW = 8
-"""So few intervals stay where they are [1]."""
+EVEN_INTERVALS = 8
+"""With so few intervals, knots stay evenly spaced."""
 INTERVALS = 50
 """Most intervals of the splines in depth. They know nothing of direction, rate or time, so history stays out however
 many they are; too few cannot follow how a skin is first touched, and half of that looks like a skin that sticks. (What
 predicts left-out episodes best is no guide: that bias lies far below one reading's noise, and far above what a test of
 all of them sees.)"""
 BENT = 0.65
-"""Share of the intervals that go where the response bends, as a skin's does when it is first touched [1]."""
+"""Share of the knots that follow the response's curvature [1]."""
 LITTLE = 0.02
-"""Added to what is read where a bend counts over it, of the largest reading [1]."""
+"""Added to a reading where a bend is taken relative to it [largest reading]."""
 ROWS_EACH = 4
 """Rows of a place that a spline must have at least."""
-SMOOTH = 1e-5
-"""Weight of the splines' bending, over the mean diagonal: what no row decides goes on straight."""
+LEAST_SMOOTHING = 1e-5
+"""Weight of bending where no row decides, over the mean diagonal [1]."""
 RIDGE = 1e-8
 """Share of the mean diagonal added to it."""
 BLOCK = 4
-"""Rows of a mean by which noise is told: what successive readings have in common counts [1]."""
-STEPS = 30
-"""Steps to the weight of bending [1]."""
-STIFF = 1e9
-"""Largest weight of bending [1]."""
-KEPT = 3
-"""Answers remembered: most effects leave the pose alone."""
+"""Rows of a mean by which noise is estimated: autocorrelation counts."""
+REML_STEPS = 30
+"""REML: steps to the weight of bending."""
+MOST_SMOOTHING = 1e9
+"""REML: largest weight of bending [1]."""
+CACHED = 3
+"""Evaluations remembered: most effects leave the pose alone."""
 FORM_ERROR = 0.15
-"""What it does not know of an effect: transducers that are not linear in load, paths that are sampled seldom [1]."""
+"""Model error of every effect through it: transducers and sampling are not known [1]."""
 
 
 class FittedResponse(Response):
@@ -69,12 +69,12 @@ class FittedResponse(Response):
         self._designs: list[tuple[np.ndarray, list[np.ndarray]]] = []
         self._answers: list[tuple[np.ndarray, np.ndarray]] = []
         self._bases = [self._basis(reduced.tip[self._within(k), 2], count) for k in range(self.context.max() + 1)]
-        # What they say in the air: that is an offset of the place, which no history should go through.
+        # Their value in the air: that is an offset of the place, which no history should go through.
         self._air = [self._design(basis, basis.t[:1]) for basis in self._bases]
-        self._fit(streams)  # as it comes: what that leaves tells the noise, without which nothing is smooth
+        self._fit(streams)  # unsmoothed: its residual estimates the noise, which smoothing needs
         self._shaken = _shaken(streams - self._followed(), reduced)
         self._fit(streams)
-        if count > FEW:
+        if count > EVEN_INTERVALS:
             self._bases = [self._bent(k, count) for k in range(len(self._bases))]
             self._air = [self._design(basis, basis.t[:1]) for basis in self._bases]
             self._fit(streams)
@@ -86,7 +86,7 @@ class FittedResponse(Response):
         return other
 
     def of_place(self, context: int, course: Course) -> FittedResponse:
-        """Return what it says of another course, all of it at one of its places and tools."""
+        """Return it for another course, all of it at one of its places and tools."""
         other = copy.copy(self)
         other._bases, other._weights = [self._bases[context]], [self._weights[context]]
         other._air = [self._air[context]]
@@ -126,7 +126,7 @@ class FittedResponse(Response):
 
     @property
     def air(self) -> np.ndarray:
-        """What each spline says in the air, at all rows of the course, shape (n, most splines of a place)."""
+        """Each spline's value in the air, at all rows of the course, shape (n, most splines of a place)."""
         result = np.zeros((len(self.context), self.width))
         for rows, air in zip(self._rows, self._air, strict=True):
             result[np.ix_(rows, np.arange(air.shape[1]))] = air
@@ -161,7 +161,7 @@ class FittedResponse(Response):
             self._smooth.append(smooth)
 
     def _followed(self) -> np.ndarray:
-        """Return what the splines say at the rows read, shape (m, streams)."""
+        """Return the splines' values at the rows read, shape (m, streams)."""
         depth = self._course.reduced.tip[:, 2]
         result = np.zeros((len(depth), self._weights[0].shape[1]))
         for k, (basis, weights) in enumerate(zip(self._bases, self._weights, strict=True)):
@@ -208,7 +208,7 @@ class FittedResponse(Response):
             rows: Which of the rows read, shape (m,), bool.
             values: Of them, shape (k, streams).
             design: Splines there, shape (k, splines).
-            smooth: Weight of bending, shape (streams,); told by restricted maximum likelihood, unless given.
+            smooth: Weight of bending, shape (streams,); by restricted maximum likelihood (REML), unless given.
             before: Weights that those returned are added to: together they should bend little.
         """
         reduced, count = self._course.reduced, design.shape[1]
@@ -224,7 +224,7 @@ class FittedResponse(Response):
             bend[k, k : k + 3] = 1.0, -2.0, 1.0
         rough = bend.T @ bend
         # Both matrices are diagonal in these: one factorization for all weights of bending.
-        inner = np.linalg.inv(np.linalg.cholesky(gram + np.diag(penalty) + SMOOTH * scale * rough)).T
+        inner = np.linalg.inv(np.linalg.cholesky(gram + np.diag(penalty) + LEAST_SMOOTHING * scale * rough)).T
         size, turn = np.linalg.eigh(inner.T @ rough @ inner)
         size, basis = np.maximum(size, 0.0), inner @ turn
         target = basis.T @ (matrix.T @ values)
@@ -249,7 +249,7 @@ class FittedResponse(Response):
         ):  # fmt: skip
             result[rows] = design @ weights - air @ weights
         result.flags.writeable = False  # others are given the same
-        self._answers = [*self._answers[-KEPT:], (depth, result)]
+        self._answers = [*self._answers[-CACHED:], (depth, result)]
         return result
 
     def _designs_at(self, pose: np.ndarray) -> list[np.ndarray]:
@@ -295,15 +295,15 @@ def _smoothness(size: np.ndarray, target: np.ndarray, noise: np.ndarray) -> np.n
 
     Args:
         size: How much each direction bends, shape (k,).
-        target: What the readings say of each direction, shape (k, streams).
+        target: Inner products of the readings with each direction, shape (k, streams).
         noise: Variance of a reading, shape (streams,).
     """
     bends = (size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300))[:, None]
     smooth = np.ones(target.shape[1])
-    for _ in range(STEPS):
+    for _ in range(REML_STEPS):
         kept = 1 / (1 + size[:, None] * smooth)
         bending = np.sum(size[:, None] * np.square(target * kept), axis=0)
-        smooth = np.clip(noise * np.sum(bends * kept, axis=0) / np.maximum(bending, 1e-300), 0.0, STIFF)
+        smooth = np.clip(noise * np.sum(bends * kept, axis=0) / np.maximum(bending, 1e-300), 0.0, MOST_SMOOTHING)
     return smooth
 
 

@@ -11,8 +11,8 @@ from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.model.fitted_response import FORM_ERROR, FittedResponse
 from tacdata.effects import Placed
 
-SMALL = 0.01
-"""How much of a spline is added, over the largest load [1]: effects need not be linear in load."""
+SMALL_SHARE = 0.01
+"""How much of a spline is added: effects need not be linear in load [largest load]."""
 
 
 class SplineResponse(Response):
@@ -26,7 +26,7 @@ class SplineResponse(Response):
         self._response, self._weight = response, weight
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
-        """Return the size of the loads with a little of each spline less what it says in the air, and as it is.
+        """Return the size of the loads with a little of each spline less its value in the air, and as it is.
 
         Shape (n, splines + 1).
         """
@@ -64,6 +64,6 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
         return response.features(course.reduced)
     none = np.zeros((course.rows, response.width + 1))
     plain = replace(course, readings=none, centers=None, force=None, apart=True)
-    little = SMALL * max(float(np.abs(response.force(course.tip, course.tool)).max()), 1e-12)
+    little = SMALL_SHARE * max(float(np.abs(response.force(course.tip, course.tool)).max()), 1e-12)
     predicted = predict(plain, SplineResponse(response, little), acting).signal
     return ((predicted[:, :-1] - predicted[:, -1:]) / little + response.air)[course.read]

@@ -1,4 +1,4 @@
-"""How far episodes err by themselves, and how readings scatter, told from a residual beside an over-rich fit."""
+"""Sizes of episode errors, and noise, estimated from what an over-rich fit leaves of the residual."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 
 from tacdata.chain import Course
 from tacdata.discrepancy.noise import offset_random_walk, readings
-from tacdata.discrepancy.noise.gram import Noise
+from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.offset_process import offset_process
 from tacdata.discrepancy.noise.variance_components import positive, spreads
 from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.statistics.gram_fit import solve
 
-LEAST, MOST = 0.1, 10.0
-"""Errors of pose are told to be between these, in standard deviations of the prior [1]."""
-UNTOLD = 1e-4
-"""Information added to what an episode tells of its errors: what it tells nothing of is not known, not nil [1]."""
-ODD = 6.0
-"""An episode is unlike all others whose errors are larger than theirs by so many standard deviations [1]."""
+LEAST_SIZE, MOST_SIZE = 0.1, 10.0
+"""Bounds of the estimated size of pose errors [standard deviations of their prior]."""
+UNINFORMED = 1e-4
+"""Information added to an episode's own: what it has no information on is unknown, not zero [1]."""
+ODD_Z = 6.0
+"""An episode is odd if its errors exceed the estimated spread by so many standard deviations [1]."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class ErrorSizes:
 
 @dataclass(frozen=True)
 class EpisodeErrors:
-    """What tells how far episodes err: a residual, and what any response may have besides."""
+    """Estimates episode errors from a residual beside columns that any response may need."""
 
     residual: np.ndarray
     """Measured less predicted [each stream's unit], shape (m, streams); NaN where missing."""
@@ -71,12 +71,12 @@ class EpisodeErrors:
         return replace(known, offsets=wandering, random_walk=walk, tag=readings.tag_wander(rest, course, known))
 
     def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> ErrorSizes:
-        """Return how large episodes' own errors of pose are.
+        """Return the estimated size of episodes' own errors of pose.
 
-        An episode's errors are told by generalized least squares as if they were free, all kinds together, beside all
-        others' at the sizes that they have so far: their covariance is that of such errors and that of what is known.
-        Told by successive episodes of the same place, as an offset that differs from place to place is no error of an
-        episode's own; by successive ones anywhere where places are not visited again.
+        An episode's errors are estimated by generalized least squares as if they were free, all kinds together. The
+        other episodes' have the sizes estimated so far. Differences of successive episodes of the same place give the
+        sizes, as an offset that differs from place to place is no error of an episode's own. Where places are not
+        visited again, any successive episodes do.
 
         Args:
             known: Noise.
@@ -85,25 +85,25 @@ class EpisodeErrors:
         """
         whitener = Whitener(self.course, known, self.context, self.features, errors * sizes)
         score, information = whitener.episode_scores(self._left(whitener), errors)
-        # Sealed episodes say nothing.
+        # Sealed episodes have no information.
         there = np.flatnonzero(np.diagonal(information, axis1=1, axis2=2).min(axis=1) > 0)
         place, score, information = self._places()[there], score[there], information[there]
         order = np.argsort(place, kind="stable")
         again = np.diff(place[order]) == 0
-        if again.sum() < readings.FEW_GAPS:
+        if again.sum() < readings.FEWEST_GAPS:
             order, again = np.arange(len(place)), np.ones(max(len(place) - 1, 0), dtype=bool)
         before, after = order[:-1][again], order[1:][again]
-        if len(before) < readings.FEW_GAPS:
+        if len(before) < readings.FEWEST_GAPS:
             return ErrorSizes(np.ones(len(sizes)), np.zeros(0, dtype=np.int64))
-        unsure = np.linalg.inv(information + UNTOLD * np.eye(len(sizes)))
+        unsure = np.linalg.inv(information + UNINFORMED * np.eye(len(sizes)))
         found = np.einsum("ekl,el->ek", unsure, score)
         unsure = positive(unsure - np.diag(np.square(sizes)))
-        estimated = spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST, MOST)
+        estimated = spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST_SIZE, MOST_SIZE)
         middle = np.stack([np.median(found[place == p], axis=0) for p in place])
         deviation = found - middle
         spread = unsure + np.diag(np.square(estimated))
         far = np.einsum("ek,ek->e", deviation, np.linalg.solve(spread, deviation[:, :, None])[:, :, 0])
-        return ErrorSizes(estimated, there[far > ODD**2])
+        return ErrorSizes(estimated, there[far > ODD_Z**2])
 
     def gains(self, known: Noise, errors: np.ndarray) -> float:
         """Return how far an episode's gain of a stream is off the next one's at its place [1].

@@ -1,11 +1,11 @@
-"""Generalized least squares beside what episodes err by themselves.
+"""Generalized least squares (GLS) beside the errors of each episode.
 
-Rows of an episode scatter with covariance 1 + A A' + T T': A its own offset of every stream, T its own errors of pose,
-which all streams share, and its own gains of the streams. Columns are multiplied by the root of the inverse of that, so
-that inner products are those of generalized least squares (Aitken; the inverse by Woodbury): however much single
-episodes err, what they have in common stays to be seen. Features that are free are projected out afterwards.
+The covariance of an episode's whitened rows is 1 + A A' + T T'. A is its own offset of every stream. T holds its errors
+of pose, which all streams share, and its gain error of each stream. Columns are multiplied by the root of the inverse,
+so that inner products are those of GLS (Aitken 1935). The inverse is Woodbury's: only small matrices are inverted.
+Features that are free are projected out afterwards.
 
-Gains of one episode have no mean, weighted by what the streams tell: what all streams do alike is an error of depth.
+An episode's gain errors have mean zero, weighted by information: what all streams do alike is an error of depth.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LEAST = 1e-7
-"""Weight of what no row excites, of the mean of what rows do [1]."""
+RIDGE = 1e-7
+"""Ridge of what no row excites, over the mean of what rows do [1]."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class FactoredErrors:
         return result
 
     def episode_scores(self, left: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a residual says of columns in each episode by itself, and how much it knows.
+        """Return scores and information of columns, each episode by itself.
 
         Args:
             left: A residual, as `without` returns it, shape (streams, n).
@@ -114,7 +114,7 @@ class FactoredErrors:
         return np.array(scores), np.array(known)
 
     def stream_scores(self, left: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a residual says of columns that each stand in one stream of one episode, and how much it knows.
+        """Return scores and information of columns that each stand in one stream of one episode.
 
         Like the products with what `without` makes of such columns, but for streams times episodes of them at once.
         Streams must not have gains of their own beside.
@@ -244,7 +244,7 @@ class _Free:
         """Invert what is the same for all columns."""
         streams, width, _ = self._blocks.shape
         mean = np.einsum("spp->s", self._blocks) / width
-        floor = LEAST * np.maximum(mean, 1e-12)[:, None, None] * np.eye(width)
+        floor = RIDGE * np.maximum(mean, 1e-12)[:, None, None] * np.eye(width)
         self._inverse = np.linalg.inv(self._blocks + floor)
         self.freedom = float(np.einsum("sij,sji->", self._inverse, self._blocks))
         joint = np.concatenate(self._joints, axis=2)

@@ -15,17 +15,17 @@ from tacdata.discrepancy.regressors.stack import side_by_side
 from tacdata.effects import Placed, library, load
 
 IDLE = 0.01
-"""Standard deviation of what is known of the readings without load, of the largest rise [1]."""
-JITTER = (0.02, 0.02, 0.01)
-"""Standard deviation of an episode's own errors of x, y and depth [mm] where the response is not fitted."""
-FITTED_JITTER = 0.01
-"""The same of depth for a fitted response, over the stroke [1]."""
-FITTED_GAIN = 0.01
-"""Standard deviation of an episode's own gain, the same for all streams, beside a fitted response [1]."""
-SET_UP = 2.0
-"""How far recordings of several strokes are off one another, in the same standard deviations [1]."""
-FEW = 24
-"""In more recordings than so many a set-up's errors are left to their strokes' own [1]."""
+"""Prior standard deviation of a reading without load [largest rise]."""
+POSE_PRIOR = (0.02, 0.02, 0.01)
+"""Prior standard deviations of an episode's errors of x, y and depth, beside a table [mm]."""
+FITTED_DEPTH_PRIOR = 0.01
+"""The same for the depth beside a fitted response [stroke]."""
+FITTED_GAIN_PRIOR = 0.01
+"""Prior standard deviation of an episode's gain beside a fitted response [1]."""
+SET_UP_FACTOR = 2.0
+"""Prior of a recording's set-up error over that of an episode's error [1]."""
+MOST_SET_UPS = 24
+"""With more recordings, set-up errors are left to the episodes' own."""
 
 
 def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
@@ -60,10 +60,10 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
     """
     own = jitter(setting, placed)
     recording = setting.course.recording
-    if recording is None or not 1 < recording.max() + 1 <= FEW:
+    if recording is None or not 1 < recording.max() + 1 <= MOST_SET_UPS:
         return np.zeros((*own.shape[:2], 0), dtype=np.float32), np.zeros(0)
     of = recording[setting.course.reduced.episode]
-    each = [SET_UP * own * (of == number)[:, None, None] for number in range(recording.max() + 1)]
+    each = [SET_UP_FACTOR * own * (of == number)[:, None, None] for number in range(recording.max() + 1)]
     columns = np.concatenate(each, axis=2).astype(np.float32)
     return columns, np.ones(columns.shape[2])
 
@@ -76,11 +76,11 @@ def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
         # Where the response follows what was read, gains are as much each episode's own as depths.
         rise = Streams.of(course).rise(predict(course, response, list(placed)), response)
         rise[:, course.channels :] = 0.0
-        return np.stack([slope * FITTED_JITTER * course.stroke, rise * FITTED_GAIN], axis=2)
-    parts = [slope[:, :, None] * JITTER[2]]
+        return np.stack([slope * FITTED_DEPTH_PRIOR * course.stroke, rise * FITTED_GAIN_PRIOR], axis=2)
+    parts = [slope[:, :, None] * POSE_PRIOR[2]]
     for effect in (e for e in library() if e.each_episode):
         board = build(course, response, placed, [effect])
         if board.candidates:
             shift = board.candidates[0].effect.amplitudes[0].typical
-            parts.append(side_by_side(board.columns)[:, :, 1:] * (JITTER[0] / shift))
+            parts.append(side_by_side(board.columns)[:, :, 1:] * (POSE_PRIOR[0] / shift))
     return np.concatenate(parts, axis=2)

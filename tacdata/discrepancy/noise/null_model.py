@@ -1,4 +1,4 @@
-"""What stays the same while effects come and go: nuisances and noise, of the model as it was given."""
+"""The null model: noise and nuisances, estimated once, that all effects are tested against."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.fitted_response import contexts
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise import gram
 from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, ErrorSizes
-from tacdata.discrepancy.noise.gram import Noise
+from tacdata.discrepancy.noise.gram import episode_grams
+from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.nuisances import jitter, nuisance_columns
 from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.regressors.generic import generic, slow
 from tacdata.discrepancy.statistics.gram_fit import fold_of
 from tacdata.effects import Placed
 
-MODEL = 0.003
-"""What any response is off at least, in each stream of an episode, as a standard deviation of its rise [1]."""
-DRAWS = 2
-"""Draws of noise by which it is told what two models say differently of noise alone [1]."""
+LEAST_GAIN_ERROR = 0.003
+"""Least standard deviation of a stream's gain in an episode: no response is exact [1]."""
+NOISE_DRAWS = 2
+"""Draws of noise by which the J test estimates how two models differ by noise alone."""
 ROUNDS = 3
-"""How often errors of pose and of gain are told beside each other, at most [1]..."""
+"""Most alternations between estimates of pose errors and of gain errors..."""
 SETTLED = 0.1
 """...until none changes by more than this share [1]."""
 
 
 @dataclass(frozen=True)
 class NullModel:
-    """What stays the same while effects come and go: nuisances and noise, of the model as it was given."""
+    """Noise and nuisances of the model as it was given; the same while effects are added and dropped."""
 
     context: np.ndarray
     """Group of rows that share features, of the rows read, shape (m,), int64."""
@@ -71,11 +71,11 @@ class NullModel:
         beside: np.ndarray, noise: Noise, folds: np.ndarray, known: Whitener | None = None,
         odd: np.ndarray | None = None, sizes: np.ndarray | None = None, spread: float = 0.0,
     ) -> NullModel:  # fmt: skip
-        """Return a frame of the rows read, with what follows from its parts."""
-        white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), DRAWS))
+        """Return the null model of the rows read, with what follows from its parts."""
+        white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), NOISE_DRAWS))
         nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
         return cls(
-            context, features, errors, ridge, beside, nuisances, gram.episode_grams(nuisances, reduced).gram, noise,
+            context, features, errors, ridge, beside, nuisances, episode_grams(nuisances, reduced).gram, noise,
             folds,
             known or Whitener(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
@@ -87,7 +87,7 @@ class NullModel:
 
         What the response takes up, and an episode's own errors of pose and gain, go through the model's effects: those
         of another one would hold its effect, of which any share might then be every episode's error. They keep the
-        size that they were told with: a model that has readings rise higher is not allowed larger errors for it.
+        estimated size: a model with larger readings is not allowed larger errors for it.
 
         Args:
             setting: With the model's response.
@@ -115,7 +115,7 @@ class NullModel:
 
 
 def as_large(shape: np.ndarray, reference: np.ndarray, episode: np.ndarray) -> np.ndarray:
-    """Return what an episode's error changes in one model, as large in each episode as it was told to be in another.
+    """Return what an episode's error changes in one model, of the size that it has in each episode of another.
 
     Pose: shape (m, streams, kinds), the size of each kind over all streams. Gains: shape (m, streams), that of each.
 
@@ -133,7 +133,7 @@ def as_large(shape: np.ndarray, reference: np.ndarray, episode: np.ndarray) -> n
 
 
 def null_model(setting: Setting) -> NullModel:
-    """Return what stays the same, for a model without further effects."""
+    """Estimate noise and nuisances of a model without further effects."""
     course, response = setting.course, setting.response
     reduced, streams = course.reduced, Streams.of(course)
     predicted = predict(course, response, list(setting.given))
@@ -148,15 +148,15 @@ def null_model(setting: Setting) -> NullModel:
     measured = EpisodeErrors(residual, every, reduced, context, features, rise)
     known = measured.noise(errors)
     prior, own = errors, ErrorSizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
-    before, spread = np.zeros(errors.shape[2] + 1), MODEL
+    before, spread = np.zeros(errors.shape[2] + 1), LEAST_GAIN_ERROR
     for _ in range(ROUNDS):
-        # Errors of pose and of gain explain much of the same: each is told beside the other.
+        # Errors of pose and of gain explain much of the same: each is estimated beside the other.
         known = replace(known, gain_error=None)
         spread = measured.gains(known, errors)
-        known = replace(known, gain_error=(rise * max(spread, MODEL)).astype(np.float32))
+        known = replace(known, gain_error=(rise * max(spread, LEAST_GAIN_ERROR)).astype(np.float32))
         own = measured.poses(known, prior, own.sizes)
         errors = prior * own.sizes
-        now = np.array([*own.sizes, max(spread, MODEL)])
+        now = np.array([*own.sizes, max(spread, LEAST_GAIN_ERROR)])
         if np.all(np.abs(now - before) <= SETTLED * now):
             break
         before = now
@@ -165,5 +165,6 @@ def null_model(setting: Setting) -> NullModel:
     folds = fold_of(course.episodes)
     sizes = own.sizes if response.fitted else None
     return NullModel.of(
-        reduced, context, features, errors, ridge, beside, known, folds, whitener, own.odd, sizes, max(spread, MODEL)
-    )
+        reduced, context, features, errors, ridge, beside, known, folds, whitener, own.odd, sizes,
+        max(spread, LEAST_GAIN_ERROR),
+    )  # fmt: skip

@@ -1,11 +1,12 @@
-"""How offsets wander from episode to episode, and what the ones before say of the next.
+"""How offsets drift from episode to episode: an Ornstein-Uhlenbeck process, estimated by REML.
 
-A stream's offset in an episode is a level of its place and session, an Ornstein-Uhlenbeck process in time, and an error
-of the episode's own. Their variances are those of restricted maximum likelihood (Patterson & Thompson, Biometrika 58,
-1971, 545) beside a line. That leaves slow wanders undecided: of the time constants that are likely, the one counts
-that makes a drift least certain. Episodes are made independent by what the offsets before them, read where nothing
-presses, let one expect of theirs (innovations: the Cholesky factor of their covariance), so that what follows the
-clock is held against the wander that it has to stand out from, and nothing else is.
+A stream's offset in an episode is the sum of three parts: a level of its place and session, an Ornstein-Uhlenbeck
+process in time, and the episode's own error. Their variances are those of restricted maximum likelihood (REML:
+Patterson & Thompson, Biometrika 58, 1971, 545) beside a straight line. REML leaves slow processes undecided: of the
+time constants that are likely, the one counts by which a drift is least certain.
+
+Episodes are made independent by their innovations (the Cholesky factor of the offsets' covariance): what the earlier
+offsets, read without contact, predict is taken off. An effect that follows the clock must then exceed this drift.
 """
 
 from __future__ import annotations
@@ -20,20 +21,20 @@ from scipy.optimize import minimize
 
 from tacdata.chain import Course
 
-FREE = 1e3
-"""Standard deviation of a level that is not known [noise scales]."""
-FEWEST = 6
-"""Fewer episodes tell no wander; then every offset is free."""
-AT_LEAST = 3
-"""Quiet rows that an episode's offset is read from."""
-LEAST = 0.05
-"""An episode's own offset varies by so much at least [noise scales]."""
-TOLD_BY = 160
-"""At most so many successive episodes tell the variances."""
-LENGTHS = (0.5, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 200.0)
-"""Time constants that are tried [median times between episodes]."""
+FREE_LEVEL = 1e3
+"""Prior standard deviation of an unknown level: practically free [noise scales]."""
+FEWEST_OFFSETS = 6
+"""REML: with fewer episodes no process is estimated, and every offset is free."""
+QUIET_ROWS = 3
+"""Rows without contact from which an episode's offset is read, at least."""
+LEAST_OWN = 0.05
+"""REML: least standard deviation of an episode's own offset [noise scales]."""
+MOST_OFFSETS = 160
+"""REML: most successive episodes that enter; its cost grows with their cube."""
+TIME_CONSTANTS = (0.5, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 200.0)
+"""REML: time constants of the Ornstein-Uhlenbeck process on a grid [median times between episodes]."""
 LIKELY = 1.0
-"""A time constant is likely if the likelihood is not lower by more than this [nats]: some 84 %, one-sided."""
+"""REML: a time constant is likely within this log-likelihood of the best, 84 % one-sided [1]."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class OffsetProcess:
     def _innovations(self) -> tuple[np.ndarray, np.ndarray]:
         count, blind = len(self.error), ~np.isfinite(self.error)
         read = self.covariance + np.diag(np.where(blind, 0.0, self.error))
-        # An episode whose offset cannot be read says nothing of others.
+        # An episode whose offset cannot be read has no part in the others' prediction.
         read[blind] = read[:, blind] = 0.0
         read[blind, blind] = 1.0
         # Its inverse's rows up to e whiten the offsets before e: E[o_e | q_<e] = C_e,<e (Q_<e,<e)^-1 q_<e.
@@ -72,7 +73,7 @@ class OffsetProcess:
         for e in range(count):
             half = inverse[:e, :e] @ np.where(blind[:e], 0.0, self.covariance[e, :e])
             weights[e, :e] = half @ inverse[:e, :e]
-            spread[e] = np.sqrt(max(self.covariance[e, e] - float(half @ half), LEAST**2))
+            spread[e] = np.sqrt(max(self.covariance[e, e] - float(half @ half), LEAST_OWN**2))
         return weights, spread
 
     def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> OffsetProcess:
@@ -105,7 +106,7 @@ class OffsetProcess:
 def offset_process(
     residual: np.ndarray, course: Course, scale: np.ndarray, memory: float, levels: Sequence[np.ndarray]
 ) -> OffsetProcess | None:  # fmt: skip
-    """Return how offsets wander; None if there are too few episodes to say.
+    """Return how offsets drift; None if there are too few episodes to estimate it.
 
     Args:
         residual: What an over-rich fit leaves, shape (m, streams); NaN where nothing was read.
@@ -119,8 +120,8 @@ def offset_process(
     missing = ~np.isfinite(streams)
     there = quiet & ~missing.any(axis=1)
     count = np.bincount(course.episode[there], minlength=course.episodes)
-    known = count >= AT_LEAST
-    if known.sum() < FEWEST:
+    known = count >= QUIET_ROWS
+    if known.sum() < FEWEST_OFFSETS:
         return None
     offsets = _means(streams[:, :, None], there, course.episode, course.episodes, None)[:, :, 0]
     # The mean of n rows with memory m and innovations of variance 1.
@@ -129,7 +130,7 @@ def offset_process(
     walk, length, own = _reml(offsets[known], error[known], time[known], [level[known] for level in levels])
     apart = np.abs(np.subtract.outer(time, time))
     same = np.sum([level[:, None] == level for level in levels], axis=0)
-    covariance = walk * np.exp(-apart / length) + FREE**2 * same + max(own, LEAST**2) * np.eye(len(time))
+    covariance = walk * np.exp(-apart / length) + FREE_LEVEL**2 * same + max(own, LEAST_OWN**2) * np.eye(len(time))
     return OffsetProcess(covariance, error, quiet, course.episode)
 
 
@@ -158,7 +159,7 @@ def _means(
 def _reml(
     offsets: np.ndarray, error: np.ndarray, time: np.ndarray, levels: Sequence[np.ndarray]
 ) -> tuple[float, float, float]:  # fmt: skip
-    """Return variance and time constant [s] of the wander, and the variance of episodes' own offsets.
+    """Return the REML variance and time constant [s] of the process, and the variance of episodes' own offsets.
 
     Args:
         offsets: In noise scales, shape (episodes, channels).
@@ -166,14 +167,15 @@ def _reml(
         time: Of each [s].
         levels: Of each.
     """
-    offsets, error, time = offsets[:TOLD_BY], error[:TOLD_BY], time[:TOLD_BY]
+    offsets, error, time = offsets[:MOST_OFFSETS], error[:MOST_OFFSETS], time[:MOST_OFFSETS]
     clock = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
-    # A line beside levels that are not known: a drift is no evidence of a wander.
-    basis = np.column_stack([*(level[:TOLD_BY, None] == np.unique(level[:TOLD_BY]) for level in levels), clock])
+    # A line beside levels that are not known: a drift is no evidence of the process.
+    few = [level[:MOST_OFFSETS] for level in levels]
+    basis = np.column_stack([*(level[:, None] == np.unique(level) for level in few), clock])
     values, vectors = np.linalg.eigh(basis @ basis.T)
     kept = values < 1e-9 * values[-1]
     contrast = vectors[:, kept]
-    if contrast.shape[1] < FEWEST // 2:
+    if contrast.shape[1] < FEWEST_OFFSETS // 2:
         return 0.0, 1.0, float(np.var(offsets, axis=0).mean())
     apart = np.abs(np.subtract.outer(time, time))
     between = max(float(np.median(np.diff(time))), 1e-9)
@@ -181,7 +183,7 @@ def _reml(
     read_error = (contrast.T * error) @ contrast
     size = max(float(np.mean(seen**2) - np.trace(read_error) / len(read_error)), 0.01 * float(np.mean(seen**2)), 1e-6)
     best = []
-    for steps in LENGTHS:
+    for steps in TIME_CONSTANTS:
         alike = np.exp(-apart / (steps * between))
         pattern = contrast.T @ alike @ contrast
 
@@ -195,7 +197,7 @@ def _reml(
         found = minimize(cost, np.log([size, 0.1 * size]), method="Nelder-Mead",
                          options={"maxfev": 80, "xatol": 0.05, "fatol": 0.05})  # fmt: skip
         walk, own = (float(v) for v in np.exp(np.clip(found.x, -14, 14)))
-        matrix = walk * alike + np.diag(error) + max(own, LEAST**2) * np.eye(len(time))
+        matrix = walk * alike + np.diag(error) + max(own, LEAST_OWN**2) * np.eye(len(time))
         best.append((float(found.fun), _doubt(matrix, basis), (walk, steps * between, own)))
     least = min(value for value, _, _ in best)
     return max((b for b in best if b[0] <= least + LIKELY), key=lambda b: b[1])[2]

@@ -3,7 +3,7 @@
 Electronics do not stand still while a finger is pressed: their noise is larger the slower it is. About the mean over
 an episode of length T a Brownian motion of rate q is a sum of cos(k pi t / T) with independent amplitudes of variance
 2 q T / (k pi)^2 (its Karhunen-Loeve series). Whatever a press remembers looks much like the first few of them. The rate
-is told where nothing presses, by how far an offset after a press is off the one before it.
+is estimated without contact, from how far an offset after a press is off the one before it.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import numpy as np
 from tacdata.chain import Course
 from tacdata.discrepancy.noise import readings
 
-MOST = 8
-"""Most modes [1]."""
+MOST_MODES = 8
+"""Karhunen-Loeve series: most modes."""
 SHOWS = 0.03
-"""A mode counts while its variance is so much of the one that rows know of it [1]."""
-HEARD = (0.05, 1.5)
-"""Means scatter by so much of what independent rows would make of them, in variance [1]."""
-AT_LEAST = 3
-"""Quiet rows that an offset before or after a press is read from."""
+"""Karhunen-Loeve series: a mode counts while its variance is this share of its reading error's [1]."""
+MEANS_SCATTER = (0.05, 1.5)
+"""Bounds of the variance of a mean over that of independent rows: hum averages out [1]."""
+QUIET_ROWS = 3
+"""Rows without contact from which an offset before or after a press is read, at least."""
 
 
 def modes(
@@ -45,11 +45,11 @@ def modes(
     np.maximum.at(end, course.episode, course.time)
     there = count > 1
     length = np.where(there, end - begin, 1.0)
-    number = np.arange(1, MOST + 1)
+    number = np.arange(1, MOST_MODES + 1)
     variance = 2 * rate * length[:, None] / (np.pi * number) ** 2
     known = 0.5 * count[:, None] * (1 - memory) ** 2
     shown = np.median((variance * known)[there], axis=0) > SHOWS
-    most = int(np.argmin(shown)) if not shown.all() else MOST
+    most = int(np.argmin(shown)) if not shown.all() else MOST_MODES
     if not most:
         return None
     share = (course.time - begin[course.episode]) / np.maximum(length, 1e-9)[course.episode]
@@ -58,7 +58,7 @@ def modes(
 
 
 def walk_rate(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray) -> float:
-    """Return the rate of the wander [noise scales squared a second], 0 where it cannot be told; as for `modes`."""
+    """Return the rate of the wander [noise scales squared a second], 0 where it cannot be estimated; as for `modes`."""
     quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
     streams = rest[:, : course.channels] / scale[: course.channels]
     quiet &= np.isfinite(streams).all(axis=1)
@@ -70,7 +70,7 @@ def walk_rate(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float
         if not len(pressed):
             continue
         before, after = rows[quiet[rows] & (rows < pressed[0])], rows[quiet[rows] & (rows > pressed[-1])]
-        if min(len(before), len(after)) < AT_LEAST:
+        if min(len(before), len(after)) < QUIET_ROWS:
             continue
         t0, t1 = course.time[before], course.time[after]
         # Means over stretches of a Brownian motion: a third of each stretch counts.
@@ -78,14 +78,14 @@ def walk_rate(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float
         steps.append((streams[after].mean(axis=0) - streams[before].mean(axis=0)) / np.sqrt(apart))
         known.append((1 / len(before) + 1 / len(after)) / ((1 - memory) ** 2 * apart))
         of.append(place[episode])
-        halves += [_halved(streams[part]) for part in (before, after) if len(part) >= 2 * AT_LEAST]
+        halves += [_halved(streams[part]) for part in (before, after) if len(part) >= 2 * QUIET_ROWS]
     if not steps:
         return 0.0
     step, error, where = np.array(steps), np.array(known), np.array(of)
     if halves:
         # A hum makes rows scatter, and means hardly.
-        heard = float(np.median(np.square(np.concatenate(halves))) / readings.HALF) * (1 - memory) ** 2
-        error *= np.clip(heard, *HEARD)
+        heard = float(np.median(np.square(np.concatenate(halves))) / readings.MEDIAN_CHI2) * (1 - memory) ** 2
+        error *= np.clip(heard, *MEANS_SCATTER)
     gaps, unsure = [], []
     for key in np.unique(where):
         own = np.diff(step[where == key], axis=0)

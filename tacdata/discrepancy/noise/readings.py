@@ -1,4 +1,4 @@
-"""How much readings scatter, told from the recordings themselves."""
+"""Noise of single readings: scale, autocorrelation, load dependence, and spreads between episodes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.noise.gram import Noise
+from tacdata.discrepancy.noise.noise_model import Noise
 
-SHARES = (0.0, 0.03, 0.1, 0.25, 0.5, 0.75, 1.0)
-"""Edges of the shares of the largest rise in which noise is told apart [1]."""
-SAME = 1.2
-"""Noise that is nowhere larger than so many times what it is without load is the same everywhere [1]."""
-LARGEST = 5.0
-"""It is told to be no larger than so many times that [1]."""
-ENOUGH = 150
-"""Fewer values tell no spread."""
+LOAD_EDGES = (0.0, 0.03, 0.1, 0.25, 0.5, 0.75, 1.0)
+"""Load dependence: edges of the classes, as shares of the largest rise [1]."""
+LEAST_GROWTH = 1.2
+"""Load dependence: noise that grows by a smaller factor is taken as constant [1]."""
+MOST_GROWTH = 5.0
+"""Load dependence: largest factor [1]."""
+FEWEST_DIFFERENCES = 150
+"""Load dependence: fewer second differences estimate no standard deviation."""
 
 
 def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np.ndarray | None:
@@ -34,22 +34,22 @@ def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np
     share = own / max(float(own.max(initial=0.0)), 1e-12)
     second, inside = _second(residual[:, : course.channels], course)
     at, read = share[1:-1][inside], np.isfinite(second)
-    quiet = read & (at <= SHARES[1])
+    quiet = read & (at <= LOAD_EDGES[1])
     count, power = quiet.sum(axis=0), np.sum(np.square(second), axis=0, where=quiet)
-    # A stream that mostly stands still without load, or was not read, tells nothing.
+    # A stream that mostly stands still without load, or was not read, has no information.
     informative = np.sum(quiet & (second != 0), axis=0) > 0.5 * count
-    if count[informative].sum() < ENOUGH:
+    if count[informative].sum() < FEWEST_DIFFERENCES:
         return None
     size = np.sqrt(power[informative] / count[informative])
     second, at, known = second[:, informative] / size, at[:, informative], read[:, informative]
-    nodes, levels = [0.0], [_spread(second[known & (at <= SHARES[1])])]
-    for low, high in itertools.pairwise(SHARES[1:]):
+    nodes, levels = [0.0], [_spread(second[known & (at <= LOAD_EDGES[1])])]
+    for low, high in itertools.pairwise(LOAD_EDGES[1:]):
         inside = known & (at > low) & (at <= high)
-        if inside.sum() >= ENOUGH:
+        if inside.sum() >= FEWEST_DIFFERENCES:
             nodes.append(float(np.mean(at[inside])))
             levels.append(_spread(second[inside]))
-    size = np.clip(np.array(levels) / max(levels[0], 1e-12), 1.0, LARGEST)
-    if size.max() < SAME:
+    size = np.clip(np.array(levels) / max(levels[0], 1e-12), 1.0, MOST_GROWTH)
+    if size.max() < LEAST_GROWTH:
         return None
     result = np.ones(residual.shape, dtype=np.float32)
     result[:, : course.channels] = np.interp(share, nodes, size)
@@ -91,7 +91,7 @@ def first_guess(residual: np.ndarray, course: Course, relative: np.ndarray | Non
 
 
 def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
-    """Return noise with memory, told from what an over-rich fit leaves.
+    """Return autocorrelated noise, estimated from what an over-rich fit leaves.
 
     Args:
         leftover: Shape (n, streams).
@@ -125,12 +125,12 @@ def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -
     a gradient.
 
     Args:
-        score: What the residual says of each episode's gain of each stream, shape (episodes, streams).
+        score: Score of each episode's gain of each stream, shape (episodes, streams).
         information: How much it knows of it, shape (episodes, streams).
         place: Of each episode, shape (episodes,).
     """
     gaps, known = [], []
-    informative = information.max(axis=1) > 0  # sealed episodes say nothing
+    informative = information.max(axis=1) > 0  # sealed episodes have none
     for key in np.unique(place[informative]):
         power = information[informative & (place == key)]
         gain = score[informative & (place == key)] / np.maximum(power, 1e-9)
@@ -140,34 +140,33 @@ def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -
     return spread_of(np.concatenate(gaps), np.concatenate(known))
 
 
-HALF = 0.4549
-"""Median of the square of a standard normal number [1]."""
-FEW_GAPS = 6
-"""Fewer differences tell no spread."""
-SHARED = 40
-"""The best known differences, so many, count alike: no few of them decide [1]."""
+MEDIAN_CHI2 = 0.4549
+"""Median of the square of a standard normal number, chi square with one degree of freedom [1]."""
+FEWEST_GAPS = 6
+"""Spread: fewer differences of successive episodes estimate none."""
+EQUAL_WEIGHTS = 40
+"""Spread: the best known differences, so many, weigh alike: no few of them decide."""
 
 
 def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
     """Return the standard deviation that numbers have beyond their known errors, 0 or more.
 
-    Told from differences of successive ones by their median: neither a slow change nor a step makes it larger. Each
-    counts by what it says of the spread (the Fisher information of a variance), so that many that are hardly known do
-    not drown the few that are.
+    Estimated by the median of differences of successive ones: neither a slow change nor a step makes it larger. Each
+    is weighted by its Fisher information on the spread, so that many uncertain ones do not drown the few good ones.
 
     Args:
         gaps: Differences of successive numbers, shape (n,).
         known: Variance of each that is known, shape (n,).
     """
-    if len(gaps) < FEW_GAPS:
+    if len(gaps) < FEWEST_GAPS:
         return 0.0
     square = np.square(gaps)
-    floor = float(np.partition(known, min(SHARED, len(known)) - 1)[min(SHARED, len(known)) - 1])
+    floor = float(np.partition(known, min(EQUAL_WEIGHTS, len(known)) - 1)[min(EQUAL_WEIGHTS, len(known)) - 1])
 
     def beyond(power: float) -> bool:
         ratio = square / np.maximum(2 * power + known, 1e-30)
         weight = 1 / np.square(2 * power + np.maximum(known, floor) + 1e-30)
-        return float(weight[ratio > HALF].sum()) > 0.5 * float(weight.sum())
+        return float(weight[ratio > MEDIAN_CHI2].sum()) > 0.5 * float(weight.sum())
 
     low, high = 0.0, float(np.max(square)) + 1e-30
     if not beyond(0.0):
@@ -178,10 +177,10 @@ def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
     return float(np.sqrt(high))
 
 
-INTERVALS = 10
-"""Of the function of depth that a tag's noise is told beside [1]."""
-FEW_VIEWS = 100
-"""Fewer views tell no function of depth beside an offset each episode [1]."""
+DEPTH_INTERVALS = 10
+"""Tag: intervals of the function of depth beside which its noise is estimated."""
+FEWEST_VIEWS = 100
+"""Tag: fewer views estimate no function of depth."""
 
 
 def beside_depth(residual: np.ndarray, course: Course) -> np.ndarray:
@@ -197,12 +196,12 @@ def beside_depth(residual: np.ndarray, course: Course) -> np.ndarray:
     if course.tag is None:
         return residual
     result, depth = residual.copy(), np.clip(course.tip[:, 2] / max(float(course.tip[:, 2].max()), 1e-12), 0.0, 1.0)
-    hats = np.maximum(1 - np.abs(depth[:, None] * INTERVALS - np.arange(1, INTERVALS + 1)), 0.0)
+    hats = np.maximum(1 - np.abs(depth[:, None] * DEPTH_INTERVALS - np.arange(1, DEPTH_INTERVALS + 1)), 0.0)
     leaving = (course.speed < 0)[:, None]
     columns = np.concatenate([np.where(leaving, 0.0, hats), np.where(leaving, hats, 0.0)], axis=1)
     for k in range(residual.shape[1] - 3, residual.shape[1]):
         there = np.isfinite(residual[:, k])
-        if there.sum() < FEW_VIEWS:
+        if there.sum() < FEWEST_VIEWS:
             continue
         own = [_about_mean(x, course.episode[there]) for x in (columns[there], residual[there, k : k + 1])]
         gram = own[0].T @ own[0]

@@ -1,4 +1,4 @@
-"""How large errors of several kinds are that differ from episode to episode, told together from noisy differences."""
+"""Variance components: the size of several kinds of episode errors, estimated together by a robust likelihood."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 from scipy.optimize import minimize, root_scalar
 from scipy.stats import chi2
 
-FREEDOM = 4.0
-"""Degrees of freedom of the t distribution by whose likelihood spreads are told: few episodes may be unlike others."""
+T_FREEDOM = 4.0
+"""Degrees of freedom of the t likelihood: a few odd episodes hardly count [1]."""
 STARTS = (0.2, 1.0, 3.0)
-"""Spreads from which the likelihood is climbed [1]."""
+"""Standard deviations from which the likelihood is climbed [1]."""
 
 
 def spreads(gaps: np.ndarray, known: np.ndarray, least: float, most: float) -> np.ndarray:
     """Return the standard deviation of each kind of error beyond what is known of it, shape (kinds,).
 
     Successive errors e of independent kinds differ with covariance 2 diag(s^2) + K, K known: the s of largest
-    likelihood, all at once, as kinds that change readings almost alike are told by each other. The likelihood is that
-    of a multivariate t distribution, scaled so that normal differences are told right (Maronna, Ann. Stat. 4, 1976).
+    likelihood, all at once, as kinds that change readings almost alike explain each other. The likelihood is that
+    of a multivariate t distribution, scaled to be consistent for normal differences (Maronna, Ann. Stat. 4, 1976).
 
     Args:
         gaps: Differences of successive errors, shape (n, kinds).
@@ -28,13 +28,13 @@ def spreads(gaps: np.ndarray, known: np.ndarray, least: float, most: float) -> n
         most: Largest spread.
     """
     kinds = gaps.shape[1]
-    scale = FREEDOM * _consistent(kinds)
+    scale = T_FREEDOM * _consistent(kinds)
 
     def unlikely(log: np.ndarray) -> float:
         whole = known + 2 * np.diag(np.exp(2 * log))
         far = np.einsum("nk,nk->n", gaps, np.linalg.solve(whole, gaps[:, :, None])[:, :, 0])
         _, volume = np.linalg.slogdet(whole)
-        return float(0.5 * np.sum(volume + (FREEDOM + kinds) * np.log1p(far / scale)))
+        return float(0.5 * np.sum(volume + (T_FREEDOM + kinds) * np.log1p(far / scale)))
 
     bounds = [(np.log(least), np.log(most))] * kinds
     tried = [
@@ -52,10 +52,10 @@ def positive(matrices: np.ndarray) -> np.ndarray:
 
 @cache
 def _consistent(kinds: int) -> float:
-    """Return the factor of the t distribution's scale with which it tells normal numbers' covariance right [1]."""
+    """Return the factor of the t distribution's scale that is consistent for normal numbers [1]."""
     at = chi2.ppf((np.arange(4000) + 0.5) / 4000, kinds)
 
     def bias(scale: float) -> float:
-        return float(np.mean((FREEDOM + kinds) * at / (FREEDOM * scale + at))) - kinds
+        return float(np.mean((T_FREEDOM + kinds) * at / (T_FREEDOM * scale + at))) - kinds
 
     return float(root_scalar(bias, bracket=(0.1, 20.0)).root)

@@ -1,4 +1,4 @@
-"""Takes noise and nuisances out of columns, place by place: what is the same for all columns is factored once."""
+"""The whitener: columns as generalized least squares sees them. What is the same for all columns is factored once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,47 @@ import numpy as np
 
 from tacdata.chain import Course
 from tacdata.discrepancy.noise.episode_gls import EpisodeErrorModel, FactoredErrors
-from tacdata.discrepancy.noise.gram import EpisodeGrams, Noise, whiten
+from tacdata.discrepancy.noise.gram import EpisodeGrams
+from tacdata.discrepancy.noise.noise_model import Noise
+
+
+def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | None = None) -> np.ndarray:
+    """Divide by the relative scale, filter by e_i - phi^(dt / median dt) e_{i-1} within episodes, divide by the scale.
+
+    Args:
+        values: Shape (n, streams, columns).
+        course: Whose rows.
+        noise: Scales and memory.
+        rows: Rows of the course, of whole episodes, that ``values`` are of; all, unless given.
+    """
+    some = slice(None) if rows is None else rows
+    decay, spread = _filter(course, noise)
+    decay, spread = decay[some], spread[some]
+    if noise.relative_scale is None:
+        result = values.astype(np.float32)
+    else:
+        result = values.astype(np.float32, copy=False) / noise.relative_scale[some][:, :, None]
+    if noise.missing is not None:
+        missing = noise.missing[some]
+        result[missing] = 0.0
+        result[1:] -= decay[1:, None, None].astype(np.float32) * result[:-1]
+        gone = missing.copy()
+        gone[1:] |= missing[:-1] & ~course.first[some][1:, None]
+        result[gone] = 0.0
+    else:
+        result[1:] -= decay[1:, None, None].astype(np.float32) * result[:-1]
+    result /= (spread[:, None] * noise.scale[None]).astype(np.float32)[:, :, None]
+    return result
+
+
+def _filter(course: Course, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
+    """Return how much of the reading before each row keeps [1], and its innovation over the scale [1], shape (n,)."""
+    inside = course.step[~course.first]
+    median = float(np.median(inside)) if len(inside) else 1.0
+    decay = noise.memory ** np.clip(course.step / max(median, 1e-9), 0.0, 50.0)
+    decay = np.where(course.first, 0.0, decay)
+    spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
+    return decay, spread / np.sqrt(np.minimum(course.averaged, 4.0))
 
 
 @dataclass(frozen=True)
@@ -25,7 +65,7 @@ class _Place:
 
 
 class Whitener:
-    """Whitens columns and takes nuisances out of them."""
+    """Whitens columns, and projects out what the response may take up, place by place."""
 
     def __init__(
         self, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None, jitter: np.ndarray
@@ -115,7 +155,7 @@ class Whitener:
             yield place.rows, part
 
     def stream_scores(self, residual: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a residual says of columns that each stand in one stream of one episode, and how much it knows.
+        """Return scores and information of columns that each stand in one stream of one episode.
 
         Args:
             residual: Shape (n, streams).
@@ -133,7 +173,7 @@ class Whitener:
         return score, np.maximum(known, 0.0)
 
     def episode_scores(self, residual: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a residual says of columns in each episode by itself, and how much it knows.
+        """Return scores and information of columns, each episode by itself.
 
         Args:
             residual: Shape (n, streams).

@@ -1,4 +1,4 @@
-"""What every effect would add to these recordings, as columns beside the residual."""
+"""Candidates: what every effect would add to these recordings, as columns beside the residual."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.effects import Effect, Placed
 
 MOST_CHANNELS = 32
-"""Up to so many channels, parameters that every channel has of its own get a column each; beyond, one for all."""
+"""Up to so many channels, a parameter per channel has a column each; beyond, one for all."""
 
 
-SMALL = (0.1, 0.02)
-"""An effect with a threshold looks otherwise where it is small: it is tried at these shares of its size too..."""
+SMALL_SHARES = (0.1, 0.02)
+"""Effects with a threshold are tried at these shares of their typical size, too..."""
 ALIKE = 0.95
-"""...if what it changes there is no more alike than this [cosine] to what it does at the larger size."""
+"""...if their column there differs: cosine to that at the larger size [1]."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class CandidateColumns:
     """Residual first, then columns [each stream's unit], shape (n, streams) each, float32."""
     candidates: list[Candidate]
     unjudgeable: dict[str, str]
-    """Effect -> why these recordings cannot tell of it."""
+    """Effect -> why these recordings cannot show it."""
 
 
 def build(
@@ -93,7 +93,7 @@ def build(
         if reason:
             unjudgeable[effect.name] = reason
             continue
-        shares = SMALL
+        shares = SMALL_SHARES
         for shapes in _shapes(effect):
             made, low, high = _columns(effect, shapes, course, chain, placed, streams, now)
             sizes = [made]

@@ -1,4 +1,4 @@
-"""Columns that belong to no effect: patterns times histories, to see whether anything is left to explain."""
+"""Generic columns, of no effect: patterns times histories of the path. Is anything left to explain?"""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from tacdata.chain.memory import low_pass, play, running_max
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.effects import Placed
 
-CLOCK = (3, 4, -1)
-"""Histories that follow the clock: a slow wander of the electronics does too, so a gap needs more than them."""
-TIMES = (0.1, 0.4, 1.5, 6.0, 25.0, 100.0)
+CLOCK_HISTORIES = (3, 4, -1)
+"""Histories that follow the clock: a drift of the electronics does, too."""
+TIME_CONSTANTS = (0.1, 0.4, 1.5, 6.0, 25.0, 100.0)
 """Time constants of leaky means of depth [s]."""
 
 
@@ -22,7 +22,7 @@ def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndar
     slope = depth_slope(course, response, placed)
     level = np.zeros_like(rise)
     level[:, : course.channels] = np.abs(rise[:, : course.channels]).max()
-    own = np.delete(histories(course), CLOCK, axis=1)[streams.rows]
+    own = np.delete(histories(course), CLOCK_HISTORIES, axis=1)[streams.rows]
     parts = [rise[:, :, None] * own[:, None, :], slope[:, :, None] * own[:, None, :] * 0.1]
     parts.append(level[:, :, None] * own[:, None, ::2])
     return np.concatenate(parts, axis=2).astype(np.float32)
@@ -31,11 +31,11 @@ def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndar
 def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
     """Return columns of what changes over a session, shape (n, streams, k), float32: gains and depths with the clock.
 
-    They tell slow changes from what differs from one visit of a place to the next; they are no evidence themselves.
+    They separate slow changes from differences between visits of a place; they are no evidence themselves.
     """
     streams = Streams.of(course)
     rise = streams.rise(predict(course, response, placed), response)
-    own = [histories(course)[:, k] for k in CLOCK]
+    own = [histories(course)[:, k] for k in CLOCK_HISTORIES]
     if course.temperature is not None:
         own.append((course.temperature - course.temperature.mean()) / max(float(np.std(course.temperature)), 1e-9))
     follow = np.stack(own, axis=-1)[streams.rows][:, None, :]
@@ -57,8 +57,8 @@ def histories(course: Course) -> np.ndarray:
     stroke = _since_start(course, share)
     columns = [
         np.sign(speed), np.sign(speed) * fast, fast, clock, clock**2 - 1 / 12, most - share, stroke - share,
-        most - recent * 0.0 - stroke, *(low_pass(share, course.step, tau) for tau in TIMES),
-        *(np.square(low_pass(share, course.step, tau)) for tau in TIMES[1::2]),
+        most - recent * 0.0 - stroke, *(low_pass(share, course.step, tau) for tau in TIME_CONSTANTS),
+        *(np.square(low_pass(share, course.step, tau)) for tau in TIME_CONSTANTS[1::2]),
         *(play(share, r) - share for r in (0.03, 0.1, 0.3)),
         share * (speed < 0), np.exp(-np.square(share / 0.1)) * (speed < 0),
         course.session[course.episode] - float(np.mean(course.session)),

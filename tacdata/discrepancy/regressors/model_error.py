@@ -1,4 +1,4 @@
-"""What an effect's equation may be off about: its own contribution, a little larger here and smaller there."""
+"""Model error: what an effect's equation may be wrong by, as regressors with a prior."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tacdata.chain import Chain, Course, Response
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.effects import Placed, library
 
-SPREAD = 3.0
-"""How far a mechanism may be spread over its other forms and shapes, over what one equation is off about [1]."""
-SIZES = (0.25, 0.5, 2.0, 4.0)
-"""Other sizes of what has no shape, whose time constant or width is its size [1]."""
-NEAR = (0.5, 2.0)
-"""Shapes beside an effect's own: what goes with a period has harmonics, what relaxes has times on either side [1]."""
-NOTHING = 1e-9
-"""What changes less than this share of what the effect does is no form of it [1]."""
+OTHER_FORMS = 3.0
+"""Prior of a mechanism's other forms and shapes, over that of its equation [1]."""
+OTHER_SIZES = (0.25, 0.5, 2.0, 4.0)
+"""Other sizes of an effect without a shape: its time constant or width is its size [1]."""
+OTHER_SHAPES = (0.5, 2.0)
+"""Factors of an effect's own shape: periods have harmonics, relaxation a spectrum [1]."""
+NEGLIGIBLE = 1e-9
+"""A form that changes less than this share of the effect is left out [1]."""
 
 
 def model_error_columns(
@@ -45,8 +45,8 @@ def model_error_columns(
                 continue
             change = streams.predicted(chain.again([*rest, other])) - bare
             large = float(np.linalg.norm(change))
-            if large > NOTHING * size:
-                columns.append(SPREAD * one.effect.form_error * size / large * change)
+            if large > NEGLIGIBLE * size:
+                columns.append(OTHER_FORMS * one.effect.form_error * size / large * change)
     return np.stack(columns, axis=-1).astype(np.float32)
 
 
@@ -62,7 +62,7 @@ def variants(one: Placed, channels: int) -> list[Placed]:
         if effect.called != one.effect.called:
             continue
         if not effect.shapes and effect.name == one.effect.name:
-            made += [_sized(one, by) for by in SIZES]
+            made += [_sized(one, by) for by in OTHER_SIZES]
             continue
         sizes = [
             {
@@ -74,7 +74,7 @@ def variants(one: Placed, channels: int) -> list[Placed]:
         every = list(product(*(p.grid for p in effect.shapes)))
         if effect.name == one.effect.name:
             now = [float(one.values[p.name]) for p in effect.shapes]
-            beside = [(k, by * value) for k, value in enumerate(now) for by in NEAR]
+            beside = [(k, by * value) for k, value in enumerate(now) for by in OTHER_SHAPES]
             every += [(*now[:k], value, *now[k + 1 :]) for k, value in beside]
         for shapes in every:
             own = {p.name: np.clip(value, p.low, p.high) for p, value in zip(effect.shapes, shapes, strict=True)}

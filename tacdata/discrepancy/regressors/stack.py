@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-ROWS = 64
-"""Rows laid out at once [1]: what they hold of some hundred columns stays in a processor's cache."""
+BLOCK_ROWS = 64
+"""Rows laid out at once: some hundred columns of them stay in a processor's cache."""
 
 
 def side_by_side(columns: Iterable[np.ndarray]) -> np.ndarray:
@@ -19,10 +19,10 @@ def side_by_side(columns: Iterable[np.ndarray]) -> np.ndarray:
     given = list(columns)
     rows, streams = given[0].shape
     result = np.empty((rows, streams, len(given)), dtype=np.float32)
-    for begin in range(0, rows, ROWS):
-        block = result[begin : begin + ROWS]
+    for begin in range(0, rows, BLOCK_ROWS):
+        block = result[begin : begin + BLOCK_ROWS]
         for k, column in enumerate(given):
-            block[:, :, k] = column[begin : begin + ROWS]
+            block[:, :, k] = column[begin : begin + BLOCK_ROWS]
     return result
 
 

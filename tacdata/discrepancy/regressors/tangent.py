@@ -1,4 +1,4 @@
-"""How a model moves with the parameters of the effects that it has."""
+"""Tangent: derivatives of a model by the parameters of the effects that it has."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.effects import Parameter, Placed
 
 STEP = 0.02
-"""Step of the finite differences, in typical sizes (amplitudes) or e-folds (shapes)."""
+"""Step of the finite differences [typical sizes, or e-folds of a shape]."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""How large an effect would have had to be to be seen."""
+"""Detection limits: the size of each effect at which it would be found about half the time."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ FOUND_Z = 4.0
 def detection_limits(problem: Problem) -> dict[str, float]:
     """Return for each effect the size at which it would be found about half the time, in typical sizes.
 
-    The error of an amplitude is told from how the episodes' scores scatter, so that whatever an episode's rows have in
-    common counts once. Of several shapes or directions the easiest counts. inf: these episodes do not excite it.
+    The error of an amplitude is cluster-robust: it is estimated from how the episodes' scores scatter. Of several
+    shapes or directions the easiest counts. inf: these episodes do not excite it.
     """
     fixed, ridge = problem.fixed, problem.fixed_ridge(0.0)
     gram = eliminated(problem.grams.gram, fixed, ridge)

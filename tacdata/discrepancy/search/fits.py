@@ -11,7 +11,7 @@ from tacdata.discrepancy.search.problem import Problem
 from tacdata.discrepancy.statistics.gram_fit import gains, solve
 
 INFORMED = 3.0
-"""A channel's gain is estimated if presses say so many times what its prior says, in information [1]."""
+"""A channel's gain is estimated if presses have so many times its prior's information [1]."""
 
 
 def fitted(problem: Problem, chosen: Sequence[Candidate], episodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""From the linear picture to the model itself: Gauss-Newton steps on the chain."""
+"""Gauss-Newton refinement: a model's parameters at their optimum on the chain itself, with cluster-robust errors."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise import gram
-from tacdata.discrepancy.noise.gram import EpisodeGrams
+from tacdata.discrepancy.noise.gram import EpisodeGrams, episode_grams
 from tacdata.discrepancy.noise.null_model import NullModel
 from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.regressors.tangent import Tangent, tangents
 from tacdata.discrepancy.statistics.gram_fit import solve
 from tacdata.effects import Placed
 
-STEPS = 5
-SMALL = 0.2
-"""Gain in half the whitened energy below which no further step is made [nats]."""
+MOST_STEPS = 5
+"""Gauss-Newton: most steps."""
+SMALL_GAIN = 0.2
+"""Gauss-Newton: it ends when half the sum of squares falls by less [1]."""
 
-HEAVIEST = 0.9
-"""No episode is taken to hold a larger share of what is known of a number [1]."""
+LARGEST_LEVERAGE = 0.9
+"""CR3: largest leverage of an episode [1]."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Refined:
     response: Response
     tangent: Tangent
     energy: np.ndarray
-    """Half the whitened energy of each episode, nuisances fitted [nats], shape (episodes,)."""
+    """Half the whitened sum of squares of each episode, nuisances fitted [1], shape (episodes,)."""
     covariance: np.ndarray
     """Of the knobs [their steps], as episodes scatter; 1.645 standard errors hold 90 %, shape (knobs, knobs)."""
     left: np.ndarray
@@ -81,7 +81,7 @@ class Refined:
         return error, tuple(bound)
 
 
-def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: int = STEPS) -> Refined:
+def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: int = MOST_STEPS) -> Refined:
     """Fit the numbers of placed effects on the chain itself.
 
     Args:
@@ -114,7 +114,7 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
         gained = view.energy.sum() - best[0].energy.sum()
         view, now, response = best
         state = _state(replace(setting, response=response), response, now, null, view)
-        if gained < SMALL:
+        if gained < SMALL_GAIN:
             break
     return Refined(
         tuple(now), response, state.tangent, view.energy, state.covariance, view.left, setting.course.reduced.episode,
@@ -163,7 +163,7 @@ def _looked(setting: Setting, response: Response, placed: list[Placed], null: Nu
     residual = (streams.measured(course) - streams.predicted(predicted))[:, :, None].astype(np.float32)
     whitener = null.whitener_for(replace(setting, response=response), [*setting.given, *placed])
     clean = whitener.whitened(residual)
-    found = gram.episode_grams(clean, course.reduced, null.nuisances, null.inner)
+    found = episode_grams(clean, course.reduced, null.nuisances, null.inner)
     still = _without(found.gram.sum(axis=0), np.arange(len(null.ridge)), null.ridge)
     return _View(clean, whitener, _energy(found, still), clean[:, :, 0] - null.nuisances @ still.astype(np.float32))
 
@@ -175,7 +175,7 @@ def _state(setting: Setting, response: Response, placed: list[Placed], null: Nul
         return _State(moving, np.zeros(0), np.zeros((0, 0)))
     clean = view.whitener.whitened(moving.values)
     both = np.concatenate([view.clean, clean], axis=2)
-    found = gram.episode_grams(both, course.reduced, null.nuisances, null.inner)
+    found = episode_grams(both, course.reduced, null.nuisances, null.inner)
     k = len(moving.knobs)
     rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
     weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
@@ -197,12 +197,12 @@ def _energy(found: EpisodeGrams, values: np.ndarray) -> np.ndarray:
 
 
 def _covariance(found: EpisodeGrams, values: np.ndarray, weight: np.ndarray, knobs: int) -> np.ndarray:
-    """Return the covariance of the first ``knobs`` numbers: a sandwich over episodes, beside the others.
+    """Return the covariance of the first ``knobs`` parameters: a cluster-robust sandwich over episodes.
 
     Errors within an episode may depend on each other in any way. Each episode's score is that of a fit without it (CR3,
-    the jackknife: Bell & McCaffrey, Survey Methodology 28, 2002, 169). Few episodes tell their scatter badly: errors
-    are larger by Student's t over the normal quantile, with the degrees of freedom that the episodes' shares of the
-    information leave, so that 1.645 of them hold 90 %.
+    the jackknife: Bell & McCaffrey, Survey Methodology 28, 2002, 169). Few episodes estimate their scatter badly. So
+    errors are enlarged by the ratio of the t to the normal quantile, with the degrees of freedom that the episodes'
+    shares of the information leave: 1.645 of them hold 90 %.
     """
     if not knobs:
         return np.zeros((0, 0))
@@ -215,7 +215,7 @@ def _covariance(found: EpisodeGrams, values: np.ndarray, weight: np.ndarray, kno
     good = size > 1e-12 * max(float(size[-1]), 1e-300)
     root = (vectors[:, good] / np.sqrt(size[good])) @ vectors[:, good].T
     heavy, axes = np.linalg.eigh(root @ each @ root)
-    left = np.einsum("eji,ej->ei", axes, scores @ root) / (1 - np.minimum(heavy, HEAVIEST))
+    left = np.einsum("eji,ej->ei", axes, scores @ root) / (1 - np.minimum(heavy, LARGEST_LEVERAGE))
     left = np.einsum("eij,ej->ei", axes, left)
     count, inverse = len(scores), root @ root
     share = np.maximum(np.einsum("ki,eij,kj->ek", inverse, each, inverse), 0.0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.discrepancy.noise.gram import Noise
+from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.regressors.generic import histories
 from tacdata.discrepancy.search.fits import fitted

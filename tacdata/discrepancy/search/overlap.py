@@ -1,4 +1,4 @@
-"""How much of what one effect does others might do in other forms: of that alone they may take it for their own."""
+"""Overlap: how much of what one effect does those in the model might do in other forms."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from tacdata.discrepancy.regressors.candidates import Candidate
 from tacdata.discrepancy.search.problem import Problem
 
-LEAST = 1e-6
-"""Weight of what no row excites, of the mean of what rows do [1]."""
+RIDGE = 1e-6
+"""Ridge of what no row excites, over the mean of what rows do [1]."""
 
 
 def overlap(problem: Problem, candidates: Sequence[Candidate]) -> float:
-    """Return the largest share of a candidate's columns that what is placed could say press by press [1].
+    """Return the largest share of a candidate's columns that what is placed could explain press by press [1].
 
     Every press has amounts of its own of what the equations of what is placed may be off about, and of what its numbers
     move: what is left then looks like no form of it, however large that is.
@@ -29,7 +29,7 @@ def overlap(problem: Problem, candidates: Sequence[Candidate]) -> float:
         return 0.0
     inner = gram[:, beside][:, :, beside]
     mean = np.einsum("eii->e", inner)[:, None, None] / len(beside)
-    inner = inner + (LEAST * mean + 1e-300) * np.eye(len(beside))
+    inner = inner + (RIDGE * mean + 1e-300) * np.eye(len(beside))
     shares = []
     for candidate in candidates:
         own = candidate.columns + 1

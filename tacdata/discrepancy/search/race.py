@@ -11,7 +11,7 @@ from tacdata.chain import Response
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import NullModel, null_model
 from tacdata.discrepancy.regressors.candidates import Candidate
-from tacdata.discrepancy.regressors.model_error import SPREAD
+from tacdata.discrepancy.regressors.model_error import OTHER_FORMS
 from tacdata.discrepancy.search.fits import fitted
 from tacdata.discrepancy.search.gate import Gate
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
@@ -154,7 +154,7 @@ def model_error_energy(
     def error(one: Effect) -> float:
         own = [c for c in problem.candidates if c.effect.name == one.name] if problem else []
         alike = overlap(problem, own) if problem else 1.0
-        kin = [SPREAD if effect.group == one.group else 1.0 for effect, _ in explained]
+        kin = [OTHER_FORMS if effect.group == one.group else 1.0 for effect, _ in explained]
         return sum(
             much * (alike * (wide * effect.form_error) ** 2 + response.form_error**2)
             for wide, (effect, much) in zip(kin, explained, strict=True)

@@ -1,4 +1,4 @@
-"""Which effects, and which pair of them, are worth refining beside what a model has."""
+"""The shortlist: effects, and one pair of effects, worth refining beside what a model has."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _gain(problem: Problem, chosen: list[Candidate]) -> float:
 
 
 def _beside(problem: Problem, first: Candidate, others: list[Candidate]) -> list[float]:
-    """Return the gain of a first effect with each of others, without bounds, less half a log of episodes a number."""
+    """Return the gain of a first effect with each of others, without bounds, less half its BIC penalty."""
     fixed = np.concatenate([problem.fixed, first.columns]).astype(int) + 1
     total = problem.grams.of(np.arange(len(problem.folds)))
     ridge = np.concatenate([problem.fixed_ridge(1.0), np.zeros(len(first.columns))])

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 FOLDS = 5
+"""Cross-validation: number of folds."""
 
 
 def solve(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -31,7 +32,7 @@ def solve(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray, low: np.ndar
 
 
 def gains(gram: np.ndarray, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return by how much coefficients lower half the whitened energy of each episode, shape (episodes,)."""
+    """Return by how much coefficients lower half the whitened sum of squares of each episode, shape (episodes,)."""
     index = columns + 1
     linear = gram[:, 0, :][:, index] @ values
     square = np.einsum("i,eij,j->e", values, gram[:, index][:, :, index], values)
@@ -75,10 +76,10 @@ def t_value(values: np.ndarray) -> float:
     return mean / (spread / np.sqrt(len(values))) if spread > 1e-12 else (0.0 if abs(mean) < 1e-12 else np.inf * mean)
 
 
-CLIP = 6.0
-"""Most that one episode may say for or against [nats]: one that is wrong must not decide."""
+LARGEST_RATIO = 6.0
+"""Clipped t: largest log-likelihood ratio that one episode contributes [1]."""
 
 
 def clipped_t(values: np.ndarray) -> float:
-    """Return the mean over its standard error with every episode's say bounded."""
-    return t_value(np.clip(values, -CLIP, CLIP))
+    """Return the mean over its standard error with every episode's contribution bounded."""
+    return t_value(np.clip(values, -LARGEST_RATIO, LARGEST_RATIO))

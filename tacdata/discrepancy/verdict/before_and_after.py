@@ -1,4 +1,4 @@
-"""Readings laid beside what the model of a verdict says of them, without and with its effects."""
+"""Readings beside the predictions of a verdict's model, without and with its effects."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tacdata.discrepancy.search.findings import Findings
 from tacdata.discrepancy.verdict.residual_slices import PHASES, phases
 from tacdata.discrepancy.verdict.residual_table import Residuals
 
-MOST = 2_000_000
-"""Values that a file holds of each kind; of more, every second, third, ... reading is kept [1]."""
+MOST_VALUES = 2_000_000
+"""Values of each kind in the file; of more, every second, third, ... reading is kept."""
 
 
-def beside_model(course: Course, found: Findings, sealed: np.ndarray, most: int = MOST) -> Residuals:
+def beside_model(course: Course, found: Findings, sealed: np.ndarray, most: int = MOST_VALUES) -> Residuals:
     """Lay the readings beside the model before and after.
 
     Args:
@@ -42,7 +42,7 @@ def beside_model(course: Course, found: Findings, sealed: np.ndarray, most: int 
 
 
 def _level(measured: np.ndarray, predicted: np.ndarray, episode: np.ndarray) -> np.ndarray:
-    """Return what is said, moved by the median of what it is off in each episode: offsets are no one's fault."""
+    """Return predictions moved by the median residual of each episode: offsets are nuisances."""
     result = predicted.copy()
     for number in np.unique(episode):
         own = episode == number

@@ -13,8 +13,8 @@ from tacdata.discrepancy.search.findings import Findings, FoundEffect
 
 FILE = "confidence.json"
 """The map: weights, and the worlds and the command that they come from."""
-MOST = 12.0
-"""Margins beyond so many standard errors are all the same [1]."""
+LARGEST_Z = 12.0
+"""Margins beyond are all the same [standard errors]."""
 
 
 def features(found: Findings, finding: FoundEffect, count: int) -> dict[str, float]:
@@ -26,14 +26,14 @@ def features(found: Findings, finding: FoundEffect, count: int) -> dict[str, flo
         count: How many there are.
     """
     p = finding.corrected_p
-    margin = min((float(v) for v in finding.margins.values()), default=MOST)
+    margin = min((float(v) for v in finding.margins.values()), default=LARGEST_Z)
     return {
-        "margin": float(np.clip(margin, 0, MOST)) / MOST,
-        "need": float(np.clip(finding.necessity, 0, MOST)) / MOST,
+        "margin": float(np.clip(margin, 0, LARGEST_Z)) / LARGEST_Z,
+        "need": float(np.clip(finding.necessity, 0, LARGEST_Z)) / LARGEST_Z,
         "selected": finding.selected,
         "decoys": 1.0 if p is None else float(np.clip(-np.log10(max(p, 1e-3)) / 3, 0, 1)),  # the file's name for it
         "explained": 1 - float(np.clip(found.share_left, 0, 1)),
-        "left": float(np.clip(found.left.t, 0, MOST)) / MOST,
+        "left": float(np.clip(found.left.t, 0, LARGEST_Z)) / LARGEST_Z,
         "others": (count - 1) / 3,
         "episodes": float(np.clip(np.log10(len(found.energy[0])) / 2, 0, 1)),
     }
@@ -59,8 +59,8 @@ def known() -> dict[str, Any] | None:
 def fit(rows: list[dict[str, float]], right: list[bool], weight: float = 1.0) -> dict[str, Any]:
     """Return a map fitted to names of which it is known whether they were right.
 
-    A logistic regression with a ridge of ``weight`` on every weight; what it says stays within what so many names can
-    tell: between 1 / (n + 2) and 1 - 1 / (n + 2) (rule of succession).
+    A logistic regression with a ridge of ``weight`` on every weight. Its probabilities stay between 1 / (n + 2) and
+    1 - 1 / (n + 2), as n names prove no more (rule of succession).
 
     Args:
         rows: Features of each name.

@@ -99,7 +99,7 @@ def _status(found: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
     """Return what the statistics allow."""
     if found.until != "decide":
         return ("unknown" if found.gap else "none"), Reason.STOPPED
-    # One test in a hundred rejects by chance: without an effect, leftovers must bear the gap out.
+    # One test in a hundred rejects by chance: without an effect, leftovers must confirm the gap.
     chance = found.tests.p_generic > GATE and found.left.t < GAP_T
     if not answer and (not found.gap or chance):
         if len(found.problem.null.odd):

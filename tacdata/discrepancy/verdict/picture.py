@@ -15,8 +15,8 @@ from tacdata.discrepancy.verdict.residual_slices import Slice, whitened_residual
 MOST_ROWS = 1200
 """Rows drawn of the worst episodes."""
 
-WIDEST = 120
-"""Characters in a line of the title: more do not fit."""
+TITLE_WIDTH = 120
+"""Characters in a line of the title."""
 
 
 def draw(found: Findings, before: list[Slice], after: list[Slice], verdict: dict[str, Any], path: Path) -> None:
@@ -27,7 +27,7 @@ def draw(found: Findings, before: list[Slice], after: list[Slice], verdict: dict
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(12, 8), constrained_layout=True)
-    title = textwrap.fill(f"{verdict['status']}: {verdict['why']}", WIDEST)
+    title = textwrap.fill(f"{verdict['status']}: {verdict['why']}", TITLE_WIDTH)
     figure.suptitle(title, fontsize=11)
     added = bool(verdict["effects"])  # without an effect there is no after
     _streams(axes[0, 0], found, added)

@@ -45,8 +45,8 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             return _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
         case Reason.LOUD:
             return (
-                f"readings are off by {found.loudness:.1f} times the noise, but no effect is borne out by several "
-                "episodes: look at where it lives"
+                f"readings are off by {found.loudness:.1f} times the noise, but no effect shows in several episodes: "
+                "look at where it lives"
             )
         case Reason.UNEXPLAINED:
             return "something is missing that no modelled effect explains"

@@ -13,9 +13,9 @@ from tacdata.discrepancy.search.problem import Problem
 from tacdata.discrepancy.statistics.gram_fit import t_value
 
 NOTABLE = 1.3
-"""A slice is told of when its mean square is so many times the noise floor [1]..."""
-SURE = 3.0
-"""...and so many standard errors over episodes above it [1]."""
+"""A slice stands out from this mean square on [noise floor]..."""
+NOTABLE_T = 3.0
+"""...and from so many standard errors over episodes on [1]."""
 NOWHERE = "nowhere does the residual stand out from the noise"
 
 
@@ -102,7 +102,7 @@ def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) ->
 
     Args:
         names: Of the episodes.
-        energy: Half the whitened energy of each [nats], shape (episodes,).
+        energy: Half the whitened sum of squares of each [1], shape (episodes,).
         values: Whitened values behind each [1], shape (episodes,).
     """
     there = np.flatnonzero(values > 0)
@@ -126,7 +126,7 @@ def in_words(found: list[Slice], alone: list[str] | None = None) -> list[str]:
     words = list(alone or [])
     for by in dict.fromkeys(s.by for s in found):
         own = [s for s in found if s.by == by]
-        high = [s for s in own if s.mean_square > NOTABLE and s.t > SURE]
+        high = [s for s in own if s.mean_square > NOTABLE and s.t > NOTABLE_T]
         if not high:
             continue
         if len(high) == len(own) > 2 and max(s.mean_square for s in high) < 2 * min(s.mean_square for s in high):

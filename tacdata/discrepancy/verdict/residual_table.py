@@ -1,4 +1,4 @@
-"""Readings beside what a model says before and after, and their file (`schemas/residuals.schema.json`)."""
+"""Readings beside a model's predictions before and after, and their file (`schemas/residuals.schema.json`)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REMEDY = "run `tacdata discrepancy` again: residuals can always be made anew"
 
 @dataclass(frozen=True)
 class Residuals:
-    """What was measured and what a model says of it; a model's readings are moved by a constant an episode."""
+    """What was measured and what a model predicts; predictions are moved by a constant an episode."""
 
     episode: np.ndarray
     """Number of the episode, shape (n,), int32."""
@@ -38,9 +38,9 @@ class Residuals:
     measured: np.ndarray
     """[each stream's unit], shape (n, streams), float32; NaN where missing."""
     before: np.ndarray
-    """What the model said [each stream's unit], shape (n, streams), float32."""
+    """Prediction of the model as it was given [each stream's unit], shape (n, streams), float32."""
     after: np.ndarray
-    """What it says with the effects of the verdict [each stream's unit], shape (n, streams), float32."""
+    """Prediction with the effects of the verdict [each stream's unit], shape (n, streams), float32."""
     noise: np.ndarray
     """Standard deviation of each stream's noise [its unit], shape (streams,)."""
     streams: tuple[str, ...]

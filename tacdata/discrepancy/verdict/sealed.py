@@ -12,28 +12,29 @@ from tacdata.chain import Course, predict
 from tacdata.discrepancy.regressors.generic import histories
 from tacdata.discrepancy.search.findings import Findings
 
-SHARE = 0.1
+SEALED_SHARE = 0.1
 """Share of the episodes that is sealed [1]..."""
 LEAST_SEALED = 4
 """...and no fewer: a handful shows the gap, all the others are needed to say what it is [episodes]."""
-ENOUGH = 20
+FEWEST_TO_SEAL = 20
 """With fewer episodes none is sealed: all are needed for the verdict."""
-KEPT = 2
-"""Episodes of a place and indenter that stay open at least."""
-WITHIN = 0.02
-"""By how much a sealed episode may go deeper than all open ones of its place [1]."""
-RESAMPLED = 2000
-STRENGTHS = (1e-3, 1e-2, 1e-1, 1.0)
-"""Weights of the ceiling's ridge to choose from, over the mean diagonal [1]."""
+OPEN_EACH = 2
+"""Episodes of a place and indenter that stay open, at least."""
+DEEPER = 0.02
+"""A sealed episode goes deeper than all open ones of its place by at most this share [1]."""
+BOOTSTRAPS = 2000
+"""Bootstrap: resamplings of the sealed episodes."""
+RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
+"""Ceiling: ridges to choose from, over the mean diagonal [1]."""
 
 
 def chosen(course: Course) -> np.ndarray:
     """Return which episodes are sealed, by the hash of session and name, shape (k,), int64.
 
-    An episode deeper than all that stay open at its place is left open: a response fitted to the others says nothing of
-    such depths.
+    An episode deeper than all that stay open at its place is left open: a response fitted to the others is
+    not known at such depths.
     """
-    if course.episodes < ENOUGH:
+    if course.episodes < FEWEST_TO_SEAL:
         return np.zeros(0, dtype=np.int64)
     keys = [f"{course.session[k]}/{course.names[k]}" for k in range(course.episodes)]
     order = sorted(range(course.episodes), key=lambda k: hashlib.sha256(keys[k].encode()).digest())
@@ -45,8 +46,8 @@ def chosen(course: Course) -> np.ndarray:
     found: list[int] = []
     for k in order:
         others = [other for other in left[int(course.site[k]), int(tool[k])] if other != k]
-        enough = len(others) >= KEPT and depth[others].max() >= (1 - WITHIN) * depth[k]
-        if len(found) < max(int(SHARE * course.episodes), LEAST_SEALED) and enough:
+        enough = len(others) >= OPEN_EACH and depth[others].max() >= (1 - DEEPER) * depth[k]
+        if len(found) < max(int(SEALED_SHARE * course.episodes), LEAST_SEALED) and enough:
             found.append(k)
             left[int(course.site[k]), int(tool[k])] = others
     return np.sort(np.array(found, dtype=np.int64))
@@ -72,15 +73,15 @@ class Gap:
     def document(self) -> dict[str, Any]:
         """Return it as in the verdict."""
         if not len(self.before):
-            return {"episodes": 0, "share": SHARE, "rule": f"none of fewer than {ENOUGH} episodes"}
+            return {"episodes": 0, "share": SEALED_SHARE, "rule": f"none of fewer than {FEWEST_TO_SEAL} episodes"}
         best = min(float(self.ceiling.mean()), float(self.after.mean()))
         worst = int(np.argmax(self.after))
-        pick = np.random.default_rng(0).integers(len(self.before), size=(RESAMPLED, len(self.before)))
+        pick = np.random.default_rng(0).integers(len(self.before), size=(BOOTSTRAPS, len(self.before)))
         before, after, ceiling = (v[pick].mean(axis=1) for v in (self.before, self.after, self.ceiling))
         share = _closed(before, after, np.minimum(ceiling, after))
         low, high = np.quantile(share, [0.05, 0.95])
         return {
-            "episodes": len(self.before), "share": SHARE,
+            "episodes": len(self.before), "share": SEALED_SHARE,
             "rule": f"least SHA-256 of session/name, {LEAST_SEALED} at least",
             "before": float(self.before.mean()), "after": float(self.after.mean()), "floor": 1.0, "ceiling": best,
             "closed": float(_closed(self.before.mean(), self.after.mean(), np.array(best))),
@@ -128,7 +129,7 @@ def _squares(residual: np.ndarray, number: np.ndarray, episodes: np.ndarray) -> 
 
 
 def _predicted(course: Course, residual: np.ndarray, episodes: np.ndarray) -> np.ndarray:
-    """Return what a ridge regression on histories of the path, fitted to the open episodes, says of a residual."""
+    """Return what a ridge regression on histories of the path, fitted to the open episodes, predicts of a residual."""
     own = histories(course)[course.read]
     share = np.clip(course.tip[course.read, 2] / course.span, 0.0, None)[:, None]
     columns = np.column_stack([own * np.minimum(share * 10, 1), own * share, own])
@@ -136,8 +137,8 @@ def _predicted(course: Course, residual: np.ndarray, episodes: np.ndarray) -> np
     number = course.episode[course.read]
     sealed = np.isin(number, episodes)
     validation = ~sealed & (number % 4 == 0)
-    best, chosen_weight = np.inf, STRENGTHS[-1]
-    for strength in STRENGTHS:
+    best, chosen_weight = np.inf, RIDGES[-1]
+    for strength in RIDGES:
         train = ~sealed & ~validation
         error = residual[validation] - columns[validation] @ _ridge(columns[train], residual[train], strength)
         if float(np.mean(np.square(error))) < best:

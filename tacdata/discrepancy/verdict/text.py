@@ -6,10 +6,10 @@ from typing import Any
 
 from tacdata.effects import library
 
-FEW = 6
-"""Rivals that are listed at most."""
-WEAK = 3.0
-"""Effects that would be seen only at more than so many times their usual size are listed [1]."""
+MOST_RIVALS = 6
+"""Most rivals that are listed."""
+WEAK_LIMIT = 3.0
+"""Effects with a larger detection limit are listed [typical sizes]."""
 
 
 def in_text(verdict: dict[str, Any]) -> str:
@@ -27,7 +27,7 @@ def in_text(verdict: dict[str, Any]) -> str:
         lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
     spoken = answered(verdict)
     lines.append("cannot be judged here: " + ", ".join(sorted(set(verdict["unjudgeable"]) - spoken)))
-    weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK) and k not in spoken]
+    weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK_LIMIT) and k not in spoken]
     if weak:
         lines.append("would be seen only at more than three times their usual size: " + ", ".join(sorted(weak)))
     if verdict["untested"]:
@@ -55,8 +55,8 @@ def _effect(entry: dict[str, Any]) -> list[str]:
             spread = f" +- {p['error']:.2g}" if p["error"] is not None else ""
             lines.append(f"    {name} = {p['value']:.4g}{spread} {p['unit']}")
     rivals = sorted(entry["margins"].items(), key=lambda item: item[1])
-    worse = [(name, by) for name, by in rivals if by > 0][:FEW]
-    better = [(name, -by) for name, by in rivals if by <= 0][:FEW]
+    worse = [(name, by) for name, by in rivals if by > 0][:MOST_RIVALS]
+    better = [(name, -by) for name, by in rivals if by <= 0][:MOST_RIVALS]
     if worse:
         lines.append(f"    better, in standard errors over episodes, than: {_by(worse)}")
     if better:

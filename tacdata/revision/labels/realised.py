@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tacdata.discrepancy.data.tip_observation import NEAR, second_views
+from tacdata.discrepancy.data.tip_observation import NEAR_NS, second_views
 from tacdata.effects import Placed
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording import Episode, read_episode, read_session
@@ -92,7 +92,7 @@ def _apart(before: Episode, after: Episode, time_ns: np.ndarray, seen: np.ndarra
     """Return the tip error before and after while it touches [mm], each of shape (n, 3)."""
     told, revised = before.tip_at(time_ns), after.tip_at(time_ns)
     good = (told[:, 2] > 0) & np.isfinite(seen[:, 2])
-    good &= (time_ns >= before.tip_ns[0] - NEAR) & (time_ns <= before.tip_ns[-1] + NEAR)
+    good &= (time_ns >= before.tip_ns[0] - NEAR_NS) & (time_ns <= before.tip_ns[-1] + NEAR_NS)
     return seen[good] - told[good], seen[good] - revised[good]
 
 
