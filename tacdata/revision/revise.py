@@ -111,7 +111,7 @@ def revise(
     held = Comparison(course_of(recordings), spec, tuple(answer))
     out.mkdir(parents=True)
     note("gap, with the numbers fitted without the sealed episodes")
-    # The gap uses parameters fitted without the sealed episodes; the model that is written uses all episodes.
+    # The gap uses parameters fitted without the sealed episodes; the model that is written has the verdict's own.
     found = gap(held, answer, sealed(held.course, verdict), note) if answer else None
     slices = sealed_slices(held, found.fitted, sealed(held.course, verdict).numbers) if found else []
     moved = _labels(recordings, answer, out, asked, note) if status == "named" else []

@@ -106,7 +106,7 @@ def preflight(
             corners.append(target)
         needed, position = duration(path, position or corners[0], limits)
         seconds.append(needed + SECONDS_PER_PRESS)
-        # An indenter is changed over the last site at the safe height; that move is checked too.
+        # An indenter is changed at the safe height; that position is checked too.
         if not indenters or indenters[-1] != press.indenter_name:
             indenters.append(press.indenter_name)
             change = (*(corners[-1] if len(indenters) > 1 else corners[0])[:2], safe_height(plan, rig))
