@@ -13,7 +13,7 @@ from viewers.scene.scene import Scene
 CHECKPOINT = "best.safetensors"
 
 
-class Predictions(Kind):
+class PredictionsKind(Kind):
     """A training run with predictions, their folder, or one file of it."""
 
     ORDER, NOUN = 25, "a training run or predictions"

@@ -11,7 +11,7 @@ from viewers.scene.scene import Scene
 FILE, TABLE, CURVES = "revision.json", "gap.md", "gap.rrd"
 
 
-class Revision(Kind):
+class RevisionKind(Kind):
     """The folder of a revision."""
 
     ORDER, NOUN = 11, "a revision"

@@ -11,7 +11,7 @@ from viewers.scene.scene import Scene
 FILE, RESIDUALS = "verdict.json", "residuals.parquet"
 
 
-class Verdict(Kind):
+class VerdictKind(Kind):
     """A folder with a verdict, or the verdict itself."""
 
     ORDER, NOUN = 10, "a verdict"
