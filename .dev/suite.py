@@ -23,7 +23,9 @@ MOST = 8
 """Computing test processes at most: each takes 1 to 2 GB."""
 NO_TESTS = 5
 """Pytest's exit status if none was to run."""
-STAND_BACK = 10
+MOST_OF_A_LINE = 1000
+"""Characters kept of what pytest says, to find its last line."""
+STAND_BACK = 5
 """How much pyright is put back beside the tests (nice)."""
 
 
@@ -44,16 +46,16 @@ class Checks:
         """Run pytest and keep its last line; say whether there may be nothing to do."""
         command = [sys.executable, "-m", "pytest", *arguments]
         self._head(name, command)
-        last = ""
+        said = ""
         # One thread a process: more would only wait for those of the others.
         environment = {**os.environ, "OMP_NUM_THREADS": str(max(1, _cores() // MOST)), "PYTHONUNBUFFERED": "1"}
-        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, bufsize=1, env=environment) as done:
-            for line in done.stdout:
-                sys.stdout.write(line)
-                sys.stdout.flush()
-                last = line.strip() or last
+        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, env=environment) as done:
+            # Piece by piece: pytest's dots come long before the end of their line.
+            while piece := os.read(done.stdout.fileno(), 65536).decode(errors="replace"):
+                print(piece, end="", flush=True)
+                said = (said + piece)[-MOST_OF_A_LINE:]
         self._note(name, 0 if perhaps_none and done.returncode == NO_TESTS else done.returncode)
-        self.summaries.append(last)
+        self.summaries.append(said.strip().rpartition("\n")[2])
 
     def collect(self, name, command, process, said):
         """Wait for a command that was started beside the tests, and print what it said."""

@@ -13,8 +13,8 @@ from running.real_time import in_real_time
 from xdist.scheduler import LoadFileScheduling
 
 ROOT = Path(__file__).parents[2]
-STAND_BACK = 10
-"""How much computing processes are put back (nice)."""
+STAND_BACK = 3
+"""How much computing processes are put back (nice): more would leave them next to nothing on a busy machine."""
 UNKNOWN = 5.0
 """What a file counts that has not been timed yet [s]."""
 
