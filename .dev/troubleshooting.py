@@ -34,7 +34,8 @@ MOST_WORDS = 24
 HEAD = """# Troubleshooting
 
 Every error of tacdata has three parts: what was given, what is allowed, and what to do next. Search this page for a few
-words of your message. Where the message names a file, a value or a name of yours, the page shows `…`.
+words of your message. Where the message names a file, a value or a name of yours, the page shows `…`. The
+[exit code](exit_codes.md) says which kind of error it is.
 
 The page is generated from the source: `.venv/bin/python .dev/troubleshooting.py`.
 """
