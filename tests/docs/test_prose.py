@@ -43,7 +43,7 @@ LISTED: dict[str, Figures] = {}
 LIMITS = {
     "docstrings": Figures(12, 19, 2),
     "fields and constants": Figures(11, 18, 1),
-    "help": Figures(9, 16, 0),
+    "help": Figures(9, 15, 0),
 }
 """Of what stands in the code; to be lowered whenever it has fallen."""
 
