@@ -53,7 +53,7 @@ def test_the_revision_says_how_far_labels_were_off(loose, truth, tmp_path):
     made = revise(judged, [loose], read_spec(None), tmp_path / "revision", RevisionOptions(truth=truth))
     [told] = made.document["tips"]
     assert told["better"] == 16 and told["after"] < 0.1 * told["before"]
-    assert "How far the labels' tip is off" in (made.folder / "card.html").read_text()
+    assert "Tip error of the labels" in (made.folder / "card.html").read_text()
     assert "truth.csv" in (made.folder / "gap.md").read_text()
 
 

@@ -138,7 +138,7 @@ def _tips(page: HtmlPage, told: list[dict[str, Any]]) -> None:
     ]  # fmt: skip
     head = ("session", "held against", "episodes", "before, rms / most [mm]", "after, rms / most [mm]",
             "episodes better / worse", "constant part, before / after [mm]")  # fmt: skip
-    _table(page, "How far the labels' tip is off", head, rows)
+    _table(page, "Tip error of the labels", head, rows)
 
 
 def _networks(page: HtmlPage, trained: dict[str, Any] | None) -> None:
