@@ -3,13 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from pressing import course
 
 from tacdata import documents
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.spec import read_spec
+from tacdata.discrepancy.verdict.picture import draw
 from tacdata.discrepancy.verdict.sealed import FEWEST_TO_SEAL, chosen, without_readings
+from tacdata.discrepancy.verdict.text import in_text
 from tacdata.effects import library
 
 FEW = ("latency", "low_pass_filter", "backlash")
@@ -55,11 +58,18 @@ def test_the_gap_on_sealed_episodes_closes_with_the_right_name():
     assert shown["interval"][0] <= shown["closed"] + 1e-9
 
 
-def test_the_gate_can_be_had_alone():
-    done = judge(course(delay=0.05, episodes=12), read_spec(None), until="gate")
-    assert done.found.gap
-    assert not done.document["effects"]
-    assert "stopped after gate: a gap" in done.document["why"]
+@pytest.mark.parametrize("step", ["gate", "locate"])
+def test_the_gate_can_be_had_alone_and_then_where_the_residual_lives(step, tmp_path):
+    """Neither step fits an effect; the gate does not look where the residual lives."""
+    done = judge(course(delay=0.05, episodes=12), read_spec(None), until=step)
+    documents.check(done.document, "verdict", "verdict")
+    assert done.found.gap and not done.found.effects and not done.document["effects"]
+    assert f"stopped after {step}: a gap" in done.document["why"]
+    located = step == "locate"
+    assert bool(done.document["located"]) == bool(done.document["slices"]) == located
+    assert ("where it lives" in in_text(done.document)) == located
+    draw(done.found, done.before, done.after, done.document, tmp_path / "page.png")
+    assert (tmp_path / "page.png").stat().st_size > 10_000
 
 
 def test_a_fitted_response_says_nothing_new_of_the_air():

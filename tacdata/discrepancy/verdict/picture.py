@@ -62,6 +62,9 @@ def _streams(axis: Any, found: Findings, added: bool) -> None:
 
 
 def _slices(axis: Any, before: list[Slice], after: list[Slice], added: bool) -> None:
+    if not before:  # not asked for
+        axis.set_axis_off()
+        return
     shown = [(b, a) for b, a in zip(before, after, strict=True) if b.by != "stream"]
     names = [f"{b.by}: {b.name}" for b, _ in shown]
     where = np.arange(len(shown))

@@ -20,7 +20,9 @@ def in_text(verdict: dict[str, Any]) -> str:
     gate = verdict["gate"]
     lines += [""] if verdict["effects"] else []
     lines.append(f"gate: p = {gate['p']:.3f} over all effects, {gate['p_generic']:.3f} for patterns of no effect")
-    lines += [*_sizes(verdict), "where it lives:", *(f"  {words}" for words in verdict["located"])]
+    lines += _sizes(verdict)
+    if verdict["located"]:
+        lines += ["where it lives:", *(f"  {words}" for words in verdict["located"])]
     if verdict["next"]:
         lines += ["next:", *(f"  {words}" for words in verdict["next"])]
     if verdict["remarks"]:
