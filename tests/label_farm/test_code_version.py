@@ -1,5 +1,6 @@
 """The version of code that decides a result: what changes it, and what an earlier release left stays readable."""
 
+import ast
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -28,51 +29,73 @@ def no_version_is_remembered():
 
 
 @pytest.fixture
-def edited(tmp_path, monkeypatch):
-    """Return a function that edits a file in a copy of the skin's rooms and returns the copy's version."""
-    copy = tmp_path / f"copied_for_{tmp_path.name}"  # a name is imported once in a process
-    shutil.copytree(Path(tacdata.__path__[0]) / "skin", copy, ignore=shutil.ignore_patterns("shipped", "__pycache__"))
+def copied(tmp_path, monkeypatch):
+    """A copy of the skin's rooms, as a package of its own name: a name is imported once in a process."""
+    folder = tmp_path / f"copied_for_{tmp_path.name}"
+    shutil.copytree(Path(tacdata.__path__[0]) / "skin", folder, ignore=shutil.ignore_patterns("shipped", "__pycache__"))
     monkeypatch.syspath_prepend(tmp_path)
-
-    def edit(file, before, after):
-        text = (copy / file).read_text()
-        assert before in text
-        (copy / file).write_text(text.replace(before, after, 1))
-        provenance.code_hash.cache_clear()
-        return provenance.code_hash(copy.name, without=(f"{copy.name}.derivatives",))
-
-    return edit
+    return folder
 
 
-def test_words_and_layout_leave_the_version_and_a_constant_changes_it(edited):
+def version(folder):
+    provenance.code_hash.cache_clear()
+    return provenance.code_hash(folder.name, without=(f"{folder.name}.derivatives",))
+
+
+def reworded(text):
+    """Return a source with other docstrings, of a field or a constant too, and comments between its statements."""
+    lines, found = text.splitlines(), 0
+    for node in sorted((n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Expr)), key=lambda n: -n.lineno):
+        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            indent = " " * node.col_offset
+            lines[node.lineno - 1 : node.end_lineno] = [f'{indent}"""Other words."""', f"{indent}# A comment.", ""]
+            found += 1
+    assert found
+    return "\n".join(lines) + "\n"
+
+
+def with_another_number(text):
+    """Return a source with its first number a thousandth larger."""
+    node = next(n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Constant) and isinstance(n.value, float))
+    lines = text.splitlines(keepends=True)
+    line = lines[node.lineno - 1]
+    lines[node.lineno - 1] = f"{line[: node.col_offset]}{1.001 * node.value}{line[node.end_col_offset :]}"
+    return "".join(lines)
+
+
+def edit(path, change):
+    path.write_text(change(path.read_text()))
+
+
+def test_words_and_layout_leave_the_version_and_a_constant_changes_it(copied):
     before = provenance.code_hash("tacdata.skin", without=("tacdata.skin.derivatives",))
-    file = "model.py"
-    assert edited(file, '"""The skin model: presses go in', '"""Presses go in') == before, "a module's docstring"
-    assert edited(file, '"""Longest load step upward', '"""Longest step upward') == before, "a constant's docstring"
-    assert edited(file, '        """The same skin on a coarser mesh', '        """A coarser mesh') == before, (
-        "a method's"
-    )
-    assert edited(file, "_LIFT = 0.5\n", "# Chosen by hand.\n_LIFT = (\n    0.5  # a half\n)\n") == before, "comments"
-    assert edited(file, "    0.5  # a half\n", "    0.6  # a half\n") != before, "a constant"
+    for path in ("model.py", "solve/newton.py", "materials/neo_hookean.py"):
+        edit(copied / path, reworded)
+    assert version(copied) == before
+    edit(copied / "solve/newton.py", with_another_number)
+    assert version(copied) != before
 
 
-def test_what_decides_nothing_leaves_the_version(edited):
-    before = provenance.code_hash("tacdata.skin", without=("tacdata.skin.derivatives",))
-    assert edited("derivatives/path_uncertainty.py", "\nimport ", "\nimport os\nimport ") == before
-    assert edited("solve/newton.py", "\nimport ", "\nimport os\nimport ") != before
+def test_what_decides_nothing_leaves_the_version(copied):
+    before = version(copied)
+    (changed, *_) = sorted((copied / "derivatives").glob("[a-z]*.py"))
+    edit(changed, lambda text: text + "STEP = 1.0\n")
+    assert version(copied) == before
 
 
-def test_an_added_file_changes_the_version(edited, tmp_path):
-    before = edited("model.py", "_LIFT = 0.5", "_LIFT = 0.5")
-    (next(tmp_path.glob("copied*")) / "materials" / "new_law.py").write_text("STIFFNESS = 1.0\n")
-    assert edited("model.py", "_LIFT = 0.5", "_LIFT = 0.5") != before
+def test_an_added_file_changes_the_version(copied):
+    before = version(copied)
+    (copied / "materials" / "new_law.py").write_text("STIFFNESS = 1.0\n")
+    assert version(copied) != before
 
 
-def test_a_version_shown_to_be_equal_goes_by_the_older_name_until_the_code_changes(edited, monkeypatch):
-    before = edited("model.py", "_LIFT = 0.5", "_LIFT = 0.5")
+def test_a_version_shown_to_be_equal_goes_by_the_older_name_until_the_code_changes(copied, monkeypatch):
+    before = version(copied)
     monkeypatch.setattr(provenance, "EQUAL_VERSIONS", {before: ("older", "identical on 12 presses")})
-    assert edited("model.py", "_LIFT = 0.5", "_LIFT =  0.5") == "older"
-    assert edited("model.py", "_LIFT =  0.5", "_LIFT = 0.6") not in ("older", before)
+    edit(copied / "solve/newton.py", reworded)
+    assert version(copied) == "older"
+    edit(copied / "solve/newton.py", with_another_number)
+    assert version(copied) not in ("older", before)
 
 
 def test_a_name_without_a_module_is_refused():
