@@ -49,6 +49,8 @@ class Checks:
         said = ""
         # One thread a process: more would only wait for those of the others.
         environment = {**os.environ, "OMP_NUM_THREADS": str(max(1, _cores() // MOST)), "PYTHONUNBUFFERED": "1"}
+        # Many tests start a process; each would compile all of its imports anew.
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)
         with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, env=environment) as done:
             # Piece by piece: pytest's dots come long before the end of their line.
             while piece := os.read(done.stdout.fileno(), 65536).decode(errors="replace"):
