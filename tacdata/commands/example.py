@@ -32,8 +32,11 @@ def run(
     PictureBackend(out / PICTURE).draw(scene)
     print(f"picture: {out / PICTURE}")
     say(f"next: open {out / PICTURE}, then")
-    say(f"  tacdata browse {out}               list its presses")
-    say(f"  tacdata view {out} --episode 0     look at one in 3D (pip install 'tacdata[view]')")
-    say("  tacdata demo                       the whole pipeline (pip install 'tacdata[all]')")
+    for command, purpose in (
+        (f"tacdata browse {out}", "list its presses"),
+        (f"tacdata view {out}", "turn one in 3D (pip install 'tacdata[view]')"),
+        ("tacdata demo", "run the whole pipeline (pip install 'tacdata[all]')"),
+    ):
+        say(f"  {command:<{len(str(out)) + 16}}{purpose}")
     return Result({"check": report.document, "press": {"number": DEEPEST, "found": scene.found}, "folder": out,
                    "picture": out / PICTURE})  # fmt: skip

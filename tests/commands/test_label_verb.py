@@ -1,5 +1,6 @@
 """`tacdata label`: what it prints, what it refuses, and its exit codes."""
 
+import json
 import os
 import subprocess
 import sys
@@ -9,8 +10,10 @@ from types import SimpleNamespace
 import pytest
 from typer.testing import CliRunner
 
-from tacdata import cli, recording
+from tacdata import cli
 from tacdata.errors import SolveError
+from tacdata.recording import session as sessions
+from tacdata.recording.files import reader
 
 FARM = Path(__file__).resolve().parent.parent / "label_farm"
 
@@ -26,8 +29,8 @@ def label(tmp_path, monkeypatch):
         f"episode-{k:06d}.mcap": press_episode(tmp_path, k, x=float(k), depth=k - 0.5) for k in range(3)
     }
     session = SimpleNamespace(episodes=tuple(tmp_path / name for name in episodes))
-    monkeypatch.setattr(recording.session, "read_session", lambda folder: session)
-    monkeypatch.setattr(recording.reader, "read_episode", lambda path: episodes[path.name])
+    monkeypatch.setattr(sessions, "read_session", lambda folder: session)
+    monkeypatch.setattr(reader, "read_episode", lambda path: episodes[path.name])
 
     def run(*options):
         arguments = ["label", str(tmp_path), "--factory", "fast_model:FastModel", "--workers", "1", *options]
@@ -43,6 +46,14 @@ def test_it_labels_a_session_and_says_what_it_did(tmp_path, label):
     assert "presses solved: 2" in shown.output and "next: tacdata pack" in shown.output
     assert len(list((tmp_path / "labels").glob("episode-*.parquet"))) == 3
     assert "labels written: 0 (0 without contact), already there: 3" in label().output
+
+
+def test_what_it_did_comes_as_json_and_quietly(label):
+    shown = label("--json", "--quiet")
+    found = json.loads(shown.stdout)
+    assert (len(found["written"]), found["untouched"], found["failed"]) == (3, 1, {})
+    assert "labels written: 3" in shown.stderr
+    assert "press 1 of 2" not in shown.stderr and "next:" not in shown.stderr
 
 
 def test_it_says_how_well_the_labels_are_known(label):
