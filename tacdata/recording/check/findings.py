@@ -10,6 +10,7 @@ from tacdata.recording.check.camera_findings import camera_warnings
 from tacdata.recording.check.clocks import clock_warnings
 from tacdata.recording.check.figures import COUNTS, RecordingFigures
 from tacdata.recording.check.imported import imported_findings, is_imported
+from tacdata.recording.check.possible import impossible
 
 WARNING, UNUSABLE = "warning", "unusable"
 LOST_SHARE = 0.01
@@ -24,6 +25,9 @@ REPORT_GAP_MS = 1500.0
 """Warning threshold: time without a status report [ms of real time]."""
 DEPTH_MM = (0.05, 0.2)
 """Depth uncertainty from which a warning is given, and from which a recording is unusable [mm]."""
+LATE_MS = 20.0
+"""Contradiction of reports and profile from which a motion came late [ms of real time]: the controller is the cause of
+what then looks like a jump at rest."""
 HOLD_MM = 0.05
 """Distance between reported and commanded position in the hold that makes a recording unusable [mm]."""
 NOISE_RATIO = 5.0
@@ -54,6 +58,7 @@ def findings(figures: RecordingFigures) -> list[Finding]:
         found = [*imported_findings(figures), *doubts]
     else:
         found = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
+    found += impossible(figures)
     name = figures.recording.episode.path.name
     return [Finding(severity, stream, name, text) for severity, stream, text in found]
 
@@ -131,7 +136,12 @@ def _channels(figures: RecordingFigures) -> list[Judgement]:
     counts = figures.recording.episode.taxels.counts
     if len(counts) > 1 and (counts == counts[:1]).all() and figures.recording.episode.press.depth >= DEAD_DEPTH:
         found.append((UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"))
-    found += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1], values["unit"])]
+    late = figures.document["cnc"]["contradiction"] / _rate_of_clock(figures)
+    if values["jumps"] and late > LATE_MS:
+        text = f"jumps while nothing moves are NOT ASSESSED: the controller moved up to {late:.0f} ms off its profile"
+        found.append((WARNING, "taxels", text))
+    else:
+        found += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1], values["unit"])]
     if values["stuck"]:
         found.append((UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"))
     if values["saturated"]:

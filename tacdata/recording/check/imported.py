@@ -9,8 +9,6 @@ import numpy as np
 from tacdata.recording.check.figures import RecordingFigures
 from tacdata.recording.episode import Episode
 
-FASTEST = 100_000.0
-"""Rate above which times are no times of a tactile sensor [Hz]."""
 GAP_PERIODS = 5.0
 """Warning threshold: time without a sample [periods]."""
 
@@ -43,8 +41,6 @@ def imported_findings(figures: RecordingFigures) -> list[tuple[str, str, str]]:
         return [("unusable", "taxels", f"{values['frames']} frames")]
     if not len(episode.tip_ns):
         return [("unusable", "position", "no position and no schedule")]
-    if values["rate"] and values["rate"] > FASTEST:
-        return [("unusable", "taxels", f"{values['rate']:.3g} Hz: the times are in another unit than the mapping says")]
     found = []
     if stand_ins := [text.split(":")[0] for text in episode.rig["imported"].get("stand_ins", [])]:
         text = f"the source does not say {', '.join(stand_ins)}: what stands in makes depth or labels a guess"

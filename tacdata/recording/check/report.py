@@ -14,6 +14,7 @@ from tacdata.recording.check.clocks import clock_words
 from tacdata.recording.check.figures import RecordingFigures, figures
 from tacdata.recording.check.findings import UNUSABLE, WARNING, Finding, findings
 from tacdata.recording.check.imported import imported_summary, is_imported
+from tacdata.recording.check.possible import ANSWER, CONTACT, answer
 from tacdata.recording.check.session import session_findings
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.session import read_session
@@ -52,6 +53,7 @@ class Report:
         imported = bool(self.episodes) and is_imported(self.episodes[0].recording.episode)
         told = imported_summary(self.episodes) if imported else _summary([entry.document for entry in self.episodes])
         lines += told
+        lines += _not_assessed(self.episodes)
         lines += _grouped(self.findings) or ["nothing to remark"]
         return "\n".join([*lines, "usable" if self.usable else "NOT usable as it is"])
 
@@ -100,8 +102,25 @@ def _of_session(session: Any, entries: list[RecordingFigures]) -> list[Finding]:
         text = f"{len(session.remaining)} of {len(session.plan.presses)} presses of the plan are not recorded"
         found.append(Finding(WARNING, "session", "", f"{text}; go on with tacdata record --resume"))
     if entries and is_imported(entries[0].recording.episode):
-        return found  # the positions of its channels may be stand-ins
+        return [*found, *_unanswered(entries)]  # the positions of its channels may be stand-ins
     return [*found, *session_findings(entries)]
+
+
+def _unanswered(entries: list[RecordingFigures]) -> list[Finding]:
+    pressed = [answer(entry) for entry in entries if entry.recording.episode.press.depth >= CONTACT]
+    known = [value for value in pressed if value is not None]
+    if not known or max(known) >= ANSWER:
+        return []
+    text = f"no channel answers to any of {len(known)} presses: at most {max(known):.1f} times its noise"
+    return [Finding(UNUSABLE, "taxels", "", text)]
+
+
+def _not_assessed(entries: tuple[RecordingFigures, ...]) -> list[str]:
+    """Say what the recordings cannot tell."""
+    pressed = [entry for entry in entries if entry.recording.episode.press.depth >= CONTACT]
+    blind = sum(answer(entry) is None for entry in pressed)
+    words = f"{blind} of {len(pressed)} presses have no rest, no contact or no noise to compare"
+    return [f"  NOT ASSESSED  whether the readings answer contact: {words}"] if blind else []
 
 
 def _summary(documents: list[dict[str, Any]]) -> list[str]:
