@@ -62,7 +62,7 @@ def _tiles(revision: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[str,
         tiles.append(("residual before → after (1 is noise)", f"{sealed['before']:.3g} → {sealed['after']:.3g}"))
     moved = revision["labels"]
     if moved:
-        tiles.append(("largest move of the tip [mm]", f"{max(m['path_most'] for m in moved):.3g}"))
+        tiles.append(("largest shift of the tip [mm]", f"{max(m['path_most'] for m in moved):.3g}"))
     return tiles
 
 
@@ -87,7 +87,7 @@ def _parameters(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
                 shown = f"{value:.4g}"
                 spread = "{:.4g} to {:.4g}".format(*p["interval"]) if "interval" in p else _number(p["error"], 2)
             rows.append((e["effect"], name, shown, spread, p["unit"]))
-    _table(page, "How large", ("effect", "number", "value", "90 % interval", "unit"), rows)
+    _table(page, "Size of the effects", ("effect", "parameter", "value", "90 % interval", "unit"), rows)
 
 
 def _rivals(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
@@ -99,12 +99,12 @@ def _rivals(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
     listed = [f"{', '.join(e['alternatives'])} for {e['mechanism']}" for e in answer if e["alternatives"]]
     _table(page, "What else it could be", ("rival", "worse by, in standard errors over episodes", ""), rows)
     if listed:
-        page.paragraph(f"Not told apart by these recordings: {'; '.join(listed)}.")
+        page.paragraph(f"Not separable by these recordings: {'; '.join(listed)}.")
 
 
 def _gap(page: HtmlPage, gap: dict[str, Any]) -> None:
     kept = "the verdict was reached without them" if gap["unseen"] else (
-        "the effects' numbers were fitted without them; the name was not"
+        "the effects' parameters were fitted without them; the name was found with them"
     )  # fmt: skip
     rows = [(f"sealed episodes: {kept}", gap["sealed"]), ("worst of them: " + gap["worst"]["name"], gap["worst"])]
     rows += [(f"{c['name']}, not fitted to", c) for c in gap["elsewhere"]]
@@ -123,10 +123,10 @@ def _slices(page: HtmlPage, told: list[dict[str, Any]]) -> None:
     shown = [*(c for c in told if c not in channels), *channels[:CHANNELS]]
     if len(channels) > CHANNELS:
         words += f" Of {len(channels)} channels the {CHANNELS} worst are listed; gap.csv has all."
-    words += " Contact that differs from press to press is in these figures, and not in those above."
+    words += " These figures include differences of the contact between presses; those above do not."
     cells = [(c["name"], c["episodes"], f"{c['before']:.3g}", f"{c['after']:.3g}") for c in shown]
     head = ("of the sealed episodes", "episodes", "before", "after (1 is the noise floor)")
-    _table(page, "Where it lives", head, cells, words)
+    _table(page, "Where the gap is", head, cells, words)
 
 
 def _tips(page: HtmlPage, told: list[dict[str, Any]]) -> None:
@@ -136,7 +136,7 @@ def _tips(page: HtmlPage, told: list[dict[str, Any]]) -> None:
          f"{t['constant_before']:.4f} / {t['constant_after']:.4f}")
         for t in told
     ]  # fmt: skip
-    head = ("session", "held against", "episodes", "before, rms / most [mm]", "after, rms / most [mm]",
+    head = ("session", "reference", "episodes", "before, rms / most [mm]", "after, rms / most [mm]",
             "episodes better / worse", "constant part, before / after [mm]")  # fmt: skip
     _table(page, "Tip error of the labels", head, rows)
 
@@ -152,17 +152,17 @@ def _labels(page: HtmlPage, revision: dict[str, Any]) -> None:
     moved = revision["labels"]
     if not (revision["added"] and moved):
         page.heading("Labels")
-        named = "No label moves: the effect changes readings alone."
+        named = "No label changes: the effect acts on readings alone."
         page.paragraph(
             named if revision["added"] else "Nothing was named, so the model and its labels stay as they are."
         )
         return
     rows = [
         (m["session"], f"{m['paths']} of {m['episodes']}", f"{m['path_rms']:.3g} / {m['path_most']:.3g}",
-         m["labels"] or "not asked for", f"{_number(m['rms'])} / {_number(m['most'])}" if m["labels"] else "–")
+         m["labels"] or "not requested", f"{_number(m['rms'])} / {_number(m['most'])}" if m["labels"] else "–")
         for m in moved
     ]  # fmt: skip
-    head = ("session", "paths that move", "tip, rms / most [mm]", "labels made again", "depth, rms / most [mm]")
+    head = ("session", "paths that change", "tip, rms / most [mm]", "labels made again", "depth, rms / most [mm]")
     _table(page, "Labels", head, rows)
 
 
@@ -172,7 +172,7 @@ def _confirmed(page: HtmlPage, found: list[dict[str, Any]]) -> None:
          f"{100 * c['difference']:.1f} %" if c["solved"] else "no equilibrium")
         for c in found
     ]  # fmt: skip
-    head = ("tool", "place [mm]", "depth [mm]", "moved by the effect", "surrogate off finite elements (rms)")
+    head = ("tool", "place [mm]", "depth [mm]", "change by the effect", "surrogate minus finite elements (rms)")
     _table(page, "Solved again by finite elements", head, rows)
 
 

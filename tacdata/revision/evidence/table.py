@@ -37,7 +37,7 @@ def _tips(revision: dict[str, Any]) -> list[str]:
     told = revision.get("tips") or []
     if not told:
         return []
-    lines = ["", "| tip off where it was [mm] | against | episodes | before | after | better | worse |"]
+    lines = ["", "| tip error [mm] | reference | episodes | before | after | better | worse |"]
     lines.append("|---|---|---:|---:|---:|---:|---:|")
     for t in told:
         lines.append(
@@ -61,9 +61,9 @@ def _networks(revision: dict[str, Any]) -> list[str]:
 def in_words(trained: dict[str, Any]) -> str:
     """Describe the data on which two networks were trained and scored."""
     learnt = {
-        "labels": "both learnt from the readings measured, with labels of either model; scored on labels of the model "
-        "after, which is right as far as the effect is",
-        "readings": "both learnt from readings as either model says them; scored on the readings measured",
+        "labels": "both learnt from measured readings, with labels of either model; scored on labels of the model "
+        "after, which are right as far as the effect is",
+        "readings": "both learnt from readings that either model predicts; scored on measured readings",
     }[trained["by"]]
     return (
         f"Networks of {trained['epochs']} epochs, {trained['episodes']} episodes that neither saw "
