@@ -126,6 +126,7 @@ def test_nothing_moves_without_a_yes(bench):
     assert (summary.presses, summary.total) == (2, 2)
     assert summary.deepest == pytest.approx(0.82)
     assert "machine bounds" in summary.text
+    assert "first move: straight up, to -27.00 mm or more; see that up is free" in summary.text
     assert summary.lower[2] == pytest.approx(-30.82)
 
 

@@ -174,3 +174,31 @@ def test_a_signal_stops_the_search_and_nothing_is_written(virtual, monkeypatch, 
     assert re.search(r"(?s)motion: (stopped|at rest) at .*data:   nothing was written", loud), loud
     assert not virtual.path.with_name(FILE).exists()
     assert signal.getsignal(number) == before
+
+
+def test_a_lost_answer_ends_the_search_with_the_tip_lifted_and_words(virtual, monkeypatch, capfd):
+    left = [30]
+
+    def lose(text):
+        left[0] -= text == "ok"
+        return None if text == "ok" and left[0] == 0 else text
+
+    virtual.controller.inject_wire(to_host=lose)
+    code, _, loud = run(monkeypatch, capfd, "register", "--rig", virtual.path, "--yes")
+    assert code == 4
+    assert "stands idle and still owes an answer" in loud
+    assert re.search(r"(?s)motion: stopped at .*tip:    the indenter was lifted .*data:   nothing was written", loud)
+    assert "--resume" not in loud
+    assert not virtual.path.with_name(FILE).exists()
+
+
+def test_a_board_that_was_reset_by_opening_is_not_moved_by_yes(virtual, monkeypatch, capfd):
+    virtual.controller.settings.update({"$22": "0", "$20": "0"})
+    before = virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000).copy()
+    monkeypatch.setattr("tacdata.devices.grbl.Grbl.position_lost", "the controller was reset when its port was opened")
+    monkeypatch.setattr("builtins.input", lambda question: "n")
+    code, _, loud = run(monkeypatch, capfd, "register", "--rig", virtual.path, "--yes")
+    assert code == 4
+    assert "the position is not known" in loud
+    assert "motion: nothing was moved" in loud
+    assert np.array_equal(before, virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000))

@@ -42,6 +42,8 @@ class Preflight:
     """What a person should know about the controller's settings before the first move."""
     tap: str = ""
     """What the sync tap does, in words; empty without one."""
+    height: float = float("nan")
+    """Machine height to which the first move goes, straight up [mm]; NaN where there is none."""
     tools: str = ""
     """Tool offsets that are used, in words; empty without any."""
 
@@ -51,6 +53,7 @@ class Preflight:
         bounds = ", ".join(
             f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in zip("xyz", self.lower, self.upper, strict=True)
         )
+        up = f"first move: straight up, to {self.height:.2f} mm or more; see that up is free\n"
         minutes, seconds = divmod(round(sum(self.seconds)), 60)
         return (
             f"plan {self.plan}: {self.presses} of {self.total} presses, deepest {self.deepest:.2f} mm\n"
@@ -58,7 +61,9 @@ class Preflight:
             + (f"first {self.tap}\n" if self.tap else "")
             + (f"tool offsets [mm]: {self.tools}\n" if self.tools else "")
             + f"machine bounds [mm]: {bounds}\n"
-            f"time: about {minutes} min {seconds:02d} s" + "".join(f"\ncaution: {caution}" for caution in self.cautions)
+            + (up if np.isfinite(self.height) else "")
+            + f"time: about {minutes} min {seconds:02d} s"
+            + "".join(f"\ncaution: {caution}" for caution in self.cautions)
         )
 
 
@@ -123,6 +128,7 @@ def preflight(
         tuple(seconds),
         (*cautions, *_unknown_tools(rig, indenters)),
         _described(tap),
+        safe_height(plan, rig),
         "; ".join(f"{name} {_text(tuple(rig.document['tools'][name]['offset']))}" for name in _tools(rig, indenters)),
     )
 
