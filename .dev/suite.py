@@ -96,7 +96,9 @@ def _sum(lines, seconds):
     for line in lines:
         for count, what in re.findall(r"(\d+) ([a-z]+)", line.split(" in ")[0]):
             what = {"errors": "error", "warnings": "warning"}.get(what, what)
-            counts[what] = counts.get(what, 0) + int(count)
+            # Either part leaves out all tests of the other.
+            if what != "deselected":
+                counts[what] = counts.get(what, 0) + int(count)
     words = ", ".join(f"{count} {what}" for what, count in counts.items()) or "no tests ran"
     return f" {words} in {seconds:.2f}s ({time.strftime('%H:%M:%S', time.gmtime(seconds))}) ".center(100, "=")
 

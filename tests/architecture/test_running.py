@@ -1,11 +1,14 @@
-"""How the tests are run: what decides a long test, and what a run says at its end."""
+"""How the tests are run: what decides a long test, who takes which file, and what a run says at its end."""
 
 import ast
 import importlib.util
+from collections import OrderedDict
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from running import long_part
+from running import long_part, side_by_side
+from xdist.scheduler import LoadFileScheduling
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -42,11 +45,25 @@ def test_a_room_brings_what_it_imports():
     assert not rooms & {"viewers", "training"}
 
 
+def test_the_longest_file_of_a_kind_goes_first_and_nobody_idles(monkeypatch):
+    files = ["tests/skin/short.py", "tests/skin/long.py", "tests/live/short.py", "tests/live/long.py"]
+    monkeypatch.setattr(side_by_side, "recorded", lambda: {file: 9.0 if "long" in file else 1.0 for file in files})
+    scheduler, given = object.__new__(side_by_side.ByKind), []
+    take_first = lambda self, node: given.append(self.workqueue.popitem(last=False)[0])  # noqa: E731
+    monkeypatch.setattr(LoadFileScheduling, "_assign_work_unit", take_first)
+    scheduler.config = SimpleNamespace(option=SimpleNamespace(waiting=1))
+    scheduler.workqueue = OrderedDict.fromkeys(files)
+    for worker in ("gw1", "gw0", "gw0", "gw0"):
+        scheduler._assign_work_unit(SimpleNamespace(gateway=SimpleNamespace(id=worker)))
+    assert given == [files[1], files[3], files[2], files[0]]
+
+
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
         (["= 3 passed, 1 skipped in 2.00s ="], "3 passed, 1 skipped in 7.00s (00:00:07)"),
         (["= 1 failed, 3 passed in 2s =", "= 2 passed, 1 error in 1s ="], "1 failed, 5 passed, 1 error in 7.00s"),
+        (["= 5 passed in 2s =", "= 9 deselected in 1s ="], "5 passed in 7.00s"),
         (["no tests ran in 0.10s"], "no tests ran in 7.00s"),
     ],
 )
