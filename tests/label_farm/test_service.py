@@ -244,7 +244,7 @@ class crew:
         (("--token", "short"), "at least 16"),
         (("--host", "192.0.2.1", "--token", TOKEN), "cannot listen"),
         (("--root", "nowhere"), "no folder"),
-        (("--device", ("gpu",)), "cuda for all cards"),
+        (("--device", ("gpu",)), "cuda for all GPUs"),
     ],
 )
 def test_what_may_not_be_served_is_said(tmp_path, monkeypatch, options, words):
