@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import pkgutil
+import sys
 from importlib.util import find_spec
 from types import ModuleType
 
@@ -25,6 +26,8 @@ def names(room: str, base: str) -> list[str]:
     """
     spec = find_spec(room)  # the room itself may need a package that is not installed
     places = spec.submodule_search_locations if spec else None
+    if room in sys.modules:
+        places = sys.modules[room].__path__  # a folder may have been added
     return sorted(m.name for m in pkgutil.iter_modules(places) if m.name not in (base, "__init__")) if places else []
 
 
