@@ -21,7 +21,7 @@ def freedom_of(problem):
     return pooled_excess(scores).freedom
 
 
-def test_what_is_there_does_not_keep_others_from_lending():
+def test_what_is_there_does_not_spoil_the_prior_of_others():
     """A delay leaves much in all that looks a little like one; beside it, the others scatter alike."""
     freedoms = []
     for delay in (0.0, 0.05):

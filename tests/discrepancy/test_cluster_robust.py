@@ -32,7 +32,7 @@ def test_scores_without_an_effect_are_no_larger_than_normal_ones(episodes, tails
         assert np.mean(z > normal) < 1.6 * level
 
 
-def test_decoys_of_few_episodes_reach_as_far_as_chance_does():
+def test_null_draws_of_few_episodes_reach_as_far_as_chance_does():
     rng = np.random.default_rng(4)
     scores = clustered_score(gram_of(rng, 9, False), np.array([0]))
     z = scores.bootstrap(rng.normal(size=(4000, 9)))
@@ -41,7 +41,7 @@ def test_decoys_of_few_episodes_reach_as_far_as_chance_does():
     assert z.max() > 2.8
 
 
-def test_what_is_lent_steadies_a_score_of_few_episodes():
+def test_shrinkage_steadies_a_score_of_few_episodes():
     rng = np.random.default_rng(5)
     effects = {str(k): [clustered_score(gram_of(rng, 40, False), np.array([0]))] for k in range(12)}
     given = pooled_excess(effects)
@@ -52,7 +52,7 @@ def test_what_is_lent_steadies_a_score_of_few_episodes():
     assert pooled_excess({"alone": effects["0"]}) is None
 
 
-def test_effects_that_follow_the_clock_are_lent_by_all_where_nothing_wanders():
+def test_effects_that_follow_the_clock_share_the_prior_of_all_where_nothing_drifts():
     others, quiet, wandering = PooledExcess(1.2, 38.0), PooledExcess(0.9, 6.0), PooledExcess(3.0, 6.0)
     assert pooled_by_kind(others, quiet) == {False: others, True: others}
     assert pooled_by_kind(others, wandering) == {False: others, True: wandering}
@@ -61,7 +61,7 @@ def test_effects_that_follow_the_clock_are_lent_by_all_where_nothing_wanders():
     assert few.z_score(others) > few.z_score(quiet) > few.z_score(wandering)
 
 
-def test_one_that_scatters_far_more_than_its_kind_is_lent_little():
+def test_one_that_scatters_far_more_than_its_kind_is_shrunk_little():
     given, own = PooledExcess(1.0, 40.0), np.sqrt(8.0 / 13) * np.ones((13, 1))
     wild = ClusteredScore(np.array([8.0]), own, np.arange(13), (1.0, 12.0), 1.0)
     assert wild.variance == pytest.approx(8.0)
@@ -70,7 +70,7 @@ def test_one_that_scatters_far_more_than_its_kind_is_lent_little():
     assert like.z_score(given) > like.z_score() + 0.5
 
 
-def test_noise_told_too_large_is_not_lent_as_quiet():
+def test_an_overestimated_noise_is_no_prior_of_quiet():
     """Most effects scatter as half the noise would; the one that scatters as the noise does is no discovery for it."""
     rng = np.random.default_rng(6)
     alarms, worlds = 0, 400
