@@ -8,7 +8,7 @@ from pressing import course
 
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.nuisances import FITTED_GAIN_PRIOR, jitter
+from tacdata.discrepancy.noise.nuisances import FITTED_GAIN_PRIOR, pose_errors
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.problem import prepare
 from tacdata.discrepancy.search.score_tests import score_tests
@@ -28,7 +28,7 @@ def set_of(made, effects=CLOCKED, knots=None):
 
 def told(setting):
     """Return what was told [mm, 1]: depth and gain of an episode."""
-    prior, found = jitter(setting, setting.given), null_model(setting).errors
+    prior, found = pose_errors(setting, setting.given), null_model(setting).errors
     sizes = np.linalg.norm(found, axis=(0, 1)) / np.linalg.norm(prior, axis=(0, 1))
     return sizes * [0.01 * setting.course.stroke, FITTED_GAIN_PRIOR]
 

@@ -14,7 +14,7 @@ from tacdata.chain import predict
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.nuisances import jitter
+from tacdata.discrepancy.noise.nuisances import pose_errors
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.find import find
 from tacdata.discrepancy.search.findings import FoundEffect
@@ -192,9 +192,9 @@ def test_one_that_follows_the_clock_is_held_against_others_that_do(newcomer, clo
 def test_one_that_each_episode_has_of_its_own_is_a_nuisance(newcomer):
     effect = newcomer()
     course, response = read_with(effect, 0.1, (1.0,))
-    before = jitter(Setting(course, response, []), []).shape[2]
+    before = pose_errors(Setting(course, response, []), []).shape[2]
     type(effect).each_episode = True
-    assert jitter(Setting(course, response, []), []).shape[2] == before + 1
+    assert pose_errors(Setting(course, response, []), []).shape[2] == before + 1
 
 
 def test_what_delays_readings_or_changes_the_skin_moves_labels_and_says_so(newcomer):

@@ -66,9 +66,9 @@ class EpisodeErrors:
             known = readings.refined(bare * known.scale, course, known)
         rest = residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
-        wandering = offset_process(rest, course, known.scale, known.memory, kinds)
+        process = offset_process(rest, course, known.scale, known.memory, kinds)
         walk = offset_random_walk.modes(rest, course, known.scale, known.memory, self._places())
-        return replace(known, offsets=wandering, random_walk=walk, tag=readings.tag_wander(rest, course, known))
+        return replace(known, offsets=process, random_walk=walk, tag=readings.tag_offset_spread(rest, course, known))
 
     def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> ErrorSizes:
         """Return the estimated size of episodes' own errors of pose.

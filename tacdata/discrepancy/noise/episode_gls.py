@@ -34,7 +34,7 @@ class EpisodeErrorModel:
     features: np.ndarray | None = None
     """What all episodes may take up together, each stream by itself [1], shape (streams, n, p)."""
     random_walk: np.ndarray | None = None
-    """What one standard deviation of each mode of a stream's own wander changes [1], shape (streams, n, modes)."""
+    """What one standard deviation of each mode of a stream's random walk changes [1], shape (streams, n, modes)."""
 
 
 class FactoredErrors:
@@ -142,7 +142,7 @@ class _Offsets:
     """One episode's own offset of every stream, and how it goes on within the episode."""
 
     def __init__(self, offset: np.ndarray, prior: float, random_walk: np.ndarray | None = None) -> None:
-        """Take a constant (streams, m, 1), its standard deviation, and modes of a wander (streams, m, k)."""
+        """Take a constant (streams, m, 1), its standard deviation, and modes of a random walk (streams, m, k)."""
         modes = offset[:, :, :0] if random_walk is None else random_walk
         if np.isinf(prior):
             constant = offset / np.sqrt(np.maximum(np.square(offset).sum(axis=1, keepdims=True), 1e-12))

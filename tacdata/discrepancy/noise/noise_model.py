@@ -24,8 +24,8 @@ class Noise:
     missing: np.ndarray | None = None
     """Which values were not read, shape (n, streams), bool; None: all were."""
     random_walk: np.ndarray | None = None
-    """What one standard deviation of each mode of a stream's wander within an episode changes [noise scales], shape
-    (n, modes); None: it does not wander there."""
+    """What one standard deviation of each mode of the random walk within an episode changes [noise scales], shape
+    (n, modes); None: there is none."""
     relative_scale: np.ndarray | None = None
     """How much larger noise is in each value than without load [1], shape (n, streams); None: it is not."""
     tag: float | None = None

@@ -58,7 +58,7 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
 
     A recording is set up once: its strokes share errors of pose and gain, which are no drift from one to the next.
     """
-    own = jitter(setting, placed)
+    own = pose_errors(setting, placed)
     recording = setting.course.recording
     if recording is None or not 1 < recording.max() + 1 <= MOST_SET_UPS:
         return np.zeros((*own.shape[:2], 0), dtype=np.float32), np.zeros(0)
@@ -68,7 +68,7 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
     return columns, np.ones(columns.shape[2])
 
 
-def jitter(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
+def pose_errors(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
     """Return what an episode's own errors of pose change, at one standard deviation, shape (n, streams, kinds)."""
     course, response = setting.course, setting.response
     slope = depth_slope(course, response, list(placed))

@@ -16,7 +16,7 @@ from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, ErrorSizes
 from tacdata.discrepancy.noise.gram import episode_grams
 from tacdata.discrepancy.noise.noise_model import Noise
-from tacdata.discrepancy.noise.nuisances import jitter, nuisance_columns
+from tacdata.discrepancy.noise.nuisances import nuisance_columns, pose_errors
 from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.regressors.generic import generic, slow
 from tacdata.discrepancy.statistics.gram_fit import fold_of
@@ -100,7 +100,7 @@ class NullModel:
         errors, noise = self.errors, self.noise
         if self.sizes is not None and noise.gain_error is not None:
             episode, streams = course.reduced.episode, Streams.of(course)
-            errors = as_large(jitter(setting, placed), errors, episode)
+            errors = as_large(pose_errors(setting, placed), errors, episode)
             rise = streams.rise(predict(course, setting.response, list(placed)), setting.response)
             noise = replace(noise, gain_error=as_large(rise, noise.gain_error, episode))
         return Whitener(course.reduced, noise, self.context, features, errors)
@@ -138,7 +138,7 @@ def null_model(setting: Setting) -> NullModel:
     reduced, streams = course.reduced, Streams.of(course)
     predicted = predict(course, response, list(setting.given))
     context, features = contexts(reduced), taken_up(course, response, setting.given)
-    errors = jitter(setting, setting.given)
+    errors = pose_errors(setting, setting.given)
     extra, ridge = nuisance_columns(setting, setting.given)
     rich = generic(course, response, list(setting.given))
     residual = streams.measured(course) - streams.predicted(predicted)

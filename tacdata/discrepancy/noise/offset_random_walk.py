@@ -58,7 +58,7 @@ def modes(
 
 
 def walk_rate(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray) -> float:
-    """Return the rate of the wander [noise scales squared a second], 0 where it cannot be estimated; as for `modes`."""
+    """Return the rate of the random walk [noise scales squared a second], 0 where it is unknown; as for `modes`."""
     quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
     streams = rest[:, : course.channels] / scale[: course.channels]
     quiet &= np.isfinite(streams).all(axis=1)

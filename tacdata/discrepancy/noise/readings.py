@@ -217,7 +217,7 @@ def _about_mean(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     return values - means[group]
 
 
-def tag_wander(residual: np.ndarray, course: Course, known: Noise) -> float | None:
+def tag_offset_spread(residual: np.ndarray, course: Course, known: Noise) -> float | None:
     """Return how far an episode's offset of the tag is off the next one's, in noise scales [1]; None without a tag.
 
     Args:

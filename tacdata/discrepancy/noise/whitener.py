@@ -68,7 +68,7 @@ class Whitener:
     """Whitens columns, and projects out what the response may take up, place by place."""
 
     def __init__(
-        self, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None, jitter: np.ndarray
+        self, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None, pose_errors: np.ndarray
     ) -> None:  # fmt: skip
         """Factor what is the same for all columns.
 
@@ -77,7 +77,7 @@ class Whitener:
             noise: Noise model.
             context: Group of rows that share features, shape (n,); an episode lies in one.
             features: What the response may take up, shape (n, k); None for nothing but offsets.
-            jitter: What an episode's own errors of pose of one standard deviation change, shape (n, streams, kinds).
+            pose_errors: Change by an episode's pose errors of one standard deviation, shape (n, streams, kinds).
         """
         self.features = features
         self._course, self._noise, offsets = course, noise, noise.offsets
@@ -86,7 +86,7 @@ class Whitener:
         flat = replace(noise, scale=np.ones(1))
         one = replace(flat, missing=None)
         offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
-        moved = whiten(jitter, course, noise)
+        moved = whiten(pose_errors, course, noise)
         random_walk = None
         if noise.random_walk is not None:
             each = np.broadcast_to(noise.random_walk[:, None, :], (course.rows, streams, noise.random_walk.shape[1]))
