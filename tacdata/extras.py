@@ -8,11 +8,11 @@ from types import TracebackType
 
 from tacdata.errors import PackageError
 
-IMPORTED_AS = {"rerun": "rerun-sdk", "warp": "warp-lang"}
+IMPORTED_AS = {"markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "warp": "warp-lang"}
 """What is imported by another name than it is installed by."""
 ALL = "all"
 """The extra that brings everything: never the least that is needed."""
-ROOMS = {"training": "learn", "viewers": "view"}
+ROOMS = {"tacdata.revision": "fem", "training": "learn", "viewers": "view"}
 """Who asks decides, where two extras bring the same package: torch solves for `fem` and trains for `learn`."""
 
 
@@ -31,7 +31,8 @@ def missing_package(error: ImportError, asked: str, instead: str = "") -> Packag
     extras = extras_of(package)
     if not extras:
         return None
-    extra = next((ROOMS[room] for room in _askers(error.__traceback__) if ROOMS.get(room) in extras), extras[0])
+    rooms = (room for asker in _askers(error.__traceback__) for room in ROOMS if f"{asker}.".startswith(f"{room}."))
+    extra = next((ROOMS[room] for room in rooms if ROOMS[room] in extras), extras[0])
     name = package if package == module else f"{module.capitalize()} ({package})"
     line = f"pip install 'tacdata[{extra}]' (from a clone: pip install '.[{extra}]')"
     return PackageError(
@@ -62,9 +63,9 @@ def _same(one: str, other: str) -> bool:
 
 
 def _askers(trace: TracebackType | None) -> list[str]:
-    """Return the top-level packages that an error passed through, the innermost first."""
+    """Return the modules that an error passed through, the outermost first: the first room among them asked."""
     found = []
     while trace is not None:
-        found.insert(0, trace.tb_frame.f_globals.get("__name__", "").split(".")[0])
+        found.append(trace.tb_frame.f_globals.get("__name__", ""))
         trace = trace.tb_next
     return found

@@ -32,6 +32,7 @@ def run(
     ] = False,
 ) -> Result:
     """Find where recordings and a model disagree, and name the missing effect, or say why not."""
+    import tacdata.warp_runtime  # noqa: F401 - missing, it is said now, not when all is read
     from tacdata.discrepancy.model.spec import read_spec
     from tacdata.discrepancy.run import run as judge
 

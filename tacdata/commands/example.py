@@ -37,6 +37,6 @@ def run(
         (f"tacdata view {out}", "turn one in 3D (pip install 'tacdata[view]')"),
         ("tacdata demo", "run the whole pipeline (pip install 'tacdata[all]')"),
     ):
-        say(f"  {command:<{len(str(out)) + 16}}{purpose}")
+        say(f"  {command:<{len(str(out)) + 18}}{purpose}")
     return Result({"check": report.document, "press": {"number": DEEPEST, "found": scene.found}, "folder": out,
                    "picture": out / PICTURE})  # fmt: skip

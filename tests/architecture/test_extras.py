@@ -147,6 +147,7 @@ def test_a_first_look_works_without_the_extras(beyond, tmp_path):
     ("arguments", "module", "extra"),
     [
         (["solve", "case.json"], "torch", "fem"),
+        (["discrepancy", "first", "--out", "verdict"], "warp", "fem"),
         (["train", "dataset", "--out", "run"], "torch", "learn"),
         (["view", "first", "--save", "x.rrd"], "rerun", "view"),
         (["farm", "up"], "uvicorn", "farm"),
@@ -162,6 +163,7 @@ def test_a_verb_says_the_install_line_of_what_it_lacks(arguments, module, extra,
     assert f"pip install 'tacdata[{extra}]' (from a clone: pip install '.[{extra}]')" in done.stderr
     assert IMPORTED_AS.get(module, module) in done.stderr
     assert "Traceback" not in done.stderr
+    assert not (tmp_path / "verdict").exists()
 
 
 def test_a_missing_package_is_one_error_in_the_process_too(monkeypatch):
