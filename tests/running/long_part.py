@@ -2,7 +2,7 @@
 
 A test says which rooms decide it and why it is long: `@pytest.mark.long("label_farm", reason="workers die at random")`.
 `pytest --long=all` runs these tests alone. `--long=changed` runs the files whose inputs differ from those at which they
-last passed. Inputs are the rooms named, what they import in turn, the test's own folder and the pinned versions; no
+last passed. Inputs are the rooms named, what they import in turn, the test, its helpers and the pinned versions; no
 docstrings or comments. A run in which all long tests of a file pass writes a hash of its inputs to `long_runs.json`.
 """
 
@@ -103,7 +103,8 @@ class Passed:
 @functools.cache
 def inputs(file, rooms):
     """Return a hash of all that decides the long tests of a file."""
-    paths = {ROOT / ".dev" / "constraints.txt", *_texts((ROOT / file).parent)}
+    beside = {path for path in _texts((ROOT / file).parent) if not path.name.startswith("test_")}
+    paths = {ROOT / ".dev" / "constraints.txt", ROOT / file, *beside}
     for room in sorted(closure(rooms)):
         paths |= _texts(ROOT / room)
     whole = hashlib.sha256()
