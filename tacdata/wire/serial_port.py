@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import errno
+import os
+import select
 
 import serial
 from serial.tools import list_ports
 
 from tacdata.errors import DeviceError
+from tacdata.wire.patience import Patience
 
 try:
     import termios
 except ImportError:  # Windows has no hang-up flag to clear.
     termios = None
+
+WRITE = 2.0
+"""Longest wait for room on a line [s, real time]."""
 
 
 def ports() -> str:
@@ -43,7 +49,7 @@ def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | Non
         DeviceError: If the port is missing, busy, forbidden or no serial port.
     """
     try:
-        line = serial.serial_for_url(port, baud, timeout=timeout, write_timeout=2.0, do_not_open=True)
+        line = serial.serial_for_url(port, baud, timeout=timeout, write_timeout=WRITE, do_not_open=True)
         if "://" not in port:
             line.exclusive = True
         if dtr is not None:
@@ -62,6 +68,29 @@ def read_available(line: serial.SerialBase) -> bytes:
         serial.SerialException: If the line broke (OSError or TypeError on some systems).
     """
     return line.read(max(1, getattr(line, "in_waiting", 0)))
+
+
+def write_all(line: serial.SerialBase, data: bytes) -> None:
+    """Write all bytes, waiting at most `WRITE` for room.
+
+    pyserial's own limit counts the time in which this computer stood still, after bytes that did go out; then nobody
+    knows whether they did.
+
+    Raises:
+        serial.SerialException: If there is no room for so long, or the line broke (OSError on some systems).
+    """
+    handle = getattr(line, "fd", None)
+    if not isinstance(handle, int) or termios is None:
+        line.write(data)
+        return
+    patience = Patience(WRITE, floor=WRITE)
+    while data:
+        try:
+            data = data[os.write(handle, data) :]
+        except BlockingIOError:
+            if patience.over():
+                raise serial.SerialTimeoutException("it takes no more bytes") from None
+            select.select([], [handle], [], 0.05)
 
 
 def _keep_dtr(line: serial.SerialBase) -> None:

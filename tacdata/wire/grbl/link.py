@@ -18,7 +18,7 @@ from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.statuses import Statuses
 from tacdata.wire.grbl.watch import WELCOME_IN_MID_STREAM, what_is_wrong
 from tacdata.wire.patience import Patience
-from tacdata.wire.serial_port import read_available
+from tacdata.wire.serial_port import read_available, write_all
 
 SILENCE = 3.0
 """Time without an answer after which the controller counts as gone [s of the clock, and of real time, since an emulator
@@ -274,7 +274,7 @@ class GrblLink:
     def _write(self, data: bytes) -> None:
         try:
             with self._writing:
-                self.port.write(data)
+                write_all(self.port, data)
         except (serial.SerialException, OSError) as error:
             self._break(error)
             raise DeviceError(*self._broken(error)) from None
