@@ -12,7 +12,7 @@ from tacdata.commands.command import TOOLS, Result
 from tacdata.progress import say
 
 if TYPE_CHECKING:
-    from tacdata.tags.board import CharucoBoard
+    from tacdata.tags.board import Board
     from tacdata.tags.calibration.view_picker import ViewPicker
 
 ORDER = 104
@@ -58,7 +58,7 @@ def run(
     return _calibrate(picker, pattern, source, model, out, picture)
 
 
-def _calibrate(picker: ViewPicker, board: CharucoBoard, source: str, model: str, out: Path, picture: Path) -> Result:
+def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, out: Path, picture: Path) -> Result:
     import cv2
     import yaml
 
@@ -99,14 +99,14 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
 
     from tacdata import documents
     from tacdata.errors import UsageError
-    from tacdata.tags.board import DPI, CharucoBoard, draw_board, printable
+    from tacdata.tags.board import DPI, Board, draw_board, printable
 
     if target.suffix.lower() not in (".pdf", ".png"):
         raise UsageError(f"--draw {target}", "a file ending in .pdf or .png", "choose another name")
     for path in (target, board):
         if path.exists():
             raise UsageError(f"{path} exists", "a new file", "choose another name")
-    wanted = printable(CharucoBoard.from_document({"version": "1.0", **shape}, "--draw"))
+    wanted = printable(Board.from_document({"version": "1.0", **shape}, "--draw"))
     sheet = Image.fromarray(draw_board(wanted, paper)).convert("1", dither=Image.Dither.NONE)
     target.parent.mkdir(parents=True, exist_ok=True)
     if target.suffix.lower() == ".pdf":
@@ -118,7 +118,7 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
     say(f"next: tacdata calibrate-camera --board {board} --source IMAGES --out camera.yaml")
 
 
-def _look_through(source: Path, board: CharucoBoard, wanted: int) -> ViewPicker:
+def _look_through(source: Path, board: Board, wanted: int) -> ViewPicker:
     """Take a folder's images all, and of a video the still ones that show something new."""
     from tacdata.tags.calibration.view_picker import ViewPicker, images_of
 
@@ -130,7 +130,7 @@ def _look_through(source: Path, board: CharucoBoard, wanted: int) -> ViewPicker:
     return picker
 
 
-def _watch(source: str, board: CharucoBoard, size: str, wanted: int) -> ViewPicker:
+def _watch(source: str, board: Board, size: str, wanted: int) -> ViewPicker:
     """Watch a live camera until there are enough views, or Ctrl-C."""
     from tacdata.clock import Clock
     from tacdata.devices.opencv_camera import OpencvCamera

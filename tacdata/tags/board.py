@@ -18,7 +18,7 @@ DPI = 600
 
 
 @dataclass(frozen=True)
-class CharucoBoard:
+class Board:
     """Squares and markers as printed. Its corners lie between the squares, row by row."""
 
     columns: int
@@ -35,7 +35,7 @@ class CharucoBoard:
     """Whether the pattern begins as OpenCV before 4.6 drew it."""
 
     @classmethod
-    def from_document(cls, document: dict[str, Any], origin: str = "board") -> CharucoBoard:
+    def from_document(cls, document: dict[str, Any], origin: str = "board") -> Board:
         """Build a board from a parsed file (`schemas/calibration_board.schema.json`).
 
         Raises:
@@ -77,17 +77,17 @@ class CharucoBoard:
         return board
 
 
-def read_board(path: Path) -> CharucoBoard:
+def read_board(path: Path) -> Board:
     """Read a board's file.
 
     Raises:
         UsageError: If it does not exist.
-        FormatError: As `CharucoBoard.from_document`.
+        FormatError: As `Board.from_document`.
     """
-    return CharucoBoard.from_document(documents.read(Path(path), "calibration_board"), str(path))
+    return Board.from_document(documents.read(Path(path), "calibration_board"), str(path))
 
 
-def draw_squares(board: CharucoBoard, side: int) -> np.ndarray:
+def draw_squares(board: Board, side: int) -> np.ndarray:
     """Return the board alone with ``side`` dots per square, uint8 0 or 255, shape (rows side, columns side)."""
     import cv2
 
@@ -106,7 +106,7 @@ def draw_squares(board: CharucoBoard, side: int) -> np.ndarray:
     return image
 
 
-def printable(board: CharucoBoard, dpi: int = DPI) -> CharucoBoard:
+def printable(board: Board, dpi: int = DPI) -> Board:
     """Return the nearest board whose squares are whole dots, as `draw_board` draws it."""
     dot = 25.4 / dpi
     side = round(board.square / dot)
@@ -114,7 +114,7 @@ def printable(board: CharucoBoard, dpi: int = DPI) -> CharucoBoard:
     return replace(board, square=round(side * dot, 4), marker=round(marker * dot, 4))
 
 
-def draw_board(board: CharucoBoard, paper: str = "a4", dpi: int = DPI) -> np.ndarray:
+def draw_board(board: Board, paper: str = "a4", dpi: int = DPI) -> np.ndarray:
     """Return a sheet to print at 100 %: board, ruler and instructions, uint8, shape (height, width).
 
     Raises:

@@ -14,7 +14,7 @@ from tacdata.demonstrations.camera_pose.hand_eye import board_world, hand_eye
 from tacdata.demonstrations.camera_pose.hand_eye_pairs import solve_pairs
 from tacdata.demonstrations.camera_world import CameraWorld
 from tacdata.errors import FormatError, UsageError
-from tacdata.tags.board import CharucoBoard, draw_squares
+from tacdata.tags.board import Board, draw_squares
 from tacdata.virtual_rig.optics.render import render_cube
 from tacdata.virtual_rig.optics.sheet import render_sheet
 
@@ -97,7 +97,7 @@ def test_a_file_of_pairs_gives_a_file_of_the_camera(tmp_path):
 
 
 def test_a_board_on_the_table_gives_the_camera():
-    board, truth = CharucoBoard(9, 6, 25.0, 18.0, "4X4_50"), pose([0.5, 0.3, 0.1], [-0.1, -0.08, 0.45])
+    board, truth = Board(9, 6, 25.0, 18.0, "4X4_50"), pose([0.5, 0.3, 0.1], [-0.1, -0.08, 0.45])
     intrinsics = {"width": 640, "height": 480, "fx": 605.0, "fy": 602.0, "cx": 320.0, "cy": 240.0}
     sheet = np.pad(draw_squares(board, 40), 40, constant_values=255)
     corner = truth @ pose([0, 0, 0], [-0.025, -0.025, 0])  # the sheet has a margin of one square
@@ -154,7 +154,7 @@ def test_images_of_a_robot_that_carries_a_cube_give_a_file_that_a_demo_rig_takes
 
 
 def test_images_of_a_board_give_it_too(tmp_path, capsys):
-    board, truth = CharucoBoard(9, 6, 25.0, 18.0, "4X4_50"), pose([0.5, 0.3, 0.1], [-0.1, -0.08, 0.45])
+    board, truth = Board(9, 6, 25.0, 18.0, "4X4_50"), pose([0.5, 0.3, 0.1], [-0.1, -0.08, 0.45])
     intrinsics = {"width": 640, "height": 480, "fx": 605.0, "fy": 602.0, "cx": 320.0, "cy": 240.0, "distortion": []}
     sheet = np.pad(draw_squares(board, 40), 40, constant_values=255)
     corner = truth @ pose([0, 0, 0], [-0.025, -0.025, 0])

@@ -3,10 +3,10 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tacdata.tags.board import CharucoBoard, draw_squares
+from tacdata.tags.board import Board, draw_squares
 from tacdata.virtual_rig.optics.sheet import render_sheet, whole_lens
 
-BOARD = CharucoBoard(9, 6, 25.0, 18.0, "4X4_50")
+BOARD = Board(9, 6, 25.0, 18.0, "4X4_50")
 TRUTH = {
     "width": 640, "height": 480, "fx": 605.0, "fy": 602.0, "cx": 325.5, "cy": 236.0,
     "distortion": [-0.25, 0.08, 0.001, -0.0007, 0.0],

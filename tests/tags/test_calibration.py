@@ -9,7 +9,7 @@ from board_images import BOARD, TRUTH, images
 from scipy.optimize import least_squares
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.tags.board import CharucoBoard, draw_board, printable
+from tacdata.tags.board import Board, draw_board, printable
 from tacdata.tags.calibration.board_view import BoardView, find_board
 from tacdata.tags.calibration.intrinsics import calibrate, coverage_of
 from tacdata.tags.calibration.picture import draw_calibration
@@ -99,7 +99,7 @@ def test_views_that_tell_too_little_are_refused(views, kind, words):
             for k, place in enumerate((x, y) for x in (5, 160, 330) for y in (5, 130, 270))
         ]
     else:
-        board = CharucoBoard(6, 9, 25.0, 18.0, "4X4_50")
+        board = Board(6, 9, 25.0, 18.0, "4X4_50")
     with pytest.raises(FormatError, match=words):
         calibrate(views, board, SIZE, "k1k2p1p2")
 
@@ -136,11 +136,11 @@ def test_a_printed_board_is_read_back_at_its_size():
 ])  # fmt: skip
 def test_impossible_boards_are_refused(change, words):
     with pytest.raises(FormatError, match=words):
-        CharucoBoard.from_document({**BOARD.document, **change})
+        Board.from_document({**BOARD.document, **change})
 
 
 def test_a_board_larger_than_the_paper_is_refused():
     with pytest.raises(UsageError, match="at most"):
-        draw_board(CharucoBoard(12, 9, 25.0, 18.0, "5X5_100"))
+        draw_board(Board(12, 9, 25.0, 18.0, "5X5_100"))
     with pytest.raises(UsageError, match="a4"):
         draw_board(BOARD, "a0")

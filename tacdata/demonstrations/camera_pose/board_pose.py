@@ -9,13 +9,13 @@ import numpy as np
 
 from tacdata.demonstrations.paths.motion_filter import exponential
 from tacdata.errors import UsageError
-from tacdata.tags.board import CharucoBoard
+from tacdata.tags.board import Board
 from tacdata.tags.calibration.board_view import find_board
 from tacdata.tags.camera import PinholeCamera
 
 
 def board_poses(
-    images: Iterable[tuple[str, np.ndarray]], board: CharucoBoard, intrinsics: dict[str, Any]
+    images: Iterable[tuple[str, np.ndarray]], board: Board, intrinsics: dict[str, Any]
 ) -> tuple[list[np.ndarray], float, float]:
     """Return the board's pose in the camera for every image that shows it.
 

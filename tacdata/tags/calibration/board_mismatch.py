@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import schemas
-from tacdata.tags.board import CharucoBoard
+from tacdata.tags.board import Board
 from tacdata.tags.calibration.board_view import LEAST_CORNERS, find_board
 from tacdata.tags.detection.detector import to_grey
 
@@ -26,7 +26,7 @@ class Mismatch:
     """What to change."""
 
 
-def mismatch(images: Sequence[np.ndarray], board: CharucoBoard) -> Mismatch | None:
+def mismatch(images: Sequence[np.ndarray], board: Board) -> Mismatch | None:
     """Return the change that makes a board's corners appear in images that show none; None if nothing tried does.
 
     Args:
@@ -44,7 +44,7 @@ def mismatch(images: Sequence[np.ndarray], board: CharucoBoard) -> Mismatch | No
     return best[1] if best else None
 
 
-def _candidates(images: Sequence[np.ndarray], board: CharucoBoard) -> Iterator[tuple[CharucoBoard, bool, Mismatch]]:
+def _candidates(images: Sequence[np.ndarray], board: Board) -> Iterator[tuple[Board, bool, Mismatch]]:
     """Yield boards to try, whether in the mirrored images, and the conclusion if they are found."""
     for dictionary in (board.dictionary, *_dictionaries_seen(images, board)):
         named = replace(board, dictionary=dictionary)
@@ -57,7 +57,7 @@ def _candidates(images: Sequence[np.ndarray], board: CharucoBoard) -> Iterator[t
                         yield changed, is_mirrored, _in_words(board, changed, is_mirrored)
 
 
-def _in_words(board: CharucoBoard, changed: CharucoBoard, is_mirrored: bool) -> Mismatch:
+def _in_words(board: Board, changed: Board, is_mirrored: bool) -> Mismatch:
     found, remedy = [], []
     if is_mirrored:
         found.append("the images are mirrored")
@@ -77,7 +77,7 @@ def _in_words(board: CharucoBoard, changed: CharucoBoard, is_mirrored: bool) -> 
     return Mismatch(", ".join(found), ", and ".join(words))
 
 
-def _dictionaries_seen(images: Sequence[np.ndarray], board: CharucoBoard) -> list[str]:
+def _dictionaries_seen(images: Sequence[np.ndarray], board: Board) -> list[str]:
     """Return other dictionaries whose markers the images show, most frequent first."""
     import cv2
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.tags.board import CharucoBoard
+from tacdata.tags.board import Board
 from tacdata.tags.detection.detector import to_grey
 
 LEAST_CORNERS = 8
@@ -32,7 +32,7 @@ class BoardView:
         return float(np.median(np.linalg.norm(self.corners[here] - other.corners[there], axis=1)))
 
 
-def find_board(image: np.ndarray, board: CharucoBoard, name: str = "") -> BoardView | None:
+def find_board(image: np.ndarray, board: Board, name: str = "") -> BoardView | None:
     """Return a board's corners to a fraction of a pixel, or None if fewer than `LEAST_CORNERS` are seen.
 
     Args:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.tags.board import CharucoBoard
+from tacdata.tags.board import Board
 from tacdata.tags.calibration.board_view import BoardView
 
 LEAST_VIEWS = 8
@@ -90,7 +90,7 @@ class Calibration:
             "distortion": [round(value, 7) for value in self.distortion.tolist()],
         }  # fmt: skip
 
-    def document(self, board: CharucoBoard, source: str, code_version: str, date: str) -> dict[str, Any]:
+    def document(self, board: Board, source: str, code_version: str, date: str) -> dict[str, Any]:
         """Return the calibration's file (`schemas/camera_calibration.schema.json`)."""
         return {
             "version": "1.0", "date": date, "code_version": code_version, "source": source, "model": self.model,
@@ -102,7 +102,7 @@ class Calibration:
         }  # fmt: skip
 
 
-def calibrate(views: list[BoardView], board: CharucoBoard, size: tuple[int, int], model: str = "auto") -> Calibration:
+def calibrate(views: list[BoardView], board: Board, size: tuple[int, int], model: str = "auto") -> Calibration:
     """Estimate a camera's intrinsics.
 
     Args:
@@ -147,7 +147,7 @@ def _without_strays(views: list[BoardView], fit: _Fit) -> tuple[list[BoardView],
 
 
 def _fitting(
-    views: list[BoardView], board: CharucoBoard, size: tuple[int, int], model: str, count: int
+    views: list[BoardView], board: Board, size: tuple[int, int], model: str, count: int
 ) -> tuple[list[BoardView], list[UsedView]]:
     """Return the views that fit one camera, and those dropped, worst first: at most `MOST_DROPPED` of ``count``."""
     kept, dropped = list(views), []
@@ -230,7 +230,7 @@ def _judged(
     )
 
 
-def _choose_model(views: list[BoardView], board: CharucoBoard, size: tuple[int, int]) -> str:
+def _choose_model(views: list[BoardView], board: Board, size: tuple[int, int]) -> str:
     scores = {model: _held_out(views, board, size, model) for model in MODELS}
     chosen = MODELS[0]
     for model in MODELS[1:]:
@@ -239,7 +239,7 @@ def _choose_model(views: list[BoardView], board: CharucoBoard, size: tuple[int, 
     return chosen
 
 
-def _held_out(views: list[BoardView], board: CharucoBoard, size: tuple[int, int], model: str) -> float:
+def _held_out(views: list[BoardView], board: Board, size: tuple[int, int], model: str) -> float:
     """Return the reprojection error [px] of each half of the views with the intrinsics of the other half."""
     import cv2
 
@@ -255,7 +255,7 @@ def _held_out(views: list[BoardView], board: CharucoBoard, size: tuple[int, int]
     return float(np.sqrt(np.concatenate(squares).mean())) if squares else np.inf
 
 
-def _fit(views: list[BoardView], board: CharucoBoard, size: tuple[int, int], model: str) -> _Fit:
+def _fit(views: list[BoardView], board: Board, size: tuple[int, int], model: str) -> _Fit:
     import cv2
 
     flags = {MODELS[0]: cv2.CALIB_FIX_K3, MODELS[1]: 0, MODELS[2]: cv2.CALIB_RATIONAL_MODEL}[model]

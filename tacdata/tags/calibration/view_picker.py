@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.tags.board import CharucoBoard
+from tacdata.tags.board import Board
 from tacdata.tags.calibration.board_mismatch import mismatch
 from tacdata.tags.calibration.board_view import BoardView, find_board
 
@@ -24,7 +24,7 @@ ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 class ViewPicker:
     """Takes images one after the other; `views` holds those that were kept."""
 
-    def __init__(self, board: CharucoBoard, still: bool = True) -> None:
+    def __init__(self, board: Board, still: bool = True) -> None:
         """Keep the board; ``still``: consecutive images belong to one film."""
         self.board, self.still = board, still
         self.views: list[BoardView] = []
