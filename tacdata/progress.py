@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import PurePath
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -33,6 +35,19 @@ def say(words: str) -> None:
     """Print what happens meanwhile, or what to do next."""
     if not _quiet:
         print(words, flush=True)
+
+
+def suggest(*words: object) -> None:
+    """Print the command to type next; paths are quoted for the shell.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tacdata.progress import suggest
+        >>> suggest("check", Path("my session"))
+        next: tacdata check 'my session'
+    """
+    typed = [quote(str(word)) if isinstance(word, PurePath) else str(word) for word in words]
+    say(" ".join(["next: tacdata", *filter(None, typed)]))
 
 
 def console() -> Console:

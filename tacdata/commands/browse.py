@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import PIPELINE, Result
-from tacdata.progress import say
+from tacdata.progress import suggest
 
 if TYPE_CHECKING:
     from viewers.browse.episode_list import EpisodeList
@@ -56,8 +56,8 @@ def run(
         return Result(None)
     _print(chosen, most, predictions is not None)
     if chosen.entries:
-        more = f" --predictions {predictions}" if predictions else ""
-        say(f"next: tacdata view {path} --episode {chosen.entries[0].number}{more}")
+        more = ("--predictions", predictions) if predictions else ()
+        suggest("view", path, "--episode", chosen.entries[0].number, *more)
     return Result({"episodes": chosen.entries, "remarks": chosen.remarks})
 
 

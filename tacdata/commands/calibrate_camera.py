@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import TOOLS, Result
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.tags.board import Board
@@ -115,7 +115,7 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
         sheet.save(target, dpi=(DPI, DPI))
     documents.write(board, wanted.document, "calibration_board")
     print(f"{target} is to be printed at 100 %; measure its squares and correct square and marker in {board}")
-    say(f"next: tacdata calibrate-camera --board {board} --source IMAGES --out camera.yaml")
+    suggest("calibrate-camera --board", board, "--source IMAGES --out camera.yaml")
 
 
 def _look_through(source: Path, board: Board, wanted: int) -> ViewPicker:

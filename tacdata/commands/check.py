@@ -9,7 +9,7 @@ import typer
 
 from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import Exit
-from tacdata.progress import say
+from tacdata.progress import suggest
 
 if TYPE_CHECKING:
     from tacdata.recording.check.report import Report
@@ -27,7 +27,7 @@ def run(
     """Check every stream for gaps, noise, stuck channels and missing tags; exit 0 if usable, 1 if not."""
     report = checked(path, out or (path if path.is_dir() else path.parent))
     if path.is_dir() and report.usable:
-        say(f"next: tacdata label {path}")
+        suggest("label", path)
     return Result(report.document, Exit.DONE if report.usable else Exit.UNFIT)
 
 

@@ -9,7 +9,7 @@ import typer
 
 from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import Exit
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 ORDER = 15
 PANEL = PIPELINE
@@ -42,7 +42,7 @@ def run(
     for text in made.refused:
         print(f"left out: {text}")
     print(f"{made.recordings} recordings in {made.folder}" + f", {len(made.refused)} left out" * bool(made.refused))
-    say(f"next: tacdata check {made.folder}")
+    suggest("check", made.folder)
     return Result(made, Exit.FORMAT if made.refused else Exit.DONE)
 
 
@@ -57,9 +57,9 @@ def _inspect(source: Path, propose: Path | None) -> Result:
     print(text)
     mapping = proposed_mapping(source, tables)
     if propose is None:
-        say(f"next: tacdata import {source} --propose mapping.yaml")
+        suggest("import", source, "--propose mapping.yaml")
         return Result({"mapping": mapping})
     documents.write(propose, mapping, "import_mapping")
     print(f"a mapping to start from is in {propose}; correct it by hand, its guesses are guesses")
-    say(f"next: tacdata import {source} --mapping {propose} --out SESSION")
+    suggest("import", source, "--mapping", propose, "--out SESSION")
     return Result({"mapping": mapping, "written": propose})

@@ -11,7 +11,7 @@ import typer
 
 from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import SolveError, UsageError
-from tacdata.progress import bars, say
+from tacdata.progress import bars, say, suggest
 
 if TYPE_CHECKING:
     from label_farm.labelling import LabellingSummary
@@ -165,7 +165,7 @@ def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:
             f"read {labels}/episode-*.failure.json; `tacdata label {session} --redo` tries again",
         )
         return Result(summary, error)
-    say(f"next: tacdata pack {session} --out DATASET")
+    suggest("pack", session, "--out DATASET")
     return Result(summary)
 
 

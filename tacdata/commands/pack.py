@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import PIPELINE, Result
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 ORDER = 40
 PANEL = PIPELINE
@@ -56,5 +56,5 @@ def run(
     for flag in carry_flags(session, out):
         print(f"  {flag.file}  set aside, training leaves it out: {flag.reason}")
     print(f"{packed.episodes} episodes, {packed.frames} frames in {out}")
-    say(f"next: tacdata train {out}")
+    suggest("train", out)
     return Result(packed)

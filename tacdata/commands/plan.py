@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tacdata.commands.command import TOOLS, Result
-from tacdata.progress import say
+from tacdata.progress import suggest
 
 if TYPE_CHECKING:
     from tacdata.plans import Plan
@@ -62,7 +62,7 @@ def run(
     if out:
         print(f"{len(plan.presses)} presses with {', '.join(document['indenters'])} in {out}")
     if written := out or (Path(what) if is_plan else None):
-        say(f"next: tacdata record --rig RIG --plan {written} --out SESSION")
+        suggest("record --rig RIG --plan", written, "--out SESSION")
     return Result({"plan": document, "expected": expected, "written": out, "picture": picture})
 
 

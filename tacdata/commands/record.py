@@ -12,7 +12,7 @@ import typer
 from tacdata import progress
 from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import Exit
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,7 +110,7 @@ def run(
         finally:
             chosen.keep(out)
     print(f"{len(session.done)} of {len(session.plan.presses)} presses recorded in {out}")
-    say(f"next: tacdata check {out}")
+    suggest("check", out)
     return Result({"session": out, "recorded": len(session.done), "planned": len(session.plan.presses)})
 
 
@@ -128,7 +128,7 @@ def _by_hand(
         print(f"interrupted: what was recorded is in {out}", file=sys.stderr)
         raise typer.Exit(Exit.INTERRUPTED) from None
     print(f"{len(session.episodes)} demonstrations in {out}")
-    say(f"next: tacdata track {out}")
+    suggest("track", out)
     return Result({"session": out, "demonstrations": [path.name for path in session.episodes]})
 
 

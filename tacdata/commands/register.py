@@ -10,7 +10,7 @@ import typer
 
 from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import Exit
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.recording.live.guarded_motion import GuardedMotion
@@ -61,7 +61,7 @@ def run(
 
     documents.write(target, document, "registration")
     print(f"{text}\nwritten to {target}")
-    say(f"next: tacdata record --rig {rig} --registration {target} --plan PLAN --out SESSION")
+    suggest("record --rig", rig, "--registration", target, "--plan PLAN --out SESSION")
     return Result(document)
 
 

@@ -9,7 +9,7 @@ import typer
 
 from tacdata import progress
 from tacdata.commands.command import TOOLS, Result
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 ORDER = 162
 PANEL = TOOLS
@@ -97,6 +97,6 @@ def run(
         if words:
             say(f"next: {words}")
     if document["next"]["plan"]:
-        say(f"next: tacdata record --rig RIG --plan {out / document['next']['plan']} --out SESSION")
+        suggest("record --rig RIG --plan", out / document["next"]["plan"], "--out SESSION")
     print(f"card: {out / CARD}")
     return Result(document)

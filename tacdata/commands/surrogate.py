@@ -10,7 +10,7 @@ import typer
 from tacdata import progress
 from tacdata.commands.command import TOOLS, Result
 from tacdata.errors import UsageError
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 ORDER = 158
 PANEL = TOOLS
@@ -74,5 +74,5 @@ def run(
         )
     spec = written_spec(out, ready, table, off)
     print(f"written: {spec}")
-    say(f"next: tacdata discrepancy {' '.join(map(str, recordings))} --spec {spec} --out VERDICT")
+    suggest("discrepancy", *recordings, "--spec", spec, "--out VERDICT")
     return Result({**known, "left_out": off, "uncovered": len(outside), "spec": spec})

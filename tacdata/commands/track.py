@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import TOOLS, Result
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
@@ -73,7 +73,7 @@ def run(
         for remark in made.remarks:
             print(f"  note: {remark}")
     hint = "" if network else "  (with --network the targets can be compensated)"
-    say(f"next: tacdata export {path} --out EXPORT{hint}")
+    suggest("export", path, "--out EXPORT", hint)
     return Result({"recordings": told})
 
 

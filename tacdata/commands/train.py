@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import PIPELINE, Result
-from tacdata.progress import bars, say
+from tacdata.progress import bars, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,7 +77,7 @@ def run(
     print(f"episodes: {parts} (split {document['split']['name']!r})")
     print(f"best epoch {document['epoch']}: validation loss {document['best']['validation_loss']:.5f}")
     print(f"checkpoint {best.path}\nmetrics    {out / METRICS}")
-    say(f"next: tacdata evaluate {out}")
+    suggest("evaluate", out)
     return Result({**document, "checkpoint": best.path})
 
 

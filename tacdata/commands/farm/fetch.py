@@ -9,7 +9,7 @@ import typer
 
 from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
-from tacdata.progress import say
+from tacdata.progress import suggest
 
 ORDER = 35
 
@@ -46,7 +46,7 @@ def run(
     left = entry["episodes"] - len(found.written) - len(found.current) - len(found.failed)
     if entry["state"] in ("waiting", "planning", "running"):
         print(f"{left} episodes are still to come: the submission is {entry['state']}")
-        say(f"next: tacdata farm fetch {number} {session} --wait")
+        suggest("farm fetch", number, session, "--wait")
     elif found.failed:
         error = SolveError(
             f"{len(found.failed)} of {entry['episodes']} episodes have no label",
@@ -55,5 +55,5 @@ def run(
         )
         return Result(told, error)
     else:
-        say(f"next: tacdata pack {session} --out DATASET")
+        suggest("pack", session, "--out DATASET")
     return Result(told)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Annotated
 
 import typer
 
 from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
-from tacdata.progress import say
+from tacdata.progress import suggest
 
 ORDER = 15
 
@@ -23,7 +23,6 @@ def run(
     ] = "",
 ) -> Result:
     """Send a session's recordings to the service; run again, it goes on. Not needed where it sees the same disk."""
-    from shlex import quote
 
     from label_farm.remote.client import Client
     from label_farm.remote.send import send
@@ -31,5 +30,6 @@ def run(
     name = to or session.resolve().name
     sent = send(Client(url, token), session, name)
     print(f"files sent: {sent.files} ({sent.size / 1e6:.1f} MB), already there: {sent.there}")
-    say(f"next: tacdata farm submit {quote(name)}, then tacdata farm fetch NUMBER {quote(str(session))} --wait")
+    suggest("farm submit", PurePath(name))
+    suggest("farm fetch NUMBER", session, "--wait")
     return Result(sent)

@@ -8,7 +8,7 @@ import typer
 
 from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
-from tacdata.progress import say
+from tacdata.progress import suggest
 
 ORDER = 30
 
@@ -50,7 +50,7 @@ def run(
         return Result(entry, error)
     if entry["state"] == "done":
         print(f"labels lie in {entry['session']}/labels under the service's root; on another computer:")
-        say(f"next: tacdata farm fetch {number} SESSION")
+        suggest("farm fetch", number, "SESSION")
     return Result(entry)
 
 

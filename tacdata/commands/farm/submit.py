@@ -10,7 +10,7 @@ import typer
 
 from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
-from tacdata.progress import say
+from tacdata.progress import say, suggest
 
 ORDER = 20
 
@@ -41,5 +41,6 @@ def run(
     }  # fmt: skip
     filed = Client(url, token).post("/api/submissions", wish)
     print(f"submission {filed['id']} of {session} is filed")
-    say(f"next: tacdata farm status {filed['id']}, or open {url} in a browser")
+    suggest("farm status", filed["id"])
+    say(f"or open {url} in a browser")
     return Result(filed)
