@@ -15,6 +15,7 @@ from tacdata.discrepancy.verdict.residual_table import write as write_residuals
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import exporter
 from tacdata.replay.targets import targets_of
+from tacdata.sensor import default_sensor
 from training.inference.prediction import write_prediction
 from viewers.kinds.kind import BASE, ROOM, kinds
 from viewers.pictures.backend import PictureBackend
@@ -22,6 +23,7 @@ from viewers.rerun.backend import LAYOUTS, RerunBackend
 from viewers.rerun.bar_table import bar_table
 from viewers.rerun.gap_recording import write as write_gap
 from viewers.scene.scene import Bars, MotionTrail
+from viewers.scenes.prediction import prediction_scene
 from viewers.source import scene_at
 
 START = 1_760_000_000_000_000_000
@@ -105,6 +107,11 @@ def test_predictions_alone(prediction, tmp_path):
     assert "in pixels" in scene.summary and "estimate" in scene.summary
     assert (scene.maps[0].values == prediction.depth).all()
     assert "/maps/prediction" in drawn(scene, tmp_path)
+    # With the checkpoint beside it the skin is known, its taxels' readings are not.
+    known = prediction_scene("run", prediction, default_sensor(), 1)
+    assert known.footprint is not None and not known.arrays
+    (tmp_path / "known").mkdir()
+    assert "/world/footprint" in drawn(known, tmp_path / "known")
     with pytest.raises(UsageError, match="--episode 3") as caught:
         scene_at(tmp_path / "run" / "predictions", episode=3)
     assert caught.value.allowed == "4"

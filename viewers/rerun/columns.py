@@ -132,9 +132,10 @@ class RerunParts:
         self._image(entity("maps", maps.name), maps.time_ns, maps.pictures, maps.scale)
 
     def _map_marks(self, maps: DepthMaps) -> None:
-        """Write the taxels and the nominal tip as marks that every map view lays over its picture."""
-        fixed = rr.Points2D(maps.pixels(self._scene.taxels.centers), radii=[0.12], colors=[OUTLINE_COLOR])
-        self._static("maps/marks/taxels", fixed)
+        """Write the taxels and the nominal tip, where there are any, as marks over the picture of every map view."""
+        for array in self._scene.arrays[:1]:
+            fixed = rr.Points2D(maps.pixels(array.centers), radii=[0.12], colors=[OUTLINE_COLOR])
+            self._static("maps/marks/taxels", fixed)
         tip = self._scene.tip
         if tip is not None:
             self._static("maps/marks/tip", rr.Points2D.from_fields(radii=[0.4], colors=[TIP_COLOR]))
