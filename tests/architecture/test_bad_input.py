@@ -51,7 +51,7 @@ def folder(tmp_path):
         "version": "1.0",
         "name": "unplugged",
         "cnc": {"driver": "grbl", "port": str(tmp_path / "no-port")},
-        "board": {"driver": "capacitive_board", "port": str(tmp_path / "no-board")},
+        "board": {"driver": "capacitive_board", "port": str(tmp_path / "no-port-2")},
         "registration": {"origin": [0.0, 0.0, 0.0], "yaw": 0.0},
         "envelope": {"min": [-20.0, -20.0, -10.0], "max": [20.0, 20.0, 20.0]},
     }
