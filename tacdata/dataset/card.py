@@ -153,10 +153,14 @@ def _gaps(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
 
 
 def _columns(dataset: Dataset) -> list[str]:
-    lines = ["## Columns", "", "| Column | Shape | Unit |", "| --- | --- | --- |"]
+    heads = "| Column | Shape | Unit in the files | Unit by read_dataset |"
+    lines = ["## Columns", "", heads, "| --- | --- | --- | --- |"]
+    described = features.lerobot_features(dataset.sensor)
+    stored = {key: entry.get("info", {}).get("unit") for key, entry in described.items()}
     for key, values in dataset.columns.items():
         shape = " x ".join(map(str, values.shape[1:])) or "1"
-        lines.append(f"| {key} | {shape} | {dataset.units[key]} |")
+        ours = dataset.units[key]
+        lines.append(f"| {key} | {shape} | {stored.get(key) or ours} | {ours} |")
     return lines
 
 

@@ -27,7 +27,7 @@ def test_the_card_says_what_is_inside(tmp_path: Path) -> None:
     assert "| sphere1 | sphere, radius 3 | 1 | 1.2 | 1 |" in text
     assert "skin model (content hash): cccccccccccc (3)" in text
     assert "3 episodes: made for a test" in text
-    assert "| observation.depth | 35 x 26 | mm |" in text
+    assert "| observation.depth | 35 x 26 | m | mm |" in text, "LeRobot keeps depth maps in metres"
 
 
 def test_specimens_are_told_apart(tmp_path: Path) -> None:
