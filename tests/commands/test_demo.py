@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from running.in_process import tacdata
 
-from tacdata import cli, stages
+from tacdata import stages
 from tacdata.commands import demo
 from tacdata.errors import UsageError
 
@@ -77,9 +77,9 @@ def quick_stages(monkeypatch):
     def run(line):
         arguments = line[line.index("tacdata.cli") + 1 :]
         stand_in = ["--factory", "fast_model:FastModel", "--workers", "2"] if arguments[0] == "label" else []
-        ended = CliRunner().invoke(cli.application(), [*arguments, *stand_in])
-        print(ended.output)
-        return ended.exit_code
+        ended = tacdata(*arguments, *stand_in)
+        print(ended.stdout, ended.stderr)
+        return ended.returncode
 
     monkeypatch.setattr(stages, "_run", run)
 
