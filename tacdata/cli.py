@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tacdata import progress, registry
+from tacdata import progress, registry, stages
 from tacdata.commands.command import Result
 from tacdata.errors import DeviceError, Exit, TacdataError
 from tacdata.extras import missing_package
@@ -155,6 +155,7 @@ def _end(result: Result, as_json: bool) -> None:
 
 def main() -> None:
     """Run the command line; an error meant for a person ends in words and a non-zero exit, never a traceback."""
+    stages.follow()
     try:
         application()(prog_name="tacdata")
     except TacdataError as error:

@@ -155,7 +155,7 @@ def test_interrupted_wait_does_not_mix_up_later_answers(rig):
     _, _, driver = rig
     with driver:
         with pytest.raises(DeviceError, match="waited"):
-            driver.move((-50.0, -50.0, -35.0), 1.0)
+            driver.move((-50.0, -50.0, -35.0), 0.2)
             driver.wait_idle(0.5)
         driver.feed_hold()
         driver.abandon()

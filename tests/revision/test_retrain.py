@@ -74,7 +74,7 @@ def test_a_network_learns_better_from_labels_that_are_paired_rightly(both):
     assert moved["solved"] == 0 and moved["found"] == 7, "late labels are the same presses"
     assert moved["most"] > 0.3, "and yet other maps"
     for page in ("card.html", "gap.md"):
-        assert "learnt from the readings measured" in (both.folder / page).read_text()
+        assert "learnt from measured readings" in (both.folder / page).read_text()
 
 
 def test_new_labels_are_needed_where_labels_move(both, tmp_path):
