@@ -11,7 +11,7 @@ import numpy as np
 from viewers.scene.scene import Bars, Curves, Page, Scene
 
 GATE = 0.01
-"""Largest share of sign flips at which a gap counts as one (`tacdata.discrepancy`)."""
+"""p-value at or below which a gap counts as one (`tacdata.discrepancy`)."""
 WIDE = 20.0
 """Ratio from which bars are drawn on a logarithmic axis."""
 SURELY = 2.33
