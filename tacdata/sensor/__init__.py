@@ -1,7 +1,7 @@
 """The sensor description: one versioned file says everything about a taxel skin."""
 
 from tacdata.sensor.adhesion import Adhesion
-from tacdata.sensor.material import Material, PronyTerm
+from tacdata.sensor.material import Material
 from tacdata.sensor.sensor import ContactProperties, DepthMap, Sensor, Skin, Taxels, default_sensor, read_sensor
 from tacdata.sensor.transduction import Transduction
 
@@ -10,7 +10,6 @@ __all__ = [
     "ContactProperties",
     "DepthMap",
     "Material",
-    "PronyTerm",
     "Sensor",
     "Skin",
     "Taxels",
