@@ -123,7 +123,8 @@ def main(arguments):
             if ours:
                 rest = [argument for argument in arguments if argument not in ours]
                 which = "changed" if "--ci" in ours else "all"
-                checks.tests("long part", f"--long={which}", *side_by_side, *rest, perhaps_none=True)
+                # One after the other: each fills the machine, and some hold an emulated rig against the clock.
+                checks.tests("long part", f"--long={which}", *rest, perhaps_none=True)
             checks.collect("types", types, beside, said)
         finally:
             beside.kill()
