@@ -119,15 +119,15 @@ class AdhesiveSurface(ContactSurface):
     """Contact of the outer face with a shape that it sticks to."""
 
     def __init__(
-        self, nodes: torch.Tensor, faces: torch.Tensor, distance: wp.Function, rough: bool, penalty: float,
-        stick: float, adhesion: Adhesion,
+        self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distance: wp.Function, rough: bool,
+        activation: float, stick: float, adhesion: Adhesion,
     ) -> None:
         """Bind faces of the mesh, a shape and a law; for the other arguments see `ContactSurface`.
 
         Raises:
             UsageError: If there is no such law.
         """
-        super().__init__(nodes, faces, 1, distance, rough, penalty, stick)
+        super().__init__(nodes, faces, held, distance, rough, activation, stick)
         self._pull = _pull(distance, adhesion.law)
         self._adhesion = filled(
             AdhesionData, strength=adhesion.work * _PER_MM / adhesion.range, length=adhesion.range,
@@ -135,15 +135,16 @@ class AdhesiveSurface(ContactSurface):
         )
 
     def add_forces(
-        self, u: torch.Tensor, pose: Pose, history: ContactHistory, conditions: Conditions,
-        friction_tangent: torch.Tensor, total: torch.Tensor,
+        self, u: torch.Tensor, multiplier: torch.Tensor, pose: Pose, history: ContactHistory, conditions: Conditions,
+        friction_tangent: torch.Tensor, near: torch.Tensor, total: torch.Tensor,
     ) -> ContactForces:
         """Add the nodal forces of contact and attraction on the skin [N], as `ContactSurface.add_forces`.
 
         Falling attraction enters the stiffness where ``friction_tangent`` is 1.
         """
-        contact = super().add_forces(u, pose, history, conditions, friction_tangent, total)
-        nodal, stiffness = torch.zeros_like(total), self._values(u, 4)
+        contact = super().add_forces(u, multiplier, pose, history, conditions, friction_tangent, near, total)
+        nodal = torch.zeros_like(total)
+        stiffness = torch.zeros(*self.weights.shape, 4, u.shape[2], dtype=torch.float64, device=u.device)
         energy = torch.zeros(u.shape[2], dtype=torch.float64, device=u.device)
         wp.launch(
             self._pull, dim=(*self.weights.shape, u.shape[2]),

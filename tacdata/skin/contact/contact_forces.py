@@ -1,4 +1,4 @@
-"""What contact does at given displacements: tractions at the quadrature points, their stiffness, the resultant."""
+"""What contact does at given displacements and multipliers: gaps, tractions, the resultant, the stiffness."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from tacdata.skin.member.columns import Columns
 
 @dataclass(frozen=True)
 class ContactTangent(Columns):
-    """The stiffness of one contact at one state; f faces, k points each, b batch members."""
+    """The linearization of one contact at one state; s contact nodes, b batch members."""
 
-    pressure: torch.Tensor
-    """Normal traction [MPa], shape (f, k, b); where it is 0, ``stiffness`` means nothing."""
-    stiffness: torch.Tensor
-    """Of each point per area, symmetric: xx, yy, zz, xy, yz, xz [MPa/mm], shape (f, k, 6, b)."""
-    touched: torch.Tensor
-    """Faces with a point that carries load, shape (f, b), bool."""
+    active: torch.Tensor
+    """Nodes whose mean gap is to be closed, shape (s, b), bool."""
+    normal: torch.Tensor
+    """Mean outward normal of the shape under each hat, in the sensor's frame [1], shape (s, 3, b)."""
+    friction: torch.Tensor
+    """Stiffness of each hat against slip, symmetric: xx, yy, zz, xy, yz, xz [N/mm], shape (s, 6, b)."""
     attraction: torch.Tensor | None = None
     """Slope of adhesive traction [MPa/mm] and the normal along which it acts, shape (f, k, 4, b)."""
 
 
 @dataclass(frozen=True)
 class ContactForces(Columns):
-    """Tractions of one contact; f faces, k points each, b batch members."""
+    """Tractions of one contact; s contact nodes, b batch members."""
 
     force: torch.Tensor
     """Resultant on the skin [N], shape (3, b)."""
     gap: torch.Tensor
-    """Signed distance to the shape [mm], shape (f, k, b)."""
+    """Mean signed distance to the shape under each hat [mm], shape (s, b)."""
     pressure: torch.Tensor
-    """Normal traction [MPa], shape (f, k, b)."""
+    """Normal traction at the nodes [MPa], 0 where not active, shape (s, b)."""
     shear: torch.Tensor
-    """Tangential traction in the shape's frame [MPa], shape (f, k, 3, b)."""
+    """Tangential traction in the shape's frame [MPa], shape (s, 3, b)."""
     local: torch.Tensor
-    """Place of each point in the shape's frame [mm], shape (f, k, 3, b)."""
+    """Mean place of each hat in the shape's frame [mm], shape (s, 3, b)."""
     tangent: ContactTangent
     """Their change with the displacements."""
     energy: torch.Tensor | None = None

@@ -1,149 +1,175 @@
-"""Contact of faces of the skin with a rigid shape: augmented Lagrangian, integrated over the faces, Coulomb friction.
+"""Contact of faces of the skin with a rigid shape: multipliers at nodes, Coulomb friction.
 
-At every quadrature point the normal traction is t = max(0, lambda - penalty * gap) (Alart and Curnier 1991; Simo and
-Laursen 1992). Friction is a return mapping of the shear traction onto the disc of radius mu t. Its history is that of
-the last equilibrium. Far from the solution friction enters the stiffness by its secant (Kacanov's method). That is a
-majorant of the dissipation, so that iterates do not flip between opposite slips as they do with the tangent. Near the
-solution it enters by the tangent, without the derivative of the disc's radius: so the stiffness stays symmetric.
-Tractions are per undeformed area. Arrays of points are laid out (faces, points, ..., batch).
+The normal traction is a piecewise linear field on the four sub-triangles of every quadratic face. Its values at the
+nodes are unknowns (multipliers) beside the displacements. A node carries pressure, or the mean gap under its hat is not
+negative: the primal-dual active set of Hueeber and Wohlmuth (Comput. Methods Appl. Mech. Eng. 194 (2005) 3147), which
+is Newton's method on a function without slope at the kink (Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2002) 865).
+Node j is active where lambda_j - c gap_j > 0.
+
+Friction acts on the mean slip under each hat: return mapping of the shear traction onto the disc of radius mu lambda_j.
+Its history is that of the last equilibrium. Far from the solution friction enters the stiffness by its secant
+(Kacanov's method), near it by the tangent, without the derivative of the disc's radius: so the stiffness stays symmetric.
+Tractions are per undeformed area.
 """
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 import warp as wp
 
 from tacdata.skin.contact import kernels
 from tacdata.skin.contact.contact_forces import ContactForces, ContactTangent
 from tacdata.skin.contact.history import ContactHistory
+from tacdata.skin.contact.mortar import Mortar, hats
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.member.warp_arrays import REAL, argument, filled
 from tacdata.skin.mesh import elements
+
+SUBDIVISIONS = 2
+"""The quadrature rule is repeated on the sub-triangles of the hats, on which these are linear."""
 
 
 class ContactSurface:
     """Faces of the mesh against one rigid shape. It holds nothing that changes while presses are solved."""
 
     def __init__(
-        self, nodes: torch.Tensor, faces: torch.Tensor, subdivisions: int, distance: wp.Function, rough: bool,
-        penalty: float, stick: float,
+        self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distance: wp.Function, rough: bool,
+        activation: float, stick: float, flat: bool = False,
     ) -> None:
         """Bind faces of the mesh and a shape.
 
         Args:
             nodes: Undeformed positions [mm], shape (n, 3).
             faces: Quadratic triangles, shape (f, 6), int32.
-            subdivisions: The quadrature rule is repeated on the square of this many sub-triangles.
+            held: Nodes that cannot move, shape (n,), bool; they carry no multiplier.
             distance: Signed distance of the shape (`tacdata.indenters.indenter`).
             rough: Whether there is friction (its coefficient is each member's own).
-            penalty: Normal stiffness over Young's modulus [1/mm].
-            stick: Tangential stiffness of sticking points over Young's modulus [1/mm].
+            activation: c over Young's modulus: weight of a gap against a pressure in the active set [1/mm].
+            stick: Tangential stiffness of sticking nodes over Young's modulus [1/mm].
+            flat: Whether the shape's normal is the z axis everywhere.
         """
         self.faces, self.distance, self.device = faces, distance, str(nodes.device)
-        self.weights, self.shapes = face_quadrature(nodes, faces, subdivisions)
-        self.data = filled(
-            kernels.SurfaceData, nodes=nodes, faces=faces, shapes=self.shapes, weights=self.weights, penalty=penalty,
-            stick=stick, rough=int(rough),
+        self.rough, self.activation, self.flat = rough, activation, flat
+        self.weights, self.shapes = face_quadrature(nodes, faces, SUBDIVISIONS)
+        at_points = hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
+        self.mortar = Mortar(
+            faces.cpu().numpy(), self.weights.cpu().numpy(), self.shapes.cpu().numpy(), at_points, len(nodes),
+            self.device,
         )
-        """The same, as kernels take it."""
+        """The projection onto the hats."""
+        self.area = torch.as_tensor(self.mortar.area, device=nodes.device)
+        """Area of each hat, undeformed [mm^2], shape (s,)."""
+        self.able = ~held[torch.as_tensor(self.mortar.nodes, device=nodes.device)]
+        """Nodes that may carry a multiplier, shape (s,), bool."""
+        self._mean_nodes = self.mortar.means(nodes[:, :, None].contiguous())
+        """Mean undeformed place under each hat [mm], shape (s, 3, 1)."""
+        rise = torch.zeros_like(nodes)
+        rise[:, 2] = nodes[:, 2].clamp_min(0.0)
+        self._mean_rise = self.mortar.means(rise[:, :, None].contiguous())
         self.rule = {
             dtype: (self.shapes.to(dtype).contiguous(), self.weights.to(dtype).contiguous()) for dtype in REAL
         }
         """Shape functions, shape (k, 6), and weights [mm^2], shape (f, k), by precision."""
+        slots = torch.as_tensor(self.mortar.slots.astype(np.int32), device=nodes.device)
+        self.data = filled(
+            kernels.SurfaceData, nodes=nodes, faces=faces, slots=slots, shapes=self.shapes,
+            hats=torch.as_tensor(at_points, device=nodes.device), weights=self.weights, area=self.area, stick=stick,
+            rough=int(rough),
+        )
+        """The same, as kernels take it."""
+
+    @property
+    def count(self) -> int:
+        """Number of contact nodes."""
+        return len(self.area)
 
     def start(self, pose: Pose) -> ContactHistory:
         """Return the history of members without contact, the shape at ``pose``."""
         place = pose.place.clone()
-        multiplier, gap = self._values(place), torch.full_like(self._values(place), torch.inf)
-        return ContactHistory(multiplier, self._values(place, 3), self._values(place, 3), gap, place)
+        gap = torch.full((self.count, place.shape[1]), torch.inf, dtype=torch.float64, device=place.device)
+        anchor = torch.zeros(self.count, 3, place.shape[1], dtype=torch.float64, device=place.device)
+        return ContactHistory(anchor, anchor.clone(), gap, place)
 
     def add_forces(
-        self, u: torch.Tensor, pose: Pose, history: ContactHistory, conditions: Conditions,
-        friction_tangent: torch.Tensor, total: torch.Tensor,
+        self, u: torch.Tensor, multiplier: torch.Tensor, pose: Pose, history: ContactHistory, conditions: Conditions,
+        friction_tangent: torch.Tensor, near: torch.Tensor, total: torch.Tensor,
     ) -> ContactForces:
         """Add the contact's nodal forces on the skin [N] to ``total``, shape (n, 3, b).
 
         Args:
             u: Displacements [mm], shape (n, 3, b), float64.
+            multiplier: Normal tractions at the nodes [MPa], shape (s, b); those of nodes that are not active are
+                taken as 0.
             pose: Of the shape.
-            history: Where friction starts from, and the multipliers.
+            history: Where friction starts from.
             conditions: Friction, thickness, modulus and the shape's parameters.
-            friction_tangent: Stiffness of slipping points: 0 by the secant of friction, 1 by its tangent, shape (b,).
+            friction_tangent: Stiffness of slipping nodes: 0 by the secant of friction, 1 by its tangent, shape (b,).
+            near: Gap up to which nodes without pressure are active, too [mm], shape (b,).
             total: Receives the forces.
 
         Returns:
-            Tractions, their stiffness, and the resultant.
+            Gaps, tractions, their linearization, and the resultant.
         """
-        nodal, gap, pressure = torch.zeros_like(total), self._values(u), self._values(u)
-        shear, local, stiffness = self._values(u, 3), self._values(u, 3), self._values(u, 6)
-        found = filled(kernels.PointData, gap=gap, pressure=pressure, shear=shear, local=local)
+        count, b = self.count, u.shape[2]
+        members = kernels.member_data(conditions, pose)
+        gap = self._zeros(u)
         wp.launch(
-            kernels.traction_kernel(self.distance), dim=(*self.weights.shape, u.shape[2]),
-            inputs=[
-                argument(u), self.data, kernels.member_data(conditions, pose), kernels.history_data(history),
-                argument(friction_tangent),
-            ],
-            outputs=[argument(nodal), found, argument(stiffness)], device=self.device,
+            kernels.gap_kernel(self.distance), dim=(len(self.faces), b), inputs=[argument(u), self.data, members],
+            outputs=[argument(gap)], device=self.device,
         )
+        c = self.activation * conditions.modulus
+        active = (multiplier - c * (gap - near) > 0) & self.able[:, None]
+        pressure = torch.where(active, multiplier, 0.0)
+        nodal, normal = torch.zeros_like(total), self._zeros(u, 3)
+        wp.launch(
+            kernels.pressure_kernel(self.distance), dim=(len(self.faces), b),
+            inputs=[argument(u), self.data, members, argument(pressure), argument(active)],
+            outputs=[argument(nodal), argument(normal)], device=self.device,
+        )
+        normal = normal / torch.linalg.vector_norm(normal, dim=1, keepdim=True).clamp_min(1e-12)
+        place = self.mortar.means(u) + self._mean_nodes + self._mean_rise * (conditions.thickness - 1)
+        local, shear, force, stiffness = (self._zeros(u, size) for size in (3, 3, 3, 6))
+        wp.launch(
+            kernels.friction, dim=(count, b),
+            inputs=[
+                argument(place), self.data, members, kernels.history_data(history), argument(pressure),
+                argument(active), argument(normal), argument(friction_tangent),
+            ],
+            outputs=[argument(value) for value in (local, shear, force, stiffness)], device=self.device,
+        )
+        if self.rough:
+            self.mortar.spread(force, nodal)
         total += nodal
-        tangent = ContactTangent(pressure, stiffness, (pressure > 0).any(dim=1))
-        return ContactForces(nodal.sum(dim=0), gap, pressure, shear, local, tangent)
+        return ContactForces(
+            nodal.sum(dim=0), gap, pressure, shear, local, ContactTangent(active, normal, stiffness)
+        )
 
     def add_product(self, at: ContactTangent, p: torch.Tensor, result: torch.Tensor) -> None:
-        """Add the contact stiffness times ``p`` [N] to ``result``; both of shape (n, 3, b) and of one precision."""
-        shapes, weights = self.rule[p.dtype]
-        inputs = [p, self.faces, shapes, weights, weights.shape[1], at.pressure, at.stiffness, at.touched]
+        """Add friction's stiffness times ``p`` [N] to ``result``; both of shape (n, 3, b) and of one precision."""
+        if not self.rough:
+            return
+        slips = self.mortar.means(p)
         wp.launch(
-            kernels.product_kernel(REAL[p.dtype]), dim=(len(self.faces), p.shape[2]),
-            inputs=[argument(value) for value in inputs], outputs=[argument(result)], device=self.device,
+            kernels.slip_kernel(REAL[p.dtype]), dim=(self.count, p.shape[2]),
+            inputs=[argument(at.friction), argument(slips)], device=self.device,
         )
-
-    def face_stiffness(self, at: ContactTangent, face: torch.Tensor, member: torch.Tensor) -> torch.Tensor:
-        """Return the nodal stiffness of some faces [N/mm], shape (pairs, 18, 18), float32.
-
-        Args:
-            at: The stiffness of all points.
-            face: Index of the face, shape (pairs,).
-            member: Index of the batch member, shape (pairs,).
-        """
-        packed = self._weighted(at, face, member, 6)
-        shapes = self.shapes.to(torch.float32)
-        pairs = torch.einsum("ka,kb->abk", shapes, shapes).reshape(36, -1)
-        six = torch.einsum("nk,pkc->pnc", pairs, packed)
-        full = six[:, :, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(-1, 6, 6, 3, 3)
-        return full.permute(0, 1, 3, 2, 4).reshape(-1, 18, 18)
-
-    def face_diagonal(self, at: ContactTangent, face: torch.Tensor, member: torch.Tensor) -> torch.Tensor:
-        """Return the diagonals of `face_stiffness` [N/mm], shape (pairs, 18)."""
-        packed = self._weighted(at, face, member, 3)
-        return torch.einsum("ka,pkc->pac", self.shapes.to(torch.float32).square(), packed).reshape(-1, 18)
-
-    def weighted_stiffness(self, at: ContactTangent) -> torch.Tensor:
-        """Return the stiffness of every point that carries load [N/mm], shape (f, k, 6, b), float32."""
-        loaded = (at.pressure > 0)[:, :, None]
-        weights = self.rule[torch.float32][1]
-        return torch.where(loaded, at.stiffness, 0.0).to(torch.float32) * weights[..., None, None]
+        self.mortar.spread(slips, result)
 
     def penetration(self, now: ContactForces) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the largest |gap| among points that carry load, and its mean weighted by their load [mm].
+        """Return the largest mean gap of active nodes in magnitude, and its mean weighted by their load [mm].
 
-        Both of shape (b,): penetration, or load across a gap. The mean is what the force is off by; the largest is that
-        of some point at the contact's edge.
+        Both of shape (b,): penetration, or load across a gap.
         """
-        carried = torch.where(now.pressure > 0, now.gap.abs(), torch.zeros_like(now.gap))
-        load = now.pressure * self.weights[:, :, None]
-        mean = (load * carried).sum(dim=(0, 1)) / load.sum(dim=(0, 1)).clamp_min(1e-30)
-        return carried.flatten(0, 1).amax(dim=0), mean
+        carried = torch.where(now.tangent.active, now.gap.abs(), 0.0)
+        load = now.pressure.abs() * self.area[:, None]
+        mean = (load * carried).sum(dim=0) / load.sum(dim=0).clamp_min(1e-30)
+        return carried.amax(dim=0), mean
 
-    def _values(self, like: torch.Tensor, *shape: int) -> torch.Tensor:
-        """Return zeros for every point of as many members as ``like`` has."""
-        return torch.zeros(*self.weights.shape, *shape, like.shape[-1], dtype=torch.float64, device=like.device)
-
-    def _weighted(self, at: ContactTangent, face: torch.Tensor, member: torch.Tensor, count: int) -> torch.Tensor:
-        """Return the first entries of the stiffness of some faces' points [N/mm], shape (pairs, k, count), float32."""
-        packed = at.stiffness[face, :, :count, member] * self.weights[face][:, :, None]
-        return torch.where((at.pressure[face, :, member] > 0)[..., None], packed, 0.0).to(torch.float32)
+    def _zeros(self, like: torch.Tensor, *shape: int) -> torch.Tensor:
+        """Return zeros for every contact node of as many members as ``like`` has."""
+        return torch.zeros(self.count, *shape, like.shape[-1], dtype=torch.float64, device=like.device)
 
 
 def face_quadrature(nodes: torch.Tensor, faces: torch.Tensor, subdivisions: int) -> tuple[torch.Tensor, torch.Tensor]:

@@ -1,16 +1,15 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
 # pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
-"""Warp kernels of `tacdata.skin.contact.contact_surface`: tractions at quadrature points, and their stiffness.
+"""Warp kernels of `tacdata.skin.contact.contact_surface`: gaps, normal forces, friction.
 
-Indices: f a face, k a point of its quadrature rule, b a batch member.
+Indices: f a face, k a point of its quadrature rule, a a node of the face, j a contact node, b a batch member.
 """
 
 from functools import cache
 
 import warp as wp
 
-from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
@@ -20,15 +19,22 @@ Parameters = wp.types.vector(length=8, dtype=wp.float64)
 """Numbers of an indenter's distance function."""
 
 
+Six = wp.types.vector(length=6, dtype=wp.float64)
+Nodal = wp.types.matrix((6, 3), wp.float64)
+"""Of a face's nodes: numbers, vectors."""
+
+
 @wp.struct
 class SurfaceData:
-    """What never changes: faces of the mesh, their quadrature rule, and the contact's stiffnesses."""
+    """What never changes: faces of the mesh, their quadrature rule, hats, and friction's stiffness."""
 
     nodes: wp.array2d(dtype=wp.float64)
     faces: wp.array2d(dtype=wp.int32)
+    slots: wp.array2d(dtype=wp.int32)
     shapes: wp.array2d(dtype=wp.float64)
+    hats: wp.array2d(dtype=wp.float64)
     weights: wp.array2d(dtype=wp.float64)
-    penalty: wp.float64
+    area: wp.array(dtype=wp.float64)
     stick: wp.float64
     rough: int
 
@@ -49,21 +55,10 @@ class MemberData:
 class HistoryData:
     """`ContactHistory` (or its change)."""
 
-    multiplier: wp.array3d(dtype=wp.float64)
-    anchor: wp.array4d(dtype=wp.float64)
-    held: wp.array4d(dtype=wp.float64)
-    gap: wp.array3d(dtype=wp.float64)
+    anchor: wp.array3d(dtype=wp.float64)
+    held: wp.array3d(dtype=wp.float64)
+    gap: wp.array2d(dtype=wp.float64)
     place: wp.array2d(dtype=wp.float64)
-
-
-@wp.struct
-class PointData:
-    """What is found at each point: gap, tractions, place in the shape's frame (or their changes)."""
-
-    gap: wp.array3d(dtype=wp.float64)
-    pressure: wp.array3d(dtype=wp.float64)
-    shear: wp.array4d(dtype=wp.float64)
-    local: wp.array4d(dtype=wp.float64)
 
 
 def member_data(conditions: Conditions, pose: Pose) -> MemberData:
@@ -76,15 +71,7 @@ def member_data(conditions: Conditions, pose: Pose) -> MemberData:
 
 def history_data(history: ContactHistory) -> HistoryData:
     """Return a history as a kernel takes it; all tensors contiguous."""
-    return filled(
-        HistoryData, multiplier=history.multiplier, anchor=history.anchor, held=history.held, gap=history.gap,
-        place=history.place,
-    )
-
-
-def point_data(found: ContactForces) -> PointData:
-    """Return where a kernel writes what it finds at each point."""
-    return filled(PointData, gap=found.gap, pressure=found.pressure, shear=found.shear, local=found.local)
+    return filled(HistoryData, anchor=history.anchor, held=history.held, gap=history.gap, place=history.place)
 
 
 @wp.func
@@ -94,9 +81,9 @@ def board_distance(p: wp.vec3d, q: Parameters):
 
 
 @wp.func
-def at_point(values: wp.array4d(dtype=wp.float64), f: int, k: int, b: int):
-    """Return a vector of a point."""
-    return wp.vec3d(values[f, k, 0, b], values[f, k, 1, b], values[f, k, 2, b])
+def at_node(values: wp.array3d(dtype=wp.float64), j: int, b: int):
+    """Return a vector of a node."""
+    return wp.vec3d(values[j, 0, b], values[j, 1, b], values[j, 2, b])
 
 
 @wp.func
@@ -188,112 +175,140 @@ def normal_function(distance: wp.Function) -> wp.Function:
 
 
 @cache
-def traction_kernel(distance: wp.Function) -> wp.Kernel:
-    """Compile the kernel of forces for one shape; in double precision, as gaps are differences of large numbers."""
-    normal = normal_function(distance)
+def gap_kernel(distance: wp.Function) -> wp.Kernel:
+    """Compile the kernel of gaps for one shape; in double precision, as gaps are differences of large numbers."""
 
     @wp.kernel(module="unique", enable_backward=False)
-    def traction(
-        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, history: HistoryData,
-        friction_tangent: wp.array(dtype=wp.float64), force: wp.array3d(dtype=wp.float64), found: PointData,
-        stiffness: wp.array4d(dtype=wp.float64),
+    def gaps(
+        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, gap: wp.array2d(dtype=wp.float64),
     ):
-        """Tractions of one point, added to the nodes.
-
-        1. Place of the point in the shape's frame, and its gap.
-        2. Normal traction: multiplier less penalty times gap, not below zero.
-        3. Trial shear: what was held, less the stiffness of sticking times the slip since.
-        4. Return mapping of the trial onto Coulomb's disc.
-        5. Stiffness of the point, symmetric: xx, yy, zz, xy, yz, xz in the sensor's frame.
-        6. Forces on the face's nodes.
-        """
-        f, k, b = wp.tid()
-        zero = wp.float64(0.0)
+        """Add the share of one face to the mean gaps of its nodes."""
+        f, b = wp.tid()
         q = parameters_of(members.indenter, b)
         R = rotation_of(members.turn, b)
         tip = of_member(members.place, b)
-        local = wp.transpose(R) * (deformed_point(u, surface, f, k, b, members.thickness[b]) - tip)
-        g = distance(local, q)
-        penalty, stick = surface.penalty * members.modulus[b], surface.stick * members.modulus[b]
-        t = history.multiplier[f, k, b] - penalty * g
-        found.gap[f, k, b] = g
-        found.pressure[f, k, b] = wp.max(t, zero)
-        for i in range(3):
-            found.local[f, k, i, b] = local[i]
-            found.shear[f, k, i, b] = zero
-        if t > zero:
-            n = normal(local, q)
-            nn = wp.outer(n, n)
-            D = penalty * nn
-            total = t * n
-            coefficient = members.friction[b]
-            if surface.rough == 1 and coefficient > zero:
-                tangential = wp.identity(n=3, dtype=wp.float64) - nn
-                moved = wp.transpose(R) * (tip - of_member(history.place, b))
-                after = share_in_contact(history.gap[f, k, b], wp.dot(moved, n))
-                slid = local - at_point(history.anchor, f, k, b)
-                trial = tangential * (at_point(history.held, f, k, b) - (stick * after) * slid)
-                scale, along = friction_cone_projection(trial, coefficient * t, friction_tangent[b])
-                D += (stick * after * scale) * (tangential - along)
-                trial = scale * trial
-                for i in range(3):
-                    found.shear[f, k, i, b] = trial[i]
-                total += trial
-            D = R * D * wp.transpose(R)
-            total = R * total
-            stiffness[f, k, 0, b] = D[0, 0]
-            stiffness[f, k, 1, b] = D[1, 1]
-            stiffness[f, k, 2, b] = D[2, 2]
-            stiffness[f, k, 3, b] = D[0, 1]
-            stiffness[f, k, 4, b] = D[1, 2]
-            stiffness[f, k, 5, b] = D[0, 2]
+        total = Six()
+        for k in range(surface.weights.shape[1]):
+            local = wp.transpose(R) * (deformed_point(u, surface, f, k, b, members.thickness[b]) - tip)
+            g = surface.weights[f, k] * distance(local, q)
             for a in range(6):
-                for i in range(3):
-                    wp.atomic_add(
-                        force, surface.faces[f, a], i, b, surface.shapes[k, a] * surface.weights[f, k] * total[i]
-                    )
+                total[a] = total[a] + surface.hats[k, a] * g
+        for a in range(6):
+            j = surface.slots[f, a]
+            wp.atomic_add(gap, j, b, total[a] / surface.area[j])
 
-    return traction
+    return gaps
 
 
 @cache
-def product_kernel(real: type) -> wp.Kernel:
-    """Compile the kernel that applies the contact stiffness, in one precision."""
-    vec3, Nodal = wp.types.vector(3, real), wp.types.matrix((6, 3), real)
+def pressure_kernel(distance: wp.Function) -> wp.Kernel:
+    """Compile the kernel of normal forces for one shape."""
+    normal = normal_function(distance)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def product(
-        p: wp.array3d(dtype=real), faces: wp.array2d(dtype=wp.int32), shapes: wp.array2d(dtype=real),
-        weights: wp.array2d(dtype=real), points: int, pressure: wp.array3d(dtype=wp.float64),
-        stiffness: wp.array4d(dtype=wp.float64), touched: wp.array2d(dtype=wp.bool), result: wp.array3d(dtype=real),
+    def pressures(
+        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData,
+        pressure: wp.array2d(dtype=wp.float64), active: wp.array2d(dtype=wp.bool),
+        force: wp.array3d(dtype=wp.float64), mean_normal: wp.array3d(dtype=wp.float64),
     ):
-        """Stiffness of the points that carry load times nodal displacements ``p``, added to the nodes; one face."""
-        f, b = wp.tid()
-        if touched[f, b]:
-            along, total = Nodal(), Nodal()
-            for a in range(6):
-                for i in range(3):
-                    along[a, i] = p[faces[f, a], i, b]
-            for k in range(points):
-                if pressure[f, k, b] > wp.float64(0.0):
-                    v = vec3()
-                    for a in range(6):
-                        v += shapes[k, a] * vec3(along[a, 0], along[a, 1], along[a, 2])
-                    xx, yy, zz = (
-                        real(stiffness[f, k, 0, b]), real(stiffness[f, k, 1, b]), real(stiffness[f, k, 2, b])
-                    )
-                    xy, yz, xz = (
-                        real(stiffness[f, k, 3, b]), real(stiffness[f, k, 4, b]), real(stiffness[f, k, 5, b])
-                    )
-                    r = weights[f, k] * vec3(
-                        xx * v[0] + xy * v[1] + xz * v[2], xy * v[0] + yy * v[1] + yz * v[2],
-                        xz * v[0] + yz * v[1] + zz * v[2],
-                    )
-                    for a in range(6):
-                        for i in range(3):
-                            total[a, i] = total[a, i] + shapes[k, a] * r[i]
-            for a in range(6):
-                for i in range(3):
-                    wp.atomic_add(result, faces[f, a], i, b, total[a, i])
+        """Add the normal forces of one face to its nodes, and its share to the mean normals.
 
-    return product
+        1. Place of each point in the shape's frame, and the shape's normal there.
+        2. Pressure: that of the active nodes, by their hats.
+        3. Forces on the face's nodes; the normal's share in the means under the hats.
+        """
+        f, b = wp.tid()
+        some = int(0)
+        values = Six()
+        for a in range(6):
+            j = surface.slots[f, a]
+            values[a] = pressure[j, b]
+            if active[j, b]:
+                some = 1
+        if some == 0:
+            return
+        q = parameters_of(members.indenter, b)
+        R = rotation_of(members.turn, b)
+        tip = of_member(members.place, b)
+        total, means = Nodal(), Nodal()
+        for k in range(surface.weights.shape[1]):
+            local = wp.transpose(R) * (deformed_point(u, surface, f, k, b, members.thickness[b]) - tip)
+            n = R * normal(local, q) * surface.weights[f, k]
+            p = wp.float64(0.0)
+            for a in range(6):
+                p += surface.hats[k, a] * values[a]
+            for a in range(6):
+                for i in range(3):
+                    total[a, i] = total[a, i] + surface.shapes[k, a] * p * n[i]
+                    means[a, i] = means[a, i] + surface.hats[k, a] * n[i]
+        for a in range(6):
+            j = surface.slots[f, a]
+            for i in range(3):
+                wp.atomic_add(force, surface.faces[f, a], i, b, total[a, i])
+                wp.atomic_add(mean_normal, j, i, b, means[a, i] / surface.area[j])
+
+    return pressures
+
+
+@wp.kernel(enable_backward=False)
+def friction(
+    place: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, history: HistoryData,
+    pressure: wp.array2d(dtype=wp.float64), active: wp.array2d(dtype=wp.bool), normals: wp.array3d(dtype=wp.float64),
+    friction_tangent: wp.array(dtype=wp.float64), local: wp.array3d(dtype=wp.float64),
+    shear: wp.array3d(dtype=wp.float64), force: wp.array3d(dtype=wp.float64), stiffness: wp.array3d(dtype=wp.float64),
+):
+    """Coulomb friction of one hat.
+
+    1. Mean place of the hat in the shape's frame.
+    2. Trial shear: what was held, less the stiffness of sticking times the slip since.
+    3. Return mapping of the trial onto Coulomb's disc, whose radius is friction times the node's pressure.
+    4. Force on the hat, and its stiffness, symmetric: xx, yy, zz, xy, yz, xz in the sensor's frame.
+    """
+    j, b = wp.tid()
+    R = rotation_of(members.turn, b)
+    tip = of_member(members.place, b)
+    now = wp.transpose(R) * (at_node(place, j, b) - tip)
+    for i in range(3):
+        local[j, i, b] = now[i]
+    coefficient = members.friction[b]
+    if surface.rough == 0 or not active[j, b] or coefficient <= wp.float64(0.0):
+        return
+    n = wp.transpose(R) * at_node(normals, j, b)
+    tangential = wp.identity(n=3, dtype=wp.float64) - wp.outer(n, n)
+    moved = wp.transpose(R) * (tip - of_member(history.place, b))
+    after = share_in_contact(history.gap[j, b], wp.dot(moved, n))
+    stick = surface.stick * members.modulus[b] * after
+    trial = tangential * (at_node(history.held, j, b) - stick * (now - at_node(history.anchor, j, b)))
+    scale, along = friction_cone_projection(
+        trial, coefficient * wp.max(pressure[j, b], wp.float64(0.0)), friction_tangent[b]
+    )
+    D = (surface.area[j] * stick * scale) * (R * (tangential - along) * wp.transpose(R))
+    trial = scale * trial
+    total = surface.area[j] * (R * trial)
+    for i in range(3):
+        shear[j, i, b] = trial[i]
+        force[j, i, b] = total[i]
+    stiffness[j, 0, b] = D[0, 0]
+    stiffness[j, 1, b] = D[1, 1]
+    stiffness[j, 2, b] = D[2, 2]
+    stiffness[j, 3, b] = D[0, 1]
+    stiffness[j, 4, b] = D[1, 2]
+    stiffness[j, 5, b] = D[0, 2]
+
+
+@cache
+def slip_kernel(real: type) -> wp.Kernel:
+    """Compile the kernel that multiplies slips of hats with friction's stiffness, in one precision."""
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def slip(stiffness: wp.array3d(dtype=wp.float64), slips: wp.array3d(dtype=real)):
+        """Replace the slip of one hat [mm] by the force against it [N]."""
+        j, b = wp.tid()
+        x, y, z = slips[j, 0, b], slips[j, 1, b], slips[j, 2, b]
+        xx, yy, zz = real(stiffness[j, 0, b]), real(stiffness[j, 1, b]), real(stiffness[j, 2, b])
+        xy, yz, xz = real(stiffness[j, 3, b]), real(stiffness[j, 4, b]), real(stiffness[j, 5, b])
+        slips[j, 0, b] = xx * x + xy * y + xz * z
+        slips[j, 1, b] = xy * x + yy * y + yz * z
+        slips[j, 2, b] = xz * x + yz * y + zz * z
+
+    return slip

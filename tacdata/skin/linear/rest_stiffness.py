@@ -56,21 +56,25 @@ def for_averaged(material: Material) -> Material:
 
 
 class RestSolver(Protocol):
-    """K0^-1 on one device, and the compliance of those degrees of freedom that contact may load."""
+    """K0^-1 on one device, and the compliance of the rows of M, the mortar projections of all contacts."""
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
         """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
         ...
 
-    def loadable(self, residual: torch.Tensor) -> torch.Tensor:
-        """Return `apply` at the loadable degrees of freedom only, shape (m, b)."""
+    def rows(self, displacement: torch.Tensor) -> torch.Tensor:
+        """Return M z, shape (m, b), of z, shape (3n, b), float32."""
+        ...
+
+    def spread(self, forces: torch.Tensor) -> torch.Tensor:
+        """Return M^T f, shape (3n, b), of f, shape (m, b), float32."""
         ...
 
     def compliance(self, which: torch.Tensor) -> torch.Tensor:
-        """Return K0^-1 [mm/N] between loadable degrees of freedom.
+        """Return M K0^-1 M^T [mm/N] between rows.
 
         Args:
-            which: Numbers among the loadable ones of every member, shape (b, k); m stands for none.
+            which: Numbers of rows of every member, shape (b, k); m stands for none.
 
         Returns:
             Shape (b, k, k), float32, symmetric, zero where there is none.
@@ -79,7 +83,7 @@ class RestSolver(Protocol):
 
 
 def rest_solver(
-    mesh: SkinMesh, material: Material, fixed: np.ndarray, loadable: np.ndarray, device: str, averaged: bool = False
+    mesh: SkinMesh, material: Material, fixed: np.ndarray, rows: sp.csr_matrix, device: str, averaged: bool = False
 ) -> RestSolver:
     """Prepare K0^-1: a sparse factor on the CPU, the dense inverse on a GPU.
 
@@ -87,7 +91,7 @@ def rest_solver(
         mesh: The skin.
         material: Its elastic constants.
         fixed: Which nodes are held, shape (n,), bool.
-        loadable: Free degrees of freedom (3 node + axis) that contact may load, ascending, shape (m,).
+        rows: M, shape (m, 3n).
         device: "cpu" or "cuda:0".
         averaged: Whether the body's volume changes are averaged at the corners.
 
@@ -98,7 +102,21 @@ def rest_solver(
     known = averaged and device != "cpu"
     stiffness = rest_stiffness(mesh, material if known == averaged else for_averaged(material), known)
     free = np.flatnonzero(~np.repeat(fixed, 3))
-    return (SparseRest if device == "cpu" else DenseRest)(stiffness, free, loadable, device)
+    return (SparseRest if device == "cpu" else DenseRest)(stiffness, free, rows, device)
+
+
+class _MortarRows:
+    """M and its transpose."""
+
+    def __init__(self, rows: sp.csr_matrix, device: str) -> None:
+        self.count = rows.shape[0]  # pyright: ignore[reportOptionalSubscript]
+        self.down, self.up = (_sparse(matrix, device) for matrix in (rows, sp.csr_matrix(rows.T)))
+
+
+def _sparse(matrix: sp.csr_matrix, device: str) -> torch.Tensor:
+    indices = (torch.as_tensor(values.astype(np.int64)) for values in (matrix.indptr, matrix.indices))
+    values = torch.as_tensor(matrix.data.astype(np.float32))
+    return torch.sparse_csr_tensor(*indices, values, size=matrix.shape, dtype=torch.float32).to(device)
 
 
 class SparseRest:
@@ -109,15 +127,15 @@ class SparseRest:
 
     _BLOCK = 64
 
-    def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, loadable: np.ndarray, device: str = "cpu") -> None:
+    def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, rows: sp.csr_matrix, device: str = "cpu") -> None:
         """Factorize; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
-        self._free, self._loadable = torch.as_tensor(free), torch.as_tensor(loadable)
-        self.size = stiffness.shape[0]  # pyright: ignore[reportOptionalSubscript]
+        self._free, self._mortar = torch.as_tensor(free), _MortarRows(rows, device)
         self._factor = factor_of(stiffness[free][:, free])
         # Rows are filled when a press first needs them and serve every later one; memory is taken as they are.
-        self._table = torch.from_numpy(np.empty((len(loadable) + 1, len(loadable) + 1), dtype=np.float32))
+        count = self._mortar.count
+        self._table = torch.from_numpy(np.empty((count + 1, count + 1), dtype=np.float32))
         self._table[-1] = 0.0
-        self._known = torch.zeros(len(loadable) + 1, dtype=torch.bool)
+        self._known = torch.zeros(count + 1, dtype=torch.bool)
         self._known[-1] = True
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
@@ -126,19 +144,23 @@ class SparseRest:
         result[self._free] = torch.from_numpy(self._factor.solve(residual[self._free].numpy()))
         return result
 
-    def loadable(self, residual: torch.Tensor) -> torch.Tensor:
-        """Return `apply` at the loadable degrees of freedom only, shape (m, b)."""
-        return self.apply(residual)[self._loadable]
+    def rows(self, displacement: torch.Tensor) -> torch.Tensor:
+        """Return M z, as `RestSolver`."""
+        return self._mortar.down @ displacement
+
+    def spread(self, forces: torch.Tensor) -> torch.Tensor:
+        """Return M^T f, as `RestSolver`."""
+        return self._mortar.up @ forces
 
     def compliance(self, which: torch.Tensor) -> torch.Tensor:
-        """Return K0^-1 [mm/N] between loadable degrees of freedom, as in `RestSolver`."""
+        """Return M K0^-1 M^T [mm/N] between rows, as in `RestSolver`."""
         wanted = torch.unique(which)
         missing = wanted[~self._known[wanted]]
         for start in range(0, len(missing), self._BLOCK):
             part = missing[start : start + self._BLOCK]
-            unit = torch.zeros(self.size, len(part), dtype=torch.float32)
-            unit[self._loadable[part], torch.arange(len(part))] = 1.0
-            self._table[part, :-1] = self.apply(unit)[self._loadable].T
+            unit = torch.zeros(self._mortar.count, len(part), dtype=torch.float32)
+            unit[part, torch.arange(len(part))] = 1.0
+            self._table[part, :-1] = self.rows(self.apply(self.spread(unit))).T
             self._table[part, -1] = 0.0
         self._known[missing] = True
         blocks = self._table[which[:, :, None], which[:, None, :]]

@@ -18,7 +18,7 @@ from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
-from tacdata.skin.solve.configuration import Configuration
+from tacdata.skin.solve.configuration import Configuration, Unknowns
 from tacdata.skin.solve.load_path import LoadPath
 from tacdata.skin.solve.loading_states import LoadingStates
 from tacdata.skin.solve.newton import Newton, Residual
@@ -28,6 +28,9 @@ _WILD = 0.3
 
 _HALVINGS, _SHORTER = 4, 4.0
 """How often a step that went astray is shortened, and by what; each costs an evaluation for the whole batch."""
+
+_TOUCHING = 0.02
+"""Gap up to which nodes are active when a load step begins [mm]: the tips on the board bear load from the first."""
 
 _AWAY = 1e3
 """Height at which the shapes of an idle column wait [mm]."""
@@ -94,11 +97,14 @@ class Batch:
         places = (torch.tensor([0.0, 0.0, height], dtype=torch.float64, device=device) for height in heights)
         poses = tuple(Pose(place[:, None].repeat(1, capacity), eye.clone()) for place in places)
         histories = tuple(surface.start(pose) for surface, pose in zip(newton.surfaces, poses, strict=True))
-        self._at = Configuration(u, idle.repeat(capacity), poses, histories, torch.zeros_like(u[0, 0]))
-        self._base, self._accepted = torch.zeros_like(u), torch.zeros_like(u)
-        self._rate = torch.zeros_like(u)
-        self._loading = LoadingStates((nodes, 3, capacity), str(device))
-        self._multipliers = [history.multiplier.clone() for history in histories]
+        multipliers = tuple(
+            torch.zeros(surface.count, capacity, dtype=torch.float64, device=device) for surface in newton.surfaces
+        )
+        none = torch.zeros_like(u[0, 0])
+        self._at = Configuration(u, multipliers, idle.repeat(capacity), poses, histories, none, none.clone())
+        unknowns = self._at.unknowns
+        self._base, self._accepted, self._rate = unknowns, unknowns.zeros(), unknowns.zeros()
+        self._loading = LoadingStates(unknowns)
         self._presses: list[PlacedPress | None] = [None] * capacity
         self._before = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
         self.cg = 0
@@ -140,41 +146,36 @@ class Batch:
         """Do one Newton iteration of every column.
 
         1. Evaluate the forces; shorten steps that went astray.
-        2. Judge every column: found, failed, augment, go on.
+        2. Judge every column: found, failed, go on.
         3. Accept what is found; hand out the states that are wanted; send columns on, or give them the next press.
         4. Take failed columns back to their last equilibrium, for a smaller step.
-        5. Augment multipliers where penetration asks for it.
-        6. Evaluate again what has changed, and take a Newton step.
+        5. Evaluate again what has changed, and take a Newton step.
         """
         now = self._settled()
         verdicts = self._judge(now)
         yield from self._collect(verdicts, now, collect, observe)
         failed = self._mask(verdicts, "failed")
         yield from self._retreat(verdicts)
-        changed, augment = failed | self._mask(verdicts, "found"), self._mask(verdicts, "augment")
+        changed = failed | self._mask(verdicts, "found")
         if changed.any():
             yield from self._fill(waiting, observe)
             self._start(changed)
-        if augment.any():
-            which = self._tensor(augment)
-            for history, contact in zip(self._at.histories, now.contacts, strict=True):
-                history.augment(contact, which)
-        if (changed | augment).any():
-            now = self._updated(now, changed | augment)
+            now = self._updated(now, changed)
         self._step(now)
 
     def _settled(self) -> Residual:
         """Evaluate the forces, shortening steps that went astray."""
         now, at = self._newton.residual(self._at), self._at
-        step = at.u - self._base
+        step = at.unknowns.minus(self._base)
         for _ in range(_HALVINGS):
             # After a start there is no step to shorten.
             bad = self._newton.is_bad(self._before, now) & torch.isfinite(self._before)
             marks = bad.cpu().numpy()
             if not marks.any():
                 break
-            step = torch.where(bad, step / _SHORTER, step)
-            at.u = torch.where(bad, self._base + step, at.u)
+            factor = torch.where(bad, 1 / _SHORTER, 1.0)
+            step = step.zeros().plus(step, factor)
+            at.unknowns = self._base.plus(step).where(bad, at.unknowns)
             now = self._updated(now, marks)
         return now
 
@@ -208,12 +209,13 @@ class Batch:
             observe(at.take(torch.as_tensor(found, device=at.u.device)))
         for history, contact, pose in zip(at.histories, now.contacts, at.poses, strict=True):
             history.accept(contact, pose, which)
-        for kept, history in zip(self._multipliers, at.histories, strict=True):
-            kept.copy_(torch.where(which, history.multiplier, kept))
-        rate = torch.where(straight & (moved != 0), (at.u - self._accepted) / moved, 0.0)
-        self._rate = torch.where(which & ((moved != 0) | ~straight), rate, self._rate)
-        self._accepted = torch.where(which, at.u, self._accepted)
-        self._loading.add(which, self._values({column: path.attempt for column, path in paths.items()}), at.u)
+        # What is not active carries nothing.
+        state = Unknowns(at.u, tuple(contact.pressure for contact in now.contacts))
+        along = torch.where(straight & (moved != 0), 1 / torch.where(moved != 0, moved, 1.0), 0.0)
+        rate = state.zeros().plus(state.minus(self._accepted), along)
+        self._rate = rate.where(which & ((moved != 0) | ~straight), self._rate)
+        self._accepted = state.where(which, self._accepted)
+        self._loading.add(which, self._values({column: path.attempt for column, path in paths.items()}), state)
         wanted = [column for column, path in paths.items() if path.found()]
         if wanted:
             columns = torch.as_tensor(wanted, device=at.u.device)
@@ -236,9 +238,6 @@ class Batch:
         failed = self._mask(verdicts, "failed")
         if not failed.any():
             return
-        which = self._tensor(failed)
-        for kept, history in zip(self._multipliers, self._at.histories, strict=True):
-            history.multiplier.copy_(torch.where(which, kept, history.multiplier))
         for column in failed.nonzero()[0].tolist():
             press = self._press(column)
             try:
@@ -261,14 +260,11 @@ class Batch:
             touch, turn = ([getattr(press, name) for press in taken.values()] for name in ("touch", "turn"))
             at.poses[0].place[:, which] = torch.as_tensor(np.stack(touch, axis=-1), device=device).double()
             at.poses[0].turn[:, :, which] = torch.as_tensor(np.stack(turn, axis=-1), device=device).double()
-            for field in (at.u, self._base, self._accepted, self._rate):
-                field.index_fill_(-1, which, 0.0)
+            self._clear(which)
             self._loading.forget(self._tensor(new))
             at.friction_tangent.index_fill_(0, which, 0.0)
             for history, first in zip(at.histories, self._touched(which, observe), strict=True):
                 history.put(which, first)
-            for kept in self._multipliers:
-                kept.index_fill_(-1, which, 0.0)
             self._start(new)
         yield from ()
 
@@ -293,16 +289,19 @@ class Batch:
         heights = self._values({c: float(press.touch[2]) - press.path.attempt for c, press in busy.items()})
         moved, place = self._values(dict.fromkeys(busy, 1.0)) > 0, self._at.poses[0].place
         place[2] = torch.where(moved, heights, place[2])
-        guess = self._accepted + self._rate * (attempt - depth)
+        guess = self._accepted.plus(self._rate, attempt - depth)
         beyond = attempt >= self._loading.deepest
         if not bool((beyond | ~which).all()):
-            back = self._loading.at(attempt) + (self._accepted - self._loading.at(depth))
-            guess = torch.where(beyond, guess, back)
+            back = self._loading.at(attempt).plus(self._accepted.minus(self._loading.at(depth)))
+            guess = guess.where(beyond, back)
         columns = which.nonzero()[:, 0]
-        chosen = guess.index_select(-1, columns)
-        volume = self._newton.body.internal_force(chosen, self._at.conditions.take(columns))[1]
-        chosen = torch.where(volume < _WILD, self._accepted.index_select(-1, columns), chosen)
-        self._at.u = self._at.u.index_copy(-1, columns, chosen)
+        chosen = guess.take(columns)
+        volume = self._newton.body.internal_force(chosen.u, self._at.conditions.take(columns))[1]
+        chosen = self._accepted.take(columns).where(volume < _WILD, chosen)
+        state = self._at.unknowns.copy()
+        state.put(columns, chosen)
+        self._at.unknowns = state
+        self._at.near = torch.where(which, _TOUCHING, self._at.near)
         self._before = torch.where(which, torch.inf, self._before)
 
     def _step(self, now: Residual) -> None:
@@ -312,10 +311,11 @@ class Batch:
             return
         at = self._at
         at.friction_tangent = self._newton.friction_tangent(now)
-        step, used = self._newton.step(at, now, busy)
+        moved, changes, used = self._newton.step(at, now, busy)
         self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
-        self._base, self._before = at.u, now.norm
-        at.u = at.u + step
+        self._base, self._before = at.unknowns, now.relative
+        at.unknowns = self._base.plus(Unknowns(moved, changes))
+        at.near = torch.zeros_like(at.near)
 
     def _release(self, columns: list[int]) -> None:
         """Make columns idle."""
@@ -325,11 +325,13 @@ class Batch:
             self._presses[column] = None
         which = torch.as_tensor(columns, device=self._at.u.device)
         self._at.poses[0].place[2, which] = _AWAY
-        for history, kept in zip(self._at.histories, self._multipliers, strict=True):
-            history.multiplier.index_fill_(-1, which, 0.0)
-            kept.index_fill_(-1, which, 0.0)
-        for field in (self._at.u, self._base, self._accepted, self._rate):
-            field.index_fill_(-1, which, 0.0)
+        self._clear(which)
+
+    def _clear(self, which: torch.Tensor) -> None:
+        """Take columns, by index, back to the undeformed skin."""
+        for state in (self._at.unknowns, self._base, self._accepted, self._rate):
+            for field in (state.u, *state.multipliers):
+                field.index_fill_(-1, which, 0.0)
 
     def _press(self, column: int) -> PlacedPress:
         press = self._presses[column]

@@ -12,12 +12,38 @@ from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 
 
+@dataclass(frozen=True)
+class Unknowns(Columns):
+    """What Newton's method solves for; one column a member."""
+
+    u: torch.Tensor
+    """Displacements [mm], shape (n, 3, b), float64."""
+    multipliers: tuple[torch.Tensor, ...]
+    """Normal tractions at the nodes of each contact [MPa], shape (s, b), float64."""
+
+    def plus(self, other: Unknowns, factor: torch.Tensor | float = 1.0) -> Unknowns:
+        """Return the sum with others, times a factor, shape (b,)."""
+        pairs = zip(self.multipliers, other.multipliers, strict=True)
+        return Unknowns(self.u + factor * other.u, tuple(a + factor * b for a, b in pairs))
+
+    def minus(self, other: Unknowns) -> Unknowns:
+        """Return the difference from others."""
+        return self.plus(other, -1.0)
+
+    def where(self, mask: torch.Tensor, other: Unknowns) -> Unknowns:
+        """Return these members where ``mask``, shape (b,), holds, else those of ``other``."""
+        pairs = zip(self.multipliers, other.multipliers, strict=True)
+        return Unknowns(torch.where(mask, self.u, other.u), tuple(torch.where(mask, a, b) for a, b in pairs))
+
+
 @dataclass
 class Configuration(Columns):
     """Where the skin and the shapes are, what they are made of, and what contact remembers; one column a member."""
 
     u: torch.Tensor
     """Displacements [mm], shape (n, 3, b), float64."""
+    multipliers: tuple[torch.Tensor, ...]
+    """Normal tractions at the nodes of each contact [MPa], shape (s, b), float64."""
     conditions: Conditions
     """Of the members."""
     poses: tuple[Pose, ...]
@@ -25,4 +51,15 @@ class Configuration(Columns):
     histories: tuple[ContactHistory, ...]
     """Of each contact."""
     friction_tangent: torch.Tensor
-    """Stiffness of slipping points: 0 by the secant of friction, 1 by its tangent, shape (b,)."""
+    """Stiffness of slipping nodes: 0 by the secant of friction, 1 by its tangent, shape (b,)."""
+    near: torch.Tensor
+    """Gap up to which nodes without pressure are active, too [mm], shape (b,)."""
+
+    @property
+    def unknowns(self) -> Unknowns:
+        """Displacements and multipliers."""
+        return Unknowns(self.u, self.multipliers)
+
+    @unknowns.setter
+    def unknowns(self, value: Unknowns) -> None:
+        self.u, self.multipliers = value.u, value.multipliers

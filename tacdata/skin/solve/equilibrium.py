@@ -47,10 +47,11 @@ class StateReader:
             device: "cpu" or "cuda:0".
         """
         self._taxels, self._board = taxels, board
-        self._taxel = torch.as_tensor(mesh.protrusion_taxel, device=device).long()
         faces = mesh.protrusions
         taxel = np.repeat(mesh.protrusion_taxel, faces.shape[1])
         pairs = np.unique(np.stack([faces.ravel(), taxel]), axis=1)
+        # Protrusions share no node: each contact node belongs to one of them.
+        self._taxel = torch.as_tensor(pairs[1], device=device).long()
         node, taxel = pairs[:, np.abs(mesh.nodes[pairs[0], 2]) < 1e-9]
         share = 1 / np.maximum(np.bincount(taxel, minlength=taxels), 1)[taxel]
         self._rim = torch.zeros(taxels, len(mesh.nodes), dtype=torch.float64)
@@ -62,7 +63,7 @@ class StateReader:
         return -self._rim @ u[:, 2]
 
     def taxel_load(self, load: torch.Tensor) -> torch.Tensor:
-        """Return the sum over each protrusion of what its faces carry, shape (taxels, k); ``load``: (f, k)."""
+        """Return the sum over each protrusion of what its nodes carry, shape (taxels, k); ``load``: (s, k)."""
         total = torch.zeros(self._taxels, load.shape[1], dtype=torch.float64, device=load.device)
         return total.index_add_(0, self._taxel, load)
 
@@ -73,9 +74,9 @@ class StateReader:
         load = torch.zeros(self._taxels, len(column), dtype=torch.float64, device=force.device)
         area = torch.zeros_like(load)
         if self._board:
-            pressure, weights = found.contacts[1].pressure[:, :, column], self._board.weights[:, :, None]
-            load.index_add_(0, self._taxel, (pressure * weights).sum(dim=1))
-            area.index_add_(0, self._taxel, ((pressure > 0) * weights).sum(dim=1))
+            pressure, hat = found.contacts[1].pressure[:, column], self._board.area[:, None]
+            load.index_add_(0, self._taxel, pressure * hat)
+            area.index_add_(0, self._taxel, (pressure > 0) * hat)
         force, load, area, closure = (
             value.T.cpu().numpy() for value in (force, load, area, self.closure(found.u))
         )

@@ -8,21 +8,23 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 import torch
 
 from tacdata.errors import SolveError
 from tacdata.sensor import Sensor
 from tacdata.skin.adhesions import load_adhesion_law
 from tacdata.skin.contact.adhesion import AdhesiveSurface
-from tacdata.skin.contact.contact_surface import ContactSurface
+from tacdata.skin.contact.contact_surface import SUBDIVISIONS, ContactSurface, face_quadrature
 from tacdata.skin.contact.first_touch import rotation, touch
 from tacdata.skin.contact.kernels import board_distance
+from tacdata.skin.contact.mortar import Mortar, hats
 from tacdata.skin.elasticity.body import Elasticity
-from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
-from tacdata.skin.linear.coupled_dofs import in_order
+from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
 from tacdata.skin.linear.rest_stiffness import RestSolver, rest_solver
 from tacdata.skin.materials import load_law
 from tacdata.skin.member.conditions import Conditions, conditions
+from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.build import build_mesh
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
@@ -32,10 +34,6 @@ from tacdata.skin.solve.load_path import LoadPath
 from tacdata.skin.solve.newton import Newton
 from tacdata.skin.solve.settings import ModelSettings, SolverSettings
 from tacdata.skin.surface.outer_face import OuterFace
-
-_TIP = 0.4
-"""Height of a protrusion's tip region, over its radius, that the preconditioner knows as possible contact [1]. Contact
-beyond costs iterations, not accuracy."""
 
 _FIRST = 0.3
 """Longest first load step over the smallest radius of curvature of the shape [1]."""
@@ -73,6 +71,7 @@ class MeshedSkin:
         self.averaged = near and load_law(sensor.material.law).splits_volume
         """Whether volume changes are averaged at the corners."""
         self._nodes = torch.as_tensor(self.mesh.nodes, device=device)
+        self._held = torch.as_tensor(self.fixed, device=device)
         self.body = Elasticity(self.mesh, sensor.material.law, device, self.averaged)
         self.board = self._board() if sensor.contact.board and len(self.mesh.protrusions) else None
         """What the protrusions stand on, if they do."""
@@ -80,21 +79,14 @@ class MeshedSkin:
         self.face = OuterFace(self.mesh)
 
     @cached_property
-    def loadable(self) -> np.ndarray:
-        """Degrees of freedom that contact may load: the outer face, all axes; the protrusions' tips, vertically."""
-        outer = np.unique(self.mesh.outer)
-        dofs = (3 * outer[~self.fixed[outer]][:, None] + np.arange(3)).ravel()
-        if self.board:
-            bumps = np.unique(self.mesh.protrusions)
-            tips = bumps[self.mesh.nodes[bumps, 2] < (_TIP - 1) * self.sensor.skin.protrusion_radius]
-            dofs = np.concatenate([dofs, 3 * tips[~self.fixed[tips]] + 2])
-        return np.unique(dofs) if self.device == "cpu" else in_order(np.unique(dofs), self.mesh)
-
-    @cached_property
     def rest(self) -> RestSolver:
         """The inverse of the stiffness at rest; costs seconds, once."""
         material = self.sensor.material
-        return rest_solver(self.mesh, material, self.fixed, self.loadable, self.device, self.averaged)
+        faces = [(self.mesh.outer, np.eye(3))]
+        if self.board:
+            faces.append((self.mesh.protrusions, np.eye(3)[2:]))
+        rows = sp.csr_matrix(sp.vstack([sp.kron(self._mortar(own).mean, axes) for own, axes in faces]))
+        return rest_solver(self.mesh, material, self.fixed, rows, self.device, self.averaged)
 
     @cached_property
     def conditions(self) -> Conditions:
@@ -120,20 +112,18 @@ class MeshedSkin:
         """Return the contact surfaces of presses by the shape of ``request``: the outer face's, then the board's."""
         outer = torch.as_tensor(self.mesh.outer, device=self.device)
         distance, contact = request.indenter.distance_function(), self.sensor.contact
-        rough, penalty, stick = contact.friction > 0, self.settings.penalty, self.settings.stick
+        given = self._nodes, outer, self._held, distance, contact.friction > 0, self.settings.activation
         if contact.adhesion:
-            pressed = AdhesiveSurface(self._nodes, outer, distance, rough, penalty, stick, contact.adhesion)
+            pressed = AdhesiveSurface(*given, self.settings.stick, contact.adhesion)
         else:
-            pressed = ContactSurface(self._nodes, outer, 1, distance, rough, penalty, stick)
+            pressed = ContactSurface(*given, self.settings.stick)
         return (pressed, self.board) if self.board else (pressed,)
 
     def newton(self, request: PressRequest) -> Newton:
         """Return what solves presses by the shape of ``request``; its preconditioner is for one batch at a time."""
         surfaces = self.surfaces(request)
-        fixed, loadable = (torch.as_tensor(value, device=self.device) for value in (self.fixed, self.loadable))
-        size, modulus = 3 * len(self.mesh.nodes), self.sensor.material.youngs_modulus
-        preconditioner = ContactPreconditioner(self.rest, surfaces, loadable, size, modulus)
-        return Newton(self.body, surfaces, fixed, preconditioner, self._solver)
+        preconditioner = ConstraintPreconditioner(self.rest, surfaces, self.sensor.material.youngs_modulus)
+        return Newton(self.body, surfaces, self._held, preconditioner, self._solver)
 
     def batch(self, request: PressRequest, capacity: int) -> Batch:
         """Return an idle batch for presses by the shape of ``request``, so many at a time."""
@@ -143,7 +133,12 @@ class MeshedSkin:
     def _board(self) -> ContactSurface:
         bumps = torch.as_tensor(self.mesh.protrusions, device=self.device)
         flat: Any = board_distance  # a Warp function, though its decorator's type does not say so
-        return ContactSurface(self._nodes, bumps, 2, flat, False, self.settings.penalty, 0.0)
+        return ContactSurface(self._nodes, bumps, self._held, flat, False, self.settings.activation, 0.0, flat=True)
+
+    def _mortar(self, faces: np.ndarray) -> Mortar:
+        weights, shapes = face_quadrature(self._nodes, torch.as_tensor(faces, device=self.device), SUBDIVISIONS)
+        points = hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
+        return Mortar(faces, weights.cpu().numpy(), shapes.cpu().numpy(), points, len(self.mesh.nodes), self.device)
 
     @property
     def _solver(self) -> SolverSettings:

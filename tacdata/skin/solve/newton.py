@@ -14,9 +14,8 @@ import torch
 from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.elasticity.body import Elasticity
-from tacdata.skin.linear.cg import Stopping, conjugate_gradients
-from tacdata.skin.linear.contact_preconditioner import ContactPreconditioner
-from tacdata.skin.linear.cuda_cg import CudaConjugateGradients
+from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
+from tacdata.skin.linear.projected_cg import Stopping, projected_conjugate_gradients
 from tacdata.skin.linear.tangent import Linearization, TangentStiffness
 from tacdata.skin.member.columns import Columns
 from tacdata.skin.solve.configuration import Configuration
@@ -54,6 +53,8 @@ class Residual(Columns):
     """The same, its mean weighted by the load [mm], shape (b,): of the contact where it is largest."""
     contacts: tuple[ContactForces, ...]
     """Of each contact."""
+    scale: torch.Tensor
+    """Norm of the contact forces [N], shape (b,)."""
 
 
 class Newton:
@@ -61,14 +62,14 @@ class Newton:
 
     def __init__(
         self, body: Elasticity, surfaces: Sequence[ContactSurface], fixed: torch.Tensor,
-        preconditioner: ContactPreconditioner, settings: SolverSettings,
+        preconditioner: ConstraintPreconditioner, settings: SolverSettings,
     ) -> None:
         """Bind the parts; ``fixed`` marks held nodes, shape (n,), bool."""
         self.body, self.surfaces, self.preconditioner, self.settings = body, tuple(surfaces), preconditioner, settings
         self.tangent = TangentStiffness(body, surfaces)
         self._free = (~fixed).to(torch.float64)[:, None, None]
         self._free_work = self._free.to(_WORK)
-        self._cuda = None if fixed.device.type == "cpu" else CudaConjugateGradients(self.tangent, preconditioner)
+        self._cuda = None
 
     def residual(self, at: Configuration) -> Residual:
         """Evaluate the forces of all members."""
@@ -81,13 +82,17 @@ class Newton:
         norm = torch.linalg.vector_norm(force, dim=(0, 1))
         gaps = [surface.penetration(now) for surface, now in zip(self.surfaces, contacts, strict=True)]
         largest, mean = (torch.stack(values).amax(dim=0) for values in zip(*gaps, strict=True))
-        return Residual(force, norm, norm / scale, volume, largest, mean, contacts)
+        return Residual(force, norm, norm / scale, volume, largest, mean, contacts, scale)
 
     def add_contact_forces(self, at: Configuration, total: torch.Tensor) -> tuple[ContactForces, ...]:
         """Add the contacts' nodal forces on the skin [N] to ``total``, shape (n, 3, b); return them by contact."""
         return tuple(
-            surface.add_forces(at.u, pose, history, at.conditions, at.friction_tangent, total)
-            for surface, pose, history in zip(self.surfaces, at.poses, at.histories, strict=True)
+            surface.add_forces(
+                at.u, multiplier, pose, history, at.conditions, at.friction_tangent, at.near, total
+            )
+            for surface, multiplier, pose, history in zip(
+                self.surfaces, at.multipliers, at.poses, at.histories, strict=True
+            )
         )
 
     def updated(self, now: Residual, at: Configuration, which: torch.Tensor) -> Residual:
@@ -106,10 +111,12 @@ class Newton:
 
     def is_bad(self, before: torch.Tensor, now: Residual) -> torch.Tensor:
         """Return which members' step failed, shape (b,): residual more than doubled, or an element nearly inverted."""
-        return ~(now.norm <= 2.0 * before) | ~(now.volume >= _LEAST_VOLUME)
+        return ~(now.relative <= torch.clamp_min(2.0 * before, 0.3)) | ~(now.volume >= _LEAST_VOLUME)
 
-    def step(self, at: Configuration, now: Residual, wanted: torch.Tensor) -> tuple[torch.Tensor, int]:
-        """Solve K x = r, loosely.
+    def step(
+        self, at: Configuration, now: Residual, wanted: torch.Tensor
+    ) -> tuple[torch.Tensor, tuple[torch.Tensor, ...], int]:
+        """Solve Newton's system, loosely: displacements and multipliers move together.
 
         Args:
             at: Where the tangent is taken.
@@ -117,19 +124,29 @@ class Newton:
             wanted: Members to solve for, shape (b,), bool; others get 0.
 
         Returns:
-            x [mm], shape (n, 3, b), float64, and the number of iterations.
+            Changes of the displacements [mm], shape (n, 3, b), and of each contact's multipliers [MPa], shape (s, b),
+            and the number of iterations.
         """
         contacts = [forces.tangent for forces in now.contacts]
         self.preconditioner.update(contacts, at.conditions.modulus)
-        size = torch.linalg.vector_norm(now.force, dim=(0, 1)).clamp_min(1e-30)
+        size = now.scale
         r = torch.where(wanted, now.force / size, 0.0).to(_WORK)
+        gaps = [torch.where(wanted & own.tangent.active, -own.gap / size, 0.0) for own in now.contacts]
         here = self.tangent.at(at.u.to(_WORK), at.conditions, contacts)
         stopping = Stopping(self.settings.forcing, self.settings.cg_limit, _STRAGGLERS, _LONG)
-        if self._cuda:
-            x, used = self._cuda.solve(here, r, wanted, stopping)
-        else:
-            x, used = conjugate_gradients(lambda p: self.product(here, p), self.preconditioner.apply, r, stopping)
-        return x.to(torch.float64) * size, used
+        x, y, used = projected_conjugate_gradients(
+            lambda p: self.product(here, p), self.preconditioner, r, gaps, stopping
+        )
+        # What is not active ends at 0.
+        changes = tuple(
+            torch.where(
+                wanted, own.pressure - multiplier - force * size / surface.area[:, None], 0.0
+            )
+            for surface, own, multiplier, force in zip(
+                self.surfaces, now.contacts, at.multipliers, self.preconditioner.forces(y), strict=True
+            )
+        )
+        return x.to(torch.float64) * size, changes, used
 
     def product(self, here: Linearization, p: torch.Tensor) -> torch.Tensor:
         """Return the tangent times ``p`` [N] on free nodes, shape (n, 3, b)."""

@@ -34,10 +34,10 @@ class ModelSettings:
 
     mesh: MeshSettings = field(default_factory=MeshSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
-    penalty: float = 1000.0
-    """Contact penalty over Young's modulus [1/mm]."""
+    activation: float = 10.0
+    """Weight of a gap against a pressure in the active set, over Young's modulus [1/mm]."""
     stick: float = 30.0
-    """Tangential stiffness of sticking points over Young's modulus [1/mm]."""
+    """Tangential stiffness of sticking nodes over Young's modulus [1/mm]."""
     step: float = 0.25
     """Longest load step [mm]."""
     averaged_from: float = 0.0
