@@ -1,15 +1,15 @@
 """Contact of faces of the skin with a rigid shape: multipliers at nodes, Coulomb friction.
 
 The normal traction is a piecewise linear field on the four sub-triangles of every quadratic face. Its values at the
-nodes are unknowns (multipliers) beside the displacements. A node carries pressure, or the mean gap under its hat is not
-negative: the primal-dual active set of Hueeber and Wohlmuth (Comput. Methods Appl. Mech. Eng. 194 (2005) 3147), which
-is Newton's method on a function without slope at the kink (Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2002) 865).
-Node j is active where lambda_j - c gap_j > 0.
+nodes are unknowns (multipliers) beside the displacements. A node either carries pressure, or the mean gap under its hat
+is not negative. Node j is active where lambda_j - c gap_j > 0: the primal-dual active set (Hueeber and Wohlmuth, Comput.
+Methods Appl. Mech. Eng. 194 (2005) 3147), a Newton method for functions with kinks (Hintermueller, Ito and Kunisch,
+SIAM J. Optim. 13 (2002) 865).
 
-Friction acts on the mean slip under each hat: return mapping of the shear traction onto the disc of radius mu lambda_j.
-Its history is that of the last equilibrium. Far from the solution friction enters the stiffness by its secant
-(Kacanov's method), near it by the tangent, without the derivative of the disc's radius: so the stiffness stays symmetric.
-Tractions are per undeformed area.
+Friction acts on the mean slip under each hat: a return mapping of the shear traction onto the disc of radius
+mu lambda_j. Its history is that of the last equilibrium. Far from the solution friction enters the stiffness by its
+secant (Kacanov's method), near it by the tangent. The derivative of the disc's radius is left out, so that the
+stiffness stays symmetric. Tractions are per undeformed area.
 """
 
 from __future__ import annotations

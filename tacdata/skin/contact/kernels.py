@@ -218,7 +218,7 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
         3. Forces on the face's nodes; the normal's share in the means under the hats.
         """
         f, b = wp.tid()
-        some = int(0)
+        some = 0
         values = Six()
         for a in range(6):
             j = surface.slots[f, a]

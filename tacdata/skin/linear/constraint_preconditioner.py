@@ -115,7 +115,7 @@ class ConstraintPreconditioner:
         """Return forces along directions, shape (b, m), on all rows, shape (b, rows)."""
         start, parts = 0, []
         for frame in self._frames:
-            b, a, axes, directions = frame.shape
+            b, a, _, directions = frame.shape
             own = values[:, start : start + a * directions].reshape(b, a, directions)
             parts.append(torch.einsum("baip,bap->bai", frame.to(values.dtype), own).reshape(b, -1))
             start += a * directions
@@ -172,7 +172,7 @@ class ConstraintPreconditioner:
 
 def _padded(active: torch.Tensor) -> torch.Tensor:
     """Return the indices of each member's active nodes, shape (b, a), the number of all nodes where there is none."""
-    count, b = active.shape
+    count = len(active)
     most = int(active.sum(dim=0).max()) if count else 0
     most = min(-(-most // _ROWS) * _ROWS, count)
     index = torch.where(active, torch.arange(count, device=active.device)[:, None], count)

@@ -32,6 +32,9 @@ _HALVINGS, _SHORTER = 4, 4.0
 _TOUCHING = 0.02
 """Gap up to which nodes are active when a load step begins [mm]: the tips on the board bear load from the first."""
 
+_ANY = 1e3
+"""Residual that stands in for that before the first step of a load step [1]."""
+
 _AWAY = 1e3
 """Height at which the shapes of an idle column wait [mm]."""
 
@@ -313,7 +316,8 @@ class Batch:
         at.friction_tangent = self._newton.friction_tangent(now)
         moved, changes, used = self._newton.step(at, now, busy)
         self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
-        self._base, self._before = at.unknowns, now.relative
+        # The first step of a load step changes the active set: its residual says nothing.
+        self._base, self._before = at.unknowns, torch.where(at.near > 0, _ANY, now.relative)
         at.unknowns = self._base.plus(Unknowns(moved, changes))
         at.near = torch.zeros_like(at.near)
 
