@@ -19,6 +19,9 @@ class ContactTangent(Columns):
     """Mean outward normal of the shape under each hat, in the sensor's frame [1], shape (s, 3, b)."""
     friction: torch.Tensor
     """Stiffness of each hat against slip, symmetric: xx, yy, zz, xy, yz, xz [N/mm], shape (s, 6, b)."""
+    turn: torch.Tensor
+    """Change of the normal force of each point as the normal turns, symmetric: xx, yy, zz, xy, yz, xz [N/mm], shape
+    (f, k, 6, b), float32; no points where the shape is flat."""
     attraction: torch.Tensor | None = None
     """Slope of adhesive traction [MPa/mm] and the normal along which it acts, shape (f, k, 4, b)."""
 

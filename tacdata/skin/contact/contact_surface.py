@@ -73,6 +73,7 @@ class ContactSurface:
         }
         """Shape functions, shape (k, 6), and weights [mm^2], shape (f, k), by precision."""
         slots = torch.as_tensor(self.mortar.slots.astype(np.int32), device=nodes.device)
+        self._slots = slots
         self.data = filled(
             kernels.SurfaceData, nodes=nodes, faces=faces, slots=slots, shapes=self.shapes,
             hats=torch.as_tensor(at_points, device=nodes.device), weights=self.weights, area=self.area, stick=stick,
@@ -123,10 +124,12 @@ class ContactSurface:
         active = (multiplier - c * (gap - near) > 0) & self.able[:, None]
         pressure = torch.where(active, multiplier, 0.0)
         nodal, normal = torch.zeros_like(total), self._zeros(u, 3)
+        points = (0, 0) if self.flat else tuple(self.weights.shape)
+        turn = torch.zeros(*points, 6, b, dtype=torch.float32, device=u.device)
         wp.launch(
             kernels.pressure_kernel(self.distance), dim=(len(self.faces), b),
             inputs=[argument(u), self.data, members, argument(pressure), argument(active)],
-            outputs=[argument(nodal), argument(normal)], device=self.device,
+            outputs=[argument(nodal), argument(normal), int(not self.flat), argument(turn)], device=self.device,
         )
         normal = normal / torch.linalg.vector_norm(normal, dim=1, keepdim=True).clamp_min(1e-12)
         place = self.mortar.means(u) + self._mean_nodes + self._mean_rise * (conditions.thickness - 1)
@@ -143,11 +146,20 @@ class ContactSurface:
             self.mortar.spread(force, nodal)
         total += nodal
         return ContactForces(
-            nodal.sum(dim=0), gap, pressure, shear, local, ContactTangent(active, normal, stiffness)
+            nodal.sum(dim=0), gap, pressure, shear, local, ContactTangent(active, normal, stiffness, turn)
         )
 
     def add_product(self, at: ContactTangent, p: torch.Tensor, result: torch.Tensor) -> None:
-        """Add friction's stiffness times ``p`` [N] to ``result``; both of shape (n, 3, b) and of one precision."""
+        """Add the contact's stiffness times ``p`` [N] to ``result``; both of shape (n, 3, b) and of one precision.
+
+        That is friction, less the turn of normal forces.
+        """
+        if not self.flat:
+            inputs = [p, self.faces, self._slots, self.rule[p.dtype][0], at.active, at.turn]
+            wp.launch(
+                kernels.turn_kernel(REAL[p.dtype]), dim=(len(self.faces), p.shape[2]),
+                inputs=[argument(value) for value in inputs], outputs=[argument(result)], device=self.device,
+            )
         if not self.rough:
             return
         slips = self.mortar.means(p)
@@ -158,14 +170,14 @@ class ContactSurface:
         self.mortar.spread(slips, result)
 
     def penetration(self, now: ContactForces) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the largest mean gap of active nodes in magnitude, and its mean weighted by their load [mm].
+        """Return the largest error of the contact condition, and its mean weighted by the load [mm], both of shape (b,).
 
-        Both of shape (b,): penetration, or load across a gap.
+        That is the mean gap of nodes under pressure, in magnitude, and the penetration of all others.
         """
-        carried = torch.where(now.tangent.active, now.gap.abs(), 0.0)
+        off = torch.where(now.pressure > 0, now.gap.abs(), (-now.gap).clamp_min(0.0) * self.able[:, None])
         load = now.pressure.abs() * self.area[:, None]
-        mean = (load * carried).sum(dim=0) / load.sum(dim=0).clamp_min(1e-30)
-        return carried.amax(dim=0), mean
+        mean = (load * off).sum(dim=0) / load.sum(dim=0).clamp_min(1e-30)
+        return off.amax(dim=0), mean
 
     def _zeros(self, like: torch.Tensor, *shape: int) -> torch.Tensor:
         """Return zeros for every contact node of as many members as ``like`` has."""

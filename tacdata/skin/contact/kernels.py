@@ -175,6 +175,27 @@ def normal_function(distance: wp.Function) -> wp.Function:
 
 
 @cache
+def curvature_function(distance: wp.Function) -> wp.Function:
+    """Return ``f(p, q)``: how a shape's normal turns with the place [1/mm], symmetric, by central differences."""
+    normal = normal_function(distance)
+
+    @wp.func
+    def curvature(p: wp.vec3d, q: Parameters):
+        # Far above the rounding of the normal (4e-10), far below any radius of curvature.
+        h, zero = wp.float64(1.0e-4), wp.float64(0.0)  # mm
+        x = (normal(p + wp.vec3d(h, zero, zero), q) - normal(p - wp.vec3d(h, zero, zero), q)) / (wp.float64(2.0) * h)
+        y = (normal(p + wp.vec3d(zero, h, zero), q) - normal(p - wp.vec3d(zero, h, zero), q)) / (wp.float64(2.0) * h)
+        z = (normal(p + wp.vec3d(zero, zero, h), q) - normal(p - wp.vec3d(zero, zero, h), q)) / (wp.float64(2.0) * h)
+        half = wp.float64(0.5)
+        return wp.mat33d(
+            x[0], half * (x[1] + y[0]), half * (x[2] + z[0]), half * (x[1] + y[0]), y[1], half * (y[2] + z[1]),
+            half * (x[2] + z[0]), half * (y[2] + z[1]), z[2],
+        )
+
+    return curvature
+
+
+@cache
 def gap_kernel(distance: wp.Function) -> wp.Kernel:
     """Compile the kernel of gaps for one shape; in double precision, as gaps are differences of large numbers."""
 
@@ -203,19 +224,21 @@ def gap_kernel(distance: wp.Function) -> wp.Kernel:
 @cache
 def pressure_kernel(distance: wp.Function) -> wp.Kernel:
     """Compile the kernel of normal forces for one shape."""
-    normal = normal_function(distance)
+    normal, curvature = normal_function(distance), curvature_function(distance)
 
     @wp.kernel(module="unique", enable_backward=False)
     def pressures(
         u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData,
         pressure: wp.array2d(dtype=wp.float64), active: wp.array2d(dtype=wp.bool),
-        force: wp.array3d(dtype=wp.float64), mean_normal: wp.array3d(dtype=wp.float64),
+        force: wp.array3d(dtype=wp.float64), mean_normal: wp.array3d(dtype=wp.float64), curved: int,
+        turn: wp.array4d(dtype=wp.float32),
     ):
         """Add the normal forces of one face to its nodes, and its share to the mean normals.
 
         1. Place of each point in the shape's frame, and the shape's normal there.
         2. Pressure: that of the active nodes, by their hats.
         3. Forces on the face's nodes; the normal's share in the means under the hats.
+        4. If the shape is curved, how the force turns with the normal, symmetric: xx, yy, zz, xy, yz, xz.
         """
         f, b = wp.tid()
         some = 0
@@ -237,6 +260,14 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
             p = wp.float64(0.0)
             for a in range(6):
                 p += surface.hats[k, a] * values[a]
+            if curved == 1 and p > wp.float64(0.0):
+                D = (p * surface.weights[f, k]) * (R * curvature(local, q) * wp.transpose(R))
+                turn[f, k, 0, b] = wp.float32(D[0, 0])
+                turn[f, k, 1, b] = wp.float32(D[1, 1])
+                turn[f, k, 2, b] = wp.float32(D[2, 2])
+                turn[f, k, 3, b] = wp.float32(D[0, 1])
+                turn[f, k, 4, b] = wp.float32(D[1, 2])
+                turn[f, k, 5, b] = wp.float32(D[0, 2])
             for a in range(6):
                 for i in range(3):
                     total[a, i] = total[a, i] + surface.shapes[k, a] * p * n[i]
@@ -312,3 +343,46 @@ def slip_kernel(real: type) -> wp.Kernel:
         slips[j, 2, b] = xz * x + yz * y + zz * z
 
     return slip
+
+
+@cache
+def turn_kernel(real: type) -> wp.Kernel:
+    """Compile the kernel that applies the turn of normal forces, in one precision."""
+    vec3, Values = wp.types.vector(3, real), wp.types.matrix((6, 3), real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def turned(
+        p: wp.array3d(dtype=real), faces: wp.array2d(dtype=wp.int32), slots: wp.array2d(dtype=wp.int32),
+        shapes: wp.array2d(dtype=real), active: wp.array2d(dtype=wp.bool), turn: wp.array4d(dtype=wp.float32),
+        result: wp.array3d(dtype=real),
+    ):
+        """Take the turn of normal forces times nodal displacements ``p`` off the nodes; one face."""
+        f, b = wp.tid()
+        some = int(0)
+        for a in range(6):
+            if active[slots[f, a], b]:
+                some = 1
+        if some == 0:
+            return
+        along, total = Values(), Values()
+        for a in range(6):
+            for i in range(3):
+                along[a, i] = p[faces[f, a], i, b]
+        for k in range(shapes.shape[0]):
+            v = vec3()
+            for a in range(6):
+                v += shapes[k, a] * vec3(along[a, 0], along[a, 1], along[a, 2])
+            xx, yy, zz = real(turn[f, k, 0, b]), real(turn[f, k, 1, b]), real(turn[f, k, 2, b])
+            xy, yz, xz = real(turn[f, k, 3, b]), real(turn[f, k, 4, b]), real(turn[f, k, 5, b])
+            r = vec3(
+                xx * v[0] + xy * v[1] + xz * v[2], xy * v[0] + yy * v[1] + yz * v[2],
+                xz * v[0] + yz * v[1] + zz * v[2],
+            )
+            for a in range(6):
+                for i in range(3):
+                    total[a, i] = total[a, i] + shapes[k, a] * r[i]
+        for a in range(6):
+            for i in range(3):
+                wp.atomic_sub(result, faces[f, a], i, b, total[a, i])
+
+    return turned

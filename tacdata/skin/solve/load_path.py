@@ -69,18 +69,23 @@ class LoadPath:
             settings: What is allowed.
         """
         deep = max(self.attempt, _SHALLOW)
-        tight = penetration <= settings.penetration * deep and mean <= settings.mean_penetration * deep
-        if error <= settings.residual and tight:
+        # What is farthest from what is allowed says how near the solution is, from the first step on.
+        shares = (
+            error / settings.residual, penetration / (settings.penetration * deep),
+            mean / (settings.mean_penetration * deep),
+        )
+        off = max(shares) if all(map(math.isfinite, shares)) else math.inf
+        if off <= 1:
             return "found"
-        stuck = not error < 0.9 * self._best and self.newton - self._best_at > settings.patience
+        stuck = not off < 0.9 * self._best and self.newton - self._best_at > settings.patience
         if stuck or not math.isfinite(error) or self.newton >= settings.newton_limit:
             self.reason = (
                 f"after {self.newton} Newton iterations the residual is {error:.1e} of the contact force (allowed "
                 f"{settings.residual:.0e}), penetration {1e3 * penetration:.1f} um, smallest det F {volume:.2f}"
             )
             return "failed"
-        if error < 0.9 * self._best:
-            self._best, self._best_at = error, self.newton
+        if self.newton and off < 0.9 * self._best:
+            self._best, self._best_at = off, self.newton
         self.newton += 1
         self.spent += 1
         return "go on"
