@@ -35,6 +35,9 @@ _TOUCHING = 0.02
 _ANY = 1e3
 """Residual that stands in for that before the first step of a load step [1]."""
 
+_SLOW = 1.0
+"""Share of the residual that a step by friction's tangent may leave at most [1]; else the secant takes over."""
+
 _AWAY = 1e3
 """Height at which the shapes of an idle column wait [mm]."""
 
@@ -108,6 +111,7 @@ class Batch:
         unknowns = self._at.unknowns
         self._base, self._accepted, self._rate = unknowns, unknowns.zeros(), unknowns.zeros()
         self._loading = LoadingStates(unknowns)
+        self._majorant = torch.zeros(capacity, dtype=torch.bool, device=device)
         self._presses: list[PlacedPress | None] = [None] * capacity
         self._before = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
         self.cg = 0
@@ -313,7 +317,10 @@ class Batch:
         if not bool(busy.any()):
             return
         at = self._at
-        at.friction_tangent = self._newton.friction_tangent(now)
+        # By the tangent, nodes may flip between opposite slips for ever; by the secant, a majorant, they do not.
+        flipping = (at.friction_tangent > 0) & (now.relative > _SLOW * self._before)
+        self._majorant = (self._majorant & (at.near == 0)) | flipping
+        at.friction_tangent = torch.where(self._majorant, 0.0, self._newton.friction_tangent(now))
         moved, changes, used = self._newton.step(at, now, busy)
         self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
         # The first step of a load step changes the active set: its residual says nothing.
