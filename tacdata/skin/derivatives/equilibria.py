@@ -1,13 +1,13 @@
 """Derivatives of equilibria by parameters, carried along a load path (tangent-linear, implicit differentiation).
 
-At every equilibrium on the path, forces balance and the gaps of active nodes are closed. Both depend on displacements u,
-multipliers l, the contact's history h and a parameter p: F(u, l, h, p) = 0. So
+At every equilibrium on the path forces balance, and the gaps of active nodes are closed: F(x, h, p) = 0. Here x are
+displacements and multipliers, h is the contact's history and p a parameter. So
 
-    d(u, l)/dp = -F_(u, l)^-1 (F_p + F_h dh/dp),
+    dx/dp = -F_x^-1 (F_p + F_h dh/dp),
 
 and accepting the state makes the next dh/dp (Michaleris, Tortorelli and Vidal, Int. J. Numer. Meth. Eng. 37 (1994)
-2471). Every parameter is a column of one batch. The matrix is the unsymmetric derivative at fixed status of all contact
-nodes; where a node just changes its status, derivatives jump.
+2471). Every parameter is a column of one batch. F_x is the unsymmetric derivative at fixed status of all contact nodes;
+where a node just changes its status, derivatives jump.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ Slack = Callable[[torch.Tensor], torch.Tensor]
 class _Point:
     """A state at which derivatives are taken, repeated for every direction.
 
-    What is solved for stands in one field, shape (3n + s, 1, c): displacements, then normal forces of all contact nodes
-    over Young's modulus times 1 mm. Residuals likewise: forces, then mean gaps times Young's modulus times 1 mm. So both
-    parts of each have one unit and nearly one size.
+    What is solved for stands in one field, shape (3n + s, 1, c): displacements, then the normal forces of all contact
+    nodes over Young's modulus times 1 mm. Residuals likewise: forces, then mean gaps times Young's modulus times 1 mm.
+    So both parts of a field have one unit and nearly one size.
     """
 
     surfaces: tuple[ContactSurface, ...]

@@ -1,12 +1,11 @@
 """The preconditioner of derivatives at one state: the body at rest under that state's contact, solved exactly.
 
-K0 is the stiffness at rest, M the mean displacement under the hats, and Q holds the normal and tangents of active
-nodes. Displacements z follow from r and from the forces f along these directions; f closes the gaps by g, or is friction:
+    K0 z = r + M^T Q f,     normals: Q^T M z = g,     tangents: f + D Q^T M z = e f_normal
 
-    K0 z = r + M^T Q f,     normal: (Q^T M z) = g,     tangents: f + D (Q^T M z) = e f_normal.
-
-D is friction's stiffness. Slipping nodes carry e: friction grows with pressure, which makes this unsymmetric. Unlike
-`tacdata.skin.linear.constraint_preconditioner`, it is of one state, and serves any number of right-hand sides.
+K0 is the stiffness at rest and M the mean displacement under the hats. Q holds the normal and the tangents of active
+nodes, and f the forces along them. Normal ones change the gaps by g. The others are friction, of stiffness D. Where a
+node slips it grows with pressure, by e, so that the system is not symmetric. Unlike
+`tacdata.skin.linear.constraint_preconditioner` it is of one state, and serves any number of right-hand sides.
 """
 
 from __future__ import annotations
@@ -88,7 +87,8 @@ class StatePreconditioner:
 
         Args:
             residual: r [N], shape (3n, c), float32.
-            gaps: g: by how much the mean gaps of active nodes are to change [mm], shape (s, c), s nodes of all contacts.
+            gaps: g: by how much mean gaps are to change [mm], at the nodes of all contacts, shape (s, c); those of
+                nodes that are not active are not read.
 
         Returns:
             z [mm], shape (3n, c), and the forces [N], shape (s, c), 0 where not active; float32.
