@@ -24,7 +24,7 @@ PRESS = PressRequest(Sphere(2.0), 0.13, -0.21, 0.0, (0.0, 0.15, 0.4, 0.25, 0.0))
 def skin():
     sensor = replace(slab_sensor(size=4.0, pixels=9), uncertainty=SPREADS)
     settings = ModelSettings(error_estimate=False, step=0.45)
-    return SkinModel(sensor, settings, mesh=box_mesh(sensor, 6, 6, 2), companion=box_mesh(sensor, 5, 5, 2))
+    return SkinModel(sensor, settings, mesh=box_mesh(sensor, 8, 8, 2), companion=box_mesh(sensor, 6, 6, 2))
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from tacdata.skin.member.pose import Pose
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve.configuration import Configuration
+from tacdata.skin.solve.configuration import Configuration, Unknowns
 from tacdata.skin.solve.settings import SolverSettings
 
 PRESS = PressRequest(Sphere(1.5), 0.13, -0.21, 0.0, (0.1, 0.2, 0.3))
@@ -26,7 +26,7 @@ PRESS = PressRequest(Sphere(1.5), 0.13, -0.21, 0.0, (0.1, 0.2, 0.3))
 def slab(residual=1e-9, **contact):
     sensor = slab_sensor(size=4.0, pixels=9)
     sensor = replace(sensor, contact=replace(sensor.contact, **contact))
-    solver = SolverSettings(residual=residual, penetration=1.0, mean_penetration=1.0)
+    solver = SolverSettings(residual=residual, penetration=1e-7, mean_penetration=1e-7)
     return SkinModel(sensor, ModelSettings(solver=solver, error_estimate=False), mesh=box_mesh(sensor, 4, 4, 2))
 
 
@@ -64,10 +64,12 @@ def _solved(skin, request, state, moved):
     place = torch.as_tensor(press.touch - [0, 0, request.depths[0]])[:, None]
     pose, everyone = Pose(place, torch.eye(3, dtype=torch.float64)[..., None]), torch.ones(1, dtype=torch.bool)
     u, histories = torch.as_tensor(state.displacement)[..., None] + moved, (newton.surfaces[0].start(pose),)
-    at = Configuration(u, press.conditions, (pose,), histories, torch.zeros(1, dtype=torch.float64))
+    none = torch.zeros(1, dtype=torch.float64)
+    pressure = torch.zeros(newton.surfaces[0].count, 1, dtype=torch.float64)
+    at = Configuration(u, (pressure,), press.conditions, (pose,), histories, none, none)
     now = newton.residual(at)
-    while float(now.relative) > 1e-9:
-        at.u = at.u + newton.step(at, now, everyone)[0]
+    while float(now.relative) > 1e-9 or float(now.penetration) > 1e-9:
+        at.unknowns = at.unknowns.plus(Unknowns(*newton.step(at, now, everyone)[:2]))
         now = newton.residual(at)
     u = at.u
     held = skin.skin.fixed

@@ -22,7 +22,7 @@ DEEP = PressRequest(Sphere(2.0), 0.13, -0.21, 0.0, (0.2, 0.4))
 def skin():
     sensor = replace(slab_sensor(size=4.0, pixels=9), uncertainty=SPREADS)
     settings = ModelSettings(error_estimate=False, step=0.45)
-    return SkinModel(sensor, settings, mesh=box_mesh(sensor, 5, 5, 2))
+    return SkinModel(sensor, settings, mesh=box_mesh(sensor, 6, 6, 2))
 
 
 def test_one_spread_is_the_derivative_times_it_and_several_add_in_squares(skin):

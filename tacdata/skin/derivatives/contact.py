@@ -1,6 +1,6 @@
-"""Directional derivatives of contact forces, with respect to everything that they depend on.
+"""Directional derivatives of gaps and contact forces, with respect to everything that they depend on.
 
-Every point keeps its status (open, sticking, slipping, just reached); within one, tractions are smooth. Unlike the
+Every node keeps its status (open, sticking, slipping, just reached); within one, tractions are smooth. Unlike the
 solver's stiffness, which is kept symmetric, the derivative holds the turn of the normal and the change of friction's
 disc with pressure. The curvature of the shape, and the change of its distance with its sizes, are central
 differences of the distance function. Nothing else is, so that the derivative is linear in its direction.
@@ -13,14 +13,15 @@ from dataclasses import dataclass
 import torch
 import warp as wp
 
+from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.contact.history import ContactHistory
-from tacdata.skin.contact.kernels import PointData, history_data, member_data
-from tacdata.skin.derivatives.contact_kernel import change_kernel
+from tacdata.skin.contact.kernels import history_data, member_data
+from tacdata.skin.derivatives.contact_kernel import friction_change, normal_change_kernel
 from tacdata.skin.member.columns import Columns
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
-from tacdata.skin.member.warp_arrays import argument, filled
+from tacdata.skin.member.warp_arrays import argument
 
 
 @dataclass(frozen=True)
@@ -35,29 +36,29 @@ class ConditionsChange(Columns):
 
 @dataclass(frozen=True)
 class ContactChange:
-    """Derivatives of one contact along directions."""
+    """Derivatives of one contact along directions; s contact nodes."""
 
     force: torch.Tensor
     """Of the nodal forces on the skin [N], shape (n, 3, b)."""
     gap: torch.Tensor
-    """Of the gap [mm], shape (f, k, b)."""
+    """Of the mean gap under each hat [mm], shape (s, b)."""
     pressure: torch.Tensor
-    """Of the normal traction [MPa], shape (f, k, b); zero where open."""
+    """Of the normal traction at the nodes [MPa], shape (s, b); zero where open."""
     shear: torch.Tensor
-    """Of the tangential traction in the shape's frame [MPa], shape (f, k, 3, b)."""
+    """Of the tangential traction in the shape's frame [MPa], shape (s, 3, b)."""
     local: torch.Tensor
-    """Of each point's place in the shape's frame [mm], shape (f, k, 3, b)."""
+    """Of each hat's mean place in the shape's frame [mm], shape (s, 3, b)."""
     load: torch.Tensor
-    """Of the normal force on each face [N], shape (f, b)."""
+    """Of the normal force at each node [N], shape (s, b)."""
 
-    def accepted(self, open_: torch.Tensor, place: torch.Tensor) -> ContactHistory:
+    def accepted(self, carries: torch.Tensor, place: torch.Tensor) -> ContactHistory:
         """Return the change of the history when the state is accepted (`ContactHistory.accept`).
 
         Args:
-            open_: Points without contact, shape (f, k, b), bool.
+            carries: Nodes with pressure, shape (s, b), bool.
             place: Change of the shape's place [mm], shape (3, b).
         """
-        return ContactHistory(self.pressure, self.local, self.shear, torch.where(open_, self.gap, 0.0), place)
+        return ContactHistory(self.local, self.shear, torch.where(carries, 0.0, self.gap), place)
 
 
 @dataclass(frozen=True)
@@ -68,41 +69,55 @@ class ContactPoint(Columns):
     """Of the shape."""
     history: ContactHistory
     """That the state starts from."""
-    pressure: torch.Tensor
-    """Normal tractions there [MPa], shape (f, k, b)."""
+    now: ContactForces
+    """Tractions there."""
 
 
 def contact_change(
     surface: ContactSurface, u: torch.Tensor, conditions: Conditions, point: ContactPoint, du: torch.Tensor,
-    change: ConditionsChange, history: ContactHistory, whole: bool = True,
+    pressure: torch.Tensor, change: ConditionsChange, history: ContactHistory, whole: bool = True,
 ) -> ContactChange:
-    """Return how a contact changes along directions, at fixed status of its points.
+    """Return how a contact changes along directions, at fixed status of its nodes.
 
     Args:
         surface: The contact.
         u: Displacements [mm], shape (n, 3, b), float64.
         conditions: Of the members.
-        point: Pose, history and pressures.
+        point: Pose, history and tractions.
         du: Change of ``u`` along each member's direction [mm], shape (n, 3, c), perhaps of the first c members alone.
+        pressure: Change of the normal traction at the nodes [MPa], shape (s, c); that of open ones is taken as 0.
         change: Change of conditions and pose.
         history: Change of the history.
-        whole: Whether gaps and places of open points are asked for, too, in which no force changes; else they are 0.
+        whole: Whether gaps of open nodes are asked for, too; else those far from contact are 0.
     """
-    f, k = surface.weights.shape
+    count, c = surface.count, du.shape[2]
 
     def zeros(*shape: int) -> torch.Tensor:
-        return torch.zeros(f, k, *shape, du.shape[2], dtype=torch.float64, device=u.device)
+        return torch.zeros(count, *shape, c, dtype=torch.float64, device=u.device)
 
-    force, gap, pressure, shear, local = torch.zeros_like(du), zeros(), zeros(), zeros(3), zeros(3)
+    moved = du.clone()
+    # A thicker slab lifts what lies above z = 0.
+    moved[:, 2] += wp.to_torch(surface.data.nodes)[:, 2:].clamp_min(0.0) * change.conditions.thickness[:c]
+    now = point.now
+    active = now.tangent.active
+    pressure = torch.where(active[:, :c], pressure, 0.0)
+    members, d_members = member_data(conditions, point.pose), member_data(change.conditions, change.pose)
+    carried = argument(now.pressure), argument(pressure), argument(active)
+    force, gap, mean, d_mean = torch.zeros_like(moved), zeros(), zeros(3), zeros(3)
     wp.launch(
-        change_kernel(surface.distance), dim=(f, k, du.shape[2]),
-        inputs=[
-            argument(u), argument(du), surface.data, member_data(conditions, point.pose),
-            member_data(change.conditions, change.pose), history_data(point.history), history_data(history),
-            argument(point.pressure), int(whole),
-        ],
-        outputs=[argument(force), filled(PointData, gap=gap, pressure=pressure, shear=shear, local=local)],
-        device=surface.device,
+        normal_change_kernel(surface.distance), dim=(len(surface.faces), c),
+        inputs=[argument(u), argument(moved), surface.data, members, d_members, *carried, int(whole)],
+        outputs=[argument(value) for value in (gap, force, mean, d_mean)], device=surface.device,
     )
-    load = (pressure * surface.weights[:, :, None]).sum(dim=1)
-    return ContactChange(force, gap, pressure, shear, local, load)
+    local, shear, rub = zeros(3), zeros(3), zeros(3)
+    wp.launch(
+        friction_change, dim=(count, c),
+        inputs=[
+            argument(now.local), argument(surface.mortar.means(moved)), surface.data, members, d_members,
+            history_data(point.history), history_data(history), *carried, argument(mean), argument(d_mean),
+        ],
+        outputs=[argument(value) for value in (local, shear, rub)], device=surface.device,
+    )
+    if surface.rough:
+        surface.mortar.spread(rub, force)
+    return ContactChange(force, gap, pressure, shear, local, pressure * surface.area[:, None])

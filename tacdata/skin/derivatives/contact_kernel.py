@@ -1,7 +1,7 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
 # pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
-"""Warp kernel of `tacdata.skin.derivatives.contact`: the change of one point's tractions along a direction.
+"""Warp kernels of `tacdata.skin.derivatives.contact`: how gaps, normal forces and friction change along a direction.
 
 Indices as in `tacdata.skin.contact.kernels`, whose structs hold the changes too.
 """
@@ -13,10 +13,11 @@ import warp as wp
 from tacdata.skin.contact.kernels import (
     HistoryData,
     MemberData,
+    Nodal,
     Parameters,
-    PointData,
+    Six,
     SurfaceData,
-    at_point,
+    at_node,
     deformed_point,
     normal_function,
     of_member,
@@ -27,18 +28,12 @@ from tacdata.skin.contact.kernels import (
 
 
 @wp.func
-def point_change(
-    du: wp.array3d(dtype=wp.float64), surface: SurfaceData, f: int, k: int, b: int, d_thickness: wp.float64
-):
-    """Return the change of `deformed_point` [mm]."""
+def point_change(moved: wp.array3d(dtype=wp.float64), surface: SurfaceData, f: int, k: int, b: int):
+    """Return the change of `deformed_point` [mm]; ``moved`` holds that of the nodes' places."""
     dx = wp.vec3d()
     for a in range(6):
         n = surface.faces[f, a]
-        z = surface.nodes[n, 2]
-        dz = wp.float64(0.0)
-        if z > wp.float64(0.0):
-            dz = z * d_thickness
-        dx += surface.shapes[k, a] * wp.vec3d(du[n, 0, b], du[n, 1, b], du[n, 2, b] + dz)
+        dx += surface.shapes[k, a] * wp.vec3d(moved[n, 0, b], moved[n, 1, b], moved[n, 2, b])
     return dx
 
 
@@ -105,79 +100,125 @@ def gap_change_function(distance: wp.Function) -> wp.Function:
 
 
 @cache
-def change_kernel(distance: wp.Function) -> wp.Kernel:
-    """Compile the kernel for one shape."""
+def normal_change_kernel(distance: wp.Function) -> wp.Kernel:
+    """Compile the kernel of gaps, normals and normal forces for one shape."""
     normal, turn_of_normal = normal_function(distance), turn_of_normal_function(distance)
     gap_change = gap_change_function(distance)
 
     @wp.kernel(module="unique", enable_backward=False)
     def change(
-        u: wp.array3d(dtype=wp.float64), du: wp.array3d(dtype=wp.float64), surface: SurfaceData,
-        members: MemberData, d_members: MemberData, history: HistoryData, d_history: HistoryData,
-        pressure: wp.array3d(dtype=wp.float64), whole: int,
-        d_force: wp.array3d(dtype=wp.float64), d_found: PointData,
+        u: wp.array3d(dtype=wp.float64), moved: wp.array3d(dtype=wp.float64), surface: SurfaceData,
+        members: MemberData, d_members: MemberData, pressure: wp.array2d(dtype=wp.float64),
+        d_pressure: wp.array2d(dtype=wp.float64), active: wp.array2d(dtype=wp.bool), whole: int,
+        d_gap: wp.array2d(dtype=wp.float64), d_force: wp.array3d(dtype=wp.float64),
+        mean: wp.array3d(dtype=wp.float64), d_mean: wp.array3d(dtype=wp.float64),
     ):
-        """Change of one point's tractions, added to the nodes.
+        """Add the changes of one face to its nodes; mean normals and their changes in the shape's frame.
 
-        1. Place of the point in the shape's frame, and how it moves there.
-        2. Change of the gap, and of the normal traction.
-        3. Trial shear and its change, projected onto the tangent plane.
-        4. Return mapping onto Coulomb's disc, whose radius changes with the pressure.
-        5. Forces on the face's nodes.
+        1. Place of each point in the shape's frame, and how it moves there.
+        2. Change of the gap, to the means under the hats.
+        3. Under active nodes: the normal and its turn, to the means under the hats.
+        4. There, too: change of pressure times normal, to the face's nodes.
         """
-        f, k, b = wp.tid()
-        zero = wp.float64(0.0)
-        if whole == 0 and pressure[f, k, b] <= zero:
+        f, b = wp.tid()
+        some = 0
+        values, d_values = Six(), Six()
+        for a in range(6):
+            j = surface.slots[f, a]
+            if active[j, b]:
+                some = 1
+                values[a] = pressure[j, b]
+                d_values[a] = d_pressure[j, b]
+        if some == 0 and whole == 0:
             return
         q, dq = parameters_of(members.indenter, b), parameters_of(d_members.indenter, b)
         R, dR = rotation_of(members.turn, b), rotation_of(d_members.turn, b)
         tip, d_tip = of_member(members.place, b), of_member(d_members.place, b)
-        penalty, stick = surface.penalty * members.modulus[b], surface.stick * members.modulus[b]
-        x = deformed_point(u, surface, f, k, b, members.thickness[b])
-        dx = point_change(du, surface, f, k, b, d_members.thickness[b])
-        local = wp.transpose(R) * (x - tip)
-        moves = wp.transpose(R) * (dx - d_tip) + wp.transpose(dR) * (x - tip)
-        for i in range(3):
-            d_found.local[f, k, i, b] = moves[i]
-        n = normal(local, q)
-        dg = gap_change(local, moves, n, q, dq)
-        d_found.gap[f, k, b] = dg
-        g = distance(local, q)
-        t = history.multiplier[f, k, b] - penalty * g
-        if t > zero:
-            d_stick = surface.stick * d_members.modulus[b]
-            dt = d_history.multiplier[f, k, b] - penalty * dg - surface.penalty * d_members.modulus[b] * g
-            d_found.pressure[f, k, b] = dt
-            dn = turn_of_normal(local, moves, q, dq)
-            total, d_total = t * n, dt * n + t * dn
-            coefficient = members.friction[b]
-            if surface.rough == 1 and coefficient > zero:
-                step = tip - of_member(history.place, b)
-                moved = wp.transpose(R) * step
-                d_moved = wp.transpose(dR) * step + wp.transpose(R) * (d_tip - of_member(d_history.place, b))
-                before, approach = history.gap[f, k, b], wp.dot(moved, n)
-                d_approach = wp.dot(d_moved, n) + wp.dot(moved, dn)
-                after = share_in_contact(before, approach)
-                d_after = share_change(before, d_history.gap[f, k, b], approach, d_approach)
-                slid, d_slid = local - at_point(history.anchor, f, k, b), moves - at_point(d_history.anchor, f, k, b)
-                w = at_point(history.held, f, k, b) - stick * after * slid
-                dw = (
-                    at_point(d_history.held, f, k, b)
-                    - stick * after * d_slid - (stick * d_after + d_stick * after) * slid
-                )
-                trial = w - n * wp.dot(n, w)
-                d_trial = dw - dn * wp.dot(n, w) - n * (wp.dot(dn, w) + wp.dot(n, dw))
-                d_limit = d_members.friction[b] * t + coefficient * dt
-                shear, d_shear = return_mapping_change(trial, d_trial, coefficient * t, d_limit)
-                for i in range(3):
-                    d_found.shear[f, k, i, b] = d_shear[i]
-                total += shear
-                d_total += d_shear
-            d_total = R * d_total + dR * total
+        gaps, total, means, d_means = Six(), Nodal(), Nodal(), Nodal()
+        for k in range(surface.weights.shape[1]):
+            w = surface.weights[f, k]
+            x = deformed_point(u, surface, f, k, b, members.thickness[b]) - tip
+            local = wp.transpose(R) * x
+            moves = wp.transpose(R) * (point_change(moved, surface, f, k, b) - d_tip) + wp.transpose(dR) * x
+            n = normal(local, q)
+            dg = gap_change(local, moves, n, q, dq)
             for a in range(6):
+                gaps[a] = gaps[a] + surface.hats[k, a] * w * dg
+            if some == 1:
+                dn = turn_of_normal(local, moves, q, dq)
+                p, dp = wp.float64(0.0), wp.float64(0.0)
+                for a in range(6):
+                    p += surface.hats[k, a] * values[a]
+                    dp += surface.hats[k, a] * d_values[a]
+                dt = R * (dp * n + p * dn) + dR * (p * n)
+                for a in range(6):
+                    for i in range(3):
+                        total[a, i] = total[a, i] + surface.shapes[k, a] * w * dt[i]
+                        means[a, i] = means[a, i] + surface.hats[k, a] * w * n[i]
+                        d_means[a, i] = d_means[a, i] + surface.hats[k, a] * w * dn[i]
+        for a in range(6):
+            j = surface.slots[f, a]
+            wp.atomic_add(d_gap, j, b, gaps[a] / surface.area[j])
+            if some == 1:
                 for i in range(3):
-                    wp.atomic_add(
-                        d_force, surface.faces[f, a], i, b, surface.shapes[k, a] * surface.weights[f, k] * d_total[i]
-                    )
+                    wp.atomic_add(d_force, surface.faces[f, a], i, b, total[a, i])
+                    wp.atomic_add(mean, j, i, b, means[a, i] / surface.area[j])
+                    wp.atomic_add(d_mean, j, i, b, d_means[a, i] / surface.area[j])
 
     return change
+
+
+@wp.kernel(enable_backward=False)
+def friction_change(
+    local: wp.array3d(dtype=wp.float64), d_place: wp.array3d(dtype=wp.float64), surface: SurfaceData,
+    members: MemberData, d_members: MemberData, history: HistoryData, d_history: HistoryData,
+    pressure: wp.array2d(dtype=wp.float64), d_pressure: wp.array2d(dtype=wp.float64),
+    active: wp.array2d(dtype=wp.bool), mean: wp.array3d(dtype=wp.float64), d_mean: wp.array3d(dtype=wp.float64),
+    d_local: wp.array3d(dtype=wp.float64), d_shear: wp.array3d(dtype=wp.float64),
+    d_force: wp.array3d(dtype=wp.float64),
+):
+    """Change of one hat's friction.
+
+    1. Change of the hat's mean place in the shape's frame.
+    2. Turn of the mean normal, which has unit length.
+    3. Trial shear and its change, projected onto the tangent plane.
+    4. Return mapping onto Coulomb's disc, whose radius changes with the pressure.
+    5. Force on the hat, in the sensor's frame.
+    """
+    j, b = wp.tid()
+    zero = wp.float64(0.0)
+    R, dR = rotation_of(members.turn, b), rotation_of(d_members.turn, b)
+    tip, d_tip = of_member(members.place, b), of_member(d_members.place, b)
+    now = at_node(local, j, b)
+    moves = wp.transpose(R) * (at_node(d_place, j, b) - d_tip) + wp.transpose(dR) * (R * now)
+    for i in range(3):
+        d_local[j, i, b] = moves[i]
+    coefficient = members.friction[b]
+    if surface.rough == 0 or not active[j, b] or coefficient <= zero:
+        return
+    mean_normal, turns = at_node(mean, j, b), at_node(d_mean, j, b)
+    length = wp.length(mean_normal)
+    n = mean_normal / length
+    dn = (turns - n * wp.dot(n, turns)) / length
+    step = tip - of_member(history.place, b)
+    moved = wp.transpose(R) * step
+    d_moved = wp.transpose(dR) * step + wp.transpose(R) * (d_tip - of_member(d_history.place, b))
+    before, approach = history.gap[j, b], wp.dot(moved, n)
+    d_approach = wp.dot(d_moved, n) + wp.dot(moved, dn)
+    after = share_in_contact(before, approach)
+    d_after = share_change(before, d_history.gap[j, b], approach, d_approach)
+    stick, d_stick = surface.stick * members.modulus[b], surface.stick * d_members.modulus[b]
+    slid, d_slid = now - at_node(history.anchor, j, b), moves - at_node(d_history.anchor, j, b)
+    w = at_node(history.held, j, b) - stick * after * slid
+    dw = at_node(d_history.held, j, b) - stick * after * d_slid - (stick * d_after + d_stick * after) * slid
+    trial = w - n * wp.dot(n, w)
+    d_trial = dw - dn * wp.dot(n, w) - n * (wp.dot(dn, w) + wp.dot(n, dw))
+    limit, d_limit = zero, zero
+    if pressure[j, b] > zero:
+        limit = coefficient * pressure[j, b]
+        d_limit = d_members.friction[b] * pressure[j, b] + coefficient * d_pressure[j, b]
+    shear, change = return_mapping_change(trial, d_trial, limit, d_limit)
+    total = surface.area[j] * (R * change + dR * shear)
+    for i in range(3):
+        d_shear[j, i, b] = change[i]
+        d_force[j, i, b] = total[i]

@@ -1,29 +1,32 @@
 """Derivatives of equilibria by parameters, carried along a load path (tangent-linear, implicit differentiation).
 
-At every equilibrium on the path, F(u, h, p) = 0 with the contact's history h and a parameter p. So
+At every equilibrium on the path forces balance, and the gaps of active nodes are closed: F(x, h, p) = 0. Here x are
+displacements and multipliers, h is the contact's history and p a parameter. So
 
-    du/dp = -F_u^-1 (F_p + F_h dh/dp),
+    dx/dp = -F_x^-1 (F_p + F_h dh/dp),
 
 and accepting the state makes the next dh/dp (Michaleris, Tortorelli and Vidal, Int. J. Numer. Meth. Eng. 37 (1994)
-2471). Every parameter is a column of one batch. F_u is the unsymmetric derivative at fixed status of all contact
-points; where a point just changes its status, derivatives jump.
+2471). Every parameter is a column of one batch. F_x is the unsymmetric derivative at fixed status of all contact nodes;
+where a node just changes its status, derivatives jump.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import torch
 
 from tacdata.errors import SolveError
+from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.derivatives.contact import ConditionsChange, ContactChange, ContactPoint, contact_change
+from tacdata.skin.derivatives.state_preconditioner import StatePreconditioner
 from tacdata.skin.linear.block_gcr import KrylovSpace
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.solve.configuration import Configuration
-from tacdata.skin.solve.newton import Newton, Residual
+from tacdata.skin.solve.newton import Newton
 
 TOLERANCE = 1e-5
 """Error of the linear solves, as `tacdata.skin.linear.block_gcr.GcrSolution` counts it [1]."""
@@ -31,42 +34,76 @@ TOLERANCE = 1e-5
 _LAW_STEP = 1e-5
 """Step of the central difference of internal forces by a law's numbers, over these [1]."""
 
-_AUGMENTATIONS, _FOLLOWED = 3, 1e-2
-"""How often multipliers follow pressures at most, and the change relative to the largest at which they have [1]."""
-
-
 Slack = Callable[[torch.Tensor], torch.Tensor]
 """From reactions of held nodes to how they move."""
 
 
 @dataclass(frozen=True)
 class _Point:
-    """A state at which derivatives are taken, repeated for every direction."""
+    """A state at which derivatives are taken, repeated for every direction.
+
+    What is solved for stands in one field, shape (3n + s, 1, c): displacements, then the normal forces of all contact
+    nodes over Young's modulus times 1 mm. Residuals likewise: forces, then mean gaps times Young's modulus times 1 mm.
+    So both parts of a field have one unit and nearly one size.
+    """
 
     surfaces: tuple[ContactSurface, ...]
     at: Configuration
-    now: Residual
+    now: tuple[ContactForces, ...]
+    """Of each contact."""
     along: tuple[ConditionsChange, ...]
     """Directions, for each contact."""
+    modulus: float
+    """Young's modulus [MPa]."""
 
-    def changes(self, du: torch.Tensor, history: tuple[ContactHistory, ...]) -> list[ContactChange]:
-        """Return each contact's change along the directions, with ``du`` [mm] and the change of history."""
-        return [self._change(k, du, self.along[k], past) for k, past in enumerate(history)]
+    def changes(
+        self, du: torch.Tensor, pressures: Sequence[torch.Tensor], history: tuple[ContactHistory, ...]
+    ) -> list[ContactChange]:
+        """Return each contact's change along the directions, with displacements, pressures and history."""
+        return [self._change(k, du, pressures[k], self.along[k], past) for k, past in enumerate(history)]
 
-    def contact_product(self, du: torch.Tensor) -> torch.Tensor:
-        """Return the change of contact forces [N] with ``du`` alone."""
-        parts = [
-            self._change(k, du, along.zeros(), history.zeros(), whole=False).force
+    def product(self, du: torch.Tensor, pressures: Sequence[torch.Tensor]) -> list[ContactChange]:
+        """Return each contact's change with displacements and pressures alone."""
+        return [
+            self._change(k, du, pressures[k], along.zeros(), history.zeros(), whole=False)
             for k, (along, history) in enumerate(zip(self.along, self.at.histories, strict=True))
         ]
-        return torch.stack(parts).sum(dim=0)
+
+    def joined(self, du: torch.Tensor, pressures: Sequence[torch.Tensor]) -> torch.Tensor:
+        """Return displacements [mm] and pressures [MPa] as one field."""
+        parts = [p * surface.area[:, None] / self.modulus for surface, p in zip(self.surfaces, pressures, strict=True)]
+        return torch.cat([du.reshape(-1, du.shape[2]), *parts])[:, None]
+
+    def parted(self, field: torch.Tensor) -> tuple[torch.Tensor, list[torch.Tensor]]:
+        """Return displacements, shape (n, 3, c), and pressures, shape (s, c), both float64; `joined` undone."""
+        du, parts = self.halves(field.to(torch.float64))
+        forces = parts.split([surface.count for surface in self.surfaces])
+        pressures = [
+            force * self.modulus / surface.area[:, None]
+            for surface, force in zip(self.surfaces, forces, strict=True)
+        ]
+        return du.reshape(-1, 3, du.shape[1]), pressures
+
+    def halves(self, field: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return the two parts of a field, shapes (3n, c) and (s, c)."""
+        size = 3 * len(self.at.u)
+        return field[:size, 0].contiguous(), field[size:, 0].contiguous()
+
+    def residual(self, force: torch.Tensor, changes: Sequence[ContactChange]) -> torch.Tensor:
+        """Return forces [N] and the changes of active nodes' gaps as one field."""
+        gaps = [
+            torch.where(now.tangent.active[:, :1], change.gap, 0.0) * self.modulus
+            for now, change in zip(self.now, changes, strict=True)
+        ]
+        return torch.cat([force.reshape(-1, force.shape[2]), *gaps])[:, None]
 
     def _change(
-        self, k: int, du: torch.Tensor, along: ConditionsChange, history: ContactHistory, whole: bool = True
+        self, k: int, du: torch.Tensor, pressure: torch.Tensor, along: ConditionsChange, history: ContactHistory,
+        whole: bool = True,
     ) -> ContactChange:
         at = self.at
-        point = ContactPoint(at.poses[k], at.histories[k], self.now.contacts[k].pressure)
-        return contact_change(self.surfaces[k], at.u, at.conditions, point, du, along, history, whole)
+        point = ContactPoint(at.poses[k], at.histories[k], self.now[k])
+        return contact_change(self.surfaces[k], at.u, at.conditions, point, du, pressure, along, history, whole)
 
 
 class PathDerivatives:
@@ -78,7 +115,7 @@ class PathDerivatives:
         """Start.
 
         Args:
-            newton: With a preconditioner of its own, for as many members as there are parameters.
+            newton: That solved the path, or one like it.
             free: 1 for nodes that are not held, else 0, shape (n, 1, 1).
             label: The press in words, for errors.
             tolerance: Error of the linear solves [1].
@@ -96,7 +133,6 @@ class PathDerivatives:
         self.products = 0
         """Products with the tangent so far, for benchmarks."""
         self._history: tuple[ContactHistory, ...] = ()
-        self._pressure: list[torch.Tensor] = []
 
     def advance(self, reached: Configuration, along: ConditionsChange) -> None:
         """Take the derivatives on to the next equilibrium; the first call: the touch.
@@ -108,28 +144,28 @@ class PathDerivatives:
         Raises:
             SolveError: If a linear solve does not converge.
         """
-        at = reached.repeat(along.pose.place.shape[1])
-        at.friction_tangent = torch.ones_like(at.friction_tangent)
+        newton, count = self._newton, along.pose.place.shape[1]
+        one = replace(reached, friction_tangent=torch.ones_like(reached.friction_tangent))
+        contacts = newton.residual(one).contacts
         still = replace(along, pose=along.pose.zeros())
-        directions = (along, *[still] * (len(self._newton.surfaces) - 1))
-        point = _Point(self._newton.surfaces, at, self._newton.residual(at), directions)
+        directions = (along, *[still] * (len(newton.surfaces) - 1))
+        now = tuple(contact.repeat(count) for contact in contacts)
+        modulus = float(one.conditions.modulus[0])
+        point = _Point(newton.surfaces, one.repeat(count), now, directions, modulus)
+        pressures = [torch.zeros_like(contact.pressure) for contact in now]
         if not self._history:
-            self.du = torch.zeros_like(at.u)
-            self._history = tuple(history.zeros() for history in at.histories)
+            self.du = torch.zeros_like(point.at.u)
+            self._history = tuple(history.zeros() for history in point.at.histories)
         else:
-            self._solve(point, self._augmented(reached), self._held(point))
-        self.changes = point.changes(self.du, self._history)
-        self._pressure = [contact.pressure[..., 0].clone() for contact in point.now.contacts]
+            turns = [pose.turn for pose in one.poses]
+            preconditioner = StatePreconditioner(
+                newton.preconditioner.rest, newton.surfaces, contacts, one.conditions.friction, turns
+            )
+            pressures = self._solve(point, preconditioner, self._held(point))
+        self.changes = point.changes(self.du, pressures, self._history)
         self._history = tuple(
-            change.accepted(contact.pressure <= 0, own.pose.place.clone())
-            for change, contact, own in zip(self.changes, point.now.contacts, point.along, strict=True)
-        )
-
-    def _augmented(self, reached: Configuration) -> bool:
-        """Return whether multipliers were augmented at this very state, so that they follow its own pressure."""
-        return any(
-            bool((history.multiplier[..., 0] != pressure).any())
-            for history, pressure in zip(reached.histories, self._pressure, strict=True)
+            change.accepted(contact.pressure > 0, own.pose.place.clone())
+            for change, contact, own in zip(self.changes, now, point.along, strict=True)
         )
 
     def _held(self, point: _Point) -> torch.Tensor:
@@ -141,51 +177,48 @@ class PathDerivatives:
         self._newton.add_contact_forces(point.at, external)
         return self._slack((internal - external) * (1 - self._free))
 
-    def _solve(self, point: _Point, augmented: bool, held: torch.Tensor) -> None:
-        """Find du; at held nodes it is ``held``."""
-        body, free = self._newton.body, self._free
-        at = point.at
-        contacts = [contact.tangent for contact in point.now.contacts]
-        self._newton.preconditioner.update(contacts, at.conditions.modulus)
-        internal = self._internal(point)
+    def _solve(self, point: _Point, preconditioner: StatePreconditioner, held: torch.Tensor) -> list[torch.Tensor]:
+        """Find du, at held nodes ``held``, and return the changes of the pressures."""
+        body, free, at = self._newton.body, self._free, point.at
         known: dict[tuple[int, torch.dtype], tuple[torch.Tensor, Conditions, torch.Tensor | None]] = {}
 
-        def product(p: torch.Tensor) -> torch.Tensor:
-            key = p.shape[2], p.dtype
+        def product(field: torch.Tensor) -> torch.Tensor:
+            du, pressures = point.parted(field)
+            key = field.shape[2], field.dtype
             if key not in known:
                 u, own = at.u[:, :, : key[0]].to(key[1]).contiguous(), at.conditions.to(key[1])
                 known[key] = u, own, body.dilatation(u, own)
             u, own, dilatation = known[key]
-            result = torch.zeros_like(p)
-            body.tangent_product(u, p, own, result, dilatation)
-            return (result - point.contact_product(p.to(torch.float64))) * free
+            internal = torch.zeros_like(u)
+            body.tangent_product(u, du.to(key[1]), own, internal, dilatation)
+            changes = point.product(du, pressures)
+            return point.residual((internal - _force(changes)) * free, changes)
 
-        space = KrylovSpace(product, self._newton.preconditioner.apply)
-        for _ in range(_AUGMENTATIONS if augmented else 1):
-            still = point.changes(torch.zeros_like(at.u), self._history)
-            rhs = (torch.stack([change.force for change in still]).sum(dim=0) - internal) * free
-            if self._slack:
-                rhs -= product(held)
-            found = space.solve(rhs, self.du * free, self._tolerance)
-            self.du, self.products = found.x + held, self.products + found.products
-            self.error = max(self.error, float(found.error.max()))
-            if not self.error <= self._tolerance:
-                raise SolveError(
-                    f"{self._label}: derivatives with an error of {self.error:.1e} after {found.products} "
-                    "products",
-                    f"at most {self._tolerance:g}", "press less deep, or refine the mesh",
-                )
-            if augmented and self._follow(point.changes(self.du, self._history)):
-                break
+        def precondition(field: torch.Tensor) -> torch.Tensor:
+            force, gaps = point.halves(field)
+            z, normal = preconditioner.apply(force, gaps / point.modulus)
+            return torch.cat([z, normal / point.modulus])[:, None]
 
-    def _follow(self, changes: list[ContactChange]) -> bool:
-        """Let multipliers change as the pressures do (Uzawa's step); return whether they did so already."""
-        moved = [change.pressure - history.multiplier for change, history in zip(changes, self._history, strict=True)]
-        for history, change in zip(self._history, changes, strict=True):
-            history.multiplier.copy_(change.pressure)
-        # Each direction by itself: a pressure over a degree says nothing of one over a millimetre.
-        size, move = (_largest(values) for values in ([change.pressure for change in changes], moved))
-        return bool((move <= _FOLLOWED * size).all())
+        none = [torch.zeros_like(contact.pressure) for contact in point.now]
+        still = point.changes(torch.zeros_like(at.u), none, self._history)
+        rhs = -point.residual((self._internal(point) - _force(still)) * free, still)
+        if self._slack:
+            rhs -= product(point.joined(held, none))
+        before = [
+            torch.where(own.tangent.active, change.pressure, 0.0)
+            for own, change in zip(point.now, self.changes, strict=True)
+        ]
+        guess = point.joined(self.du * free, before)
+        found = KrylovSpace(product, precondition).solve(rhs, guess, self._tolerance)
+        du, pressures = point.parted(found.x)
+        self.du, self.products = du + held, self.products + found.products
+        self.error = max(self.error, float(found.error.max()))
+        if not self.error <= self._tolerance:
+            raise SolveError(
+                f"{self._label}: derivatives with an error of {self.error:.1e} after {found.products} products",
+                f"at most {self._tolerance:g}", "press less deep, or refine the mesh",
+            )
+        return pressures
 
     def _internal(self, point: _Point) -> torch.Tensor:
         """Return the change of internal forces [N] with law and thickness at fixed displacements, shape (n, 3, p)."""
@@ -204,6 +237,6 @@ class PathDerivatives:
         return torch.where(moves, (upper - lower) / (2 * torch.where(moves, step, 1.0)), 0.0)
 
 
-def _largest(values: list[torch.Tensor]) -> torch.Tensor:
-    """Return the largest magnitude of each direction, shape (p,)."""
-    return torch.stack([v.abs().reshape(-1, v.shape[-1]).amax(dim=0) for v in values]).amax(dim=0)
+def _force(changes: Sequence[ContactChange]) -> torch.Tensor:
+    """Return the change of all contacts' forces [N], shape (n, 3, c)."""
+    return torch.stack([change.force for change in changes]).sum(dim=0)

@@ -47,7 +47,7 @@ class Sensitivity:
     taxel_area: np.ndarray
     """Of each protrusion's contact area [mm^2/unit], shape (p, taxels), to some tens of per cent.
 
-    By Hertz's A ~ (F (1 - nu^2) / E)^(2/3): the area itself is counted in quadrature points and has no derivative."""
+    By Hertz's A ~ (F (1 - nu^2) / E)^(2/3): the area itself is counted in whole hats and has no derivative."""
     error: float
     """Largest error of the linear solves up to here, over what they found [1]."""
 
