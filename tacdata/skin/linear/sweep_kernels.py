@@ -13,20 +13,9 @@ from tacdata.skin.member.warp_arrays import REAL
 
 
 @cache
-def sweep_kernels(kept: torch.dtype, other: torch.dtype) -> SimpleNamespace:
-    """Compile the kernels for matrices of one precision that are read from or written to such of another."""
-    real, real_other = REAL[kept], REAL[other]
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def widen(given: wp.array3d(dtype=real_other), rows: int, a: wp.array3d(dtype=real)):
-        """A = given, bordered by a unit matrix."""
-        b, i, j = wp.tid()
-        value = real(0.0)
-        if i < rows and j < rows:
-            value = real(given[b, i, j])
-        elif i == j:
-            value = real(1.0)
-        a[b, i, j] = value
+def sweep_kernels(dtype: torch.dtype) -> SimpleNamespace:
+    """Compile the kernels for matrices of one precision."""
+    real = REAL[dtype]
 
     @wp.kernel(module="unique", enable_backward=False)
     def take(
@@ -57,22 +46,9 @@ def sweep_kernels(kept: torch.dtype, other: torch.dtype) -> SimpleNamespace:
             a[b, i, start + c] = swept[b, i, c]
 
     @wp.kernel(module="unique", enable_backward=False)
-    def unfold(a: wp.array3d(dtype=real), row: wp.array(dtype=wp.int64), whole: wp.array3d(dtype=real_other)):
+    def unfold(a: wp.array3d(dtype=real), row: wp.array(dtype=wp.int64), whole: wp.array3d(dtype=real)):
         """Write the inverses, of which the negative lower triangle is known, as rows of ``whole``."""
         b, i, j = wp.tid()
-        whole[wp.int32(row[b]), i, j] = real_other(-a[b, wp.max(i, j), wp.min(i, j)])
+        whole[wp.int32(row[b]), i, j] = -a[b, wp.max(i, j), wp.min(i, j)]
 
-    @wp.kernel(module="unique", enable_backward=False)
-    def unfold_onto(
-        a: wp.array3d(dtype=real), plus: wp.array3d(dtype=real_other), rows: int, total: wp.array3d(dtype=real)
-    ):
-        """Total = the inverses + plus, bordered by a unit matrix."""
-        b, i, j = wp.tid()
-        value = real(0.0)
-        if i < rows and j < rows:
-            value = real(plus[b, i, j]) - a[b, wp.max(i, j), wp.min(i, j)]
-        elif i == j:
-            value = real(1.0)
-        total[b, i, j] = value
-
-    return SimpleNamespace(widen=widen, take=take, put=put, unfold=unfold, unfold_onto=unfold_onto)
+    return SimpleNamespace(take=take, put=put, unfold=unfold)
