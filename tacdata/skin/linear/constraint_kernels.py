@@ -13,6 +13,9 @@ SOFT = wp.constant(wp.float32(1.0e3))
 """Compliance of a slipping node, over the body's at the same node, up to which friction enters [1]: beyond, it is
 nothing."""
 
+PIVOT = wp.constant(128)
+"""Rows of a block."""
+
 _LEAST = wp.constant(wp.float32(1.0e-30))
 
 
@@ -104,7 +107,10 @@ def assemble(
     member: wp.array(dtype=wp.int64), rows: RowData, scale: wp.array(dtype=wp.float32),
     table: wp.array2d(dtype=wp.float32), compliance: wp.array3d(dtype=wp.float32),
 ):
-    """Compliance of the constraints of some members, its lower triangle, bordered by a unit matrix."""
+    """Compliance of the constraints of some members, its lower triangle, bordered by a unit matrix.
+
+    The blocks on the diagonal, on which the inverse pivots, are written whole.
+    """
     g, i, j = wp.tid()
     if j > i:
         return
@@ -121,6 +127,8 @@ def assemble(
     elif i == j:
         value = wp.float32(1.0)
     compliance[g, i, j] = value
+    if i / PIVOT == j / PIVOT:
+        compliance[g, j, i] = value
 
 
 @wp.kernel(enable_backward=False)

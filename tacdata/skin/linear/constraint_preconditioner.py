@@ -53,11 +53,8 @@ class ConstraintPreconditioner:
             modulus: Young's modulus of each member [MPa], shape (b,).
         """
         self.scale = (self._modulus / modulus).to(torch.float32)
-        table = self.rows.update(contacts, self.scale)
-        self.solver.update(
-            self.rows.sizes, self.rows.most, lambda member, room: self.rows.compliance(member, self.scale, table, room),
-            modulus.device,
-        )
+        changed = self.rows.update(contacts, self.scale)
+        self.solver.update(self.rows.sizes, changed, self.rows.most, self.rows.compliance, modulus.device)
 
     def apply(
         self, residual: torch.Tensor, gaps: Sequence[torch.Tensor] | None = None, member: torch.Tensor | None = None

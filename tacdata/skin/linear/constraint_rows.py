@@ -19,6 +19,46 @@ from tacdata.skin.linear.rest_stiffness import RestSolver
 from tacdata.skin.member.warp_arrays import argument, filled
 
 
+_TURNED, _SOFTENED = 0.02, 0.3
+"""Change of a direction [1], and of what it gives way by over itself [1], up to which members keep the constraints that
+they had: their compliance is known. It is the lag of one Newton step, and small beside what the steps leave."""
+
+
+class _Rows:
+    """Room for constraints of members; zeros beyond a member's own."""
+
+    def __init__(self, members: int, most: int, device: torch.device | str) -> None:
+        self.first = torch.zeros(members, most, dtype=torch.int32, device=device)
+        """First mortar row of each constraint, shape (b, a)."""
+        self.direction = torch.zeros(members, most, 3, device=device)
+        """What it takes of this and the two that follow [1], shape (b, a, 3)."""
+        self.give = torch.zeros(members, most, 2, device=device)
+        """By how much it gives way, alone, and with the one before [mm/N], shape (b, a, 2)."""
+        self.own = torch.zeros(members, dtype=torch.int32, device=device)
+        """Number of constraints, shape (b,)."""
+        self.scale = torch.zeros(members, device=device)
+        """Nominal modulus over the member's, shape (b,)."""
+        self.data = filled(
+            kernels.RowData, first=self.first, direction=self.direction, give=self.give, own=self.own
+        )
+        """The same, as kernels take it."""
+
+    def differ(self, new: _Rows) -> torch.Tensor:
+        """Return which of the first members have other constraints in ``new``, shape (b,), bool."""
+        count = len(new.own)
+        turned = (self.direction[:count] - new.direction).abs().amax(dim=(1, 2)) > _TURNED
+        give = self.give[:count]
+        limit = _SOFTENED * torch.maximum(give[:, :, :1], new.give[:, :, :1])
+        softened = ((give - new.give).abs() > limit).any(dim=2).any(dim=1)
+        others = (self.first[:count] != new.first).any(dim=1) | (self.own[:count] != new.own)
+        return turned | softened | others | (self.scale[:count] != new.scale)
+
+    def put(self, which: torch.Tensor, new: _Rows) -> None:
+        """Replace members, by index, by those of ``new``."""
+        for name in ("first", "direction", "give", "own", "scale"):
+            getattr(self, name).index_copy_(0, which, getattr(new, name)[which])
+
+
 class ActiveRows:
     """Normal directions, and with friction two tangents, of each member's active nodes; a constraint each."""
 
@@ -31,32 +71,28 @@ class ActiveRows:
             base += surface.count * (1 if surface.flat else 3)
         self.count = base
         """Number of mortar rows."""
-        self._room(0, 0, "cpu")
+        self._held, self._table = _Rows(0, 0, "cpu"), torch.empty(0)
         self.sizes: list[int] = []
         """Number of constraints of each member."""
         self._slots: list[torch.Tensor] = []
         self._active: list[torch.Tensor] = []
 
-    def _room(self, members: int, most: int, device: torch.device | str) -> None:
-        self.first = torch.zeros(members, most, dtype=torch.int32, device=device)
-        """First mortar row of each constraint, shape (b, a)."""
-        self.direction = torch.zeros(members, most, 3, device=device)
-        """What it takes of this and the two that follow [1], shape (b, a, 3)."""
-        self.give = torch.zeros(members, most, 2, device=device)
-        """By how much it gives way, alone, and with the one before [mm/N], shape (b, a, 2)."""
-        self.own = torch.zeros(members, dtype=torch.int32, device=device)
-        """Number of constraints, shape (b,)."""
-        self.data = filled(
-            kernels.RowData, first=self.first, direction=self.direction, give=self.give, own=self.own
-        )
-        """The same, as kernels take it."""
-
     @property
     def most(self) -> int:
         """Room for so many constraints of a member."""
-        return self.first.shape[1]
+        return self._held.first.shape[1]
 
-    def update(self, contacts: Sequence[ContactTangent], scale: torch.Tensor) -> torch.Tensor:
+    @property
+    def data(self) -> Any:
+        """The constraints as kernels take them."""
+        return self._held.data
+
+    @property
+    def place(self) -> tuple[int, ...]:
+        """Where they are: the same while the tensors stay."""
+        return self._held.first.data_ptr(), *self._held.first.shape
+
+    def update(self, contacts: Sequence[ContactTangent], scale: torch.Tensor) -> list[int]:
         """Describe the constraints of the present active nodes.
 
         Args:
@@ -64,27 +100,35 @@ class ActiveRows:
             scale: Nominal modulus over each member's [1], shape (b,), float32.
 
         Returns:
-            M K0^-1 M^T [mm/N], in which the rows of these constraints are known.
+            Members whose constraints are others than before.
         """
         self._active, self._slots, count = [contact.active for contact in contacts], [], torch.zeros_like(scale).long()
         for surface, active in zip(self._surfaces, self._active, strict=True):
             directions = _directions(surface)
-            place = active.cumsum(dim=0)
+            # Sums along rows of memory: across them they take ten times as long on a GPU.
+            place = active.T.contiguous().cumsum(dim=1).T
             self._slots.append(count + directions * (place - 1))
             count = count + directions * place[-1]
         self.sizes = count.tolist()
         most = -(-max(self.sizes) // self._step) * self._step
-        if len(scale) != len(self.own) or most > self.most or self.own.device != scale.device:
-            self._room(len(scale), max(most, self.most), scale.device)
-        self.own.copy_(count)
-        table = self._rest.table(self._used())
+        held, device = self._held, scale.device
+        if len(scale) > len(held.own) or most > self.most or held.own.device != device:
+            self._held = held = _Rows(max(len(scale), len(held.own)), max(most, self.most), device)
+        self._table = self._rest.table(self._used())
+        new = _Rows(len(scale), self.most, device)
+        new.own.copy_(count)
+        new.scale.copy_(scale)
         for surface, contact, base, slot in zip(self._surfaces, contacts, self._base, self._slots, strict=True):
             flags = int(surface.flat), int(_directions(surface) == 3), base
             self.launch(
                 kernels.describe, tuple(slot.shape), contact.active, slot, contact.normal, contact.friction, *flags,
-                scale, table, self.data,
+                scale, self._table, new.data,
             )
-        return table
+        if not self.most:
+            return []
+        which = held.differ(new).nonzero()[:, 0]
+        held.put(which, new)
+        return which.tolist()
 
     def _used(self) -> torch.Tensor:
         """Return which mortar rows some member's constraints join, shape (m,), bool."""
@@ -94,20 +138,19 @@ class ActiveRows:
         ]
         return torch.cat(parts)
 
-    def compliance(self, member: torch.Tensor, scale: torch.Tensor, table: torch.Tensor, room: torch.Tensor) -> None:
+    def compliance(self, member: torch.Tensor, room: torch.Tensor) -> None:
         """Write the compliance of the constraints of some members [mm/N], its lower triangle.
 
         Args:
             member: Indices, shape (g,), int64.
-            scale: As `update` takes it.
-            table: As `update` returned it.
             room: Receives them, bordered by a unit matrix, shape (g, a, a), float32.
         """
-        self.launch(kernels.assemble, tuple(room.shape), member, self.data, scale, table, room)
+        held = self._held
+        self.launch(kernels.assemble, tuple(room.shape), member, held.data, held.scale, self._table, room)
 
     def wanted(self, gaps: Sequence[torch.Tensor]) -> torch.Tensor:
         """Return changes of mean gaps [mm], by contact, shape (s, b), as values of the constraints, shape (b, a)."""
-        values = torch.zeros(self.most + 1, len(self.own), device=self.own.device)
+        values = torch.zeros(self.most + 1, len(self.sizes), device=self._held.own.device)
         for active, slot, gap in zip(self._active, self._slots, gaps, strict=True):
             values.scatter_(0, torch.where(active, slot, self.most), gap.to(torch.float32))
         return values[:-1].T.contiguous()
@@ -123,7 +166,7 @@ class ActiveRows:
 
     def launch(self, kernel: Any, dim: tuple[int, ...], *values: object) -> None:
         """Run a kernel of `constraint_kernels`."""
-        wp.launch(kernel, dim=dim, inputs=[*map(argument, values)], device=str(self.own.device))
+        wp.launch(kernel, dim=dim, inputs=[*map(argument, values)], device=str(self._held.own.device))
 
 
 def _directions(surface: ContactSurface) -> int:

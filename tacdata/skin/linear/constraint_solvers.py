@@ -6,8 +6,10 @@ Each member's matrix has the size of its own constraints.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache, partial
 
 import torch
+import warp as wp
 
 from tacdata.skin.linear.batched_inverse import ROWS, inverse_of
 
@@ -28,20 +30,24 @@ class FactoredCompliance:
         """Hold nothing."""
         self._factor: list[torch.Tensor] = []
 
-    def update(self, sizes: Sequence[int], most: int, assemble: Assemble, device: torch.device) -> None:
+    def update(
+        self, sizes: Sequence[int], changed: Sequence[int], most: int, assemble: Assemble, device: torch.device
+    ) -> None:
         """Factorize.
 
         Args:
             sizes: Constraints of each member.
+            changed: Members whose matrices are others than before.
             most: Constraints for which `times` has columns.
             assemble: Writes the matrices.
             device: Where.
         """
-        self._factor = []
-        for member, size in enumerate(sizes):
-            room = torch.empty(1, size, size, device=device)
+        empty = torch.empty(0, 0, device=device)
+        self._factor += [empty] * (len(sizes) - len(self._factor))
+        for member in changed:
+            room = torch.empty(1, sizes[member], sizes[member], device=device)
             assemble(torch.tensor([member], device=device), room)
-            self._factor.append(torch.linalg.cholesky(room[0].double()).float())
+            self._factor[member] = torch.linalg.cholesky(room[0].double()).float()
 
     def times(self, v: torch.Tensor, member: torch.Tensor) -> torch.Tensor:
         """Return S^-1 v of members, by index; v of shape (b, a), zero beyond their own constraints."""
@@ -65,24 +71,58 @@ class InvertedCompliance:
         """S^-1 of each member [N/mm], shape (b, a, a); beyond its own constraints anything finite."""
         self._sizes = torch.empty(0)
 
-    def update(self, sizes: Sequence[int], most: int, assemble: Assemble, device: torch.device) -> None:
+    def update(
+        self, sizes: Sequence[int], changed: Sequence[int], most: int, assemble: Assemble, device: torch.device
+    ) -> None:
         """Invert; arguments as of `FactoredCompliance.update`."""
         self._sizes = torch.tensor(sizes, device=device)
-        if self.inverse.shape != (len(sizes), most, most):
-            self.inverse = torch.zeros(len(sizes), most, most, device=device)
+        if len(sizes) > len(self.inverse) or most != self.inverse.shape[1]:
+            self.inverse = torch.zeros(max(len(sizes), len(self.inverse)), most, most, device=device)
         by_size: dict[int, list[int]] = {}
-        for member, size in enumerate(sizes):
-            if size:
-                by_size.setdefault(-(-size // ROWS) * ROWS, []).append(member)
-        for size, members in by_size.items():
-            together = max(1, _ROOM // size**2)
-            for start in range(0, len(members), together):
-                member = torch.tensor(members[start : start + together], device=device)
-                room = torch.empty(len(member), size, size, device=device)
-                assemble(member, room)
-                inverse_of(room, member, self.inverse)
+        for member in changed:
+            if sizes[member]:
+                by_size.setdefault(-(-sizes[member] // ROWS) * ROWS, []).append(member)
+        parts = [
+            (size, torch.tensor(members[start : start + max(1, _ROOM // size**2)], device=device))
+            for size, members in sorted(by_size.items(), reverse=True)
+            for start in range(0, len(members), max(1, _ROOM // size**2))
+        ]
+
+        def invert(size: int, member: torch.Tensor) -> None:
+            room = torch.empty(len(member), size, size, device=device)
+            assemble(member, room)
+            inverse_of(room, member, self.inverse)
+
+        side_by_side([partial(invert, *part) for part in parts], device)
 
     def times(self, v: torch.Tensor, member: torch.Tensor) -> torch.Tensor:
         """Return S^-1 v, as `FactoredCompliance.times`."""
         y = torch.bmm(self.inverse[member], v[:, :, None])[:, :, 0]
         return torch.where(torch.arange(v.shape[1], device=v.device) < self._sizes[member, None], y, 0.0)
+
+
+_STREAMS = 4
+"""Sizes that are worked on at a time: each is a chain of short kernels that leave most of a GPU idle."""
+
+
+def side_by_side(tasks: Sequence[Callable[[], None]], device: torch.device) -> None:
+    """Run tasks that do not need each other, on a GPU each on one of a few streams."""
+    if device.type == "cpu" or len(tasks) < 2:
+        for task in tasks:
+            task()
+        return
+    here = torch.cuda.current_stream(device)
+    streams = _streams(str(device))
+    for stream in streams:
+        stream.wait_stream(here)
+    for number, task in enumerate(tasks):
+        stream = streams[number % _STREAMS]
+        with torch.cuda.stream(stream), wp.ScopedStream(wp.stream_from_torch(stream), sync_enter=False):
+            task()
+    for stream in streams:
+        here.wait_stream(stream)
+
+
+@cache
+def _streams(device: str) -> list[torch.cuda.Stream]:
+    return [torch.cuda.Stream(device) for _ in range(_STREAMS)]

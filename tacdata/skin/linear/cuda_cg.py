@@ -65,7 +65,7 @@ class CudaConjugateGradients:
         """
         answer = torch.zeros(r.shape[0] * 3, r.shape[2], device=r.device)
         forces = torch.zeros(r.shape[2], self._preconditioner.rows.most, device=r.device)
-        self._step = _COLUMNS * -(-len(wanted) // (_COLUMNS * _WIDTHS))
+        self._step = max(self._step, _COLUMNS * -(-len(wanted) // (_COLUMNS * _WIDTHS)))
         count, iteration = int(wanted.sum()), 0
         if not count:
             return answer.view_as(r), forces, 0
@@ -95,22 +95,20 @@ class CudaConjugateGradients:
                 self._columns_of[width] = ActiveColumns(at, width, self._preconditioner, self._rest.padded)
         now = self._columns_of[len(member)]
         now.begin(at, member, wanted, r, tolerance)
-        self._scale(now)
+        self._scale(now, now.r)
         self._hold(now, self._preconditioner.rows.wanted(gaps)[member])
         # What the constraints answer may be any multiple of the right-hand side.
-        self._scale(now)
-        w = self._rest.times(now.h)
-        self._turn(now, w)
+        self._scale(now, now.r - self._rest.spread(now.soft) if self._tangent.surfaces[0].rough else now.r)
+        self._turn(now, self._rest.times(now.h))
         return now
 
-    def _scale(self, now: ActiveColumns) -> None:
+    def _scale(self, now: ActiveColumns, left: torch.Tensor) -> None:
+        """Find by what residuals are multiplied for half precision, and round those that are left."""
         rest = self._rest
-        left = now.r
-        if now.soft.shape[0]:
-            left = now.r - self._rest.spread(now.soft)
-        largest = (left[rest.order] * rest.scale[:, None]).abs().amax(dim=0)
-        now.size.copy_(_ROOM / largest.clamp_min(1e-30))
-        now.factor.copy_(now.softness / now.size)
+        now.size.zero_()
+        self._sum(kernels.reach, now, left, rest.order, rest.scale, now.size)
+        now.size.copy_(_ROOM / now.size.clamp_min(1e-30))
+        torch.div(now.softness, now.size, out=now.factor)
         self._launch(kernels.load, (len(rest.order), now.width), left, rest.order, rest.scale, now.size, now.h)
 
     def _iterate(self, now: ActiveColumns) -> None:
@@ -155,7 +153,7 @@ class CudaConjugateGradients:
 
     def _turn(self, now: ActiveColumns, w: torch.Tensor) -> None:
         rest = self._rest
-        self._launch(kernels.turn, tuple(w.shape), w, rest.order, rest.scale, now.factor, now.beta, now.p)
+        self._launch(kernels.turn, (len(w), now.width), w, rest.order, rest.scale, now.factor, now.beta, now.p)
 
     def _sum(self, kernel: Any, now: ActiveColumns, *inputs: torch.Tensor) -> None:
         rows = len(self._rest.order)

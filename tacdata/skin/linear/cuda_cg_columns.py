@@ -15,6 +15,8 @@ from tacdata.skin.linear.constraint_preconditioner import ConstraintPrecondition
 from tacdata.skin.linear.tangent import Linearization
 
 _FIELDS = ("x", "r", "p")
+_ALIGNED = 8
+"""Columns are padded to a multiple of this, as libraries multiply others at a fraction of the rate."""
 _VALUES = ("member", "row", "softness", "size", "factor", "rho", "goal", "going", "first")
 
 
@@ -43,8 +45,8 @@ class ActiveColumns:
         """Solution, residual and direction, shape (3n, b)."""
         self.q = zeros(nodes, 3)
         """The tangent times the direction, shape (n, 3, b)."""
-        self.h = zeros(padded, dtype=torch.float16)
-        """The residual, scaled, on the rows of the inverse."""
+        self.h = torch.zeros(padded, -(-width // _ALIGNED) * _ALIGNED, dtype=torch.float16, device=device)
+        """The residual, scaled, on the rows of the inverse; columns beyond b are zero."""
         self.hard, self.soft = (zeros(preconditioner.rows.count) for _ in range(2))
         """Forces of hard and of soft constraints on the mortar rows, shape (m, b)."""
         self.member, self.row = zeros(dtype=torch.int64), zeros(dtype=torch.int32)
@@ -92,7 +94,7 @@ class ActiveColumns:
     def _bind(self) -> None:
         """Make room for the constraints there are; what was recorded for another room is of no use."""
         rows, inverse = self._preconditioner.rows, self._preconditioner.solver.inverse
-        place = rows.first.data_ptr(), inverse.data_ptr(), *inverse.shape
+        place = *rows.place, inverse.data_ptr()
         if place != self._place:
             self.v, self.y, self.total = (torch.zeros(self.width, rows.most, device=self.x.device) for _ in range(3))
             self._place, self._seen, self._graph = place, 0, None

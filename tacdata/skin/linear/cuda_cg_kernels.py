@@ -33,6 +33,19 @@ def load(
 
 
 @wp.kernel(enable_backward=False)
+def reach(
+    r: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32),
+    largest: wp.array(dtype=wp.float32),
+):
+    """Largest = the largest magnitude of the residual, scaled."""
+    strip, b = wp.tid()
+    most = wp.float32(0.0)
+    for k in range(strip * STRIP, wp.min((strip + 1) * STRIP, order.shape[0])):
+        most = wp.max(most, wp.abs(r[order[k], b] * scale[k]))
+    wp.atomic_max(largest, b, most)
+
+
+@wp.kernel(enable_backward=False)
 def spread(
     start: wp.array(dtype=wp.int32), column: wp.array(dtype=wp.int32), value: wp.array(dtype=wp.float32),
     row: wp.array(dtype=wp.int32), hard: wp.array2d(dtype=wp.float32), soft: wp.array2d(dtype=wp.float32),
