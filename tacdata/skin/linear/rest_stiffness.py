@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from typing import Protocol
 
@@ -116,7 +117,11 @@ class _MortarRows:
 def _sparse(matrix: sp.csr_matrix, device: str) -> torch.Tensor:
     indices = (torch.as_tensor(values.astype(np.int64)) for values in (matrix.indptr, matrix.indices))
     values = torch.as_tensor(matrix.data.astype(np.float32))
-    return torch.sparse_csr_tensor(*indices, values, size=matrix.shape, dtype=torch.float32).to(device)
+    with warnings.catch_warnings():
+        # PyTorch calls compressed rows a beta, and warns that it trusts them; their products are all that is used.
+        warnings.simplefilter("ignore", UserWarning)
+        made = torch.sparse_csr_tensor(*indices, values, size=matrix.shape)
+    return made.to(device)
 
 
 class SparseRest:
