@@ -87,7 +87,7 @@ def test_compliance_is_what_a_unit_force_moves(body, rest):
 
 
 def test_compliance_asked_for_in_parts_is_that_of_the_whole(body):
-    """Rows are made when first wanted: whatever the order, they are the same to rounding, and the table is symmetric."""
+    """Rows are made when first wanted: in any order they are the same to rounding, and the table is symmetric."""
     m = body.rows.shape[0]
     first, second = (rest_solver(body.mesh, MATERIAL, body.mesh.bottom, body.rows, "cpu") for _ in range(2))
     half = torch.arange(m) < m // 2

@@ -9,8 +9,7 @@ from __future__ import annotations
 import torch
 import warp as wp
 
-from tacdata.skin.linear.pivot_kernel import ROWS, invert_in_place
-from tacdata.skin.linear.sweep_kernels import sweep_kernels
+from tacdata.skin.linear.sweep_kernels import ROWS, invert_in_place, sweep_kernels
 from tacdata.skin.member.warp_arrays import argument
 
 _STRIP = 256

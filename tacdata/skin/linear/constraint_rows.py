@@ -18,7 +18,6 @@ from tacdata.skin.linear import constraint_kernels as kernels
 from tacdata.skin.linear.rest_stiffness import RestSolver
 from tacdata.skin.member.warp_arrays import argument, filled
 
-
 _TURNED, _SOFTENED = 0.02, 0.3
 """Change of a direction [1], and of what it gives way by over itself [1], up to which members keep the constraints that
 they had: their compliance is known. It is the lag of one Newton step, and small beside what the steps leave."""

@@ -26,6 +26,9 @@ class FactoredCompliance:
     STEP = 1
     """Sizes that are worth being told apart."""
 
+    place = ()
+    """Nothing that stays where it is."""
+
     def __init__(self) -> None:
         """Hold nothing."""
         self._factor: list[torch.Tensor] = []
@@ -63,13 +66,18 @@ class FactoredCompliance:
 class InvertedCompliance:
     """Inverses, for many members at once; in a tensor that keeps its place while it is large enough."""
 
-    STEP = ROWS
+    STEP = 2 * ROWS
 
     def __init__(self) -> None:
         """Hold nothing."""
         self.inverse = torch.empty(0, 0, 0)
         """S^-1 of each member [N/mm], shape (b, a, a); beyond its own constraints anything finite."""
         self._sizes = torch.empty(0)
+
+    @property
+    def place(self) -> tuple[int, ...]:
+        """Where the inverses are: the same while the tensor stays."""
+        return (self.inverse.data_ptr(),)
 
     def update(
         self, sizes: Sequence[int], changed: Sequence[int], most: int, assemble: Assemble, device: torch.device
@@ -81,7 +89,7 @@ class InvertedCompliance:
         by_size: dict[int, list[int]] = {}
         for member in changed:
             if sizes[member]:
-                by_size.setdefault(-(-sizes[member] // ROWS) * ROWS, []).append(member)
+                by_size.setdefault(-(-sizes[member] // self.STEP) * self.STEP, []).append(member)
         parts = [
             (size, torch.tensor(members[start : start + max(1, _ROOM // size**2)], device=device))
             for size, members in sorted(by_size.items(), reverse=True)

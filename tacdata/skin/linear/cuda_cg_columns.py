@@ -93,8 +93,8 @@ class ActiveColumns:
 
     def _bind(self) -> None:
         """Make room for the constraints there are; what was recorded for another room is of no use."""
-        rows, inverse = self._preconditioner.rows, self._preconditioner.solver.inverse
-        place = *rows.place, inverse.data_ptr()
+        rows = self._preconditioner.rows
+        place = *rows.place, *self._preconditioner.solver.place
         if place != self._place:
             self.v, self.y, self.total = (torch.zeros(self.width, rows.most, device=self.x.device) for _ in range(3))
             self._place, self._seen, self._graph = place, 0, None

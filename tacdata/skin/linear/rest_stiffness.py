@@ -115,12 +115,12 @@ class _MortarRows:
 
 
 def _sparse(matrix: sp.csr_matrix, device: str) -> torch.Tensor:
-    indices = (torch.as_tensor(values.astype(np.int64)) for values in (matrix.indptr, matrix.indices))
+    starts, columns = (torch.as_tensor(values.astype(np.int64)) for values in (matrix.indptr, matrix.indices))
     values = torch.as_tensor(matrix.data.astype(np.float32))
     with warnings.catch_warnings():
         # PyTorch calls compressed rows a beta, and warns that it trusts them; their products are all that is used.
         warnings.simplefilter("ignore", UserWarning)
-        made = torch.sparse_csr_tensor(*indices, values, size=matrix.shape)
+        made = torch.sparse_csr_tensor(starts, columns, values, size=matrix.shape)
     return made.to(device)
 
 
