@@ -160,7 +160,7 @@ def test_inverses_are_those_of_the_cpu_whatever_runs_beside_them():
 
     solver = InvertedCompliance()
     for _ in range(3):
-        solver.update(sizes, range(len(sizes)), 640, assemble, torch.device(GPU))
+        solver.update(sizes, range(len(sizes)), 768, assemble, torch.device(GPU))
         for number, (size, matrix) in enumerate(zip(sizes, matrices, strict=True)):
             found = solver.inverse[number, :size, :size].double().cpu()
             assert (found @ matrix - torch.eye(size)).norm() < 1e-4 * max(size, 1)
