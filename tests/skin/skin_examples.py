@@ -4,11 +4,14 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import scipy.sparse as sp
 import torch
 import warp as wp
 
 from tacdata.sensor import Material, Sensor, default_sensor
 from tacdata.sensor.sensor import ContactProperties, DepthMap, Skin, Taxels
+from tacdata.skin.contact.contact_surface import SUBDIVISIONS, face_quadrature
+from tacdata.skin.contact.mortar import Mortar, hats
 from tacdata.skin.linear.rest_stiffness import rest_stiffness
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.mesh import elements
@@ -92,7 +95,7 @@ def joined(*members: Conditions) -> Conditions:
 
 
 class HeldSlab:
-    """A slab of 4 x 4 x 2 cells, bottom held, contact possible on its outer face, with its rest stiffness."""
+    """A slab of 4 x 4 x 2 cells, bottom held, contact possible on its outer face: rest stiffness and mortar rows."""
 
     def __init__(self) -> None:
         """Mesh and assemble."""
@@ -101,7 +104,11 @@ class HeldSlab:
         self.stiffness = rest_stiffness(self.mesh, MATERIAL)
         self.free = np.flatnonzero(~np.repeat(self.mesh.bottom, 3))
         self.held = np.setdiff1d(np.arange(3 * self.count), self.free)
-        self.loadable = (3 * np.unique(self.mesh.outer)[:, None] + np.arange(3)).ravel()
+        nodes, faces = torch.as_tensor(self.mesh.nodes), torch.as_tensor(self.mesh.outer)
+        weights, shapes = face_quadrature(nodes, faces, SUBDIVISIONS)
+        at_points = hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
+        mortar = Mortar(self.mesh.outer, weights.numpy(), shapes.numpy(), at_points, self.count, "cpu")
+        self.rows = sp.csr_matrix(sp.kron(mortar.mean, np.eye(3)))
 
     def random(self, *seeds: int) -> torch.Tensor:
         """Random fields (3n, b), zero where held, float32, one for each seed."""

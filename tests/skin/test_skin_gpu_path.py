@@ -1,21 +1,17 @@
-"""Whole presses on the CPU by a GPU's way: shrinking batches, dense shares, forces anew where something changed."""
+"""Whole presses on the CPU by a GPU's way: shrinking batches, a dense inverse in half precision."""
 
 import numpy as np
 import pytest
 from skin_examples import PLAIN, box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.linear import contact_preconditioner
-from tacdata.skin.linear.contact_transfer import DenseTransfer
-from tacdata.skin.linear.coupled_dofs import in_order
-from tacdata.skin.linear.cuda_cg import CudaConjugateGradients
+from tacdata.skin.linear import constraint_preconditioner
+from tacdata.skin.linear.constraint_solvers import InvertedCompliance
 from tacdata.skin.linear.rest_stiffness import DenseRest, rest_stiffness
 from tacdata.skin.mesh.build import MeshSettings, build_mesh
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve import meshed_skin
-from tacdata.skin.solve.meshed_skin import MeshedSkin
-from tacdata.skin.solve.newton import Newton
 
 
 @pytest.fixture
@@ -23,23 +19,13 @@ def as_on_a_gpu(monkeypatch):
     """Makes models take a GPU's way from now on."""
 
     def switch():
-        begin = Newton.__init__
-
-        def newton(self, body, surfaces, fixed, preconditioner, settings):
-            begin(self, body, surfaces, fixed, preconditioner, settings)
-            self._cuda = CudaConjugateGradients(self.tangent, preconditioner)
-
-        def rest(mesh, material, fixed, loadable, device, averaged):
+        def rest(mesh, material, fixed, rows, device, averaged):
             return DenseRest(
-                rest_stiffness(mesh, material, averaged), np.flatnonzero(~np.repeat(fixed, 3)), loadable, device
+                rest_stiffness(mesh, material, averaged), np.flatnonzero(~np.repeat(fixed, 3)), rows, device
             )
 
-        loadable = MeshedSkin.loadable.func
-        monkeypatch.setattr(MeshedSkin, "loadable", property(lambda own: in_order(loadable(own), own.mesh)))
-        monkeypatch.setattr(Newton, "__init__", newton)
         monkeypatch.setattr(meshed_skin, "rest_solver", rest)
-        monkeypatch.setattr(contact_preconditioner, "contact_transfer", lambda members, device: DenseTransfer(members))
-        monkeypatch.setitem(contact_preconditioner._WEAK, "cpu", contact_preconditioner._WEAK["cuda"])
+        monkeypatch.setattr(constraint_preconditioner, "compliance_solver", lambda device: InvertedCompliance())
 
     return switch
 

@@ -1,4 +1,4 @@
-"""The rest stiffness, its factor, and the compliance between degrees of freedom that contact may load."""
+"""The rest stiffness, its factor and dense inverse, and the compliance of the mortar rows."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def body():
 
 @pytest.fixture(scope="module")
 def rest(body):
-    return rest_solver(body.mesh, MATERIAL, body.mesh.bottom, body.loadable, "cpu")
+    return rest_solver(body.mesh, MATERIAL, body.mesh.bottom, body.rows, "cpu")
 
 
 def single(field):
@@ -61,57 +61,85 @@ def test_what_is_held_needs_no_zero_in_the_right_hand_side(body, rest):
     assert torch.equal(rest.apply(loaded), rest.apply(r))
 
 
-def test_the_loadable_part_is_that_of_the_whole(body, rest):
-    r = body.random(3, 4)
-    assert torch.equal(rest.loadable(r), rest.apply(r)[body.loadable])
+def test_rows_and_what_they_spread_do_the_same_work(body, rest):
+    z, f = body.random(3, 4), torch.as_tensor(np.random.default_rng(5).normal(size=(body.rows.shape[0], 2))).float()
+    assert torch.allclose(rest.rows(z), torch.as_tensor(body.rows @ z.double().numpy()).float(), atol=1e-5)
+    assert (rest.rows(z) * f).sum().item() == pytest.approx((z * rest.spread(f)).sum().item(), rel=1e-3)
 
 
-def test_compliance_is_what_a_unit_force_moves(body, rest):
-    m = len(body.loadable)
-    matrix = rest.compliance(torch.arange(m)[None])[0]
-    unit = torch.zeros(3 * body.count, 1)
-    unit[body.loadable[5]] = 1.0
-    moved = rest.apply(unit)[body.loadable, 0]
-    assert (matrix[5] - moved).norm() < 1e-5 * moved.norm()
+def everything(rest, body):
+    return rest.table(torch.ones(body.rows.shape[0], dtype=torch.bool))
+
+
+def check_compliance(rest, body, tolerance):
+    """What a unit force on a row moves, symmetric and positive."""
+    unit = torch.zeros(body.rows.shape[0], 1)
+    unit[5] = 1.0
+    moved = rest.rows(rest.apply(rest.spread(unit)))[:, 0]
+    matrix = everything(rest, body)
+    assert (matrix[5] - moved).norm() < tolerance * moved.norm()
     assert torch.equal(matrix, matrix.T)
     assert torch.linalg.eigvalsh(matrix.double()).min() > -1e-4
 
 
+def test_compliance_is_what_a_unit_force_moves(body, rest):
+    check_compliance(rest, body, 1e-5)
+
+
 def test_compliance_asked_for_in_parts_is_that_of_the_whole(body):
-    """Rows are made when first wanted: whatever the order, they are the same."""
-    m = len(body.loadable)
-    first, second = (rest_solver(body.mesh, MATERIAL, body.mesh.bottom, body.loadable, "cpu") for _ in range(2))
-    early = first.compliance(torch.arange(m)[None, : m // 2]).clone()
-    whole = first.compliance(torch.arange(m)[None])
-    assert torch.equal(early[0], whole[0, : m // 2, : m // 2])
-    assert (second.compliance(torch.arange(m)[None]) - whole).abs().max() < 1e-5 * whole.abs().max()
+    """Rows are made when first wanted: in any order they are the same to rounding, and the table is symmetric."""
+    m = body.rows.shape[0]
+    first, second = (rest_solver(body.mesh, MATERIAL, body.mesh.bottom, body.rows, "cpu") for _ in range(2))
+    half = torch.arange(m) < m // 2
+    early = first.table(half)[: m // 2, : m // 2].clone()
+    whole = everything(first, body)
+    assert torch.equal(early, whole[: m // 2, : m // 2]) and torch.equal(whole, whole.T)
+    assert (everything(second, body) - whole).abs().max() < 1e-5 * whole.abs().max()
 
 
-def test_members_ask_for_their_own_and_for_none(body, rest):
-    m = len(body.loadable)
-    whole = rest.compliance(torch.arange(m)[None])[0]
-    which = torch.tensor([[4, 9, 30], [7, m, m]])
-    blocks = rest.compliance(which)
-    assert torch.equal(blocks[0], whole[which[0]][:, which[0]])
-    assert blocks[1, 0, 0] == whole[7, 7]
-    blocks[1, 0, 0] = 0
-    assert not blocks[1].any()
+@pytest.fixture(scope="module")
+def dense(body):
+    return DenseRest(body.stiffness, body.free, body.rows, "cpu")
 
 
-def test_a_cards_inverse_solves_as_the_factor(body, rest):
-    dense = DenseRest(body.stiffness, body.free, body.loadable, "cpu")
+def test_a_gpus_inverse_solves_as_the_factor(body, rest, dense):
     r = body.random(2)
     assert (dense.apply(r) - rest.apply(r)).norm() < 2e-2 * rest.apply(r).norm()
 
 
-def test_a_cards_inverse_has_aligned_rows(body):
+def test_a_gpus_compliance_is_that_of_its_rounded_inverse(body, rest, dense):
+    """Half precision of the forces alone stands between them."""
+    check_compliance(dense, body, 1e-3)
+    exact, rounded = everything(rest, body), everything(dense, body)
+    assert 1e-5 < (exact - rounded).norm() / exact.norm() < 1e-3
+
+
+def test_a_gpus_own_rows_move_as_the_whole_does(body, dense):
+    """M K0^-1, kept in half precision, beside M times the whole inverse."""
+    r = body.random(2, 3)
+    scaled = torch.zeros(dense.padded, 2)
+    scaled[: len(body.free)] = r[body.free] * dense.scale[:, None]
+    own = dense.rows_times(scaled.half()) * dense.row_scale[:, None]
+    whole = dense.rows(dense.apply(r))
+    assert ((own - whole).norm(dim=0) < 2e-3 * whole.norm(dim=0)).all()
+
+
+def test_what_a_kernel_spreads_is_the_transpose_of_the_rows(body, dense):
+    up, f = dense.spreads, np.random.default_rng(1).normal(size=body.rows.shape[0])
+    found = np.zeros(len(body.free))
+    for k, row in enumerate(up.row.tolist()):
+        entries = slice(int(up.start[k]), int(up.start[k + 1]))
+        found[row] = up.value[entries].double().numpy() @ f[up.column[entries].numpy()]
+    np.testing.assert_allclose(found, (body.rows.T @ f)[body.free], atol=1e-6)
+
+
+def test_a_gpus_inverse_has_aligned_rows(body):
     """Whatever the number of degrees of freedom: here one that is no multiple of eight, as most meshes'."""
-    inner = np.setdiff1d(body.free, body.loadable)
-    free = np.setdiff1d(body.free, inner[: len(body.free) % 8 + 3])
+    free = body.free[: len(body.free) - len(body.free) % 8 - 3]
     assert len(free) % 8
-    dense = DenseRest(body.stiffness, free, body.loadable, "cpu")
+    dense = DenseRest(body.stiffness, free, body.rows, "cpu")
     assert dense.padded % 64 == 0 and dense.padded - len(free) < 64
-    assert dense._inverse.stride(0) == dense.padded
+    assert dense._inverse.stride(0) == dense._rows.stride(0) == dense.padded
     scaled = torch.zeros(dense.padded, 2, dtype=torch.float16)
     scaled[: len(free)] = 1.0
     again = scaled.clone()

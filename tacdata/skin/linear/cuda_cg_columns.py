@@ -11,27 +11,30 @@ from collections.abc import Callable
 import torch
 import warp as wp
 
-from tacdata.skin.linear.contact_preconditioner import Share
+from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
 from tacdata.skin.linear.tangent import Linearization
 
 _FIELDS = ("x", "r", "p")
-_VALUES = ("member", "softness", "row", "own", "size", "rho", "goal", "going", "first")
+_ALIGNED = 8
+"""Columns are padded to a multiple of this, as libraries multiply others at a fraction of the rate."""
+_VALUES = ("member", "row", "softness", "size", "factor", "rho", "goal", "going", "first")
 
 
 class ActiveColumns:
     """So many columns b, each with a batch member that is solved for."""
 
-    def __init__(self, at: Linearization, width: int, rows: int) -> None:
+    def __init__(self, at: Linearization, width: int, preconditioner: ConstraintPreconditioner, padded: int) -> None:
         """Make room.
 
         Args:
             at: State of a whole batch: for its sizes and device.
             width: Number of columns.
-            rows: Of what the rest state's inverse is multiplied with.
+            preconditioner: Whose constraints are held.
+            padded: Rows of what the rest state's inverse is multiplied with.
         """
         device, nodes = at.u.device, at.u.shape[0]
         some = torch.zeros(width, dtype=torch.int64, device=device)
-        self.width = width
+        self.width, self._preconditioner = width, preconditioner
         self.at = at.take(some)
         """The state of these members."""
 
@@ -42,35 +45,40 @@ class ActiveColumns:
         """Solution, residual and direction, shape (3n, b)."""
         self.q = zeros(nodes, 3)
         """The tangent times the direction, shape (n, 3, b)."""
-        self.h = zeros(rows, dtype=torch.float16)
-        """The residual, scaled, on the rows of the inverse."""
-        self.member = zeros(dtype=torch.int64)
+        self.h = torch.zeros(padded, -(-width // _ALIGNED) * _ALIGNED, dtype=torch.float16, device=device)
+        """The residual, scaled, on the rows of the inverse; columns beyond b are zero."""
+        self.hard, self.soft = (zeros(preconditioner.rows.count) for _ in range(2))
+        """Forces of hard and of soft constraints on the mortar rows, shape (m, b)."""
+        self.member, self.row = zeros(dtype=torch.int64), zeros(dtype=torch.int32)
         """Columns in the whole batch, shape (b,), as all that follows."""
-        self.row, self.own = zeros(dtype=torch.int32), zeros(dtype=torch.int32)
-        """Row of the contact's shares, and how many degrees of freedom are touched."""
-        self.softness, self.size = zeros(), zeros()
-        """Nominal modulus over the member's; by what residuals are multiplied for half precision [1]."""
+        self.softness, self.size, self.factor = zeros(), zeros(), zeros()
+        """Nominal modulus over the member's; by what residuals are multiplied for half precision [1]; their ratio."""
         self.rho, self.goal = zeros(), zeros()
         """Squared preconditioned norms of the residual: now, and where to stop."""
         self.going, self.first = zeros(dtype=torch.int32), zeros(dtype=torch.int32)
         """1 where not done; 1 in the first iteration."""
         self.curvature, self.rho_new, self.beta = zeros(), zeros(), zeros()
-        self.moved, self.share = torch.empty(0), Share.none(device)
+        self.tolerance = torch.zeros(1, device=device)
+        self._place: tuple[int, ...] | None = None
         self._seen = 0
         self._graph: torch.cuda.CUDAGraph | None = None
+        self._bind()
 
-    def begin(self, at: Linearization, member: torch.Tensor, r: torch.Tensor, share: Share) -> None:
+    def begin(
+        self, at: Linearization, member: torch.Tensor, wanted: torch.Tensor, r: torch.Tensor, tolerance: float
+    ) -> None:
         """Take members of a whole batch, by index; other arguments as of `cuda_cg.CudaConjugateGradients.solve`."""
         self.member.copy_(member)
-        torch.index_select(r.reshape(-1, r.shape[2]), -1, member, out=self.r)
         self.row.copy_(member)
-        self.softness.copy_(share.softness[member])
-        self.own.copy_(share.own[member])
-        for values in (self.x, self.p, self.rho, self.rho_new, self.beta, self.curvature):
-            values.zero_()
-        self.going.fill_(1)
+        torch.index_select(r.reshape(-1, r.shape[2]), -1, member, out=self.r)
+        self.softness.copy_(self._preconditioner.scale[member])
+        self.going.copy_(wanted[member])
         self.first.fill_(1)
-        self._bind(at, member, share)
+        self.tolerance.fill_(tolerance)
+        self.at.take_into(at, member)
+        self._bind()
+        for values in (self.x, self.p, self.rho, self.rho_new, self.beta, self.curvature, self.total, self.soft):
+            values.zero_()
 
     def take(self, other: ActiveColumns, which: torch.Tensor) -> None:
         """Take members of others, by index."""
@@ -78,14 +86,18 @@ class ActiveColumns:
             torch.index_select(getattr(other, name), -1, which, out=getattr(self, name))
         for values in (self.rho_new, self.curvature):
             values.zero_()
-        self._bind(other.at, which, other.share)
+        self.tolerance.copy_(other.tolerance)
+        self.at.take_into(other.at, which)
+        self._bind()
+        torch.index_select(other.total, 0, which, out=self.total)
 
-    def _bind(self, at: Linearization, which: torch.Tensor, share: Share) -> None:
-        self.at.take_into(at, which)
-        if share.place != self.share.place:
-            self.moved = torch.zeros(self.width, share.which.shape[1], device=share.which.device)
-            self._seen, self._graph = 0, None
-        self.share = share
+    def _bind(self) -> None:
+        """Make room for the constraints there are; what was recorded for another room is of no use."""
+        rows = self._preconditioner.rows
+        place = *rows.place, *self._preconditioner.solver.place
+        if place != self._place:
+            self.v, self.y, self.total = (torch.zeros(self.width, rows.most, device=self.x.device) for _ in range(3))
+            self._place, self._seen, self._graph = place, 0, None
 
     def run(self, iteration: Callable[[ActiveColumns], None]) -> None:
         """Run an iteration: as it stands at first, so that its kernels are loaded, then from its graph."""

@@ -33,37 +33,39 @@ def load(
 
 
 @wp.kernel(enable_backward=False)
-def pick(
-    z: wp.array2d(dtype=wp.float32), which: wp.array2d(dtype=wp.int64), member: wp.array(dtype=wp.int32),
-    scale: wp.array(dtype=wp.float32), softness: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32),
-    count: wp.int64, moved: wp.array2d(dtype=wp.float32),
+def reach(
+    r: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32),
+    largest: wp.array(dtype=wp.float32),
 ):
-    """Moved = displacements where a member touches."""
-    b, s = wp.tid()
-    row, value = which[member[b], s], wp.float32(0.0)
-    if row < count:
-        k = wp.int32(row)
-        value = z[k, b] * scale[k] * softness[b] / size[b]
-    moved[b, s] = value
+    """Largest = the largest magnitude of the residual, scaled."""
+    strip, b = wp.tid()
+    most = wp.float32(0.0)
+    for k in range(strip * STRIP, wp.min((strip + 1) * STRIP, order.shape[0])):
+        most = wp.max(most, wp.abs(r[order[k], b] * scale[k]))
+    wp.atomic_max(largest, b, most)
 
 
 @wp.kernel(enable_backward=False)
-def push_back(
-    transfer: wp.array3d(dtype=wp.float32), moved: wp.array2d(dtype=wp.float32), which: wp.array2d(dtype=wp.int64),
-    member: wp.array(dtype=wp.int32), own: wp.array(dtype=wp.int32), order: wp.array(dtype=wp.int32),
-    scale: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32), count: wp.int64,
+def spread(
+    start: wp.array(dtype=wp.int32), column: wp.array(dtype=wp.int32), value: wp.array(dtype=wp.float32),
+    row: wp.array(dtype=wp.int32), hard: wp.array2d(dtype=wp.float32), soft: wp.array2d(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32),
     r: wp.array2d(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
 ):
-    """Take what the contact answers off the residual; the transfer is symmetric, so neighbours read neighbours."""
-    b, s = wp.tid()
-    m = member[b]
-    row = which[m, s]
-    if row < count:
-        force = wp.float32(0.0)
-        for c in range(own[b]):
-            force += transfer[m, c, s] * moved[b, c]
-        k = wp.int32(row)
-        h[k, b] = halved((r[order[k], b] - force) * scale[k] * size[b])
+    """Take the constraints' forces off the residual.
+
+    Those of hard constraints for good: the preconditioner annihilates them, and what is left is small. Those of soft
+    ones, which the tangent holds too, for this time.
+    """
+    i, b = wp.tid()
+    taken, lent = wp.float32(0.0), wp.float32(0.0)
+    for e in range(start[i], start[i + 1]):
+        taken += value[e] * hard[column[e], b]
+        lent += value[e] * soft[column[e], b]
+    k = row[i]
+    left = r[order[k], b] - taken
+    r[order[k], b] = left
+    h[k, b] = halved((left - lent) * scale[k] * size[b])
 
 
 @wp.kernel(enable_backward=False)
@@ -86,50 +88,54 @@ def advance(
     going: wp.array(dtype=wp.int32), first: wp.array(dtype=wp.int32), order: wp.array(dtype=wp.int32),
     scale: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
 ):
-    """Let x += alpha p, r -= alpha q, h = r scaled; where the tangent is indefinite at first, x = p."""
+    """Let x += alpha p, r -= alpha q, h = r scaled; at first x = p, as that one keeps the constraints."""
     k, b = wp.tid()
     if going[b] == 1:
         n = order[k]
-        if curvature[b] > wp.float32(0.0):
+        alpha = wp.float32(0.0)
+        if first[b] == 1:
+            alpha = wp.float32(1.0)
+        elif curvature[b] > wp.float32(0.0):
             alpha = rho[b] / curvature[b]
-            x[n, b] = x[n, b] + alpha * p[n, b]
-            left = r[n, b] - alpha * q[n, b]
-            r[n, b] = left
-            h[k, b] = halved(left * scale[k] * size[b])
-        elif first[b] == 1:
-            x[n, b] = p[n, b]
+        x[n, b] = x[n, b] + alpha * p[n, b]
+        left = r[n, b] - alpha * q[n, b]
+        r[n, b] = left
+        h[k, b] = halved(left * scale[k] * size[b])
 
 
 @wp.kernel(enable_backward=False)
 def measure(
     w: wp.array2d(dtype=wp.float32), r: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32),
-    scale: wp.array(dtype=wp.float32), softness: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32),
-    rho: wp.array(dtype=wp.float32),
+    scale: wp.array(dtype=wp.float32), factor: wp.array(dtype=wp.float32), rho: wp.array(dtype=wp.float32),
 ):
     """Rho += r z, with z = w scaled back."""
     strip, b = wp.tid()
     total = wp.float32(0.0)
     for k in range(strip * STRIP, wp.min((strip + 1) * STRIP, order.shape[0])):
         total += r[order[k], b] * w[k, b] * scale[k]
-    wp.atomic_add(rho, b, total * softness[b] / size[b])
+    wp.atomic_add(rho, b, total * factor[b])
 
 
 @wp.kernel(enable_backward=False)
 def judge(
-    rho_new: wp.array(dtype=wp.float32), goal: wp.array(dtype=wp.float32), curvature: wp.array(dtype=wp.float32),
-    rho: wp.array(dtype=wp.float32), beta: wp.array(dtype=wp.float32), going: wp.array(dtype=wp.int32),
-    first: wp.array(dtype=wp.int32),
+    rho_new: wp.array(dtype=wp.float32), curvature: wp.array(dtype=wp.float32), tolerance: wp.array(dtype=wp.float32),
+    goal: wp.array(dtype=wp.float32), rho: wp.array(dtype=wp.float32), beta: wp.array(dtype=wp.float32),
+    going: wp.array(dtype=wp.int32), first: wp.array(dtype=wp.int32),
 ):
-    """Stop members that are done; leave nothing in the sums."""
+    """Stop members that are done; leave nothing in the sums. The first x says what is small."""
     b = wp.tid()
-    first[b] = 0
     beta[b] = wp.float32(0.0)
     if going[b] == 1:
-        if curvature[b] > wp.float32(0.0) and rho_new[b] > goal[b]:
+        if first[b] == 1:
+            goal[b] = wp.max(curvature[b], wp.float32(0.0)) * tolerance[0] * tolerance[0]
+            if rho_new[b] <= goal[b]:
+                going[b] = 0
+        elif curvature[b] > wp.float32(0.0) and rho_new[b] > goal[b]:
             beta[b] = rho_new[b] / rho[b]
-            rho[b] = rho_new[b]
         else:
             going[b] = 0
+        rho[b] = rho_new[b]
+    first[b] = 0
     rho_new[b] = wp.float32(0.0)
     curvature[b] = wp.float32(0.0)
 
@@ -137,10 +143,9 @@ def judge(
 @wp.kernel(enable_backward=False)
 def turn(
     w: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32),
-    softness: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32), beta: wp.array(dtype=wp.float32),
-    p: wp.array2d(dtype=wp.float32),
+    factor: wp.array(dtype=wp.float32), beta: wp.array(dtype=wp.float32), p: wp.array2d(dtype=wp.float32),
 ):
     """P = z + beta p."""
     k, b = wp.tid()
     n = order[k]
-    p[n, b] = w[k, b] * scale[k] * softness[b] / size[b] + beta[b] * p[n, b]
+    p[n, b] = w[k, b] * scale[k] * factor[b] + beta[b] * p[n, b]

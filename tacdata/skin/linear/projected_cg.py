@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import torch
 
 from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
+from tacdata.skin.linear.tangent import Linearization
 
-Field = Callable[[torch.Tensor], torch.Tensor]
-"""From fields (n, 3, b) to fields (n, 3, b)."""
+Product = Callable[[Linearization, torch.Tensor], torch.Tensor]
+"""K at a state of some members, times fields of as many, shape (n, 3, b)."""
 
 
 @dataclass(frozen=True)
@@ -38,45 +39,64 @@ class Stopping:
 
 
 def projected_conjugate_gradients(
-    product: Field, preconditioner: ConstraintPreconditioner, rhs: torch.Tensor, gaps: Sequence[torch.Tensor],
-    stopping: Stopping,
+    product: Product, at: Linearization, preconditioner: ConstraintPreconditioner, rhs: torch.Tensor,
+    gaps: Sequence[torch.Tensor], wanted: torch.Tensor, stopping: Stopping,
 ) -> tuple[torch.Tensor, torch.Tensor, int]:
-    """Solve for every batch member; each stops by itself.
+    """Solve for every batch member that is wanted; each stops by itself, and costs nothing from then on.
 
     Args:
         product: K times fields.
+        at: The state of K.
         preconditioner: Prepared for the present constraints.
         rhs: r, shape (n, 3, b), float32.
         gaps: c, by contact, shape (s, b).
+        wanted: Members to solve for, shape (b,), bool; others get 0.
         stopping: When to end.
 
     Returns:
         x, shape (n, 3, b), -p as `ConstraintPreconditioner.forces` takes it, and the number of iterations.
     """
-    x, _ = preconditioner.apply(rhs, gaps)
-    q = product(x)
-    goal = _dot(x, q).clamp_min(0.0) * stopping.tolerance**2
-    r = rhs - q
-    z, y = preconditioner.apply(r)
-    p = z.clone()
-    rho = _dot(r, z)
+    answer, forces = torch.zeros_like(rhs), torch.zeros(rhs.shape[2], preconditioner.rows.most, device=rhs.device)
+    member, iteration = wanted.nonzero()[:, 0], 0
+    count = len(member)
+    if not count:
+        return answer, forces, iteration
+    at, r = at.take(member), rhs.index_select(2, member)
+    x, y = preconditioner.apply(r, gaps, member)
+    q = product(at, x)
+    goal, r = _dot(x, q).clamp_min(0.0) * stopping.tolerance**2, r - q
+    z, y = preconditioner.apply(r, None, member)
+    p, rho = z, _dot(r, z)
     going = rho > goal
-    iteration, wanted = 1, int(going.sum())
-    for iteration in range(2, stopping.limit + 1):
-        if stopping.enough(iteration - 1, int(going.sum()), wanted):
+    for iteration in range(1, stopping.limit):
+        left = int(going.sum())
+        if left < len(member):
+            answer[:, :, member], forces[member] = x, y
+            at, (member, x, r, p, y, rho, goal) = _chosen(at, going, (member, x, r, p, y.T, rho, goal))
+            y = y.T
+        if stopping.enough(iteration, left, count):
             break
-        q = product(p)
+        q = product(at, p)
         curvature = _dot(p, q)
-        going = going & (curvature > 0)
+        going = curvature > 0
         alpha = torch.where(going, rho / curvature, 0.0)
-        x.addcmul_(p, alpha)
+        x = x.addcmul(p, alpha)
         r = r - alpha * q
-        z, y = preconditioner.apply(r)
+        z, y = preconditioner.apply(r, None, member)
         rho_new = _dot(r, z)
         going = going & (rho_new > goal)
-        p = z + torch.where(going, rho_new / rho, 0.0) * p
+        p = z + rho_new / rho * p
         rho = rho_new
-    return x, y, iteration
+    answer[:, :, member], forces[member] = x, y
+    return answer, forces, iteration
+
+
+def _chosen(
+    at: Linearization, mask: torch.Tensor, values: Sequence[torch.Tensor]
+) -> tuple[Linearization, list[torch.Tensor]]:
+    """Return the members in ``mask``."""
+    which = mask.nonzero()[:, 0]
+    return at.take(which), [value.index_select(-1, which) for value in values]
 
 
 def _dot(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:

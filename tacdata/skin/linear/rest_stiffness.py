@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from typing import Protocol
 
@@ -58,6 +59,9 @@ def for_averaged(material: Material) -> Material:
 class RestSolver(Protocol):
     """K0^-1 on one device, and the compliance of the rows of M, the mortar projections of all contacts."""
 
+    device: str
+    """"cpu" or "cuda:0"."""
+
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
         """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
         ...
@@ -70,14 +74,11 @@ class RestSolver(Protocol):
         """Return M^T f, shape (3n, b), of f, shape (m, b), float32."""
         ...
 
-    def compliance(self, which: torch.Tensor) -> torch.Tensor:
-        """Return M K0^-1 M^T [mm/N] between rows.
+    def table(self, used: torch.Tensor) -> torch.Tensor:
+        """Return M K0^-1 M^T [mm/N], shape (m, m), float32, symmetric: known at least between ``used`` rows.
 
         Args:
-            which: Numbers of rows of every member, shape (b, k); m stands for none.
-
-        Returns:
-            Shape (b, k, k), float32, symmetric, zero where there is none.
+            used: Which are needed, shape (m,), bool.
         """
         ...
 
@@ -114,9 +115,13 @@ class _MortarRows:
 
 
 def _sparse(matrix: sp.csr_matrix, device: str) -> torch.Tensor:
-    indices = (torch.as_tensor(values.astype(np.int64)) for values in (matrix.indptr, matrix.indices))
+    starts, columns = (torch.as_tensor(values.astype(np.int64)) for values in (matrix.indptr, matrix.indices))
     values = torch.as_tensor(matrix.data.astype(np.float32))
-    return torch.sparse_csr_tensor(*indices, values, size=matrix.shape, dtype=torch.float32).to(device)
+    with warnings.catch_warnings():
+        # PyTorch calls compressed rows a beta, and warns that it trusts them; their products are all that is used.
+        warnings.simplefilter("ignore", UserWarning)
+        made = torch.sparse_csr_tensor(starts, columns, values, size=matrix.shape)
+    return made.to(device)
 
 
 class SparseRest:
@@ -129,14 +134,13 @@ class SparseRest:
 
     def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, rows: sp.csr_matrix, device: str = "cpu") -> None:
         """Factorize; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
+        self.device = device
         self._free, self._mortar = torch.as_tensor(free), _MortarRows(rows, device)
         self._factor = factor_of(stiffness[free][:, free])
         # Rows are filled when a press first needs them and serve every later one; memory is taken as they are.
         count = self._mortar.count
-        self._table = torch.from_numpy(np.empty((count + 1, count + 1), dtype=np.float32))
-        self._table[-1] = 0.0
-        self._known = torch.zeros(count + 1, dtype=torch.bool)
-        self._known[-1] = True
+        self._table = torch.from_numpy(np.empty((count, count), dtype=np.float32))
+        self._known = torch.zeros(count, dtype=torch.bool)
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
         """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
@@ -152,27 +156,30 @@ class SparseRest:
         """Return M^T f, as `RestSolver`."""
         return self._mortar.up @ forces
 
-    def compliance(self, which: torch.Tensor) -> torch.Tensor:
-        """Return M K0^-1 M^T [mm/N] between rows, as in `RestSolver`."""
-        wanted = torch.unique(which)
-        missing = wanted[~self._known[wanted]]
+    def table(self, used: torch.Tensor) -> torch.Tensor:
+        """Return M K0^-1 M^T [mm/N], as `RestSolver`."""
+        missing = (used & ~self._known).nonzero()[:, 0]
         for start in range(0, len(missing), self._BLOCK):
             part = missing[start : start + self._BLOCK]
             unit = torch.zeros(self._mortar.count, len(part), dtype=torch.float32)
             unit[part, torch.arange(len(part))] = 1.0
-            self._table[part, :-1] = self.rows(self.apply(self.spread(unit))).T
-            self._table[part, -1] = 0.0
-        self._known[missing] = True
-        blocks = self._table[which[:, :, None], which[:, None, :]]
-        return (blocks + blocks.transpose(1, 2)) / 2
+            columns = self.rows(self.apply(self.spread(unit)))
+            columns[part] = (columns[part] + columns[part].T) / 2
+            # What was known before stays as it is, so that the table is symmetric.
+            known = self._known.nonzero()[:, 0]
+            columns[known] = self._table[known[:, None], part]
+            self._table[part], self._table[:, part] = columns.T, columns
+            self._known[part] = True
+        return self._table
 
 
 class DenseRest:
     """Inverse of the rest stiffness as a full matrix on a GPU: one product serves a whole batch.
 
     Scaled to a unit diagonal and rounded to half precision, at half the memory and several times the rate of single.
-    What is rounded is a preconditioner; what must hold exactly is that the Woodbury identity sees the same matrix. So
-    the compliance is taken from the rounded one, and sums are kept in single precision.
+    What is rounded is a preconditioner; what must hold exactly is that its constraints see the same matrix. So their
+    compliance M K0^-1 M^T is taken from the rounded one, and sums are kept in single precision. M K0^-1 is kept too,
+    each row scaled to unit compliance: its product with a residual costs a quarter of the whole inverse's.
     """
 
     _SHIFT = 2e-4
@@ -182,8 +189,10 @@ class DenseRest:
     begin at multiples of 16 bytes."""
     _LARGEST = 1024.0
     """To which right-hand sides are scaled, clear of both ends of half precision."""
+    _BLOCK = 2048
+    """Columns of M K0^-1 made at a time."""
 
-    def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, loadable: np.ndarray, device: str) -> None:
+    def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, rows: sp.csr_matrix, device: str) -> None:
         """Invert; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
         need = 2 * 8 * len(free) ** 2
         have = need if device == "cpu" else torch.cuda.mem_get_info(device)[0]
@@ -192,9 +201,7 @@ class DenseRest:
                 f"a mesh with {len(free)} degrees of freedom, whose inverse takes {need / 2**30:.0f} GiB on {device}",
                 f"at most {have / 2**30:.0f} GiB", "coarsen the mesh, or use device cpu",
             )
-        # Loadable ones first, so that their rows are a view.
-        order = np.concatenate([loadable, np.setdiff1d(free, loadable)])
-        reduced = stiffness[order][:, order].tocoo()
+        reduced = stiffness[free][:, free].tocoo()
         place = torch.as_tensor(np.stack([reduced.row, reduced.col]), dtype=torch.int64, device=device)
         inverse = torch.zeros(reduced.shape, dtype=torch.float64, device=device)
         inverse[place[0], place[1]] = torch.as_tensor(reduced.data, device=device)
@@ -202,54 +209,95 @@ class DenseRest:
         scale = inverse.diagonal().sqrt()
         inverse /= scale[:, None]
         inverse /= scale
-        self.count, self._order = len(loadable), torch.as_tensor(order, device=device)
+        inverse.diagonal().add_(self._SHIFT)
+        self.device, self._order = device, torch.as_tensor(free, device=device)
         self.order = self._order.to(torch.int32)
-        """Degree of freedom of every row, the loadable ones' first, shape (k,); so many are ``count``."""
+        """Degree of freedom of every row, shape (k,)."""
         self.scale = scale.to(torch.float32)
         """By which a right-hand side is multiplied, and then the product, shape (k,)."""
         self._scale = self.scale[:, None]
-        inverse.diagonal().add_(self._SHIFT)
-        self.padded = -(-len(order) // self._ALIGNED) * self._ALIGNED
+        self.padded = -(-len(free) // self._ALIGNED) * self._ALIGNED
         """Rows that `times` takes: one for every entry of ``order``, and zeros."""
-        self._inverse = torch.zeros(len(order), self.padded, dtype=torch.float16, device=device)
-        self._inverse[:, : len(order)] = inverse
+        self._inverse = torch.zeros(len(free), self.padded, dtype=torch.float16, device=device)
+        self._inverse[:, : len(free)] = inverse
         del inverse
-        part = self._inverse[: self.count, : self.count].to(torch.float32)
-        part *= self._scale[: self.count] * self._scale[: self.count].T
-        self._table = torch.nn.functional.pad(part, (0, 1, 0, 1))
+        self._mortar = _MortarRows(rows, device)
+        self.count = self._mortar.count
+        """Number of mortar rows."""
+        self._compliance(rows, free)
+        self.spreads = SpreadRows(rows, free, device)
+
+    def _compliance(self, rows: sp.csr_matrix, free: np.ndarray) -> None:
+        """Make M K0^-1 and M K0^-1 M^T of the rounded inverse."""
+        mortar = _sparse(sp.csr_matrix(rows[:, free] @ sp.diags_array(self.scale.cpu().numpy())), self.device)
+        whole = torch.empty(self.count, len(self.order), device=self.device)
+        for start in range(0, len(self.order), self._BLOCK):
+            part = self._inverse[start : start + self._BLOCK, : len(self.order)].T.to(torch.float32)
+            # The rounded inverse is symmetric, as rounding is a function of the number alone.
+            whole[:, start : start + self._BLOCK] = mortar @ part
+        self._table = mortar @ whole.T.contiguous()
+        self._table = (self._table + self._table.T) / 2
+        self.row_scale = self._table.diagonal().clamp_min(1e-30).sqrt().contiguous()
+        """By which the product of `rows_times` is multiplied, shape (m,)."""
+        self._rows = torch.zeros(self.count, self.padded, dtype=torch.float16, device=self.device)
+        self._rows[:, : len(self.order)] = whole / self.row_scale[:, None]
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
         """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
         result = torch.zeros(residual.shape, dtype=torch.float32, device=residual.device)
-        result[self._order] = self._times(self._inverse, residual) * self._scale
-        return result
-
-    def loadable(self, residual: torch.Tensor) -> torch.Tensor:
-        """Return `apply` at the loadable degrees of freedom only, shape (m, b)."""
-        return self._times(self._inverse[: self.count], residual) * self._scale[: self.count]
-
-    def compliance(self, which: torch.Tensor) -> torch.Tensor:
-        """Return K0^-1 [mm/N] between loadable degrees of freedom, as in `RestSolver`."""
-        return self._table[which[:, :, None], which[:, None, :]]
-
-    def _times(self, matrix: torch.Tensor, residual: torch.Tensor) -> torch.Tensor:
         scaled = residual[self._order] * self._scale
         size = scaled.abs().amax(dim=0).clamp_min(1e-30) / self._LARGEST
         half = torch.nn.functional.pad((scaled / size).to(torch.float16), (0, 0, 0, self.padded - len(scaled)))
-        return _product(matrix, half) * size
+        result[self._order] = self.times(half) * size * self._scale
+        return result
 
-    def times(self, scaled: torch.Tensor, rows: int | None = None) -> torch.Tensor:
-        """Return the scaled inverse, or its first rows only, times ``scaled``.
+    def rows(self, displacement: torch.Tensor) -> torch.Tensor:
+        """Return M z, as `RestSolver`."""
+        return self._mortar.down @ displacement
+
+    def spread(self, forces: torch.Tensor) -> torch.Tensor:
+        """Return M^T f, as `RestSolver`."""
+        return self._mortar.up @ forces
+
+    def table(self, used: torch.Tensor) -> torch.Tensor:
+        """Return M K0^-1 M^T [mm/N], as `RestSolver`: all of it."""
+        return self._table
+
+    def times(self, scaled: torch.Tensor) -> torch.Tensor:
+        """Return the scaled inverse times ``scaled``.
 
         Args:
             scaled: right-hand sides in the order of `order`, scaled by `scale`, shape (padded, b), float16; what
                 stands beyond the rows of ``order`` is not read into the result.
-            rows: how many, k if None.
 
         Returns:
-            The product before it is scaled, shape (rows, b), float32.
+            The product before it is scaled, shape (k, b), float32.
         """
-        return _product(self._inverse[:rows], scaled)
+        return _product(self._inverse, scaled)
+
+    def rows_times(self, scaled: torch.Tensor) -> torch.Tensor:
+        """Return M K0^-1 times ``scaled``, before it is scaled by `row_scale`, shape (m, b); see `times`."""
+        return _product(self._rows, scaled)
+
+
+class SpreadRows:
+    """M^T on the free degrees of freedom, row by row, as a kernel takes it."""
+
+    def __init__(self, rows: sp.csr_matrix, free: np.ndarray, device: str) -> None:
+        """Choose the rows that are not empty."""
+        up = sp.csr_matrix(sp.csr_matrix(rows.T)[free])
+        loaded = np.flatnonzero(np.diff(up.indptr))
+        up = sp.csr_matrix(up[loaded])
+
+        def number(values: np.ndarray) -> torch.Tensor:
+            return torch.as_tensor(values.astype(np.int32), device=device)
+
+        self.row = number(loaded)
+        """Place among the free degrees of freedom, shape (l,)."""
+        self.start, self.column = number(up.indptr), number(up.indices)
+        """Entries of each row, and the mortar row of each."""
+        self.value = torch.as_tensor(up.data.astype(np.float32), device=device)
+        """The entries."""
 
 
 def _product(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:

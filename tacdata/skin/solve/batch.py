@@ -138,6 +138,7 @@ class Batch:
             waiting = iter(presses)
             yield from self._fill(waiting, observe)
             while any(press is not None for press in self._presses):
+                self._shrink()
                 yield from self._iterate(waiting, collect, observe)
         except torch.OutOfMemoryError as error:
             nodes, _, count = self._at.u.shape
@@ -343,6 +344,25 @@ class Batch:
         for state in (self._at.unknowns, self._base, self._accepted, self._rate):
             for field in (state.u, *state.multipliers):
                 field.index_fill_(-1, which, 0.0)
+
+    def _shrink(self) -> None:
+        """Halve the batch, as often as it goes, when no press is waiting and half of the columns are idle."""
+        busy = [column for column, press in enumerate(self._presses) if press is not None]
+        idle = [column for column, press in enumerate(self._presses) if press is None]
+        width = len(self._presses)
+        while 2 * len(busy) <= width:
+            width //= 2
+        if width == len(self._presses):
+            return
+        columns = sorted([*busy, *idle[: width - len(busy)]])
+        which = torch.as_tensor(columns, device=self._at.u.device)
+        self._at = self._at.take(which)
+        self._base, self._accepted, self._rate = (
+            state.take(which) for state in (self._base, self._accepted, self._rate)
+        )
+        self._before = self._before[which]
+        self._loading.keep(which)
+        self._presses = [self._presses[column] for column in columns]
 
     def _press(self, column: int) -> PlacedPress:
         press = self._presses[column]

@@ -32,6 +32,11 @@ class LoadingStates:
         self._values[:, :, which] = 0.0
         self._count[which] = 1
 
+    def keep(self, which: torch.Tensor) -> None:
+        """Let go of all members but some, by index, shape (k,)."""
+        self._depth, self._count = self._depth[:, which], self._count[which]
+        self._values = self._values[:, :, which]
+
     def add(self, which: torch.Tensor, depth: torch.Tensor, state: Unknowns) -> None:
         """Keep the marked members' unknowns at depths [mm], shape (b,), if deeper."""
         column = (which & (depth > self.deepest)).nonzero().squeeze(1)

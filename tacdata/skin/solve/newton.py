@@ -15,7 +15,9 @@ from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.elasticity.body import Elasticity
 from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
+from tacdata.skin.linear.cuda_cg import CudaConjugateGradients
 from tacdata.skin.linear.projected_cg import Stopping, projected_conjugate_gradients
+from tacdata.skin.linear.rest_stiffness import DenseRest
 from tacdata.skin.linear.tangent import Linearization, TangentStiffness
 from tacdata.skin.member.columns import Columns
 from tacdata.skin.solve.configuration import Configuration
@@ -69,7 +71,8 @@ class Newton:
         self.tangent = TangentStiffness(body, surfaces)
         self._free = (~fixed).to(torch.float64)[:, None, None]
         self._free_work = self._free.to(_WORK)
-        self._cuda = None
+        cuda = isinstance(preconditioner.rest, DenseRest)
+        self._cuda = CudaConjugateGradients(self.tangent, preconditioner) if cuda else None
 
     def residual(self, at: Configuration) -> Residual:
         """Evaluate the forces of all members."""
@@ -134,9 +137,12 @@ class Newton:
         gaps = [torch.where(wanted & own.tangent.active, -own.gap / size, 0.0) for own in now.contacts]
         here = self.tangent.at(at.u.to(_WORK), at.conditions, contacts)
         stopping = Stopping(self.settings.forcing, self.settings.cg_limit, _STRAGGLERS, _LONG)
-        x, y, used = projected_conjugate_gradients(
-            lambda p: self.product(here, p), self.preconditioner, r, gaps, stopping
-        )
+        if self._cuda:
+            x, y, used = self._cuda.solve(here, r, gaps, wanted, stopping)
+        else:
+            x, y, used = projected_conjugate_gradients(
+                self.product, here, self.preconditioner, r, gaps, wanted, stopping
+            )
         # What is not active ends at 0.
         changes = tuple(
             torch.where(

@@ -1,0 +1,172 @@
+"""The active nodes' constraints of every batch member: the mortar rows that each joins, and their compliance.
+
+Tensors keep their place from one Newton step to the next, and grow where more constraints come: so what reads them can
+be recorded as a CUDA graph.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+import warp as wp
+
+from tacdata.skin.contact.contact_forces import ContactTangent
+from tacdata.skin.contact.contact_surface import ContactSurface
+from tacdata.skin.linear import constraint_kernels as kernels
+from tacdata.skin.linear.rest_stiffness import RestSolver
+from tacdata.skin.member.warp_arrays import argument, filled
+
+_TURNED, _SOFTENED = 0.02, 0.3
+"""Change of a direction [1], and of what it gives way by over itself [1], up to which members keep the constraints that
+they had: their compliance is known. It is the lag of one Newton step, and small beside what the steps leave."""
+
+
+class _Rows:
+    """Room for constraints of members; zeros beyond a member's own."""
+
+    def __init__(self, members: int, most: int, device: torch.device | str) -> None:
+        self.first = torch.zeros(members, most, dtype=torch.int32, device=device)
+        """First mortar row of each constraint, shape (b, a)."""
+        self.direction = torch.zeros(members, most, 3, device=device)
+        """What it takes of this and the two that follow [1], shape (b, a, 3)."""
+        self.give = torch.zeros(members, most, 2, device=device)
+        """By how much it gives way, alone, and with the one before [mm/N], shape (b, a, 2)."""
+        self.own = torch.zeros(members, dtype=torch.int32, device=device)
+        """Number of constraints, shape (b,)."""
+        self.scale = torch.zeros(members, device=device)
+        """Nominal modulus over the member's, shape (b,)."""
+        self.data = filled(
+            kernels.RowData, first=self.first, direction=self.direction, give=self.give, own=self.own
+        )
+        """The same, as kernels take it."""
+
+    def differ(self, new: _Rows) -> torch.Tensor:
+        """Return which of the first members have other constraints in ``new``, shape (b,), bool."""
+        count = len(new.own)
+        turned = (self.direction[:count] - new.direction).abs().amax(dim=(1, 2)) > _TURNED
+        give = self.give[:count]
+        limit = _SOFTENED * torch.maximum(give[:, :, :1], new.give[:, :, :1])
+        softened = ((give - new.give).abs() > limit).any(dim=2).any(dim=1)
+        others = (self.first[:count] != new.first).any(dim=1) | (self.own[:count] != new.own)
+        return turned | softened | others | (self.scale[:count] != new.scale)
+
+    def put(self, which: torch.Tensor, new: _Rows) -> None:
+        """Replace members, by index, by those of ``new``."""
+        for name in ("first", "direction", "give", "own", "scale"):
+            getattr(self, name).index_copy_(0, which, getattr(new, name)[which])
+
+
+class ActiveRows:
+    """Normal directions, and with friction two tangents, of each member's active nodes; a constraint each."""
+
+    def __init__(self, surfaces: Sequence[ContactSurface], rest: RestSolver, step: int) -> None:
+        """Bind the surfaces, whose mortar rows those of ``rest`` are; room grows by multiples of ``step``."""
+        self._surfaces, self._rest, self._step = tuple(surfaces), rest, step
+        self._base, base = [], 0
+        for surface in surfaces:
+            self._base.append(base)
+            base += surface.count * (1 if surface.flat else 3)
+        self.count = base
+        """Number of mortar rows."""
+        self._held, self._table = _Rows(0, 0, "cpu"), torch.empty(0)
+        self.sizes: list[int] = []
+        """Number of constraints of each member."""
+        self._slots: list[torch.Tensor] = []
+        self._active: list[torch.Tensor] = []
+
+    @property
+    def most(self) -> int:
+        """Room for so many constraints of a member."""
+        return self._held.first.shape[1]
+
+    @property
+    def data(self) -> Any:
+        """The constraints as kernels take them."""
+        return self._held.data
+
+    @property
+    def place(self) -> tuple[int, ...]:
+        """Where they are: the same while the tensors stay."""
+        return self._held.first.data_ptr(), *self._held.first.shape
+
+    def update(self, contacts: Sequence[ContactTangent], scale: torch.Tensor) -> list[int]:
+        """Describe the constraints of the present active nodes.
+
+        Args:
+            contacts: Of each surface.
+            scale: Nominal modulus over each member's [1], shape (b,), float32.
+
+        Returns:
+            Members whose constraints are others than before.
+        """
+        self._active, self._slots, count = [contact.active for contact in contacts], [], torch.zeros_like(scale).long()
+        for surface, active in zip(self._surfaces, self._active, strict=True):
+            directions = _directions(surface)
+            # Sums along rows of memory: across them they take ten times as long on a GPU.
+            place = active.T.contiguous().cumsum(dim=1).T
+            self._slots.append(count + directions * (place - 1))
+            count = count + directions * place[-1]
+        self.sizes = count.tolist()
+        most = -(-max(self.sizes) // self._step) * self._step
+        held, device = self._held, scale.device
+        if len(scale) > len(held.own) or most > self.most or held.own.device != device:
+            self._held = held = _Rows(max(len(scale), len(held.own)), max(most, self.most), device)
+        self._table = self._rest.table(self._used())
+        new = _Rows(len(scale), self.most, device)
+        new.own.copy_(count)
+        new.scale.copy_(scale)
+        for surface, contact, base, slot in zip(self._surfaces, contacts, self._base, self._slots, strict=True):
+            flags = int(surface.flat), int(_directions(surface) == 3), base
+            self.launch(
+                kernels.describe, tuple(slot.shape), contact.active, slot, contact.normal, contact.friction, *flags,
+                scale, self._table, new.data,
+            )
+        if not self.most:
+            return []
+        which = held.differ(new).nonzero()[:, 0]
+        held.put(which, new)
+        return which.tolist()
+
+    def _used(self) -> torch.Tensor:
+        """Return which mortar rows some member's constraints join, shape (m,), bool."""
+        parts = [
+            active.any(dim=1).repeat_interleave(1 if surface.flat else 3)
+            for surface, active in zip(self._surfaces, self._active, strict=True)
+        ]
+        return torch.cat(parts)
+
+    def compliance(self, member: torch.Tensor, room: torch.Tensor) -> None:
+        """Write the compliance of the constraints of some members [mm/N], its lower triangle.
+
+        Args:
+            member: Indices, shape (g,), int64.
+            room: Receives them, bordered by a unit matrix, shape (g, a, a), float32.
+        """
+        held = self._held
+        self.launch(kernels.assemble, tuple(room.shape), member, held.data, held.scale, self._table, room)
+
+    def wanted(self, gaps: Sequence[torch.Tensor]) -> torch.Tensor:
+        """Return changes of mean gaps [mm], by contact, shape (s, b), as values of the constraints, shape (b, a)."""
+        values = torch.zeros(self.most + 1, len(self.sizes), device=self._held.own.device)
+        for active, slot, gap in zip(self._active, self._slots, gaps, strict=True):
+            values.scatter_(0, torch.where(active, slot, self.most), gap.to(torch.float32))
+        return values[:-1].T.contiguous()
+
+    def normal_forces(self, y: torch.Tensor) -> list[torch.Tensor]:
+        """Return the normal forces [N] among those of the constraints, shape (b, a), by contact, shape (s, b)."""
+        if not self.most:
+            return [torch.zeros(active.shape, dtype=torch.float64, device=y.device) for active in self._active]
+        return [
+            torch.where(active, y.T.gather(0, slot.clamp_min(0)).to(torch.float64), 0.0)
+            for active, slot in zip(self._active, self._slots, strict=True)
+        ]
+
+    def launch(self, kernel: Any, dim: tuple[int, ...], *values: object) -> None:
+        """Run a kernel of `constraint_kernels`."""
+        wp.launch(kernel, dim=dim, inputs=[*map(argument, values)], device=str(self._held.own.device))
+
+
+def _directions(surface: ContactSurface) -> int:
+    return 3 if surface.rough and not surface.flat else 1
