@@ -2,9 +2,9 @@
 
 The normal traction is a piecewise linear field on the four sub-triangles of every quadratic face. Its values at the
 nodes are unknowns (multipliers) beside the displacements. A node either carries pressure, or the mean gap under its hat
-is not negative. Node j is active where lambda_j - c gap_j > 0: the primal-dual active set (Hueeber and Wohlmuth, Comput.
-Methods Appl. Mech. Eng. 194 (2005) 3147), a Newton method for functions with kinks (Hintermueller, Ito and Kunisch,
-SIAM J. Optim. 13 (2002) 865).
+is not negative. Node j is active where lambda_j - c gap_j > 0: the primal-dual active set (Hueeber and Wohlmuth,
+Comput. Methods Appl. Mech. Eng. 194 (2005) 3147). It is a Newton method for functions with kinks (Hintermueller, Ito
+and Kunisch, SIAM J. Optim. 13 (2002) 865).
 
 Friction acts on the mean slip under each hat: a return mapping of the shear traction onto the disc of radius
 mu lambda_j. Its history is that of the last equilibrium. Far from the solution friction enters the stiffness by its
@@ -170,9 +170,10 @@ class ContactSurface:
         self.mortar.spread(slips, result)
 
     def penetration(self, now: ContactForces) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the largest error of the contact condition, and its mean weighted by the load [mm], both of shape (b,).
+        """Return the largest error of the contact condition, and its mean weighted by the load [mm].
 
-        That is the mean gap of nodes under pressure, in magnitude, and the penetration of all others.
+        That is the mean gap of nodes under pressure, in magnitude, and the penetration of all others. Both are of
+        shape (b,).
         """
         off = torch.where(now.pressure > 0, now.gap.abs(), (-now.gap).clamp_min(0.0) * self.able[:, None])
         load = now.pressure.abs() * self.area[:, None]

@@ -358,7 +358,7 @@ def turn_kernel(real: type) -> wp.Kernel:
     ):
         """Take the turn of normal forces times nodal displacements ``p`` off the nodes; one face."""
         f, b = wp.tid()
-        some = int(0)
+        some = 0
         for a in range(6):
             if active[slots[f, a], b]:
                 some = 1

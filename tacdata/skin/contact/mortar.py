@@ -1,3 +1,5 @@
+# Warp kernels are Python in form only; their operators have no types that pyright knows.
+# pyright: reportAssignmentType=false, reportGeneralTypeIssues=false, reportReturnType=false
 """Weighted means over the hats of contact nodes, and the forces that do the same work: a mortar projection.
 
 A hat is the piecewise linear function of one node on the four sub-triangles of each quadratic face. Row j holds
@@ -86,7 +88,7 @@ class Mortar:
         local = np.einsum("fk,kj,ka->fja", weights, hats, shapes)
         rows, columns = np.repeat(self.slots, 6, axis=1).ravel(), np.tile(faces, (1, 6)).ravel()
         whole = sp.csr_matrix(sp.coo_matrix((local.ravel(), (rows, columns)), shape=(len(self.nodes), nodes)))
-        self.area = np.asarray(whole.sum(axis=1)).ravel()
+        self.area = np.asarray(whole.sum(axis=1), dtype=np.float64).ravel()
         """Area of each hat, undeformed [mm^2], shape (s,)."""
         self.mean = sp.csr_matrix(sp.diags_array(1 / self.area) @ whole)
         """Mean over each hat of a field on the mesh's nodes [1], shape (s, n)."""

@@ -61,7 +61,9 @@ class StatePreconditioner:
             below, slot = below + axes * surface.count, slot + surface.count
         self._rows, self._normal, self._slots = torch.cat(rows), torch.cat(normals), torch.cat(slots)
         index = torch.stack([torch.cat(directions), torch.cat(places)])
-        self._along = torch.sparse_coo_tensor(index, torch.cat(values), (start, row), check_invariants=True).coalesce()
+        # PyTorch warns unless it is told whether to check; of one tensor alone it is not enough.
+        with torch.sparse.check_sparse_tensor_invariants():
+            self._along = torch.sparse_coo_tensor(index, torch.cat(values), (start, row)).coalesce()
         """Q^T."""
         self._count = below
         self._give = torch.zeros(start, start, dtype=torch.float64, device=device)
@@ -71,7 +73,9 @@ class StatePreconditioner:
     def _factorized(
         self, blocks: list[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        compliance = self._rest.compliance(self._rows[None])[0].to(torch.float64)
+        used = torch.zeros(self._count, dtype=torch.bool, device=self._rows.device)
+        used[self._rows] = True
+        compliance = self._rest.table(used)[self._rows[:, None], self._rows].to(torch.float64)
         turned = self._along @ (self._along @ compliance).T
         self._give[self._normal, self._normal] = 1 / turned.diagonal()[self._normal]
         own = torch.zeros_like(turned)

@@ -360,7 +360,7 @@ class Batch:
         self._base, self._accepted, self._rate = (
             state.take(which) for state in (self._base, self._accepted, self._rate)
         )
-        self._before = self._before[which]
+        self._before, self._majorant = self._before[which], self._majorant[which]
         self._loading.keep(which)
         self._presses = [self._presses[column] for column in columns]
 
