@@ -1,4 +1,4 @@
-"""Tractions of a rigid shape on a face: forces, their derivative, and Coulomb's cone."""
+"""Nodal pressures of a rigid shape on a face: mean gaps, forces, their derivative, the active set, Coulomb's disc."""
 
 from dataclasses import replace
 
@@ -16,34 +16,46 @@ from tacdata.skin.member.conditions import conditions
 from tacdata.skin.member.pose import Pose, turned
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
-PENALTY, STICK = 300.0, 30.0
-"""As stiffness of the skin [MPa/mm]."""
+STICK, ACTIVATION = 30.0, 10.0
+"""Tangential stiffness as that of the skin [MPa/mm], and weight of gaps over the modulus, as that of the skin [1/mm]."""
+STIFF = 1000.0
+"""Pressure by penetration over the modulus [1/mm], by which tests make up multipliers."""
 EYE = torch.eye(3, dtype=torch.float64)[:, :, None]
+CELLS = 6
+SPACING = 4.0 / CELLS / 2
+"""Of the nodes of the face, corners and mid-sides [mm]."""
 
 
 @pytest.fixture(scope="module")
 def mesh():
-    return box_mesh(slab_sensor(size=4.0), 6, 6, 2)
+    return box_mesh(slab_sensor(size=4.0), CELLS, CELLS, 2)
 
 
 class Pressed:
     """A contact with the members' own conditions, so that a test names each thing once."""
 
-    def __init__(self, mesh, *members, distance=None, rough=True):
+    def __init__(self, mesh, *members, distance=None, rough=True, held=None):
         nodes, faces = torch.as_tensor(mesh.nodes), torch.as_tensor(mesh.outer)
-        function = distance or Sphere(2.0).distance_function()
-        modulus = MATERIAL.youngs_modulus
-        self.surface = ContactSurface(nodes, faces, 1, function, rough, PENALTY / modulus, STICK / modulus)
+        function, modulus = distance or Sphere(2.0).distance_function(), MATERIAL.youngs_modulus
+        held = torch.zeros(len(nodes), dtype=torch.bool) if held is None else torch.as_tensor(held)
+        flat = function is board_distance
+        self.surface = ContactSurface(nodes, faces, held, function, rough, ACTIVATION, STICK / modulus, flat)
         self.conditions, self.mesh = joined(*members), mesh
-        self.weights, _ = face_quadrature(nodes, faces, 1)
+        self.start, self.tangent, self.near = self.surface.start, 0.0, 0.0
 
-        self.start, self.tangent = self.surface.start, 0.0
-
-    def force(self, u, pose, history):
-        """Nodal forces; ``now`` keeps the tractions."""
-        force, share = torch.zeros_like(u), torch.full_like(self.conditions.modulus, self.tangent)
-        self.now = self.surface.add_forces(u, pose, history, self.conditions, share, force)
+    def force(self, u, pose, history, multiplier):
+        """Nodal forces of multipliers; ``now`` keeps the tractions."""
+        force, every = torch.zeros_like(u), torch.ones_like(self.conditions.modulus)
+        self.now = self.surface.add_forces(
+            u, multiplier, pose, history, self.conditions, self.tangent * every, self.near * every, force
+        )
         return force
+
+    def press(self, u, pose, history):
+        """The same, with multipliers that grow with the penetration."""
+        self.force(u, pose, history, self.even(0.0))
+        self.multiplier = STIFF * self.conditions.modulus * (-self.now.gap).clamp_min(0.0)
+        return self.force(u, pose, history, self.multiplier)
 
     def product(self, p):
         result = torch.zeros_like(p)
@@ -51,11 +63,17 @@ class Pressed:
         return result
 
     def misfit(self):
-        return self.surface.penetration(self.now)
+        return [value.tolist() for value in self.surface.penetration(self.now)]
 
-    def flat(self):
-        """Displacements of the skin at rest."""
-        return batch(*[np.zeros_like(self.mesh.nodes)] * len(self.conditions.modulus))
+    def flat(self, height=2.0):
+        """Displacements of the skin at rest, or with its face at another height [mm]."""
+        u = batch(*[np.zeros_like(self.mesh.nodes)] * len(self.conditions.modulus))
+        u[:, 2] = height - 2.0
+        return u
+
+    def even(self, pressure):
+        """The same multiplier at every node."""
+        return torch.full((self.surface.count, len(self.conditions.modulus)), pressure, dtype=torch.float64)
 
 
 def against(mesh, friction, shape=None):
@@ -64,8 +82,8 @@ def against(mesh, friction, shape=None):
     return Pressed(mesh, conditions(MATERIAL, friction, shape), distance=shape.distance_function())
 
 
-def against_board(mesh):
-    return Pressed(mesh, conditions(MATERIAL, 0.0), distance=board_distance)
+def against_board(mesh, friction=0.0, **more):
+    return Pressed(mesh, conditions(MATERIAL, friction), distance=board_distance, **more)
 
 
 def at(x=0.0, y=0.0, z=0.0, turn=EYE):
@@ -92,127 +110,237 @@ def side_by_side(*poses):
     )
 
 
+def inside(pressed):
+    """Contact nodes away from the rim, whose hats are whole, and their places."""
+    places = pressed.mesh.nodes[pressed.surface.mortar.nodes]
+    which = np.abs(places[:, :2]).max(axis=1) < 2 - 1e-9
+    return which, places[which]
+
+
 def test_quadrature_weights_add_up_to_the_area(mesh):
     weights, shapes = face_quadrature(torch.as_tensor(mesh.nodes), torch.as_tensor(mesh.outer), 2)
     assert weights.sum().item() == pytest.approx(16, rel=1e-12)
     assert shapes.sum(dim=1).numpy() == pytest.approx(np.ones(24))
 
 
-def test_a_flat_penetration_gives_penalty_times_depth_times_area(mesh):
-    """A half-space pushed 0.05 mm into the whole face: pressure and force in closed form."""
+def test_a_pressure_pushes_with_pressure_times_area_whatever_the_penetration(mesh):
+    """A half-space 0.05 mm beyond the face: the gap, its misfit, and the forces of 0.3 MPa in closed form."""
     pressed, pose = against_board(mesh), at()
-    u = pressed.flat()
-    u[:, 2] = -2.05
-    force = pressed.force(u, pose, pressed.start(pose))
-    assert pressed.now.pressure.numpy() == pytest.approx(np.full(pressed.now.pressure.shape, 0.05 * PENALTY), rel=1e-9)
-    assert force[..., 0].sum(dim=0).numpy() == pytest.approx([0, 0, 0.05 * PENALTY * 16], abs=1e-7)
-    assert pressed.now.force[:, 0].numpy() == pytest.approx([0, 0, 0.05 * PENALTY * 16], abs=1e-7)
-    assert [m.item() for m in pressed.misfit()] == pytest.approx([0.05, 0.05])
+    force = pressed.force(pressed.flat(-0.05), pose, pressed.start(pose), pressed.even(0.3))
+    assert pressed.now.gap.numpy() == pytest.approx(np.full(pressed.now.gap.shape, -0.05), rel=1e-9)
+    assert pressed.now.force[:, 0].numpy() == pytest.approx([0, 0, 0.3 * 16], abs=1e-12)
+    assert pressed.misfit() == [pytest.approx([0.05]), pytest.approx([0.05])]
+    # The integral of a quadratic triangle's shape functions: none at corners, a third of the area at mid-sides.
+    wanted = np.zeros(len(mesh.nodes))
+    np.add.at(wanted, mesh.outer[:, 3:], 0.3 * 16 / len(mesh.outer) / 3)
+    assert force[:, 2, 0].numpy() == pytest.approx(wanted, abs=1e-12) and not force[:, :2].any()
+
+
+def test_pressures_that_rise_linearly_tilt_by_their_moment(mesh):
+    """Hats hold p = 0.3 + 0.05 x exactly: resultant 0.3 * 16 N, moment 0.05 * 4^4 / 12 N mm."""
+    pressed, pose = against_board(mesh), at()
+    x = torch.as_tensor(mesh.nodes[pressed.surface.mortar.nodes, 0])
+    force = pressed.force(pressed.flat(0.0), pose, pressed.start(pose), (0.3 + 0.05 * x)[:, None])[:, 2, 0].numpy()
+    assert force.sum() == pytest.approx(0.3 * 16, rel=1e-12)
+    assert force @ mesh.nodes[:, 0] == pytest.approx(0.05 * 4**4 / 12, rel=1e-12)
+    assert force @ mesh.nodes[:, 1] == pytest.approx(0, abs=1e-12)
+
+
+def test_the_mean_gap_to_a_leaning_plane_is_that_at_the_middle_of_the_hat(mesh):
+    pressed, turn = against_board(mesh), turn_by(0.4, 0.2, -0.1)
+    pose = at(0.3, -0.2, 1.9, turn)
+    pressed.force(pressed.flat(), pose, pressed.start(pose), pressed.even(0.0))
+    which, places = inside(pressed)
+    wanted = (places - [0.3, -0.2, 1.9]) @ turn[:, 2, 0].numpy()
+    assert wanted.min() < -0.2 and wanted.max() > 0.3
+    assert pressed.now.gap[which, 0].numpy() == pytest.approx(wanted, abs=1e-12)
+
+
+def test_the_mean_gap_to_a_sphere_is_that_of_a_paraboloid_under_the_hat(mesh):
+    """The hat of a regular lattice varies by h^2 / 6 along each axis: by r^2 / 2 R the mean gap is h^2 / 6 R larger."""
+    shape = Sphere(200.0)
+    pressed, pose = against(mesh, 0.0, shape), pose_at(depth=0.02)
+    pressed.force(pressed.flat(), pose, pressed.start(pose), pressed.even(0.0))
+    which, places = inside(pressed)
+    wanted = -0.02 + ((places[:, :2] ** 2).sum(axis=1) + SPACING**2 / 3) / 400
+    # What the paraboloid leaves out of the sphere is below r^4 / 8 R^3 and the slant, some 1e-6 mm.
+    assert pressed.now.gap[which, 0].numpy() == pytest.approx(wanted, abs=2e-6)
 
 
 def test_a_shape_above_the_face_exerts_nothing(mesh):
     pressed, pose = against(mesh, 0.2), pose_at(depth=-0.01)
-    assert not pressed.force(pressed.flat(), pose, pressed.start(pose)).any()
-    assert pressed.now.gap.min() > 0 and pressed.misfit()[0].item() == 0
-    assert not pressed.now.tangent.touched.any()
+    assert not pressed.force(pressed.flat(), pose, pressed.start(pose), pressed.even(0.0)).any()
+    assert pressed.now.gap.min() > 0 and pressed.misfit()[0] == [0.0]
+    assert not pressed.now.tangent.active.any()
 
 
-def test_a_multiplier_pulls_the_face_no_further_than_its_traction(mesh):
-    """Augmented: t = lambda - penalty * gap, so an exact fit carries lambda without penetration."""
+@pytest.mark.parametrize(("gap", "near", "multiplier", "active"), [
+    (0.01, 0.0, 0.0301, True), (0.01, 0.0, 0.0299, False),
+    (-0.01, 0.0, -0.0299, True), (-0.01, 0.0, -0.0301, False),
+    (0.01, 0.02, 0.0, True), (0.03, 0.02, 0.0, False),
+])
+def test_nodes_are_active_where_the_multiplier_outweighs_the_gap(mesh, gap, near, multiplier, active):
+    """By 10 times a modulus of 0.3 MPa: at 0.01 mm it takes 0.03 MPa. Held nodes never are; others carry nothing."""
+    held = mesh.nodes[:, 0] < -2 + 1e-9
+    pressed, pose = against_board(mesh, held=held), at()
+    pressed.near = near
+    force = pressed.force(pressed.flat(gap), pose, pressed.start(pose), pressed.even(multiplier))
+    able = ~held[pressed.surface.mortar.nodes]
+    assert 0 < able.sum() < len(able)
+    assert pressed.now.tangent.active[:, 0].numpy().tolist() == (able & active).tolist()
+    assert pressed.now.pressure[:, 0].numpy() == pytest.approx(np.where(able & active, multiplier, 0.0))
+    assert active or not force.any()
+
+
+def test_misfit_counts_gaps_under_pressure_and_penetration_elsewhere(mesh):
+    """Half of the face is loaded. A gap of 0.05 mm is an error there alone; a penetration is one everywhere."""
     pressed, pose = against_board(mesh), at()
-    u = pressed.flat()
-    state = pressed.start(pose)
-    u[:, 2] = -2.0
-    state.multiplier.add_(0.3)
-    pressed.force(u, pose, state)
-    assert pressed.now.pressure.numpy() == pytest.approx(np.full(pressed.now.pressure.shape, 0.3), abs=1e-9)
-    u[:, 2] = -2.0 + 0.3 / PENALTY * 1.01
-    assert not pressed.force(u, pose, state).any()
+    loaded = torch.as_tensor(mesh.nodes[pressed.surface.mortar.nodes, 0] > 0)[:, None]
+    for height, multiplier, wanted in (
+        (0.05, torch.where(loaded, 0.3, 0.0), (0.05, 0.05)),
+        (0.05, pressed.even(0.0), (0.0, 0.0)),
+        (-0.05, pressed.even(0.0), (0.05, 0.0)),
+    ):
+        pressed.force(pressed.flat(height), pose, pressed.start(pose), multiplier.double())
+        assert [value[0] for value in pressed.misfit()] == pytest.approx(wanted)
 
 
-def test_augmenting_takes_the_tractions_of_the_marked_members_alone(mesh):
-    pressed = Pressed(mesh, *[conditions(MATERIAL, 0.0, Sphere(2.0))] * 2)
-    pose = side_by_side(pose_at(), pose_at())
-    state = pressed.start(pose)
-    pressed.force(pressed.flat(), pose, state)
-    state.augment(pressed.now, torch.tensor([False, True]))
-    assert not state.multiplier[..., 0].any()
-    assert torch.equal(state.multiplier[..., 1], pressed.now.pressure[..., 1])
+def slope(pressed, u, pose, state, multiplier, p, h):
+    ends = [pressed.force(u + sign * h * p, pose, state, multiplier) for sign in (1, -1)]
+    pressed.force(u, pose, state, multiplier)
+    return (ends[0] - ends[1]) / (2 * h)
 
 
-@pytest.mark.parametrize("sharp", [0.0, 1.0])
 @pytest.mark.parametrize("friction", [0.0, 50.0])
-def test_stiffness_is_the_derivative_of_force_where_points_stick_or_slide_freely(mesh, friction, sharp):
-    """Without friction or with sticking points the tangent is exact, up to the curvature of the shape times the gap."""
-    pressed = against(mesh, friction)
-    pose, u = pose_at(0.1, 0.2, 0.02), pressed.flat()
-    state = pressed.start(pose)
-    pressed.tangent = sharp
+@pytest.mark.parametrize("shape", [Sphere(2.0), Cylinder(1.5, 3.0, 0.4)])
+def test_stiffness_is_the_derivative_of_force_as_normals_turn_and_points_stick(mesh, friction, shape):
+    """At fixed multipliers forces turn with the normals, and sticking nodes resist; both are in the product."""
+    pressed, pose = against(mesh, friction, shape), pose_at(0.1, 0.2, 0.1, yaw=0.3)
+    u, state = pressed.flat(), pressed.start(pose)
     state.gap.zero_()
-    pressed.force(u, pose, state)
+    pressed.press(u, pose, state)
     state.anchor.copy_(pressed.now.local)
-    p, h = batch(np.random.default_rng(1).normal(size=mesh.nodes.shape)), 1e-7
-    difference = (pressed.force(u + h * p, pose, state) - pressed.force(u - h * p, pose, state)) / (2 * h)
-    pressed.force(u, pose, state)
-    assert (pressed.product(p) + difference).abs().max() < 0.04 * difference.abs().max()
+    p = batch(np.random.default_rng(1).normal(size=mesh.nodes.shape))
+    difference = slope(pressed, u, pose, state, pressed.multiplier, p, 1e-5)
+    assert difference.abs().max() > 1e-2
+    assert (pressed.product(p) + difference).abs().max() < 1e-4 * difference.abs().max()
 
 
-def test_the_stiffness_of_the_faces_is_that_of_the_product(mesh):
-    """Blocks are in single precision, as the preconditioner wants them."""
-    pressed = against(mesh, 0.3)
-    pose, u = pose_at(), pressed.flat()
-    pressed.force(u, pose, pressed.start(pose_at(depth=0.0)))
-    p = batch(np.random.default_rng(2).normal(size=mesh.nodes.shape))
-    product, assembled = pressed.product(p), torch.zeros_like(p)
-    every = torch.arange(len(mesh.outer))
-    blocks = pressed.surface.face_stiffness(pressed.now.tangent, every, torch.zeros_like(every)).double()
-    for nodes, block in zip(mesh.outer, blocks, strict=True):
-        assembled[nodes, :, 0] += (block @ p[nodes, :, 0].reshape(-1)).reshape(6, 3)
-    assert product.abs().max() > 1
-    assert (product - assembled).abs().max() < 1e-6 * product.abs().max()
-    untouched = ~pressed.now.tangent.touched[:, 0]
-    assert untouched.any() and not blocks[untouched].any()
+def slipping(mesh, tangent):
+    """A board on which all nodes slip: pressures and slips differ."""
+    pressed, pose = against_board(mesh, 0.2), at()
+    pressed.tangent = tangent
+    u, state = pressed.flat(0.0), pressed.start(pose)
+    state.gap.zero_()
+    multiplier = 0.1 + 0.02 * torch.as_tensor(np.random.default_rng(4).random((pressed.surface.count, 1)))
+    pressed.force(u, pose, state, multiplier)
+    slip = torch.as_tensor(np.random.default_rng(5).uniform(0.002, 0.004, size=(pressed.surface.count, 3, 1)))
+    state.anchor.copy_(pressed.now.local + slip)
+    pressed.force(u, pose, state, multiplier)
+    size = pressed.now.shear.norm(dim=1)
+    assert torch.allclose(size, 0.2 * multiplier, rtol=1e-12)
+    return pressed, (u, pose, state, multiplier)
+
+
+def test_the_tangent_of_slipping_nodes_is_the_derivative_of_force(mesh):
+    pressed, state = slipping(mesh, 1.0)
+    p = batch(np.random.default_rng(1).normal(size=mesh.nodes.shape))
+    difference = slope(pressed, *state, p, 1e-6)
+    assert (pressed.product(p) + difference).abs().max() < 1e-6 * difference.abs().max()
+
+
+def test_the_secant_of_slipping_nodes_is_stiffer_than_the_tangent_and_across_the_slip_the_same(mesh):
+    tangent, secant = (slipping(mesh, share)[0] for share in (1.0, 0.0))
+    rigid = torch.zeros(len(mesh.nodes), 3, 1, dtype=torch.float64)
+    for seed in range(5):
+        p = batch(np.random.default_rng(seed).normal(size=mesh.nodes.shape))
+        by_tangent, by_secant = ((p * one.product(p)).sum().item() for one in (tangent, secant))
+        assert 0 < by_tangent < by_secant
+    # Moved as a whole along a direction across all slips there would be no difference; along z there is no stiffness.
+    rigid[:, 2] = 1.0
+    assert not secant.product(rigid).any() and not tangent.product(rigid).any()
 
 
 def test_the_product_in_single_precision_is_that_in_double(mesh):
     pressed = against(mesh, 0.3)
     pose, u = pose_at(), pressed.flat()
-    pressed.force(u, pose, pressed.start(pose_at(depth=0.0)))
+    pressed.press(u, pose, pressed.start(pose_at(depth=0.0)))
     p = batch(np.random.default_rng(2).normal(size=mesh.nodes.shape))
     product, single = pressed.product(p), pressed.product(p.float())
-    assert single.dtype == torch.float32
+    assert single.dtype == torch.float32 and product.abs().max() > 1e-2
     assert (single.double() - product).abs().max() < 1e-6 * product.abs().max()
 
 
+class Dragged:
+    """A board that presses with 0.3 MPa all over, moved from place to place; every place is accepted."""
+
+    def __init__(self, mesh, friction):
+        self.pressed = against_board(mesh, friction)
+        self.state = self.pressed.start(at())
+        self.to(0.0)
+
+    def to(self, x):
+        """Shear traction of all nodes when the board has moved to ``x`` [mm], shape (s, 3)."""
+        pose = at(x)
+        self.pressed.force(self.pressed.flat(0.0), pose, self.state, self.pressed.even(0.3))
+        self.state.accept(self.pressed.now, pose, everyone(pose))
+        return self.pressed.now.shear[..., 0].numpy()
+
+    @property
+    def count(self):
+        return self.pressed.surface.count
+
+
+def test_a_small_shift_sticks_with_the_tangential_stiffness(mesh):
+    board = Dragged(mesh, 10.0)
+    shear = board.to(1e-3)
+    assert shear[:, 0] == pytest.approx(np.full(board.count, STICK * 1e-3), rel=1e-9)
+    assert not shear[:, 1:].any()
+    assert board.pressed.now.force[:, 0].numpy() == pytest.approx([STICK * 1e-3 * 16, 0, 0.3 * 16], abs=1e-9)
+
+
+def test_a_large_shift_slides_on_coulombs_disc_and_comes_back_along_a_loop(mesh):
+    """Friction 0.05 of 0.3 MPa is 0.015 MPa. A way of 1e-4 mm back takes 0.003 MPa off; a long one turns it round."""
+    board = Dragged(mesh, 0.05)
+    for x, wanted in ((0.05, 0.015), (0.05 - 1e-4, 0.012), (0.0, -0.015)):
+        shear = board.to(x)
+        assert shear[:, 0] == pytest.approx(np.full(board.count, wanted), rel=1e-9)
+        assert board.pressed.now.force[0, 0].item() == pytest.approx(16 * wanted, rel=1e-9)
+
+
+def test_a_node_that_is_reached_on_the_way_slips_only_from_then_on(mesh):
+    """A gap of 0.02 mm before, 0.08 mm closer now: it is closed for three quarters of the way of 1e-3 mm."""
+    pressed, before, now = against_board(mesh, 10.0), at(), at(x=1e-3, z=0.08)
+    state, u = pressed.start(before), pressed.flat(0.02)
+    pressed.force(u, before, state, pressed.even(0.0))
+    state.accept(pressed.now, before, everyone(before))
+    pressed.force(u, now, state, pressed.even(0.3))
+    shear = pressed.now.shear[:, 0, 0].numpy()
+    assert shear == pytest.approx(np.full(len(shear), 0.75 * STICK * 1e-3), rel=1e-9)
+
+
 def drag(mesh, friction, shift):
-    """Press 0.05 mm deep, accept, move the shape sideways; return normal and tangential traction of each point."""
+    """Press 0.05 mm deep, accept, move the shape sideways; return pressure and shear traction of each node."""
     pressed = against(mesh, friction)
     u, before = pressed.flat(), pose_at(depth=0.05)
     state = pressed.start(before)
-    pressed.force(u, before, state)
+    pressed.press(u, before, state)
     state.accept(pressed.now, before, everyone(before))
-    pressed.force(u, pose_at(x=shift, depth=0.05), state)
+    pressed.press(u, pose_at(x=shift, depth=0.05), state)
     carries = pressed.now.pressure[..., 0] > 0
     return pressed.now.pressure[..., 0][carries].numpy(), pressed.now.shear[..., 0][carries].numpy()
 
 
-def test_a_small_shift_sticks_with_the_tangential_stiffness(mesh):
-    pressure, shear = drag(mesh, 10.0, 1e-3)
-    assert len(pressure) > 10
-    assert shear[:, 0] == pytest.approx(np.full(len(shear), STICK * 1e-3), rel=0.05)
-
-
-def test_a_large_shift_slides_on_coulombs_cone_along_the_motion(mesh):
+def test_no_node_under_a_sphere_leaves_coulombs_disc(mesh):
     pressure, shear = drag(mesh, 0.05, 0.05)
     size = np.linalg.norm(shear, axis=1)
     assert np.all(size <= 0.05 * pressure * (1 + 1e-12))
     sliding = size > 0.05 * pressure * (1 - 1e-9)
-    assert sliding.mean() > 0.9
+    assert len(pressure) >= 5 and sliding.mean() > 0.9
     assert (shear[:, 0] > 0).all()
 
 
-def test_friction_comes_back_with_the_shape(mesh):
-    """Dragged to and fro by the same distance, sliding points end with the opposite traction."""
+def test_dragged_to_and_fro_friction_under_a_sphere_is_opposite(mesh):
     there, back = drag(mesh, 0.05, 0.05)[1], drag(mesh, 0.05, -0.05)[1]
     assert there[:, 0].mean() == pytest.approx(-back[:, 0].mean(), rel=0.05)
 
@@ -222,7 +350,7 @@ def test_accepting_leaves_the_unmarked_member_with_its_history(mesh):
     pose = side_by_side(pose_at(), pose_at())
     state = pressed.start(pose)
     before = state.copy()
-    pressed.force(pressed.flat(), pose, state)
+    pressed.press(pressed.flat(), pose, state)
     state.accept(pressed.now, pose, torch.tensor([True, False]))
     assert torch.equal(state.gap[..., 1], before.gap[..., 1]) and not state.anchor[..., 1].any()
     assert state.gap[..., 0].isfinite().all() and (state.gap[..., 0] == 0).any()
@@ -232,7 +360,7 @@ def test_yaw_turns_the_shape_about_its_tip(mesh):
     """A sphere has no direction: turning it changes nothing; its force follows its place."""
     pressed = against(mesh, 0.0)
     plain, turned_ = (
-        pressed.force(pressed.flat(), pose, pressed.start(pose))
+        pressed.press(pressed.flat(), pose, pressed.start(pose))
         for pose in (pose_at(0.3, 0.1), pose_at(0.3, 0.1, yaw=1.1))
     )
     assert (plain - turned_).abs().max() < 1e-7 * plain.abs().max()
@@ -246,7 +374,7 @@ def test_a_sphere_tilted_about_its_centre_presses_the_same(mesh):
     pressed, plain, tilt = against(mesh, 0.0), pose_at(0.3, 0.1), turn_by(0.4, 0.3, -0.2)
     centre = plain.place + torch.tensor([[0.0], [0.0], [2.0]])
     tilted = Pose((centre - 2.0 * tilt[:, 2]).contiguous(), tilt)
-    upright, leaning = (pressed.force(pressed.flat(), pose, pressed.start(pose)) for pose in (plain, tilted))
+    upright, leaning = (pressed.press(pressed.flat(), pose, pressed.start(pose)) for pose in (plain, tilted))
     assert (tilted.place - plain.place).abs().max() > 0.3
     assert upright.abs().max() > 0.1
     assert (upright - leaning).abs().max() < 1e-7 * upright.abs().max()
@@ -272,9 +400,9 @@ def test_an_observer_who_turns_sees_the_forces_turned(mesh, shape):
         ]
         state = pressed.start(poses[0])
         field, along = (batch(value @ turn.numpy().T) for value in (u, p))
-        pressed.force(field, poses[0], state)
+        pressed.press(field, poses[0], state)
         state.accept(pressed.now, poses[0], everyone(poses[0]))
-        force = pressed.force(field, poses[1], state)
+        force = pressed.press(field, poses[1], state)
         return force[..., 0] @ turn, pressed.product(along)[..., 0] @ turn, pressed.now.shear
 
     one = seen(mesh, torch.eye(3, dtype=torch.float64), torch.zeros(3, dtype=torch.float64))
@@ -294,24 +422,24 @@ def test_every_member_has_its_own_shape_friction_modulus_and_pose(mesh):
     poses = [pose_at(0.1, 0.2, 0.1), pose_at(-0.5, 0.0, 0.05), pose_at(0.0, 0.4, 0.15)]
     start = [pose_at(pose.place[0].item(), pose.place[1].item(), 0.0) for pose in poses]
     whole = Pressed(mesh, *members)
-    together = whole.force(whole.flat(), side_by_side(*poses), whole.start(side_by_side(*start)))
+    together = whole.press(whole.flat(), side_by_side(*poses), whole.start(side_by_side(*start)))
     p = np.random.default_rng(3).normal(size=mesh.nodes.shape)
     product = whole.product(batch(p, p, p))
     for column, (member, pose, before) in enumerate(zip(members, poses, start, strict=True)):
         alone = Pressed(mesh, member)
-        force = alone.force(alone.flat(), pose, alone.start(before))
+        force = alone.press(alone.flat(), pose, alone.start(before))
         assert force.abs().max() > 1e-3
         assert (force[..., 0] - together[..., column]).abs().max() < 1e-13 * force.abs().max()
         assert (alone.product(batch(p))[..., 0] - product[..., column]).abs().max() < 1e-12 * product.abs().max()
         assert whole.now.force[:, column].numpy() == pytest.approx(alone.now.force[:, 0].numpy())
-        largest, mean = (m[column].item() for m in whole.misfit())
-        assert (largest, mean) == pytest.approx(tuple(m.item() for m in alone.misfit()), rel=1e-12)
+        largest, mean = (m[column] for m in whole.misfit())
+        assert (largest, mean) == pytest.approx(tuple(m[0] for m in alone.misfit()), rel=1e-12)
 
 
 def test_tractions_are_proportional_to_the_members_modulus(mesh):
     soft, stiff = (conditions(replace(MATERIAL, youngs_modulus=e), 0.2, Sphere(2.0)) for e in (0.2, 0.8))
     pressed, pose = Pressed(mesh, soft, stiff), side_by_side(pose_at(0.1), pose_at(0.1))
-    force = pressed.force(pressed.flat(), pose, pressed.start(side_by_side(pose_at(), pose_at())))
+    force = pressed.press(pressed.flat(), pose, pressed.start(side_by_side(pose_at(), pose_at())))
     assert (4 * force[..., 0] - force[..., 1]).abs().max() < 1e-12 * force.abs().max()
 
 
@@ -320,7 +448,7 @@ def test_a_thicker_members_face_lies_higher(mesh):
     thick = conditions(MATERIAL, 0.0, Sphere(2.0), thickness=1.1)
     plain, raised = against(mesh, 0.0), Pressed(mesh, thick)
     low, high = pose_at(0.1, 0.2, 0.1), pose_at(0.1, 0.2, 0.1 - 0.2)
-    one = plain.force(plain.flat(), low, plain.start(low))
-    other = raised.force(raised.flat(), high, raised.start(high))
+    one = plain.press(plain.flat(), low, plain.start(low))
+    other = raised.press(raised.flat(), high, raised.start(high))
     assert one.abs().max() > 0.1
     assert (one - other).abs().max() < 1e-9 * one.abs().max()

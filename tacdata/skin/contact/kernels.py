@@ -335,7 +335,10 @@ def slip_kernel(real: type) -> wp.Kernel:
     def slip(stiffness: wp.array3d(dtype=wp.float64), slips: wp.array3d(dtype=real)):
         """Replace the slip of one hat [mm] by the force against it [N]."""
         j, b = wp.tid()
-        x, y, z = slips[j, 0, b], slips[j, 1, b], slips[j, 2, b]
+        # One by one: names bound together stay tied to the array, and would follow what is written below.
+        x = slips[j, 0, b]
+        y = slips[j, 1, b]
+        z = slips[j, 2, b]
         xx, yy, zz = real(stiffness[j, 0, b]), real(stiffness[j, 1, b]), real(stiffness[j, 2, b])
         xy, yz, xz = real(stiffness[j, 3, b]), real(stiffness[j, 4, b]), real(stiffness[j, 5, b])
         slips[j, 0, b] = xx * x + xy * y + xz * z
