@@ -61,33 +61,28 @@ def test_a_state_is_found_only_if_balanced_and_without_penetration():
     way = walk(0.2)
     balanced, tight = LIMIT.residual, LIMIT.penetration * 0.2
     assert way.judge(1.01 * balanced, tight, 0.0, 1.0, LIMIT) == "go on"
-    assert way.judge(balanced, 1.01 * tight, 0.0, 1.0, LIMIT) == "augment"
+    assert way.judge(balanced, 1.01 * tight, 0.0, 1.0, LIMIT) == "go on"
     assert way.judge(balanced, tight, 0.0, 1.0, LIMIT) == "found"
 
 
 def test_points_that_penetrate_together_count_for_more_than_one_at_the_edge():
     way, mean = walk(0.2), LIMIT.mean_penetration * 0.2
     assert LIMIT.mean_penetration < LIMIT.penetration
-    assert way.judge(LIMIT.residual, mean, 1.01 * mean, 1.0, LIMIT) == "augment"
+    assert way.judge(LIMIT.residual, mean, 1.01 * mean, 1.0, LIMIT) == "go on"
     assert way.judge(LIMIT.residual, mean, mean, 1.0, LIMIT) == "found"
 
 
 def test_penetration_is_judged_by_a_tenth_of_a_millimetre_where_a_press_is_shallower():
     allowed = LIMIT.penetration * 0.1
     assert walk(0.01).judge(0.0, allowed, 0.0, 1.0, LIMIT) == "found"
-    assert walk(0.01).judge(0.0, 1.01 * allowed, 0.0, 1.0, LIMIT) == "augment"
-
-
-def test_multipliers_wait_until_the_forces_nearly_balance():
-    way = walk(0.2)
-    assert way.judge(61 * LIMIT.residual, 1.0, 0.0, 1.0, LIMIT) == "go on"
-    assert way.judge(59 * LIMIT.residual, 1.0, 0.0, 1.0, LIMIT) == "augment"
+    assert walk(0.01).judge(0.0, 1.01 * allowed, 0.0, 1.0, LIMIT) == "go on"
 
 
 def test_iterations_without_progress_end_the_attempt():
+    """Counted from the first step on: what stands before it is a guess, and no figure to be compared with."""
     way = walk(0.2)
-    verdicts = [way.judge(1.0, 0.0, 0.0, 0.5, LIMIT) for _ in range(LIMIT.patience + 2)]
-    assert verdicts[:-1] == ["go on"] * (LIMIT.patience + 1)
+    verdicts = [way.judge(1.0, 0.0, 0.0, 0.5, LIMIT) for _ in range(LIMIT.patience + 3)]
+    assert verdicts[:-1] == ["go on"] * (LIMIT.patience + 2)
     assert verdicts[-1] == "failed"
     assert "residual is 1.0e+00" in way.reason and "det F 0.50" in way.reason
 
@@ -100,14 +95,29 @@ def test_slow_progress_is_let_go_on_up_to_the_limit():
     assert f"{LIMIT.newton_limit} Newton iterations" in way.reason
 
 
-def test_augmenting_forgives_the_growth_that_it_causes():
-    """The residual jumps with the multipliers: what counts as progress starts anew."""
-    way, small = walk(0.2), 2 * LIMIT.residual
-    way.judge(small, 0.0, 0.0, 1.0, LIMIT)
-    for _ in range(LIMIT.patience):
-        assert way.judge(small, 1.0, 0.0, 1.0, LIMIT) == "augment"
-    for _ in range(LIMIT.patience):
-        assert way.judge(100 * small, 1.0, 0.0, 1.0, LIMIT) == "go on"
+def test_a_guess_better_than_the_first_step_is_no_figure_to_be_beaten():
+    """The first step changes the active set, and may leave more than the guess: progress is measured from there."""
+    way, error = walk(0.2), 0.1
+    assert way.judge(0.01, 0.0, 0.0, 1.0, LIMIT) == "go on"
+    for _ in range(LIMIT.patience + 4):
+        assert way.judge(error, 0.0, 0.0, 1.0, LIMIT) == "go on"
+        error *= 0.88
+    assert error > 0.01
+
+
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_progress_is_that_of_what_is_farthest_from_what_is_allowed(which):
+    """Penetration and its mean go on falling while forces balance already, and count; what stands still counts not."""
+    allowed = [LIMIT.residual, 0.2 * LIMIT.penetration, 0.2 * LIMIT.mean_penetration]
+    falling, fixed, size = walk(0.2), walk(0.2), 1000.0
+    verdicts = []
+    for _ in range(LIMIT.patience + 3):
+        shares = [size if k == which else 0.5 for k in range(3)]
+        others = [1000.0 if k == which else 0.5 * size / 1000 for k in range(3)]
+        assert falling.judge(*(s * a for s, a in zip(shares, allowed, strict=True)), 1.0, LIMIT) == "go on"
+        verdicts.append(fixed.judge(*(s * a for s, a in zip(others, allowed, strict=True)), 1.0, LIMIT))
+        size *= 0.8
+    assert verdicts == ["go on"] * (LIMIT.patience + 2) + ["failed"]
 
 
 @pytest.mark.parametrize("error", [math.nan, math.inf])

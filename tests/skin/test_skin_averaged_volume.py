@@ -87,9 +87,12 @@ def test_an_even_deformation_is_none_of_its_business(law):
 
 
 def test_the_rest_stiffness_of_a_press_is_near_the_tangent():
-    """Else conjugate gradients would need hundreds of iterations near incompressibility."""
+    """Else conjugate gradients would need hundreds of iterations near incompressibility.
+
+    A press by less than the sphere rises under a hat of 0.75 mm leaves every mean gap open, and no force.
+    """
     model = pressed(0.4999, 4, 1)
-    assert force(model, 0.02) > 0
+    assert force(model, 0.15) > 0.05
     assert model.last_run["cg"] / model.last_run["ticks"] < 40
 
 
@@ -122,7 +125,8 @@ def test_models_average_from_their_settings_ratio_on():
 def test_two_meshes_agree_at_every_poisson_ratio():
     """Elements of 1.0 and 0.75 mm leave 2.2 % at nu = 0.45, the contact's own, and no more towards 0.5.
 
-    With volumes kept at the points the change grows with nu, to more than 10 %.
+    With volumes kept at the points the change grows with nu: to 7.5 % at 0.499, three times that of averages. It was
+    above 10 % when contact acted at points, whose stiffness was part of what was measured.
     """
     ratios = (0.45, 0.47, 0.49, 0.499, 0.4999)
     coarse, fine = ([force(pressed(nu, *mesh, averaged_from=0.0)) for nu in ratios] for mesh in ((6, 2), (8, 3)))
@@ -133,7 +137,7 @@ def test_two_meshes_agree_at_every_poisson_ratio():
     # What the skin gains from 0.499 on is next to nothing; a mesh that locks goes on.
     assert 0 < fine[4] / fine[3] - 1 < 0.01
     plain = [force(pressed(nu, *mesh, averaged_from=0.5)) for nu, mesh in ((0.499, (6, 2)), (0.499, (8, 3)))]
-    assert plain[0] / plain[1] - 1 > 0.1
+    assert plain[0] / plain[1] - 1 > 0.07
 
 
 @pytest.mark.long("tacdata/skin", "benchmarks/solvers", reason="another code solves it too")
