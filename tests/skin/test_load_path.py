@@ -17,6 +17,12 @@ def walk(*depths, longest=0.25):
     return LoadPath(depths, longest, "sphere at (1, 2) mm")
 
 
+def judged(way, error, largest, mean):
+    """Verdict on a state 0.2 mm deep, its figures as shares of what is allowed."""
+    deep = (0.2 * LIMIT.penetration, 0.2 * LIMIT.mean_penetration)
+    return way.judge(error * LIMIT.residual, largest * deep[0], mean * deep[1], 1.0, LIMIT)
+
+
 def path(way):
     """Every depth tried, all found at once; and those that are handed out."""
     tried, wanted = [], []
@@ -108,14 +114,10 @@ def test_a_guess_better_than_the_first_step_is_no_figure_to_be_beaten():
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_progress_is_that_of_what_is_farthest_from_what_is_allowed(which):
     """Penetration and its mean go on falling while forces balance already, and count; what stands still counts not."""
-    allowed = [LIMIT.residual, 0.2 * LIMIT.penetration, 0.2 * LIMIT.mean_penetration]
-    falling, fixed, size = walk(0.2), walk(0.2), 1000.0
-    verdicts = []
+    falling, fixed, size, verdicts = walk(0.2), walk(0.2), 1000.0, []
     for _ in range(LIMIT.patience + 3):
-        shares = [size if k == which else 0.5 for k in range(3)]
-        others = [1000.0 if k == which else 0.5 * size / 1000 for k in range(3)]
-        assert falling.judge(*(s * a for s, a in zip(shares, allowed, strict=True)), 1.0, LIMIT) == "go on"
-        verdicts.append(fixed.judge(*(s * a for s, a in zip(others, allowed, strict=True)), 1.0, LIMIT))
+        assert judged(falling, *(size if k == which else 0.5 for k in range(3))) == "go on"
+        verdicts.append(judged(fixed, *(1000.0 if k == which else size / 2000 for k in range(3))))
         size *= 0.8
     assert verdicts == ["go on"] * (LIMIT.patience + 2) + ["failed"]
 
