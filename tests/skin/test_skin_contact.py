@@ -1,113 +1,35 @@
-"""Nodal pressures of a rigid shape on a face: mean gaps, forces, their derivative, the active set, Coulomb's disc."""
+"""Nodal pressures of a rigid shape on a face: mean gaps, forces, their derivative, the active set, invariance."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
-from skin_examples import batch, box_mesh, joined, random_rotation, slab_sensor
+from pressed_face import (
+    MATERIAL,
+    SPACING,
+    Pressed,
+    against,
+    against_board,
+    at,
+    everyone,
+    pose_at,
+    side_by_side,
+    slab_mesh,
+    turn_by,
+)
+from skin_examples import batch, random_rotation
 
 from tacdata.indenters.cylinder import Cylinder
 from tacdata.indenters.sphere import Sphere
-from tacdata.sensor.sensor import Material
-from tacdata.skin.contact.contact_surface import ContactSurface, face_quadrature
-from tacdata.skin.contact.kernels import board_distance
+from tacdata.skin.contact.contact_surface import face_quadrature
 from tacdata.skin.member.conditions import conditions
-from tacdata.skin.member.pose import Pose, turned
-
-MATERIAL = Material("neo_hookean", 0.30, 0.47)
-STICK, ACTIVATION = 30.0, 10.0
-"""The skin model's tangential stiffness [MPa/mm], and its weight of gaps over the modulus [1/mm]."""
-STIFF = 1000.0
-"""Pressure by penetration over the modulus [1/mm], by which tests make up multipliers."""
-EYE = torch.eye(3, dtype=torch.float64)[:, :, None]
-CELLS = 6
-SPACING = 4.0 / CELLS / 2
-"""Of the nodes of the face, corners and mid-sides [mm]."""
+from tacdata.skin.member.pose import Pose
 
 
 @pytest.fixture(scope="module")
 def mesh():
-    return box_mesh(slab_sensor(size=4.0), CELLS, CELLS, 2)
-
-
-class Pressed:
-    """A contact with the members' own conditions, so that a test names each thing once."""
-
-    def __init__(self, mesh, *members, distance=None, rough=True, held=None):
-        nodes, faces = torch.as_tensor(mesh.nodes), torch.as_tensor(mesh.outer)
-        function, modulus = distance or Sphere(2.0).distance_function(), MATERIAL.youngs_modulus
-        held = torch.zeros(len(nodes), dtype=torch.bool) if held is None else torch.as_tensor(held)
-        flat = function is board_distance
-        self.surface = ContactSurface(nodes, faces, held, function, rough, ACTIVATION, STICK / modulus, flat)
-        self.conditions, self.mesh = joined(*members), mesh
-        self.start, self.tangent, self.near = self.surface.start, 0.0, 0.0
-
-    def force(self, u, pose, history, multiplier):
-        """Nodal forces of multipliers; ``now`` keeps the tractions."""
-        force, every = torch.zeros_like(u), torch.ones_like(self.conditions.modulus)
-        self.now = self.surface.add_forces(
-            u, multiplier, pose, history, self.conditions, self.tangent * every, self.near * every, force
-        )
-        return force
-
-    def press(self, u, pose, history):
-        """The same, with multipliers that grow with the penetration."""
-        self.force(u, pose, history, self.even(0.0))
-        self.multiplier = STIFF * self.conditions.modulus * (-self.now.gap).clamp_min(0.0)
-        return self.force(u, pose, history, self.multiplier)
-
-    def product(self, p):
-        result = torch.zeros_like(p)
-        self.surface.add_product(self.now.tangent, p, result)
-        return result
-
-    def misfit(self):
-        return [value.tolist() for value in self.surface.penetration(self.now)]
-
-    def flat(self, height=2.0):
-        """Displacements of the skin at rest, or with its face at another height [mm]."""
-        u = batch(*[np.zeros_like(self.mesh.nodes)] * len(self.conditions.modulus))
-        u[:, 2] = height - 2.0
-        return u
-
-    def even(self, pressure):
-        """The same multiplier at every node."""
-        return torch.full((self.surface.count, len(self.conditions.modulus)), pressure, dtype=torch.float64)
-
-
-def against(mesh, friction, shape=None):
-    """A sphere, or another shape, of one member."""
-    shape = shape or Sphere(2.0)
-    return Pressed(mesh, conditions(MATERIAL, friction, shape), distance=shape.distance_function())
-
-
-def against_board(mesh, friction=0.0, **more):
-    return Pressed(mesh, conditions(MATERIAL, friction), distance=board_distance, **more)
-
-
-def at(x=0.0, y=0.0, z=0.0, turn=EYE):
-    return Pose(torch.tensor([[x], [y], [z]], dtype=torch.float64), turn.clone())
-
-
-def pose_at(x=0.0, y=0.0, depth=0.1, **angles):
-    """Of a shape whose lowest point is ``depth`` below the face; angles [rad]."""
-    return at(x, y, 2.0 - depth, turn_by(**angles))
-
-
-def turn_by(yaw=0.0, tilt_x=0.0, tilt_y=0.0):
-    return turned(*(torch.tensor([angle], dtype=torch.float64) for angle in (yaw, tilt_x, tilt_y)))
-
-
-def everyone(pose):
-    return torch.ones(pose.place.shape[1], dtype=torch.bool)
-
-
-def side_by_side(*poses):
-    return Pose(
-        torch.cat([pose.place for pose in poses], dim=1).contiguous(),
-        torch.cat([pose.turn for pose in poses], dim=2).contiguous(),
-    )
+    return slab_mesh()
 
 
 def inside(pressed):
@@ -205,12 +127,6 @@ def test_misfit_counts_gaps_under_pressure_and_penetration_elsewhere(mesh):
         assert [value[0] for value in pressed.misfit()] == pytest.approx(wanted)
 
 
-def slope(pressed, u, pose, state, multiplier, p, h):
-    ends = [pressed.force(u + sign * h * p, pose, state, multiplier) for sign in (1, -1)]
-    pressed.force(u, pose, state, multiplier)
-    return (ends[0] - ends[1]) / (2 * h)
-
-
 @pytest.mark.parametrize("friction", [0.0, 50.0])
 @pytest.mark.parametrize("shape", [Sphere(2.0), Cylinder(1.5, 3.0, 0.4)])
 def test_stiffness_is_the_derivative_of_force_as_normals_turn_and_points_stick(mesh, friction, shape):
@@ -221,44 +137,9 @@ def test_stiffness_is_the_derivative_of_force_as_normals_turn_and_points_stick(m
     pressed.press(u, pose, state)
     state.anchor.copy_(pressed.now.local)
     p = batch(np.random.default_rng(1).normal(size=mesh.nodes.shape))
-    difference = slope(pressed, u, pose, state, pressed.multiplier, p, 1e-5)
+    difference = pressed.slope(u, pose, state, pressed.multiplier, p, 1e-5)
     assert difference.abs().max() > 1e-2
     assert (pressed.product(p) + difference).abs().max() < 1e-4 * difference.abs().max()
-
-
-def slipping(mesh, tangent):
-    """A board on which all nodes slip: pressures and slips differ."""
-    pressed, pose = against_board(mesh, 0.2), at()
-    pressed.tangent = tangent
-    u, state = pressed.flat(0.0), pressed.start(pose)
-    state.gap.zero_()
-    multiplier = 0.1 + 0.02 * torch.as_tensor(np.random.default_rng(4).random((pressed.surface.count, 1)))
-    pressed.force(u, pose, state, multiplier)
-    slip = torch.as_tensor(np.random.default_rng(5).uniform(0.002, 0.004, size=(pressed.surface.count, 3, 1)))
-    state.anchor.copy_(pressed.now.local + slip)
-    pressed.force(u, pose, state, multiplier)
-    size = pressed.now.shear.norm(dim=1)
-    assert torch.allclose(size, 0.2 * multiplier, rtol=1e-12)
-    return pressed, (u, pose, state, multiplier)
-
-
-def test_the_tangent_of_slipping_nodes_is_the_derivative_of_force(mesh):
-    pressed, state = slipping(mesh, 1.0)
-    p = batch(np.random.default_rng(1).normal(size=mesh.nodes.shape))
-    difference = slope(pressed, *state, p, 1e-6)
-    assert (pressed.product(p) + difference).abs().max() < 1e-6 * difference.abs().max()
-
-
-def test_the_secant_of_slipping_nodes_is_stiffer_than_the_tangent(mesh):
-    tangent, secant = (slipping(mesh, share)[0] for share in (1.0, 0.0))
-    for seed in range(5):
-        p = batch(np.random.default_rng(seed).normal(size=mesh.nodes.shape))
-        by_tangent, by_secant = ((p * one.product(p)).sum().item() for one in (tangent, secant))
-        assert 0 < by_tangent < by_secant
-    # Along the normal friction does nothing.
-    upward = torch.zeros(len(mesh.nodes), 3, 1, dtype=torch.float64)
-    upward[:, 2] = 1.0
-    assert not secant.product(upward).any() and not tangent.product(upward).any()
 
 
 def test_the_product_in_single_precision_is_that_in_double(mesh):
@@ -269,80 +150,6 @@ def test_the_product_in_single_precision_is_that_in_double(mesh):
     product, single = pressed.product(p), pressed.product(p.float())
     assert single.dtype == torch.float32 and product.abs().max() > 1e-2
     assert (single.double() - product).abs().max() < 1e-6 * product.abs().max()
-
-
-class Dragged:
-    """A board that presses with 0.3 MPa all over, moved from place to place; every place is accepted."""
-
-    def __init__(self, mesh, friction):
-        self.pressed = against_board(mesh, friction)
-        self.state = self.pressed.start(at())
-        self.to(0.0)
-
-    def to(self, x):
-        """Shear traction of all nodes when the board has moved to ``x`` [mm], shape (s, 3)."""
-        pose = at(x)
-        self.pressed.force(self.pressed.flat(0.0), pose, self.state, self.pressed.even(0.3))
-        self.state.accept(self.pressed.now, pose, everyone(pose))
-        return self.pressed.now.shear[..., 0].numpy()
-
-    @property
-    def count(self):
-        return self.pressed.surface.count
-
-
-def test_a_small_shift_sticks_with_the_tangential_stiffness(mesh):
-    board = Dragged(mesh, 10.0)
-    shear = board.to(1e-3)
-    assert shear[:, 0] == pytest.approx(np.full(board.count, STICK * 1e-3), rel=1e-9)
-    assert not shear[:, 1:].any()
-    assert board.pressed.now.force[:, 0].numpy() == pytest.approx([STICK * 1e-3 * 16, 0, 0.3 * 16], abs=1e-9)
-
-
-def test_a_large_shift_slides_on_coulombs_disc_and_comes_back_along_a_loop(mesh):
-    """Friction 0.05 of 0.3 MPa is 0.015 MPa. A way of 1e-4 mm back takes 0.003 MPa off; a long one turns it round."""
-    board = Dragged(mesh, 0.05)
-    for x, wanted in ((0.05, 0.015), (0.05 - 1e-4, 0.012), (0.0, -0.015)):
-        shear = board.to(x)
-        assert shear[:, 0] == pytest.approx(np.full(board.count, wanted), rel=1e-9)
-        assert board.pressed.now.force[0, 0].item() == pytest.approx(16 * wanted, rel=1e-9)
-
-
-def test_a_node_that_is_reached_on_the_way_slips_only_from_then_on(mesh):
-    """A gap of 0.02 mm before, 0.08 mm closer now: it is closed for three quarters of the way of 1e-3 mm."""
-    pressed, before, now = against_board(mesh, 10.0), at(), at(x=1e-3, z=0.08)
-    state, u = pressed.start(before), pressed.flat(0.02)
-    pressed.force(u, before, state, pressed.even(0.0))
-    state.accept(pressed.now, before, everyone(before))
-    pressed.force(u, now, state, pressed.even(0.3))
-    shear = pressed.now.shear[:, 0, 0].numpy()
-    assert shear == pytest.approx(np.full(len(shear), 0.75 * STICK * 1e-3), rel=1e-9)
-
-
-def drag(mesh, friction, shift):
-    """Press 0.05 mm deep, accept, move the shape sideways; return pressure and shear traction of each node."""
-    pressed = against(mesh, friction)
-    u, before = pressed.flat(), pose_at(depth=0.05)
-    state = pressed.start(before)
-    pressed.press(u, before, state)
-    state.accept(pressed.now, before, everyone(before))
-    pressed.press(u, pose_at(x=shift, depth=0.05), state)
-    carries = pressed.now.pressure[..., 0] > 0
-    return pressed.now.pressure[..., 0][carries].numpy(), pressed.now.shear[..., 0][carries].numpy()
-
-
-def test_no_node_under_a_sphere_leaves_coulombs_disc(mesh):
-    pressure, shear = drag(mesh, 0.05, 0.05)
-    size = np.linalg.norm(shear, axis=1)
-    assert np.all(size <= 0.05 * pressure * (1 + 1e-12))
-    sliding = size > 0.05 * pressure * (1 - 1e-9)
-    assert len(pressure) >= 5 and sliding.mean() > 0.9
-    assert (shear[:, 0] > 0).all()
-
-
-def test_dragged_to_and_fro_friction_under_a_sphere_is_opposite(mesh):
-    there, back = drag(mesh, 0.05, 0.05)[1], drag(mesh, 0.05, -0.05)[1]
-    assert there[:, 0].mean() == pytest.approx(-back[:, 0].mean(), rel=0.05)
 
 
 def test_accepting_leaves_the_unmarked_member_with_its_history(mesh):
