@@ -50,7 +50,7 @@ class Residual(Columns):
     volume: torch.Tensor
     """Smallest det F [1], shape (b,)."""
     penetration: torch.Tensor
-    """Largest |gap| of points that carry load [mm], shape (b,)."""
+    """Largest mean |gap| of nodes that carry load, and penetration of others [mm], shape (b,)."""
     mean_penetration: torch.Tensor
     """The same, its mean weighted by the load [mm], shape (b,): of the contact where it is largest."""
     contacts: tuple[ContactForces, ...]

@@ -14,9 +14,9 @@ class SolverSettings:
     residual: float = 5e-4
     """Out-of-balance force over the largest contact force, Euclidean norms over the nodes [1]."""
     penetration: float = 3e-3
-    """Largest |gap| of a point that carries load over the indentation depth [1]."""
+    """Largest mean |gap| of a node that carries load over the indentation depth [1]."""
     mean_penetration: float = 3e-4
-    """Mean |gap|, weighted by the load that points carry, over the indentation depth [1]; the force is off by about one
+    """Mean |gap|, weighted by the load that nodes carry, over the indentation depth [1]; the force is off by about one
     and a half times as much."""
     forcing: float = 0.1
     """Relative tolerance of the conjugate gradients in a Newton iteration [1]; loose, as an evaluation costs one."""
