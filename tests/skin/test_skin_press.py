@@ -189,7 +189,7 @@ def test_a_press_that_does_not_converge_says_how_far_it_came(slab):
 
 def test_the_models_version_follows_what_decides_a_result(slab, rough_slab):
     again = SkinModel(slab.sensor, slab.settings, mesh=slab.mesh)
-    stiffer = SkinModel(slab.sensor, replace(slab.settings, penalty=2 * slab.settings.penalty), mesh=slab.mesh)
+    stiffer = SkinModel(slab.sensor, replace(slab.settings, stick=2 * slab.settings.stick), mesh=slab.mesh)
     assert again.content_hash == slab.content_hash
     assert len({slab.content_hash, rough_slab.content_hash, stiffer.content_hash}) == 3
     assert isinstance(slab.settings, ModelSettings)
