@@ -18,6 +18,7 @@ from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import VirtualBoard, draw_timing
 from tacdata.virtual_rig.optics.camera import VirtualCamera
+from tacdata.virtual_rig.optics.scene import looking_at
 from tacdata.virtual_rig.rig import BAUDS, board_format
 from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, draw_hand
 from tacdata.virtual_rig.world.world import World, draw
@@ -27,7 +28,9 @@ INTRINSICS = {"width": 800, "height": 600, "fx": 880.0, "fy": 880.0, "cx": 399.5
 FACES = ("+x", "-x", "+y", "-y", "+z")
 TIP = {"position": [10.0, 0.0, -18.0], "quaternion": [1.0, 0.0, 0.0, 0.0], "method": "drawing", "residual": 0.1}
 EYES = {"left": (0.10, -0.36, 0.36), "right": (-0.08, 0.37, 0.35)}
-"""Positions of the cameras [m]; both look at the ball."""
+"""Positions of the cameras [m]."""
+AIM = (0.0, 0.0, 0.085)
+"""Point that both cameras look at [m]: where the ball is lifted."""
 RATE = 20.0
 """Images a second of the rig's clock [Hz]."""
 DELAY = 0.05
@@ -97,7 +100,7 @@ class VirtualDemo:
             )
             for k, name in enumerate(DIRECTIONS)
         }  # fmt: skip
-        self.eyes = {name: _look_at(EYES[name]) for name in list(EYES)[:cameras]}
+        self.eyes = {name: looking_at(EYES[name], AIM) for name in list(EYES)[:cameras]}
         self._rng = np.random.default_rng([seed, 12])
         self.cameras = {
             name: VirtualCamera(self.clock, RATE, self._painter(pose), DELAY, seed, ahead=True)
@@ -187,7 +190,7 @@ class VirtualDemo:
     def _painter(self, eye: np.ndarray) -> Callable[[int], np.ndarray]:
         from tacdata.virtual_rig.optics.render import render_scene
 
-        world_to_eye, tip = np.linalg.inv(eye), _tip_on_cube()
+        world_to_eye, tip = np.linalg.inv(eye), tip_on_cube()
 
         def draw_image(exposed_ns: int) -> np.ndarray:
             seconds = self.seconds(exposed_ns)
@@ -210,22 +213,11 @@ class VirtualDemo:
         return carried
 
 
-def _tip_on_cube() -> np.ndarray:
+def tip_on_cube() -> np.ndarray:
+    """Return the fingertip's frame in that of its cube, shape (4, 4) [m]."""
     matrix = np.diag([1.0, -1.0, -1.0, 1.0])
     matrix[:3, 3] = np.array(TIP["position"]) / 1000
     return matrix
-
-
-def _look_at(place: tuple[float, float, float]) -> np.ndarray:
-    """Return the frame of a camera that looks at the place where the ball is lifted, shape (4, 4) [m]."""
-    forward = np.array([0.0, 0.0, 0.085]) - place
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-    pose[:3, 3] = place
-    return pose
 
 
 def _world(camera: str, pose: np.ndarray, rng: np.random.Generator) -> dict[str, Any]:

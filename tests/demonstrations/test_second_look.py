@@ -11,17 +11,18 @@ from tacdata.demonstrations.recording.reader import read_demo
 from tacdata.demonstrations.recording.recorder import DemoHeader
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.tags import look
-from tacdata.virtual_rig.demo import FINGERS, INTRINSICS, _look_at, _tip_on_cube
+from tacdata.virtual_rig.demo import AIM, FINGERS, INTRINSICS, tip_on_cube
 from tacdata.virtual_rig.optics.render import render_scene
+from tacdata.virtual_rig.optics.scene import looking_at
 
-EYE = _look_at((0.10, -0.36, 0.36))
+EYE = looking_at((0.10, -0.36, 0.36), AIM)
 TIMES = 0.2 + 0.05 * np.arange(8)
 
 
 def image(seconds, rng):
     """What the camera sees of the hand."""
     cubes = [
-        (np.linalg.inv(EYE) @ HAND.tip(name, seconds) @ np.linalg.inv(_tip_on_cube()), entry["cube"])
+        (np.linalg.inv(EYE) @ HAND.tip(name, seconds) @ np.linalg.inv(tip_on_cube()), entry["cube"])
         for name, entry in FINGERS["fingers"].items()
     ]
     return render_scene(cubes, INTRINSICS, rng)
