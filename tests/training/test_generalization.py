@@ -6,6 +6,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
+from running.in_process import tacdata
 
 from tacdata.errors import UsageError
 from training.generalization import generalize
@@ -124,9 +125,11 @@ def test_runs_are_reported_by_the_verb(outcomes, tmp_path, monkeypatch):
     shown = call("generalize", tmp_path / "data", "--out", tmp_path / "runs", *options, "--split", "specimen")
     assert "split specimen is not possible" in shown
     assert (tmp_path / "runs/report.html").read_text().startswith("<!doctype html>")
-    call("report", tmp_path / "runs", "--out", tmp_path / "page.html", "--device", "cpu", "--threads", 1)
+    words = ["--out", tmp_path / "page.html", "--device", "cpu", "--threads", 1, "--json"]
+    (run,) = json.loads(tacdata("report", tmp_path / "runs", *words).stdout)["runs"]
     assert "direct" in (tmp_path / "page.html").read_text()
     with pytest.raises(UsageError, match="exists"):
         call("report", tmp_path / "runs", "--out", tmp_path / "page.html")
     scores = json.loads((tmp_path / "runs/direct-episode-0/scores/scores.json").read_text())
     assert next(entry["level"] for entry in scores["uncertainty"]["levels"]) == 0.5
+    assert "direct" in run["title"] and run["uncertainty"] == scores["uncertainty"]
