@@ -164,6 +164,11 @@ def test_failures_keep_their_reason_and_a_broken_session_is_refused(tmp_path):
         assert "skin.yaml" in refused[2]["reason"] and "next:" in refused[2]["reason"]
         shown = verb("farm", "status", "000001", "--url", service.url, "--wait")
         assert shown.returncode == 5 and "episode 2: no label" in shown.stdout
+        shown = verb("farm", "submit", "broken", "--url", service.url)
+        assert shown.returncode == 5 and "submission 000005 is refused: " in shown.stderr, shown.stderr
+        assert "session.json" in shown.stderr and shown.stderr.count("next:") == shown.stderr.count("allowed:") == 1
+        shown = verb("farm", "submit", "broken", "--url", service.url, "--wait", "0")
+        assert shown.returncode == 0 and "is filed" in shown.stdout
 
 
 def test_a_killed_service_goes_on_where_it_stood(tmp_path):

@@ -25,7 +25,8 @@ from tacdata.dataset.flags import read_flags
 from tacdata.errors import TacdataError
 from viewers.browse.episode_list import UNITS, EpisodeList, with_flags
 from viewers.browse.flagging import flag_episode, unflag_episode
-from viewers.rerun.window import GRPC_PORT, LOOPBACK, WEB_PORT, free_port, quiet_environment, running
+from viewers.rerun.shield import LOOPBACK, shielded
+from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
 
 PORT = 9095
 """Where the page is offered; another where it is in use."""
@@ -47,12 +48,13 @@ def browse_server(listed: EpisodeList, labels: Path | None, predictions: Path | 
     Yields:
         The address to open.
     """
-    web = free_port(WEB_PORT)
+    web, grpc = any_port(), free_port(GRPC_PORT)
+    viewer = ["--serve-web", "--bind", LOOPBACK, "--port", str(grpc), "--web-viewer-port", str(web)]
     with tempfile.TemporaryDirectory(prefix="tacdata-browse-") as folder, quiet_environment() as environment:
-        viewer = ["--serve-web", "--bind", LOOPBACK, "--port", str(free_port(GRPC_PORT)), "--web-viewer-port", str(web)]
-        pages = Pages(listed, labels, predictions, Path(folder), f"http://{LOOPBACK}:{web}")
-        with running(viewer, environment), serving(pages, free_port(PORT)):
-            yield f"{pages.address}/"
+        with running(viewer, environment), shielded(web, free_port(WEB_PORT)) as address:
+            pages = Pages(listed, labels, predictions, Path(folder), address)
+            with serving(pages, free_port(PORT)):
+                yield f"{pages.address}/"
 
 
 class Pages:
