@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import schemas
-from tacdata.errors import UsageError
+from tacdata.errors import TacdataError, UsageError
 from tacdata.importing.formats.source_format import SourceTable, read_table
 from tacdata.importing.units import plain, quantity_of, split_unit
 
@@ -53,7 +53,9 @@ def described(source: Path) -> tuple[dict[str, SourceTable], str]:
         try:
             tables[kind] = read_table(path, {})
         except Exception as error:  # a README beside the data is no error
-            refused.append(f"{kind}: {type(error).__name__}")
+            if source.is_file() and isinstance(error, TacdataError):
+                raise
+            refused.append(error.given if isinstance(error, TacdataError) else f"{kind}: {type(error).__name__}")
     if not tables:
         raise UsageError(
             f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
