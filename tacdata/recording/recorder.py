@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -49,8 +48,6 @@ FIRST_SEARCH = 20.0
 
 class Recorder:
     """One session of recording.
-
-    Example: ``Recorder(rig, sensor, plan, Path("session")).run(confirm=lambda summary: True)``
 
     Example:
         ``Recorder(rig, sensor, plan, Path("session")).run(confirm=lambda summary: True)``
@@ -199,18 +196,19 @@ class Recorder:
                 self._progress(done, len(wanted), sum(left[done:]) / self.rig.clock.rate)
 
     def _wait_for_streams(self, streams: RigStreams) -> None:
-        end = time.monotonic() + FIRST_FRAME
+        host = self.rig.clock.host
+        end = host.monotonic() + FIRST_FRAME
         while streams.frames < 2 or streams.position is None:
             if streams.fault:
                 raise streams.fault
             self._interruption.check()
-            if time.monotonic() > end:
+            if host.monotonic() > end:
                 raise streams.nothing_yet(FIRST_FRAME)
-            time.sleep(WATCH)
-        end = time.monotonic() + FIRST_SEARCH
-        while not streams.searching and not streams.fault and time.monotonic() < end:
+            host.sleep(WATCH)
+        end = host.monotonic() + FIRST_SEARCH
+        while not streams.searching and not streams.fault and host.monotonic() < end:
             self._interruption.check()
-            time.sleep(WATCH)
+            host.sleep(WATCH)
 
     def _rise(self, streams: RigStreams) -> Position:
         """Go straight up to the clearance height; return the position there [mm]."""

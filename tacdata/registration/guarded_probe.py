@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -69,14 +68,14 @@ class GuardedProbe(Probe):
         return self._position
 
     def _begin(self) -> Position:
-        end = time.monotonic() + PATIENCE
+        end = self._rig.clock.host.monotonic() + PATIENCE
         while self._streams.position is None or len(self._sink.frames) < 2:
             self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
-            if time.monotonic() > end:
+            if self._rig.clock.host.monotonic() > end:
                 raise self._streams.nothing_yet(PATIENCE)
-            time.sleep(LOOK)
+            self._rig.clock.host.sleep(LOOK)
         return self._streams.position
 
     def go(self, position: Position, speed: float) -> None:
@@ -113,7 +112,7 @@ class GuardedProbe(Probe):
 
     def read(self, frames: int) -> StillReading:
         """Collect frames sampled since the guide came to rest; see the base."""
-        end = time.monotonic() + PATIENCE + PATIENCE * frames / 30 / self._rig.clock.rate
+        end = self._rig.clock.host.monotonic() + PATIENCE + PATIENCE * frames / 30 / self._rig.clock.rate
         while True:
             rows = [counts for sample_ns, counts in list(self._sink.frames) if sample_ns >= self._rested_ns]
             if len(rows) >= frames:
@@ -121,11 +120,11 @@ class GuardedProbe(Probe):
             self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
-            if time.monotonic() > end:
+            if self._rig.clock.host.monotonic() > end:
                 raise DeviceError(
                     f"{len(rows)} of {frames} frames within the time", "a board that keeps its rate", "check the board"
                 )
-            time.sleep(LOOK)
+            self._rig.clock.host.sleep(LOOK)
         taken = np.array(rows[:frames])
         self._sink.frames.clear()
         spread = taken.std(axis=0, ddof=1) if frames > 1 else np.zeros(taken.shape[1])
@@ -138,7 +137,7 @@ class GuardedProbe(Probe):
             self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
-            time.sleep(LOOK)
+            self._rig.clock.host.sleep(LOOK)
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +112,7 @@ class VirtualDemo:
         """The demo rig file's document (`schemas/demo_rig.schema.json`)."""
         worlds = np.random.default_rng([self.seed, 13])
         return {
-            "version": schemas.version("demo_rig"), "name": NAME, "clock": asdict(self.clock),
+            "version": schemas.version("demo_rig"), "name": NAME, "clock": self.clock.document,
             "boards": {
                 name: {
                     "driver": "capacitive_board", "port": board.port.path, "baud": board.baud,

@@ -98,7 +98,7 @@ class VirtualRig:
         document: dict[str, Any] = {
             "version": schemas.version("rig"),
             "name": NAME,
-            "clock": asdict(self.clock),
+            "clock": self.clock.document,
             "cnc": {"driver": "grbl", "port": self.controller.port.path, "baud": 115200},
             "board": {
                 "driver": "capacitive_board", "port": self.board.port.path, "baud": self.board.baud,

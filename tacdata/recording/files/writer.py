@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import queue
-import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -130,11 +129,11 @@ class EpisodeWriter:
             raise DeviceError(
                 f"{path} cannot be begun: {error}", "a disk with room for the recording", "make room, then --resume"
             ) from error
-        self._queue: queue.SimpleQueue[tuple[str, int, int, int, bytes] | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[str, int, int, int, bytes] | None] = clock.host.queue()
         self._taken = self._written = 0  # bytes received and bytes written
         self._failure: Exception | None = None
-        self._lock = threading.Lock()
-        self._thread = threading.Thread(target=self._drain, name=f"write {path.name}", daemon=True)
+        self._lock = clock.host.lock()
+        self._thread = clock.host.thread(self._drain, f"write {path.name}")
         self.note("recording begins")
         self._thread.start()
 
@@ -317,7 +316,7 @@ def _begun(
     boards: tuple[str, ...],
 ) -> ChunkedFile:  # fmt: skip
     """Create the file with its channels and attachments and sync it to the disk."""
-    file = ChunkedFile(file_names.partial(path))
+    file = ChunkedFile(file_names.partial(path), host=clock.host)
     for topic, message in topics.FIXED.items():
         file.register(topic, message)
     for board in boards:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 
 import numpy as np
 
@@ -37,7 +36,7 @@ class GuardedMotion:
     def __init__(self, cnc: MotionController, clock: Clock, interruption: Interruption | None = None) -> None:
         """Drive ``cnc``; nothing moves before `drive`, which looks for signals that the interruption holds back."""
         self._cnc, self._clock, self._interruption = cnc, clock, interruption or Interruption()
-        self._halted = threading.Event()
+        self._halted = clock.host.event()
         self._rest: Position | None = None  # where it stands after a stop; None: it runs, or does not obey
         self._why = "nothing was stopped"
         self._path: AllowedPath | None = None
@@ -71,22 +70,22 @@ class GuardedMotion:
             DeviceError: On a fault, after a feed hold and dropping the queue.
             KeyboardInterrupt: On Ctrl-C, after the same.
         """
-        failure: list[BaseException] = []
-        work = threading.Thread(target=self._carry_out, args=(path, start, writer, failure), daemon=True)
+        failure, host = list[BaseException](), self._clock.host
+        work = self._clock.host.thread(self._carry_out, "motion", (path, start, writer, failure))
         self._allowed.stand(start, self._clock.now_ns())
         self._at = None
         try:
             work.start()
-            looked = time.monotonic()
+            looked = host.monotonic()
             while work.is_alive():
                 work.join(WATCH)
-                looked = _look_again(looked)
+                looked = _look_again(looked, host.monotonic())
                 self._interruption.check()
                 if streams.fault:
                     break
-            end = time.monotonic() + (REASON if self._halted.is_set() else WATCH)
-            while failure and streams.fault is None and time.monotonic() < end:
-                time.sleep(WATCH / 2)  # a stream that stopped the motion is about to give the reason
+            end = host.monotonic() + (REASON if self._halted.is_set() else WATCH)
+            while failure and streams.fault is None and host.monotonic() < end:
+                host.sleep(WATCH / 2)  # a stream that stopped the motion is about to give the reason
             if streams.fault or failure:
                 raise streams.fault or failure[0]
         except BaseException:
@@ -189,9 +188,8 @@ class GuardedMotion:
         return (f"motion: at rest at {_text(self._at)} mm" if self._at else "motion: NOT KNOWN to have stopped",)
 
 
-def _look_again(looked: float) -> float:
-    """Return the present time [s]; raise if this computer stood still since it ``looked``."""
-    now = time.monotonic()
+def _look_again(looked: float, now: float) -> float:
+    """Return ``now`` [s]; raise if this computer stood still since it ``looked``."""
     if now - looked > STALL:
         raise DeviceError(
             f"this computer stood still for {now - looked:.1f} s while the guide moved (suspended, a closed lid, or "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -161,5 +160,5 @@ class RigStreams(DeviceStreams):
                     self._feed.position(status.arrival_ns, self.position)
                 if self._sink and status.arrival_ns >= self._sink.begun_ns:
                     self._sink.status(status)
-        time.sleep(POLL)
+        self._host.sleep(POLL)
         return len(statuses)

@@ -45,8 +45,9 @@ class Watch:
         """Start now."""
         self._owed, self._clock = owed, clock
         self._due_ns = clock.now_ns() + round(min(owed.motion, owed.limit) * 1e9)
-        self._late = Patience(owed.limit, clock.rate, floor=FLOOR if owed.idle_ends_it else REAL_FLOOR)
-        self._idle = Patience(IDLE, clock.rate, floor=IDLE_FLOOR)
+        floor = FLOOR if owed.idle_ends_it else REAL_FLOOR
+        self._late = Patience(owed.limit, clock.rate, floor, host=clock.host)
+        self._idle = Patience(IDLE, clock.rate, IDLE_FLOOR, host=clock.host)
 
     def ending(self, last: CncStatus | None) -> DeviceError | None:
         """Return why the wait must end, or None."""
