@@ -2,7 +2,9 @@
 
 import random
 import signal
+import sys
 
+import numpy as np
 from schedule import SECOND
 
 COURSE = 19.0
@@ -40,6 +42,12 @@ class Faults:
         """Do something so much later [s]."""
         self.at(self.world.schedule.now + seconds, action)
 
+    def end(self):
+        """Let nothing go wrong any more."""
+        self.over = True
+        for watcher in list(WATCHERS):
+            watcher.stop()
+
     def see(self, name, seconds=0.0):
         """Note that the recorder can see it from now on, or so much later [s]."""
         self.visible.append((self.world.schedule.now_ns + round(seconds * SECOND), name))
@@ -59,6 +67,51 @@ class Faults:
             if begin - SECOND // 2 <= first < end:
                 first = end
         return first / SECOND
+
+
+WATCHERS = []
+"""Who counts lines."""
+TOOL = 3
+"""The number by which Python knows them."""
+
+
+class AtALine:
+    """Delivers a signal when the main thread has run so many lines of the project."""
+
+
+    def __init__(self, faults, number, lines):
+        """Begin to count."""
+        self.faults, self.number, self.left = faults, number, lines
+        if not WATCHERS:
+            sys.monitoring.use_tool_id(TOOL, "simulation")
+            sys.monitoring.register_callback(TOOL, sys.monitoring.events.LINE, self.look)
+            sys.monitoring.set_events(TOOL, sys.monitoring.events.LINE)
+        WATCHERS.append(self)
+
+    @staticmethod
+    def look(code, _line):
+        """Count a line."""
+        if "/tacdata/" not in code.co_filename:
+            return sys.monitoring.DISABLE
+        for watcher in list(WATCHERS):
+            computer = watcher.faults.world.computer
+            if watcher.faults.over:
+                watcher.stop()
+            elif computer.schedule.task is computer.main and not computer.killed:
+                watcher.left -= 1
+                if not watcher.left:
+                    watcher.stop()
+                    watcher.faults.see("signal")
+                    computer.handlers.get(watcher.number, signal.default_int_handler)(watcher.number, None)
+        return None
+
+    def stop(self):
+        """Count no more."""
+        WATCHERS.remove(self)
+        if not WATCHERS:
+            sys.monitoring.set_events(TOOL, 0)
+            sys.monitoring.register_callback(TOOL, sys.monitoring.events.LINE, None)
+            sys.monitoring.free_tool_id(TOOL)
 
 
 def _damage(faults, way, text):
@@ -223,6 +276,18 @@ def interrupted(faults):
         faults.after(faults.random.uniform(0.02, 2.0), lambda: faults.world.computer.send_signal(number))
 
 
+def interrupted_at_a_line(faults):
+    """Deliver one or two signals before any line of the project that the main thread is about to run."""
+    number, draw = signal.SIGINT, faults.random
+    for _ in range(draw.choice((1, 2))):
+        AtALine(faults, number, draw.randrange(1, draw.choice((20, 300, 3000))))
+
+
+def board_saturates(faults):
+    faults.world.board.inject_readings(lambda counts: np.full_like(counts, 65535.0))
+    faults.see("board saturates", 2.0)
+
+
 def killed(faults):
     faults.deaf = True
     faults.world.computer.kill()
@@ -232,8 +297,9 @@ KINDS = {
     act.__name__: act
     for act in (
         damaged_answer, damaged_command, lost_answer, lost_command, late_answers, controller_stalls, damaged_frame,
-        board_stalls, board_freezes, board_unplugged, controller_unplugged, controller_mute, alarm, brown_out,
-        foreign_hold, foreign_door, door, pendant, computer_stalls, disk_full, disk_slow, interrupted, killed,
+        board_stalls, board_freezes, board_saturates, board_unplugged, controller_unplugged, controller_mute, alarm,
+        brown_out, foreign_hold, foreign_door, door, pendant, computer_stalls, disk_full, disk_slow, interrupted,
+        interrupted_at_a_line, killed,
     )
 }  # fmt: skip
 """Name -> what happens."""

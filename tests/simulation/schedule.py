@@ -115,7 +115,7 @@ class Schedule:
 
     def _switch(self, task, woken):
         before, self._running, hub = self._running, task, self._hub
-        self._hub = getcurrent()
+        self._hub = task.greenlet.parent = getcurrent()  # where it goes when it has ended, too
         try:
             task.greenlet.switch(woken)
         finally:

@@ -25,16 +25,23 @@ class Way:
         """What becomes of the bytes of one write."""
         self.held_until = 0
         """Bytes wait on their way until then [ns]."""
+        self._laid = 0  # how often it was plugged in: what was on its way before never arrives
 
     def send(self, data):
         data = self.change(bytes(data))
         if data:
             due = max(self._schedule.now_ns + PASS, self.held_until)
-            self._schedule.at(due, lambda: self._arrive(data))
+            self._schedule.at(due, lambda laid=self._laid: self._arrive(data, laid))
 
-    def _arrive(self, data):
-        self.arrived += data
-        self.readers.wake()
+    def renew(self):
+        """Lay it anew: nothing is wrong with it, and nothing is on its way."""
+        self.change, self.held_until, self._laid = (lambda data: data), 0, self._laid + 1
+        self.take()
+
+    def _arrive(self, data, laid):
+        if laid == self._laid:
+            self.arrived += data
+            self.readers.wake()
 
     def take(self, most=1 << 20):
         data = bytes(self.arrived[:most])
@@ -76,8 +83,7 @@ class SimulatedLine:
         """Plug it in again; whatever was on its way is gone."""
         self.plugged = True
         for way in (self.to_host, self.to_device):
-            way.change, way.held_until = (lambda data: data), 0
-            way.take()
+            way.renew()
 
     def close(self):
         """Unplug it."""

@@ -1,7 +1,10 @@
 """One seed: a recording with faults, what must hold of it, then the person repairs the rig and resumes."""
 
+import random
 import re
+import sys
 import tempfile
+import time
 import traceback
 from pathlib import Path
 
@@ -31,6 +34,7 @@ class Run:
     def __init__(self, world, resume=False):
         """Record until it ends by itself, or is killed."""
         self.world, self.begin = world, world.schedule.now
+        self.before = set(world.folder.glob("*.mcap")) if world.folder.exists() else set()
         self.session, self.error, self.hung = None, None, ""
         try:
             self.session = world.record(resume)
@@ -76,7 +80,7 @@ def _threads(run):
         if task.error is not None and task.name != "main":
             yield f"the thread {task.name} died: {_traced(task.error)}"
     left = [task.name for task in run.world.computer.tasks if not task.ended]
-    if left and not run.killed:
+    if left and not run.killed and not isinstance(run.error, KeyboardInterrupt):  # a second one ends all waiting
         yield f"threads that go on after the end: {left}"
 
 
@@ -95,7 +99,7 @@ def _motion(run, faults):
     first = begun[0] if len(begun) else len(low)
     if np.any(sideways[:first] > 1e-6) or np.any(down[:first] > 1e-6):
         yield "the first move was not straight up"
-    seen = faults.seen()
+    seen = faults.seen()  # in the sense of `Faults.see`
     if seen is not None and not faults.deaf:
         late = times[:-1] > seen + STOPPED + BRAKING
         goes = np.flatnonzero(late & ((sideways > NEAR / 10) | (down > NEAR / 10)))
@@ -147,7 +151,7 @@ def _files(run, faults):
     if partial and not run.killed and run.world.computer.disk.refused_ns is None:
         yield f"left half written: {[path.name for path in partial]}"
     for path in [*finished.values(), *file_names.unfinished(folder)]:
-        if path.stat().st_size == 0:
+        if path.stat().st_size == 0 or path in run.before:
             continue
         if path in finished.values() or run.world.computer.disk.refused_ns is None:
             yield from _frames(run, faults, path)
@@ -177,18 +181,22 @@ def _frames(run, faults, path):
 def play(seed, only=()):
     """Play one seed; return (names of its faults, what did not hold, simulated seconds)."""
     with tempfile.TemporaryDirectory() as folder:
-        world = World(seed, Path(folder) / "session")
+        draw = random.Random(f"rig {seed}")
+        firmware = draw.choice(("Grbl", "Grbl", "grblHAL"))
+        settings = draw.choice((None, None, {"$20": "0", "$22": "0"}))
+        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings)
         faults = Faults(world, seed, only)
         try:
             found = list(_play(world, faults))
         finally:
+            faults.end()
             world.end()
-        return faults.names, found, world.schedule.now
+        return [firmware, *(["no homing"] if settings else []), *faults.names], found, world.schedule.now
 
 
 def _play(world, faults):
     run = Run(world)
-    faults.over = True
+    faults.end()
     yield from (f"first run: {words}" for words in broken(run, faults))
     if run.hung or (run.error is None and not run.killed):
         return
@@ -209,3 +217,22 @@ def _play(world, faults):
     yield from (f"resumed: {words}" for words in broken(run, calm))
     if run.error is not None:
         yield f"does not resume: {run.words}"
+
+
+def main(first, last):
+    """Play seeds from ``first`` up to ``last`` and print those that fail; return how many did."""
+    failed, seconds, begin = 0, 0.0, time.process_time()
+    for seed in range(first, last):
+        names, found, simulated = play(seed)
+        seconds += simulated
+        if found:
+            failed += 1
+            print(f"seed {seed} ({', '.join(names)}):", *found, sep="\n  ", flush=True)
+    used = time.process_time() - begin
+    print(f"{failed} of {last - first} seeds failed; {seconds:.0f} simulated s took {used:.0f} s of a core")
+    return failed
+
+
+if __name__ == "__main__":
+    sys.path.append(str(Path(__file__).parents[1]))  # pyserial imports the lines by this folder's name
+    sys.exit(bool(main(int(sys.argv[1]), int(sys.argv[2]))))

@@ -330,5 +330,6 @@ def _begun(
         file.flush()
     except OSError:
         file.let_go()
+        file.path.unlink(missing_ok=True)  # without its attachments nobody can read it
         raise
     return file
