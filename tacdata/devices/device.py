@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -106,6 +107,9 @@ class TaxelBoard(Device):
 
 class MotionController(Device):
     """Base class of motion controllers with three axes."""
+
+    before_homing: Callable[[], None] = staticmethod(lambda: None)
+    """Called before `open` homes the machine; raises if it must not."""
 
     @abstractmethod
     def settings(self) -> dict[str, str]:

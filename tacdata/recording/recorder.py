@@ -19,7 +19,7 @@ from tacdata.recording.live.ending import ending, on_disk
 from tacdata.recording.live.guarded_motion import WATCH, GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
-from tacdata.recording.live.lost_position import Ask, require_found, why_lost
+from tacdata.recording.live.lost_position import Ask, require_found, require_free, why_lost
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion import sync_tap as tap_motion
@@ -133,6 +133,8 @@ class Recorder:
     def _open_and_record(
         self, session: Session | None, wanted: tuple[int, ...], confirm: Callable[[Preflight], bool]
     ) -> Session:
+        if session:  # earlier presses may have left the tip in the skin
+            self.devices.cnc.before_homing = lambda why=session.position_lost: require_free(why, self._ask)
         with self.devices.opened() as devices:
             cnc = devices.cnc
             limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))

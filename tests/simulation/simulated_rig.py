@@ -97,11 +97,11 @@ class World:
             line.attach(self.computer)
         self.schedule.extend(seconds)
 
-    def record(self, resume=False):
-        """Run the recorder; return the session, or raise what it raises."""
+    def record(self, resume=False, **controller):
+        """Run the recorder, with settings of the controller; return the session, or raise what it raises."""
         document = {
             "version": "1.0", "name": "simulated",
-            "cnc": {"driver": "grbl", "port": self.cnc_line.path},
+            "cnc": {"driver": "grbl", "port": self.cnc_line.path, **controller},
             "board": {"driver": "capacitive_board", "port": self.board_line.path},
             "registration": {"origin": [*ORIGIN], "yaw": 5.0, "method": "by hand", "date": "2026-01-01"},
             "envelope": ENVELOPE,
