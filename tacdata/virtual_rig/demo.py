@@ -18,6 +18,7 @@ from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import VirtualBoard, draw_timing
 from tacdata.virtual_rig.optics.camera import VirtualCamera
+from tacdata.virtual_rig.optics.noise_stretch import NoiseStretch
 from tacdata.virtual_rig.optics.scene import looking_at
 from tacdata.virtual_rig.rig import BAUDS, board_format
 from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, draw_hand
@@ -101,7 +102,7 @@ class VirtualDemo:
             for k, name in enumerate(DIRECTIONS)
         }  # fmt: skip
         self.eyes = {name: looking_at(EYES[name], AIM) for name in list(EYES)[:cameras]}
-        self._rng = np.random.default_rng([seed, 12])
+        self._noise = NoiseStretch(np.random.default_rng([seed, 12]))
         self.cameras = {
             name: VirtualCamera(self.clock, RATE, self._painter(pose), DELAY, seed, ahead=True)
             for name, pose in self.eyes.items()
@@ -198,7 +199,7 @@ class VirtualDemo:
                 (world_to_eye @ self.hand.tip(name, seconds) @ np.linalg.inv(tip), self._cube(name, seconds))
                 for name in DIRECTIONS
             ]
-            return render_scene(cubes, INTRINSICS, self._rng)
+            return render_scene(cubes, INTRINSICS, self._noise)
 
         return draw_image
 
