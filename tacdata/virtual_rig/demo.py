@@ -21,7 +21,7 @@ from tacdata.virtual_rig.optics.camera import VirtualCamera
 from tacdata.virtual_rig.optics.noise_stretch import NoiseStretch
 from tacdata.virtual_rig.optics.scene import looking_at
 from tacdata.virtual_rig.rig import BAUDS, board_format
-from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, draw_hand
+from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, THINGS, draw_hand
 from tacdata.virtual_rig.world.world import World, draw
 
 NAME = "virtual demonstration"
@@ -41,6 +41,8 @@ FAULTS = ("no-tag", "turned-tag", "swapped-fingers", "silent-finger")
 """Faults on demand: the index finger's tags covered for a second; its upper tag turned by 180 deg; the cubes of index
 and middle finger exchanged; the middle finger's board silent after three seconds.
 """
+GRASPED = tuple(name for name in THINGS if name != "eraser")
+"""Objects of the task grasp."""
 NUBS = 1.0, 200.0
 """Smallest and largest radius of what presses a skin [mm]."""
 FACE_UP = "-x"
@@ -62,7 +64,7 @@ class VirtualDemo:
 
     def __init__(
         self, directory: Path, speed: float = 1.0, seed: int = 0, cameras: int = 2, fault: str | None = None,
-        sensor: Sensor | None = None, task: str = "grasp", nub: float = RADIUS,
+        sensor: Sensor | None = None, task: str = "grasp", nub: float = RADIUS, thing: str | None = None,
     ) -> None:  # fmt: skip
         """Set up a hand whose clock runs ``speed`` times as fast as real time.
 
@@ -75,6 +77,7 @@ class VirtualDemo:
             sensor: The skin on every finger.
             task: One of `TASKS`.
             nub: Radius of what presses each skin [mm].
+            thing: Object that is grasped, one of `GRASPED`; by default the ball, to wipe always the eraser.
 
         Raises:
             UsageError: If a number is out of range or there is no such fault or task.
@@ -85,10 +88,14 @@ class VirtualDemo:
             raise UsageError(f"fault {fault!r}", ", ".join(FAULTS), "name one of them")
         if task not in TASKS:
             raise UsageError(f"task {task!r}", ", ".join(TASKS), "name one of them")
+        if thing is not None and (task == "wipe" or thing not in GRASPED):
+            raise UsageError(
+                f"object {thing!r} for task {task!r}", f"grasp with {', '.join(GRASPED)}", "choose another"
+            )
         if not NUBS[0] <= nub <= NUBS[1]:
             raise UsageError(f"nubs of {nub:g} mm", f"{NUBS[0]:g} to {NUBS[1]:g} mm", "choose another radius")
         self.directory, self.path, self.fault, self.seed = directory, directory / "demo_rig.yaml", fault, seed
-        self.hand = replace(draw_hand(seed, task), nub=nub)
+        self.hand = replace(draw_hand(seed, task, thing), nub=nub)
         self.clock, self.sensor = Clock.start(speed), sensor or default_sensor()
         self.start_ns = self.clock.now_ns()
         layout = board_format(self.sensor)
@@ -142,7 +149,8 @@ class VirtualDemo:
         boards = [f"{name:<7} {board.port.path}  {self.layout.rate:g} Hz" for name, board in self.boards.items()]
         return [
             *boards, *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
-            f"{self.hand.task} every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} times real time",
+            f"{self.hand.task} ({self.hand.thing}) every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} "
+            "times real time",
             *([f"fault: {self.fault}"] if self.fault else []),
         ]  # fmt: skip
 
