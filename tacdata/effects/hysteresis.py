@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class Hysteresis(Effect):
@@ -19,6 +19,7 @@ class Hysteresis(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
+    family = Family.FRICTION_AND_PLAY
     equation = (
         "q = q_e - a q_e / F_e (F_e - mean of stop_r F_e over r of 0.05, 0.15, 0.4 of the largest force), anew at "
         "every touch: what nothing presses holds no friction"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 THRESHOLDS = (0.25, 0.6, 1.0)
 """Of the elements that slip, over the largest of them [1]: about as many at any."""
@@ -22,6 +22,7 @@ class HysteresisRead(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
+    family = Family.FRICTION_AND_PLAY
     equation = (
         "r = r_e (max(0, F - a (mean of play_w F + w over w up to w_max - F)) / F)^m, F = F_e^(1/m) over its largest, "
         "anew at every touch"
