@@ -31,7 +31,7 @@ def document(status="named", effects=(), limits=None, sealed=None, share=0.02) -
         "left": {"before": 3.316, "after": 1.612, "share": share, "t": 3.0}, "located": ["everywhere"], "next": [],
         "remarks": [], "limits": limits or {}, "untested": [], "unjudgeable": {"frame_compliance": "x", "tilt": "y"},
         "sealed": {"episodes": 4, "before": 18.489, "after": 20.374, "ceiling": 1.286, "closed": -0.11,
-                   "interval": [-0.58, 0.66]} | (sealed or {}),
+                   "interval": [-0.58, 0.66], "certain": False, "after_interval": [15.1, 26.3]} | (sealed or {}),
     }  # fmt: skip
 
 
@@ -72,9 +72,12 @@ def test_what_is_worse_is_not_called_better():
 def test_a_gap_that_becomes_wider_on_sealed_episodes_is_told_of():
     worse = line(in_text(document("unknown", [effect("power_creep")])), "4 sealed")
     assert worse == "4 sealed episodes: 18.489 before, 20.374 after: worse by 10 %, 1.286 at best"
-    closed = {"after": 2.0, "ceiling": 1.286, "closed": 0.96, "interval": [0.9, 1.0]}
+    closed = {"after": 2.0, "ceiling": 1.286, "closed": 0.94, "interval": [0.9, 1.0], "certain": True}
     better = line(in_text(document("named", [effect("power_creep")], sealed=closed)), "4 sealed")
-    assert better.endswith("1.286 at best; 96 % of the gap closed (90 %: 90 to 100 %)")
+    assert better.endswith("1.286 at best; 94 % of the gap closed (90 %: 90 to 100 %)")
+    wide = {"after": 2.0, "interval": [-0.3, 1.4], "after_interval": [1.1, 3.4]}
+    vague = line(in_text(document("named", [effect("power_creep")], sealed=wide)), "4 sealed")
+    assert vague.endswith("2.000 after (90 %: 1.1 to 3.4), 1.286 at best"), "four presses carry no share"
 
 
 def finding(name, *rivals):

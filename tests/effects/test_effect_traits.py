@@ -175,7 +175,9 @@ def test_one_that_resembles_a_gain_is_its_rival_without_a_force_reading(newcomer
         setting = SimpleNamespace(
             nuisance=prior, channel_gain=load("channel_gain"), course=SimpleNamespace(force=force)
         )
-        found = SimpleNamespace(gains=np.full(24, 0.2), problem=SimpleNamespace(setting=setting))
+        found = SimpleNamespace(
+            gains=np.full(24, 0.2), halves=np.full((2, 24), 0.2), problem=SimpleNamespace(setting=setting)
+        )
         (gain,) = gains_beyond_calibration(found)
         assert gain.placed.effect.name == "gain" and gain.rivals == rivals
 

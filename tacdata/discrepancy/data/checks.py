@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tacdata.discrepancy.data.idle_lines import idle_lines
+from tacdata.discrepancy.data.single_channels import odd_channels
 from tacdata.discrepancy.data.sufficiency import FEWEST_EPISODES, shortcomings, units
 from tacdata.discrepancy.data.wiring import miswired
 from tacdata.discrepancy.model.setting import Setting
@@ -28,6 +30,8 @@ class DataChecks:
     """What is missing from the recordings, each with its remedy."""
     base: tuple[str, ...] = ()
     """What the model that they are held against leaves open."""
+    watched: tuple[str, ...] = ()
+    """What idle stretches and single channels show that no effect of the library does."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -45,5 +49,6 @@ def check(setting: Setting) -> DataChecks:
     course, response = setting.course, setting.response
     wiring = () if setting.given else tuple(miswired(course, response))
     return DataChecks(
-        course.episodes, wiring, tuple(units(course)), tuple(shortcomings(course)), (FITTED,) if response.fitted else ()
-    )
+        course.episodes, wiring, tuple(units(course)), tuple(shortcomings(course)),
+        (FITTED,) if response.fitted else (), (*idle_lines(course), *odd_channels(course, response)),
+    )  # fmt: skip

@@ -9,7 +9,7 @@ from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.detection_limits import detection_limits
 from tacdata.discrepancy.search.elimination import Answer, eliminate
 from tacdata.discrepancy.search.findings import STEPS, Findings, FoundEffect
-from tacdata.discrepancy.search.fits import channel_gains
+from tacdata.discrepancy.search.fits import channel_gains, gains_of_halves
 from tacdata.discrepancy.search.gate import Gate, gate
 from tacdata.discrepancy.search.gauss_newton import Refined
 from tacdata.discrepancy.search.leftovers import Leftovers, leftovers
@@ -66,7 +66,9 @@ def _findings(
         gap=given.gap, tests=given.tests, effects=answer.findings,
         left=leftovers(final) if until == "decide" else Leftovers(0.0, 0.0), explained=nothing.loss - model.loss,
         energy=(nothing.energy, model.energy), values=problem.grams.rows, problem=problem, final=final,
-        limits=detection_limits(final), gains=channel_gains(final), until=until,
+        limits=detection_limits(final), gains=channel_gains(final),
+        halves=gains_of_halves(final), until=until,
+        comparisons=answer.comparisons, path=tuple((effect.name, fall) for effect, fall in selection.explained),
     )  # fmt: skip
 
 

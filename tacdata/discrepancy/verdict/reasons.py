@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
-from tacdata.discrepancy.verdict.decide import LEFT_T, Decision, Reason
+from tacdata.discrepancy.verdict.decide import LEFT_T, Decided, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import worsened
 
@@ -33,12 +34,18 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             fits = f"; {names} fits best, rivals were not tried" if answer else ""
             return f"stopped after {found.until}: {'a gap' if found.gap else 'no gap'}{fits}"
         case Reason.QUIET:
+            if checks.watched:
+                return f"no effect of the library shows, but {'; '.join(checks.watched)}"
             return "nothing is missing that these recordings would show; see the detection limits"
         case Reason.NAMED:
             more = "" if found.left.t < LEFT_T else f"; {100 * found.share_left:.1f} % of it is another form"
             return f"{names}: nothing else explains the episodes as well{more}"
         case Reason.RIVALS:
             return _undecided(answer)
+        case Reason.INCOMPLETE:
+            return _incomplete(decision, found.share_left)
+        case Reason.SEALED:
+            return f"{names} fits the presses that were judged; the sealed ones do not bear it out: not the name"
         case Reason.LEFTOVERS:
             return f"something is missing; {_closest(answer, found.share_left, shown)}"
         case Reason.ODD:
@@ -50,6 +57,23 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             )
         case Reason.UNEXPLAINED:
             return "something is missing that no modelled effect explains"
+
+
+def _incomplete(decision: Decision, share: float) -> str:
+    """Return what has a name, how fine it is, and how much has none."""
+    words = list(dict.fromkeys(at_its_level(e) for e in decision.effects if e.level is not None))
+    open_ones = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is None))
+    there = "is there" if len(words) == 1 else "are there"
+    more = f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else ""
+    return f"{_listed(words, 'and')} {there}{more}; {100 * share:.0f} % of what could be explained has no name yet"
+
+
+def at_its_level(decided: Decided) -> str:
+    """Return an effect's name at the level that holds, with what stays open."""
+    effect = decided.finding.placed.effect
+    if decided.level is Level.FAMILY:
+        return f"{effect.family.value} (as {effect.called}, or another of its family)"
+    return effect.called
 
 
 def _undecided(answer: list[FoundEffect]) -> str:

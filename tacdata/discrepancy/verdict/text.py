@@ -8,6 +8,8 @@ from tacdata.effects import library
 
 MOST_RIVALS = 6
 """Most rivals that are listed."""
+MOST_UNJUDGED = 6
+"""Effects that cannot be judged are listed up to so many; of more, only their number is given."""
 WEAK_LIMIT = 3.0
 """Effects with a larger detection limit are listed [typical sizes]."""
 
@@ -28,7 +30,9 @@ def in_text(verdict: dict[str, Any]) -> str:
     if verdict["remarks"]:
         lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
     spoken = answered(verdict)
-    lines.append("cannot be judged here: " + ", ".join(sorted(set(verdict["unjudgeable"]) - spoken)))
+    if hidden := sorted(set(verdict["unjudgeable"]) - spoken):
+        few = ", ".join(hidden) if len(hidden) <= MOST_UNJUDGED else f"{len(hidden)} effects; verdict.html says why"
+        lines.append(f"cannot be judged here: {few}")
     weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK_LIMIT) and k not in spoken]
     if weak:
         lines.append("would be seen only at more than three times their usual size: " + ", ".join(sorted(weak)))
@@ -95,8 +99,8 @@ def _closed(sealed: dict[str, Any]) -> str:
     best = f", {sealed['ceiling']:.3f} at best"
     if worse := worsened(sealed["before"], sealed["after"]):
         return f": {worse}{best}"
-    if sealed["closed"] <= 0:
-        return f"{best}: nothing that could be closed"
+    if not sealed["certain"]:
+        return f" (90 %: {sealed['after_interval'][0]:.3g} to {sealed['after_interval'][1]:.3g}){best}"
     low, high = sealed["interval"]
     return f"{best}; {100 * sealed['closed']:.0f} % of the gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
 
