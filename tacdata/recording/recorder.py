@@ -20,6 +20,7 @@ from tacdata.recording.live.guarded_motion import WATCH, GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
 from tacdata.recording.live.lost_position import Ask, require_found, require_free, why_lost
+from tacdata.recording.live.reading_health import BadReadings
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion import sync_tap as tap_motion
@@ -123,12 +124,28 @@ class Recorder:
         try:
             return self._open_and_record(session, wanted, confirm)
         except BaseException as error:
+            if isinstance(error, BadReadings) and self._paused(error):
+                return self.run(lambda summary: True)
             lost = self.devices.cnc.position_lost
             with suppress(TacdataError):  # the fault itself must be reported first
                 if lost and self.out.exists():
                     lose_position(read_session(self.out), lost)
             error.add_note(self._ending(lost))
             raise
+
+    def _paused(self, error: BadReadings) -> bool:
+        """After bad readings: whether a person has put them right and lets the session go on, as the plan allows."""
+        if self.plan.on_bad_readings != "pause" or not self._motion.lifted or self.devices.cnc.position_lost:
+            return False
+        self._say(f"PAUSED: {error.given}; the tip is lifted")
+        question = f"Put the board right: {error.remedy.split(', then')[0]}. Go on with this press? [y/N] "
+        if not self._ask(question):
+            return False
+        self.resume, self._motion = True, GuardedMotion(self.devices.cnc, self.rig.clock, self._interruption)
+        return True
+
+    def _say_bad(self, words: str) -> None:
+        self._say(f"WARNING: {words}; it goes on, as the plan says")
 
     def _open_and_record(
         self, session: Session | None, wanted: tuple[int, ...], confirm: Callable[[Preflight], bool]
@@ -148,7 +165,7 @@ class Recorder:
             session = find_position(session)
             with RigStreams(
                 devices, self.rig.cameras, self._motion.stop, self._detect, self._watch, self.rig.fingers,
-                self._motion.off_path,
+                self._motion.off_path, self._say_bad if self.plan.on_bad_readings == "go on" else None,
             ) as streams:  # fmt: skip
                 try:
                     with self._interruption.kept():

@@ -29,8 +29,8 @@ LIMIT = 180.0
 """Time after which a run counts as hung [s]; one without faults takes about 25 s."""
 
 
-def plan(presses):
-    """Return a plan of some seconds a press."""
+def plan(presses, **entries):
+    """Return a plan of some seconds a press, with further entries."""
     return Plan.from_document(
         {
             "version": "1.0", "name": "simulated", "indenters": {"ball": {"shape": "sphere", "radius": 3.0}},
@@ -42,6 +42,7 @@ def plan(presses):
                 {"indenter": "ball", "x": x, "y": y, "depth": 0.8 + 0.1 * k}
                 for k, (x, y) in enumerate((SITES * presses)[:presses])
             ],
+            **entries,
         },
         "simulated",
     )  # fmt: skip
@@ -59,9 +60,9 @@ class Calm:
 class World:
     """One computer, one controller, one board and their lines, driven by one seed."""
 
-    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None):
+    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, **entries):
         """Switch everything on."""
-        self.seed, self.folder, self.plan = seed, folder, plan(presses)
+        self.seed, self.folder, self.plan = seed, folder, plan(presses, **entries)
         self.schedule = Schedule(seed, LIMIT)
         self.bench = SimulatedHost(self.schedule)
         self.clock = Clock(EPOCH + START, START, 1.0, self.bench)
@@ -78,7 +79,7 @@ class World:
         self._noise = np.random.default_rng([seed, 1])
         self.path = []
         """(time [s], true position [mm] as x, y, z, whether it moves, whether its position is truly lost)."""
-        self.asked, self.answer = [], lambda question: False
+        self.asked, self.answer, self.said = [], lambda question: False, []
         self.controller.start()
         self.board.start()
         self.bench.thread(self._watch, "watch").start()
@@ -112,7 +113,8 @@ class World:
         def work():
             with Interruption(self.computer) as interruption:
                 recorder = Recorder(
-                    rig, SENSOR, self.plan, self.folder, resume, interruption=interruption, ask=self._asked
+                    rig, SENSOR, self.plan, self.folder, resume, interruption=interruption, ask=self._asked,
+                    say=self.said.append,
                 )
                 return recorder.run(lambda summary: True)
 
@@ -128,9 +130,13 @@ class World:
         self.controller.inject_door(False)
         if lost:
             self.controller.inject_brown_out()
-        self.board.inject_readings(lambda counts: self._read(self.clock.now_ns()))
+        self.mend_board()
         self.schedule.run_for(3.0, self.bench)
         return Calm()
+
+    def mend_board(self):
+        """Let the board read what is there again."""
+        self.board.inject_readings(lambda counts: self._read(self.clock.now_ns()))
 
     def home(self):
         """Find the position again, as homing or a touch-off does."""

@@ -67,6 +67,10 @@ class DeviceStreams(ABC):
             self._work[f"camera {view.name}"] = self._camera_reader(view)
         self._threads: list[threading.Thread] = []
 
+    def _silence_of(self, name: str) -> float:
+        """Time without data after which a stream counts as silent [s of real time]."""
+        return self.silence
+
     @abstractmethod
     def _silent(self, name: str) -> None:
         """Called when a stream has delivered nothing for `silence`, and with each empty read after that; may raise."""
@@ -144,7 +148,7 @@ class DeviceStreams(ABC):
         return {name: device.counts for name, device in (self._boards | self._cameras).items()}
 
     def _run(self, name: str, read: Callable[[], int]) -> None:
-        patience = Patience(self.silence, host=self._host)
+        patience = Patience(self._silence_of(name), host=self._host)
         while not self._stop.is_set():
             self._passes[name] = self._passes.get(name, 0) + 1
             try:

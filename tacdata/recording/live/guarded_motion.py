@@ -176,6 +176,11 @@ class GuardedMotion:
         return f"the indenter was lifted off the skin, straight up from {z:.3f} to {max(z, height):.3f} mm"
 
     @property
+    def lifted(self) -> bool:
+        """Whether the tip was lifted after the last stop."""
+        return self._rest is not None and self._rising is None and self._lifted.startswith("the indenter was lifted")
+
+    @property
     def ending(self) -> tuple[str, ...]:
         """What a person must know last, a line each: does it move, where does it stand, was the tip lifted?"""
         if self._path is None:
