@@ -21,7 +21,7 @@ def run(
     path: Annotated[Path, typer.Argument(help="A folder that tacdata track worked up, or one of its recordings.")],
     out: Annotated[Path, typer.Option(help="Folder to make.")],
     form: Annotated[
-        str, typer.Option("--format", help="A file's name in tacdata/exporters: lerobot, csv, parquet, joints, ...")
+        str, typer.Option("--format", help="A file's name in tacdata/exporters: lerobot, csv, open_x_tactile, ...")
     ] = "lerobot",
     direct: Annotated[
         bool, typer.Option("--direct", help="Targets as the fingertips were seen, not moved by what was felt.")
@@ -41,7 +41,7 @@ def run(
     from tacdata.exporters.exporter import exporter
     from tacdata.replay.targets import check_guesses, doubts, targets_of
 
-    writer = exporter(form, robot)
+    writer = exporter(form, robot, path if path.is_dir() else path.parent)
     files = [path_of(p) for p in read_demo_session(path).episodes] if path.is_dir() else [_tracks(path)]
     episodes = []
     for file in files:
