@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from tacdata import cli, extras
 from tacdata.errors import Exit, PackageError
+from tacdata.example.shipped import copy_session
 from tacdata.extras import ALL, IMPORTED_AS, extras_of, missing_package
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -155,7 +156,7 @@ def test_a_first_look_works_without_the_extras(beyond, tmp_path):
 )
 def test_a_verb_says_the_install_line_of_what_it_lacks(arguments, module, extra, beyond, tmp_path):
     code = "from tacdata.cli import main\nsys.argv = ['tacdata', *json.loads(sys.argv[2])]\nmain()"
-    run("from tacdata.cli import main\nsys.argv = ['tacdata', 'example', 'first', '-q']\nmain()", beyond, cwd=tmp_path)
+    copy_session(tmp_path / "first")
     (tmp_path / "case.json").write_text("{}")
     command = [sys.executable, "-c", LIGHT + code, beyond, json.dumps(arguments)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
