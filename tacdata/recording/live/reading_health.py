@@ -19,9 +19,9 @@ CHANGES = 20
 
 
 RATE_NS = 1_500_000_000
-"""Stretch over which the rate is counted [ns of the host's clock], without its longest gap."""
+"""Stretch over which the rate is counted [ns of real time], without its longest gap."""
 RATE_EVERY_NS = 200_000_000
-"""How often it is counted [ns of the host's clock]."""
+"""How often it is counted [ns of real time]."""
 SLOW = 0.6
 """Share of the rate below which a board counts as slow [1]."""
 FEWEST = 3
@@ -39,14 +39,17 @@ class ReadingHealth:
         ``health = ReadingHealth((0, 65535)); words = health.take(arrival_ns, counts)``
     """
 
-    def __init__(self, limits: tuple[float, float], rate: float | None = None) -> None:
+    def __init__(self, limits: tuple[float, float], rate: float | None = None, speed: float = 1.0) -> None:
         """Begin.
 
         Args:
             limits: Least and greatest reading that the frame format can hold [counts].
             rate: Frames per second that the board should send [Hz]; it counts as slow if it falls below what it sent at
                 first, or below this if that is less.
+            speed: Seconds of the host's clock per second of real time. An emulated rig runs faster than a computer's
+                pauses get shorter.
         """
+        self._stretch_ns, self._every_ns = round(RATE_NS * speed), round(RATE_EVERY_NS * speed)
         self._limits, self._rate = limits, rate
         self._arrivals: deque[int] = deque()
         self._first_rate: float | None = None
@@ -84,10 +87,10 @@ class ReadingHealth:
     def _slow(self, arrival_ns: int) -> str:
         arrivals = self._arrivals
         arrivals.append(arrival_ns)
-        if arrival_ns - arrivals[0] < RATE_NS or arrival_ns - self._counted_ns < RATE_EVERY_NS:
+        if arrival_ns - arrivals[0] < self._stretch_ns or arrival_ns - self._counted_ns < self._every_ns:
             return ""
         self._counted_ns = arrival_ns
-        while len(arrivals) > 1 and arrival_ns - arrivals[1] >= RATE_NS:
+        while len(arrivals) > 1 and arrival_ns - arrivals[1] >= self._stretch_ns:
             arrivals.popleft()
         # One long gap is a stall of this computer, or silence; a board that became slow has gaps everywhere.
         gaps = np.diff(np.array(arrivals, np.int64))
