@@ -107,14 +107,14 @@ def main(arguments):
     """Return the exit status."""
     checks = Checks()
     ours = {"--long", "--ci"} & set(arguments)
-    checks.run("lint", [str(BIN / "ruff"), "check", "."])
-    checks.run("imports", [str(BIN / "lint-imports")])
     types = [str(BIN / "pyright"), "--pythonpath", sys.executable]
     with tempfile.TemporaryFile("w+") as said:
         beside = subprocess.Popen(
             types, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT, preexec_fn=lambda: os.nice(STAND_BACK)
         )
         try:
+            checks.run("lint", [str(BIN / "ruff"), "check", "."])
+            checks.run("imports", [str(BIN / "lint-imports")])
             side_by_side = ["--numprocesses", str(min(_cores(), MOST) + WAITING), "--waiting", str(WAITING)]
             if not arguments or "--ci" in ours:
                 checks.tests("tests", *side_by_side)
