@@ -25,7 +25,7 @@ class HeatMap:
     before: np.ndarray
     """[1], shape (rows, columns); NaN where too little was read."""
     after: np.ndarray
-    """The same with the effects."""
+    """The same with the effects [1], shape (rows, columns)."""
 
 
 def heat_map(found: Residuals) -> HeatMap:

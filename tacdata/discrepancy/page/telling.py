@@ -13,7 +13,7 @@ MOST_TOLD = 3
 
 
 @dataclass(frozen=True)
-class Press:
+class ToldPress:
     """One press on its most telling channel."""
 
     name: str
@@ -25,14 +25,14 @@ class Press:
     measured: np.ndarray
     """[the stream's unit], shape (n,)."""
     before: np.ndarray
-    """Model as it was given, shape (n,)."""
+    """Model as it was given [the stream's unit], shape (n,)."""
     after: np.ndarray
-    """Model with the effects, shape (n,)."""
+    """Model with the effects [the stream's unit], shape (n,)."""
     noise: float
     """Standard deviation of the stream's noise [its unit]."""
 
 
-def telling(found: Residuals, most: int = MOST_TOLD) -> list[Press]:
+def telling(found: Residuals, most: int = MOST_TOLD) -> list[ToldPress]:
     """Return the sealed presses in which the effects change most; of all presses, where none was sealed.
 
     They show where the effects matter, whether they help there or not.
@@ -52,10 +52,10 @@ def telling(found: Residuals, most: int = MOST_TOLD) -> list[Press]:
     return [_press(found, k, stream) for _, k, stream in sorted(ranked, key=lambda one: -one[0])[:most]]
 
 
-def _press(found: Residuals, number: int, stream: int) -> Press:
+def _press(found: Residuals, number: int, stream: int) -> ToldPress:
     rows = found.episode == number
     time = found.time[rows]
-    return Press(
+    return ToldPress(
         found.names[number], found.streams[stream], time - time[0], found.depth[rows], found.measured[rows, stream],
         found.before[rows, stream], found.after[rows, stream], float(found.noise[stream]),
     )  # fmt: skip

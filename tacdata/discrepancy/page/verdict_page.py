@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.discrepancy.page import charts
 from tacdata.discrepancy.page.heat_map import heat_map
-from tacdata.discrepancy.page.telling import Press, telling
+from tacdata.discrepancy.page.telling import ToldPress, telling
 from tacdata.discrepancy.verdict.residual_table import Residuals
 from tacdata.effects import Family, load
 
@@ -69,7 +69,7 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
     return tiles
 
 
-def _presses(verdict: dict[str, Any], found: Residuals, presses: list[Press]) -> Part:
+def _presses(verdict: dict[str, Any], found: Residuals, presses: list[ToldPress]) -> Part:
     added = bool(verdict["effects"])
     pictures: list[str] = []
     for p in presses:
@@ -90,7 +90,7 @@ def _legend(added: bool) -> tuple[tuple[str, str], ...]:
     return (("measured", "measured"), ("before", "model as it was"), *last)
 
 
-def _loops(verdict: dict[str, Any], presses: list[Press]) -> Part:
+def _loops(verdict: dict[str, Any], presses: list[ToldPress]) -> Part:
     if not any(e.get("family") in LOOPS for e in verdict["effects"]):
         return Part("")
     pictures = []
