@@ -119,7 +119,7 @@ def _compose(
     corners = np.array(boxes)
     (left, top), (right, bottom) = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
     box = (int(left), int(top), int(right), int(bottom))
-    fine = max(2, min(4, int(np.sqrt(1.5e6 / ((right - left) * (bottom - top))))))
+    fine = max(2, min(look.rays, int(np.sqrt(1.5e6 / ((right - left) * (bottom - top))))))
     lens = Lens(box, fine, intrinsics)
     grey, share = np.zeros((2, bottom - top, right - left), np.float32)
     for each in poses:
