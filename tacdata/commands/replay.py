@@ -44,6 +44,9 @@ def run(
         float, typer.Option(metavar="MM", help="With --find-gain: how far the object may slide along a pad.")
     ] = 3.0,
     most_force: Annotated[float, typer.Option(metavar="N", help="With --find-gain: the largest force on a pad.")] = 6.0,
+    least_grip: Annotated[
+        float, typer.Option(help="With --find-gain: how many times the load friction at the pads must carry.")
+    ] = 2.0,
     with_guesses: Annotated[
         bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
     ] = False,
@@ -65,6 +68,7 @@ def run(
         raise UsageError("--gain-from without --find-gain", "both or none", "add --find-gain")
     given = {"radius": (radius, 1, 200, "mm"), "mass": (mass, 0.001, 10, "kg"), "stiffness": (stiffness, 1, 1e5, "N/m")}
     given |= {"most-slip": (most_slip, 0.1, 100, "mm"), "most-force": (most_force, 0.1, 1000, "N")}
+    given["least-grip"] = (least_grip, 0.1, 100, "times the load")
     for option, (value, least, most, unit) in given.items():
         if value is not None and not least <= value <= most:
             raise UsageError(f"--{option} {value:g}", f"{least:g} to {most:g} {unit}", "correct it")
@@ -83,7 +87,7 @@ def run(
         training = Trials(source, {}, scene)
         if not with_guesses:
             check_guesses(training.seen)
-        found = training.find_gain(GripDemand(preliminary, most_slip / 1000, most_force))
+        found = training.find_gain(GripDemand(preliminary, most_slip / 1000, most_force, least_grip))
         print(f"found on {source.recording}: {found.text}")
         chosen, known["chosen"] = (source, found), dict.fromkeys(source.tracks, found.gain)
     tried = [Trials(one, known, scene) for one in made]

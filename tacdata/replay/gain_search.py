@@ -25,6 +25,8 @@ class GripDemand:
     """Largest distance that the object may slide along a pad [m]."""
     force: float = 6.0
     """Largest mean force on a pad [N]; the skin of 3 N/mm is then pressed 2 mm deep."""
+    grip: float = 2.0
+    """Smallest grip factor [1]: the safety factor left for recordings whose depth is predicted too shallow."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +95,9 @@ class GripSearch:
                 f"no gain up to {self.largest:g} m/mm holds all preliminary trials; with {low:.4f} m/mm: "
                 + self._reasons[low],
                 f"all {self.demand.trials} held, slip up to {1000 * self.demand.slip:g} mm, forces up to "
-                f"{self.demand.force:g} N",
-                "check the predicted depth (tacdata view), the object's mass and size, or allow more with "
-                "--most-slip and --most-force",
+                f"{self.demand.force:g} N, friction for {self.demand.grip:g} times the load",
+                "check the predicted depth (tacdata view), the object's mass and size, or ask for less with "
+                "--most-slip, --most-force and --least-grip",
             )
         while high - low > self.tolerance:
             middle = (low + high) / 2
@@ -112,7 +114,8 @@ class GripSearch:
         for seed in tuple(self._seeds):
             end = self.outcome(gain, seed)
             most = max(end.force.values())
-            if not end.held or end.slip > self.demand.slip or most > self.demand.force:
+            demand = self.demand
+            if not end.held or end.slip > demand.slip or most > demand.force or end.grip < demand.grip:
                 self._seeds.remove(seed)
                 self._seeds.insert(0, seed)
                 self._reasons[gain] = f"{end.reason}, and a pad pressed with {most:.1f} N"

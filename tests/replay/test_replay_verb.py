@@ -112,8 +112,8 @@ def test_an_eraser_is_lost_without_compensation_and_a_gain_chosen_elsewhere_hold
     assert found["compensated"]["held"] >= 3 and found["chosen"]["of"] == 4
     assert [one["rates"]["direct"]["of"] for one in found["recordings"]] == [2, 2]
     assert found["gain_chosen"]["hash"] == "1" * 64 and 0 < found["gain_chosen"]["gains"]["thumb"] < 0.03
-    assert found["gain_chosen"]["demand"] == {"trials": 4, "slip": 0.003, "force": 6.0}
-    assert found["gain_chosen"]["slip"] <= 0.003 and found["gain_chosen"]["grip"] > 1.0
+    assert found["gain_chosen"]["demand"] == {"trials": 4, "slip": 0.003, "force": 6.0, "grip": 2.0}
+    assert found["gain_chosen"]["slip"] <= 0.003 and found["gain_chosen"]["grip"] >= 2.0
     behind = [trial["behind"] for trial in found["trials"] if trial["kind"] == "direct"]
     assert min(behind) > 0.015  # the strokes leave it behind
     assert view.stat().st_size > 10_000
