@@ -37,9 +37,11 @@ RATE = 20.0
 DELAY = 0.05
 """Minimum latency from exposure to arrival of an image [s]; the rig file states it, as if a sync tap had measured it.
 """
+SILENT_AFTER = 60.0
+"""Time after which the fault "silent-finger" closes the middle finger's port [s of the rig's clock]."""
 FAULTS = ("no-tag", "turned-tag", "swapped-fingers", "silent-finger")
 """Faults on demand: the index finger's tags covered for a second; its upper tag turned by 180 deg; the cubes of index
-and middle finger exchanged; the middle finger's board silent after three seconds.
+and middle finger exchanged; the middle finger's board silent after `SILENT_AFTER`.
 """
 GRASPED = tuple(name for name in THINGS if name != "eraser")
 """Objects of the task grasp."""
@@ -151,7 +153,7 @@ class VirtualDemo:
             *boards, *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
             f"{self.hand.task} ({self.hand.thing}) every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} "
             "times real time",
-            *([f"fault: {self.fault}"] if self.fault else []),
+            *([f"fault: {self.fault}{_when(self.fault)}"] if self.fault else []),
         ]  # fmt: skip
 
     def seconds(self, time_ns: int) -> float:
@@ -189,7 +191,7 @@ class VirtualDemo:
 
         def read(sampled_ns: int) -> np.ndarray:
             seconds = self.seconds(sampled_ns)
-            if self.fault == "silent-finger" and finger == "middle" and seconds > 3.0:
+            if self.fault == "silent-finger" and finger == "middle" and seconds > SILENT_AFTER:
                 self.boards[finger].port.close()
             x, y, depth = self.hand.press(finger, seconds)
             return world.readings(np.array([x, y, -depth]), ball, 0.0, sampled_ns)
@@ -220,6 +222,10 @@ class VirtualDemo:
         if finger == "index" and self.fault == "turned-tag":
             return {**carried, "turned": [FACE_UP]}
         return carried
+
+
+def _when(fault: str) -> str:
+    return f", {SILENT_AFTER:g} s of its clock after the start" if fault == "silent-finger" else ""
 
 
 def tip_on_cube() -> np.ndarray:

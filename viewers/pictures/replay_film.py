@@ -29,7 +29,7 @@ MARGIN = 25.0
 """Around all that moves [mm]."""
 PAD = 9.0
 """Radius at which pads are drawn [mm]."""
-MOST_SLIP = 20.0
+MOST_SLIP = 5.0
 """Upper end of the slip's axis [mm]; an object that is lost slides farther."""
 LETTERS = 62
 """Letters of a line of the verdict."""
@@ -83,7 +83,7 @@ class ReplayPage:
         self._objects: dict[tuple[str, int], ReplayObjectShape] = {}
         self._pads: dict[tuple[str, int], list[tuple[Circle, Any]]] = {}
         self._lines: list[Any] = []
-        most = 1.1 * max(float(replay.path.force.max()) for replay in replays.values()) + 0.1
+        most = 1.1 * max(_strongest(replay) for replay in replays.values()) + 0.1
         for column, (kind, replay) in enumerate(replays.items()):
             for row, up in enumerate((2, 1)):
                 axes = self._axes[row, column]
@@ -97,7 +97,7 @@ class ReplayPage:
                 (3, "slip [mm]", 1000 * replay.path.slip, MOST_SLIP),
             ):
                 self._lines.append(_curves(self._axes[row, column], replay, name, values, top, self._gap))
-            self._axes[2, column].legend(loc="upper left", fontsize=7, ncols=3, frameon=False)
+            self._axes[2, column].legend(loc="upper left", fontsize=7, ncols=4, frameon=False)
             self._axes[3, column].set_xlabel("time [s]", fontsize=8)
             for axes in self._axes[:, column]:
                 axes.tick_params(labelsize=7)
@@ -116,12 +116,18 @@ class ReplayPage:
                     place = 1000 * replay.path.tips[row, k]
                     circle.center = place[0], place[up]
                     circle.set_fill(not self._gap[row, k])
-                    name.set_position((place[0], place[up] + PAD))
+                    below = k % 3 == 2  # the middle finger often hides the index finger
+                    name.set_position((place[0], place[up] - 2.2 * PAD if below else place[up] + PAD))
             height = 1000 * float(replay.path.centre[row, 2] - replay.path.centre[0, 2])
             verdict = replay.reason if time >= replay.decided else ""
             title = f"{NAMES.get(kind, kind)}\n{time:.1f} s, object at {height:+.0f} mm\n"
             self._axes[0, column].set_title(title + _two_lines(verdict), fontsize=9, loc="left")
         self._maps.show(min(int(np.searchsorted(replay.time, time)), len(replay.time) - 1))
+
+
+def _strongest(replay: ReplayOutcome) -> float:
+    """Return the largest force on a pad until the verdict falls [N]; afterwards empty fingers may hit anything."""
+    return float(replay.path.force[replay.time <= replay.decided].max())
 
 
 def _two_lines(words: str) -> str:
@@ -141,9 +147,12 @@ def _curves(axes: Axes, replay: ReplayOutcome, name: str, values: np.ndarray, mo
     for k, finger in enumerate(replay.fingers):
         color = tuple(channel / 255 for channel in HUES[k % len(HUES)])
         axes.plot(replay.time, values[:, k], color=color, linewidth=1.2, label=finger)
-    axes.fill_between(
-        replay.time, 0, 1, where=gap.any(axis=1).tolist(), transform=axes.get_xaxis_transform(), color="0.85", zorder=0
-    )
+    if gap.any():
+        bridged = gap.any(axis=1).tolist()
+        axes.fill_between(
+            replay.time, 0, 1, where=bridged, transform=axes.get_xaxis_transform(), color="0.85", zorder=0,
+            label="path bridged",
+        )  # fmt: skip
     axes.set(xlim=(replay.time[0], replay.time[-1]), ylim=(0, most))
     axes.set_ylabel(name, fontsize=8)
     return axes.axvline(0.0, color="black", linewidth=1)
