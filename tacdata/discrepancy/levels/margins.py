@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 
 from tacdata.discrepancy.levels.remainder import Remainder, remainder
-from tacdata.discrepancy.search.findings import Comparison, Findings
+from tacdata.discrepancy.search.findings import Findings, RivalModels
 from tacdata.discrepancy.search.j_test import ModelError, j_statistic
 
 
@@ -41,7 +41,7 @@ def beside_remainder(found: Findings) -> tuple[BesideRemainder, ...]:
     return tuple(_held_against(found, one, at, left) for at, one in enumerate(found.comparisons))
 
 
-def _held_against(found: Findings, one: Comparison, at: int, left: Remainder) -> BesideRemainder:
+def _held_against(found: Findings, one: RivalModels, at: int, left: Remainder) -> BesideRemainder:
     null, setting = found.final.null, found.problem.setting
     course = setting.course.reduced
     alone = ModelError(left.columns, course, null)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.search.findings import Comparison, FoundEffect
+from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.j_test import NEEDED_Z, necessity
 from tacdata.discrepancy.search.problem import Problem, prepare
@@ -28,7 +28,7 @@ class Answer:
 
     findings: tuple[FoundEffect, ...]
     model: Refined
-    comparisons: tuple[Comparison, ...] = ()
+    comparisons: tuple[RivalModels, ...] = ()
     """Of each effect, where rivals were tried."""
 
 

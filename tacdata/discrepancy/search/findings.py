@@ -61,7 +61,7 @@ class FoundEffect:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RivalModels:
     """The models by which one effect of the answer was held against others in its place."""
 
     begin: Setting
@@ -107,7 +107,7 @@ class Findings:
     """The same in the first and the second half of the session [1], shape (2, channels)."""
     until: str = "decide"
     """The last step that was made, one of `STEPS`."""
-    comparisons: tuple[Comparison, ...] = ()
+    comparisons: tuple[RivalModels, ...] = ()
     """Of each effect of the answer; empty where rivals were not tried."""
     path: tuple[tuple[str, float], ...] = ()
     """Effects in the order in which forward selection added them, each with the fall of half the sum of squares [1]."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.regressors.candidates import Candidate
-from tacdata.discrepancy.search.findings import Comparison, FoundEffect
+from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.fits import best_shapes, fitted
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.j_test import ModelError, Pooled, j_statistic, necessity
@@ -41,7 +41,7 @@ class Tried:
     finding: FoundEffect
     better: Refined | None
     """The model with a rival, or another form, in its place, where that is ahead."""
-    comparison: Comparison
+    comparison: RivalModels
     """The models that were compared."""
 
 
@@ -105,7 +105,7 @@ def try_rivals(
         selected_family=_share(chosen, lambda e: e.family is mine.effect.family), forms=forms,
         bought=without.loss - current.loss,
     )  # fmt: skip
-    return Tried(found, better, Comparison(begin, current, without, models, pooled))
+    return Tried(found, better, RivalModels(begin, current, without, models, pooled))
 
 
 def required_margin(mine: Effect, rival: Effect) -> float:
