@@ -26,7 +26,7 @@ class Hysteresis(Effect):
     )
     source = "Prandtl-Ishlinskii; Brokate & Sprekels, ch. 2"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
-    parameters = (Parameter("a", "1", "share carried by friction", 0.1, -1.0, 3.0),)
+    parameters = (Parameter("a", "1", "share carried by friction", 0.1, 0.0, 3.0),)
     at_rest = AtRest.STAYS
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

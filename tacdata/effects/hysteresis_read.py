@@ -30,7 +30,7 @@ class HysteresisRead(Effect):
     source = "Prandtl-Ishlinskii; Brokate & Sprekels, ch. 2; slipping elements: Iwan, J. Appl. Mech. 34 (1967)"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
     parameters = (
-        Parameter("a", "1", "share of load carried by friction", 0.1, -0.5, 3.0),
+        Parameter("a", "1", "share of load carried by friction", 0.1, 0.0, 3.0),
         Parameter("w", "1", "largest half band over the largest load", 0.2, 0.005, 2.0, grid=(0.06, 0.15, 0.4)),
         Parameter("m", "1", "power of load by which readings grow", 1.0, 0.3, 4.0, grid=(1.0, 1.7)),
     )

@@ -24,7 +24,7 @@ class ProportionalHysteresis(Effect):
     source = "one element of Prandtl-Ishlinskii, scaled by load; Brokate & Sprekels, ch. 2"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
     parameters = (
-        Parameter("a", "1", "lost share of load while unloading", 0.08, -0.95, 0.95),
+        Parameter("a", "1", "lost share of load while unloading", 0.08, 0.0, 0.95),
         Parameter("w", "1", "half the turning width over the largest force", 0.1, 0.005, 1.0, grid=(0.02, 0.07, 0.2)),
     )
     at_rest = AtRest.STAYS
