@@ -10,10 +10,13 @@ import pytest
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.remainder import _size
 from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.verdict.decide import finest, stands_in
+from tacdata.discrepancy.verdict.decide import finest, outweighs, stands_in
 from tacdata.effects import Placed, load
 
-ONE = FoundEffect(Placed(load("relaxation"), {}), {}, (), (), {}, 9.0, corrected_p=0.001, forms={"power_creep": 5.0})
+MARGINS = {"creep": 9.0, "backlash": 9.0}
+ONE = FoundEffect(
+    Placed(load("relaxation"), {}), {}, (), (), MARGINS, 9.0, corrected_p=0.001, forms={"power_creep": 5.0}
+)
 NOTHING = cast(Any, None)
 
 
@@ -58,7 +61,7 @@ def test_a_form_between_two_is_named_as_a_mechanism():
 def test_an_effect_that_the_remainder_could_be_is_not_named():
     assert finest(NOTHING, ONE, BesideRemainder(1.0, {"backlash": 9.0})) is None
     assert finest(NOTHING, replace(ONE, at_bound=("f",)), BesideRemainder(9.0, {})) is None
-    assert finest(NOTHING, replace(ONE, necessity=3.0), BesideRemainder(9.0, {})) is None
+    assert finest(NOTHING, replace(ONE, necessity=3.0, corrected_p=0.02), BesideRemainder(9.0, {})) is None
 
 
 @pytest.mark.parametrize(
@@ -70,3 +73,9 @@ def test_a_further_name_may_stand_in_for_what_is_left(bought, left, t, part):
     assert stands_in(found, replace(ONE, bought=bought)) == part
     alone = cast(Any, SimpleNamespace(effects=(ONE,), left=SimpleNamespace(t=t, gain=left)))
     assert not stands_in(alone, replace(ONE, bought=bought))
+
+
+@pytest.mark.parametrize(("bought", "left", "family"), [(100, 40, True), (100, 60, False)])
+def test_a_family_is_named_where_its_effect_explains_twice_what_is_left(bought, left, family):
+    found = cast(Any, SimpleNamespace(effects=(ONE,), left=SimpleNamespace(t=5, gain=left)))
+    assert outweighs(found, replace(ONE, bought=bought)) == family

@@ -32,7 +32,7 @@ def heat_map(found: Residuals) -> HeatMap:
     """Return the map of all presses, an offset a press taken off."""
     first, last = (np.nanmean(np.square(found.standardized(p)), axis=1) for p in (found.before, found.after))
     inside = found.phase > 0
-    edges = np.quantile(found.depth[inside], [0, 1 / 3, 2 / 3, 1]) if inside.any() else np.zeros(4)
+    edges = np.quantile(found.depth[inside], [0, 1 / 3, 2 / 3, 1]).round(6) if inside.any() else np.zeros(4)
     columns = tuple(f"{low:.2g} to {high:.2g} mm" for low, high in itertools.pairwise(edges))
     within = [(found.depth >= low) & (found.depth <= high) for low, high in itertools.pairwise(edges)]
     rate = np.abs(found.rate)

@@ -119,13 +119,17 @@ def _where(verdict: dict[str, Any], found: Residuals) -> Part:
     pictures = [charts.map_of("before, mean square over the noise", made.rows, made.columns, made.before)]
     if verdict["effects"]:
         pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after))
-    return Part("Where the gap lives", tuple(pictures), tuple(verdict["located"]))
+    rest = [f"without a name yet: {words}" for words in verdict.get("located_after", ())]
+    return Part("Where the gap lives", tuple(pictures), (*verdict["located"], *rest))
 
 
 def _path(verdict: dict[str, Any]) -> Part:
-    lines = [f"{load(step['effect']).title}: {100 * step['share']:.0f} % of what could be explained"
-             for step in verdict["path"]]  # fmt: skip
-    return Part("In which order effects were added", lines=tuple(lines))
+    lines = []
+    for step in verdict["path"]:
+        title, share = load(step["effect"]).title, step["share"]
+        told = "dropped, or replaced by another form" if share is None else f"buys {100 * share:.0f} %"
+        lines.append(f"{title}: {told}")
+    return Part("In which order effects were added, and what each buys", lines=tuple(lines))
 
 
 def _rivals(verdict: dict[str, Any]) -> Part:
@@ -134,9 +138,10 @@ def _rivals(verdict: dict[str, Any]) -> Part:
     for e in verdict["effects"]:
         beside = e.get("beside_remainder") or {}
         margins = beside.get("margins") or e["margins"]
-        near = set(e["alternatives"])
-        for name, by in sorted(margins.items(), key=lambda item: item[1])[:MOST_RIVALS]:
-            called = load(name).called
+        near, least = set(e["alternatives"]), {}
+        for name, by in sorted(margins.items(), key=lambda item: item[1]):
+            least.setdefault(load(name).called, by)
+        for called, by in list(least.items())[:MOST_RIVALS]:
             if called in near:
                 lines.append(f"{called} may stand in for {e['mechanism']}: {_apart(by)}")
             else:

@@ -68,7 +68,7 @@ def _findings(
         energy=(nothing.energy, model.energy), values=problem.grams.rows, problem=problem, final=final,
         limits=detection_limits(final), gains=channel_gains(final),
         halves=gains_of_halves(final), until=until,
-        comparisons=answer.comparisons, path=tuple((effect.name, fall) for effect, fall in selection.explained),
+        comparisons=answer.comparisons, path=tuple(effect.name for effect, _ in selection.explained),
     )  # fmt: skip
 
 

@@ -109,8 +109,8 @@ class Findings:
     """The last step that was made, one of `STEPS`."""
     comparisons: tuple[RivalModels, ...] = ()
     """Of each effect of the answer; empty where rivals were not tried."""
-    path: tuple[tuple[str, float], ...] = ()
-    """Effects in the order in which forward selection added them, each with the fall of half the sum of squares [1]."""
+    path: tuple[str, ...] = ()
+    """Effects in the order in which forward selection added them."""
 
     @property
     def share_left(self) -> float:

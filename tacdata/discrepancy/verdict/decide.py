@@ -25,6 +25,8 @@ SHARE_LEFT = 0.05
 """Leftovers: largest share of the explainable that an answer may leave [1]."""
 SHARE_LEFT_ALONE = 0.15
 """Leftovers: the same for a single effect of which every rival leaves twice as much [1]."""
+MOST_BESIDE = 0.5
+"""Leftovers: largest share of what an effect explains beyond the others that its family may be named beside [1]."""
 LEFT_T = 2.0
 """Leftovers: they count from so many standard errors over episodes on [1]."""
 GAP_T = 3.0
@@ -120,6 +122,11 @@ def decide(
     status, reason = _status(found, answer)
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
     levels = [finest(found, f, own.get(f.placed.effect.name)) for f in answer]
+    if reason is Reason.LEFTOVERS:
+        # Much has no name: what has one is told from other families, and not more finely.
+        pairs = zip(answer, levels, strict=True)
+        levels = [Level.FAMILY if level is not None and outweighs(found, f) else None for f, level in pairs]
+        status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else (status, reason)
     if status == "named" and any(stands_in(found, f) for f in answer):
         # One of several names may stand in for a part of what has none: only the others are sure.
         levels = [None if stands_in(found, f) else level for f, level in zip(answer, levels, strict=True)]
@@ -135,6 +142,11 @@ def decide(
         status, reason, tuple(_decided(f, status, found, len(answer), level, own.get(f.placed.effect.name))
                               for f, level in made),
     )  # fmt: skip
+
+
+def outweighs(found: Findings, finding: FoundEffect) -> bool:
+    """Return whether an effect explains, beyond the others, far more than what nothing explains."""
+    return finding.corrected_p is not None and found.left.gain <= MOST_BESIDE * max(finding.bought, 0.0)
 
 
 def stands_in(found: Findings, finding: FoundEffect) -> bool:
@@ -161,20 +173,35 @@ def finest(found: Findings, finding: FoundEffect, beside: BesideRemainder | None
 
     Beside a remainder where there is one: what separates two effects must lie beyond what else may be missing.
     """
-    needed = finding.necessity >= finding.needed and (finding.corrected_p or 0.0) <= LARGEST_P
-    if not needed or finding.at_bound:
+    if not _needed(finding) or finding.at_bound:
         return None
     if beside is not None and beside.necessity < NEEDED_Z:
         return None
-    mine = finding.placed.effect
-    margins = finding.margins if beside is None else beside.margins
-    near = {name for name, by in margins.items() if by < required_margin(mine, load(name))}
-    called = {load(name).called for name in near} | set(finding.rivals)
-    if any(load(name).family is not mine.family for name in called):
+    near, mine = _near(finding, beside), finding.placed.effect
+    if any(load(name).family is not mine.family for name in near):
         return None
-    if called:
+    if near:
         return Level.FAMILY
     return Level.MECHANISM if any(by < RIVAL_Z for by in finding.forms.values()) else Level.FORM
+
+
+def _near(finding: FoundEffect, beside: BesideRemainder | None) -> set[str]:
+    """Return the mechanisms that may stand in for an effect, beside a remainder where there is one."""
+    rivals = set(finding.rivals)
+    if beside is None:
+        return rivals
+    close = {n for n, by in beside.margins.items() if by < required_margin(finding.placed.effect, load(n))}
+    # One that is no better and has more numbers is out, whatever is left.
+    richer = {n for n in close if finding.margins[n] < required_margin(finding.placed.effect, load(n))}
+    return rivals | {load(n).called for n in close - richer}
+
+
+def _needed(finding: FoundEffect) -> bool:
+    """Return whether an effect is surely there."""
+    needed = finding.necessity >= finding.needed
+    if finding.corrected_p is not None:
+        needed = finding.corrected_p <= (LARGEST_P if needed else RARE_P)
+    return needed
 
 
 def _status(found: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
@@ -223,10 +250,7 @@ def adequate(found: Findings, answer: list[FoundEffect]) -> bool:
 
 def settled(finding: FoundEffect) -> str:
     """Return whether one effect may be named: named or ambiguous."""
-    needed = finding.necessity >= finding.needed
-    if finding.corrected_p is not None:
-        needed = finding.corrected_p <= (LARGEST_P if needed else RARE_P)
-    return "named" if needed and not finding.rivals and not finding.at_bound else "ambiguous"
+    return "named" if _needed(finding) and not finding.rivals and not finding.at_bound else "ambiguous"
 
 
 def _hidden(found: Findings, finding: FoundEffect) -> list[str]:
@@ -246,6 +270,6 @@ def _decided(
     if verdict == INCOMPLETE:
         sure = {None: "suspected", Level.FAMILY: "ambiguous"}.get(level, "named")
         return Decided(finding, sure, values, None, level, beside)
-    status = "suspected" if verdict == "unknown" else settled(finding)
+    status = "suspected" if verdict == "unknown" else settled(finding) if level is not None else "ambiguous"
     sure = confidence(values) if status == "named" else None
     return Decided(finding, status, values, sure, None if status == "suspected" else level, beside)

@@ -54,7 +54,8 @@ def document(
                  "before": float(2 * found.energy[0].sum() / values),
                  "after": float(2 * found.energy[1].sum() / values), "floor": 1.0},
         "located": located(sliced[0], found) if sliced[0] else [], "slices": beside(*sliced),
-        "path": [{"effect": name, "share": _share_of(found, fall)} for name, fall in found.path],
+        "located_after": in_words(sliced[1]) if decision.status == INCOMPLETE else [],
+        "path": _path(found),
         "unjudgeable": found.problem.board.unjudgeable,
         "limits": {k: (round(v, 4) if v < LARGEST_LIMIT else None) for k, v in found.limits.items()},
         "untested": untested([e.finding for e in decision.effects]),
@@ -65,10 +66,14 @@ def document(
     }  # fmt: skip
 
 
-def _share_of(found: Findings, fall: float) -> float:
-    """Return a fall of half the sum of squares as a share of what could be explained [1]."""
-    whole = found.left.gain + max(found.explained, 0.0)
-    return fall / whole if whole > 0 else 0.0
+def _path(found: Findings) -> list[dict[str, Any]]:
+    """Return the effects in the order in which they were added, each with what its absence would cost."""
+    bought = {f.placed.effect.name: max(f.bought, 0.0) for f in found.effects if np.isfinite(f.bought)}
+    whole = max(sum(bought.values()) + found.left.gain, 1e-12)
+    return [
+        {"effect": name, "share": bought[name] / whole if name in bought else None}
+        for name in dict.fromkeys([*found.path, *bought])
+    ]  # fmt: skip
 
 
 def located(before: list[Slice], found: Findings) -> list[str]:

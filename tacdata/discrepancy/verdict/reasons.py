@@ -43,7 +43,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
         case Reason.RIVALS:
             return _undecided(answer)
         case Reason.INCOMPLETE:
-            return _incomplete(decision, found.share_left)
+            return _incomplete(decision, found.share_left, shown)
         case Reason.SEALED:
             return f"{names} fits the presses that were judged; the sealed ones do not bear it out: not the name"
         case Reason.LEFTOVERS:
@@ -59,20 +59,24 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             return "something is missing that no modelled effect explains"
 
 
-def _incomplete(decision: Decision, share: float) -> str:
-    """Return what has a name, how fine it is, and how much has none."""
+def _incomplete(decision: Decision, share: float, shown: Gap | None) -> str:
+    """Return what has a name, how fine it is, what it closes, and how much has none."""
     words = list(dict.fromkeys(at_its_level(e) for e in decision.effects if e.level is not None))
     open_ones = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is None))
-    there = "is there" if len(words) == 1 else "are there"
-    more = f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else ""
-    return f"{_listed(words, 'and')} {there}{more}; {100 * share:.0f} % of what could be explained has no name yet"
+    said = f"{_listed(words, 'and')} {'is' if len(words) == 1 else 'are'} there"
+    sealed = shown.document() if shown is not None and len(shown.before) else {}
+    if sealed.get("certain") and sealed["closed"] > 0:
+        closes = "closes" if len(words) == 1 else "close"
+        said += f" and {closes} {100 * sealed['closed']:.0f} % of the gap on sealed presses"
+    said += f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else ""
+    return f"{said}; {100 * share:.0f} % of what could be explained has no name yet"
 
 
 def at_its_level(decided: Decided) -> str:
     """Return an effect's name at the level that holds, with what stays open."""
     effect = decided.finding.placed.effect
     if decided.level is Level.FAMILY:
-        return f"{effect.family.value} (as {effect.called}, or another of its family)"
+        return f"{effect.family.value} ({effect.called} fits best)"
     return effect.called
 
 

@@ -25,6 +25,8 @@ def in_text(verdict: dict[str, Any]) -> str:
     lines += _sizes(verdict)
     if verdict["located"]:
         lines += ["where it lives:", *(f"  {words}" for words in verdict["located"])]
+    if verdict.get("located_after"):
+        lines += ["where what has no name lives:", *(f"  {words}" for words in verdict["located_after"])]
     if verdict["next"]:
         lines += ["next:", *(f"  {words}" for words in verdict["next"])]
     if verdict["remarks"]:
@@ -53,7 +55,10 @@ def answered(verdict: dict[str, Any]) -> set[str]:
 def _effect(entry: dict[str, Any]) -> list[str]:
     sure = entry["confidence"] if entry["status"] == "named" else None
     words = "" if sure is None else f", {100 * sure:.0f} % sure"
-    lines = [f"  {entry['mechanism']} ({entry['effect']}, {entry['stage']}): {entry['status']}{words}"]
+    status = entry["status"]
+    if entry.get("level") == "family":
+        status = f"fits best; named is its family, {entry['family']}"
+    lines = [f"  {entry['mechanism']} ({entry['effect']}, {entry['stage']}): {status}{words}"]
     for name, p in entry["parameters"].items():
         if isinstance(p["value"], list):
             lines.append(f"    {name}: {min(p['value']):.4g} to {max(p['value']):.4g} {p['unit']} over the channels")
