@@ -10,7 +10,7 @@ import pytest
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.remainder import _size
 from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.verdict.decide import finest, outweighs, stands_in
+from tacdata.discrepancy.verdict.decide import finest, stands_in
 from tacdata.effects import Placed, load
 
 MARGINS = {"creep": 9.0, "backlash": 9.0}
@@ -73,9 +73,3 @@ def test_a_further_name_may_stand_in_for_what_is_left(bought, left, t, part):
     assert stands_in(found, replace(ONE, bought=bought)) == part
     alone = cast(Any, SimpleNamespace(effects=(ONE,), left=SimpleNamespace(t=t, gain=left)))
     assert not stands_in(alone, replace(ONE, bought=bought))
-
-
-@pytest.mark.parametrize(("bought", "left", "family"), [(100, 40, True), (100, 60, False)])
-def test_a_family_is_named_where_its_effect_explains_twice_what_is_left(bought, left, family):
-    found = cast(Any, SimpleNamespace(effects=(ONE,), left=SimpleNamespace(t=5, gain=left)))
-    assert outweighs(found, replace(ONE, bought=bought)) == family

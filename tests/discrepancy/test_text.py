@@ -6,8 +6,9 @@ from typing import Any, cast
 import numpy as np
 
 from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
-from tacdata.discrepancy.verdict.decide import Decided, Decision, Reason
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import in_text
@@ -121,4 +122,23 @@ def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
     assert both == (
         "something is missing; latency and relaxation together come closest and leave 10 % of what could be explained, "
         "so they are not the names, or not all of it"
+    )
+
+
+def test_a_family_that_all_rivals_share_is_said():
+    decided = Decided(finding("low_pass_filter", "latency"), "ambiguous", {}, None, Level.FAMILY)
+    decision = Decision("ambiguous", Reason.RIVALS, (decided,))
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.1, left=SimpleNamespace(t=3.0)))
+    assert reason_in_words(decision, found, DataChecks(8)).endswith("; either way it is delay and filtering")
+
+
+def test_what_stays_named_is_told_from_what_stands_in():
+    decided = [Decided(finding("power_creep"), "named", {}, None, Level.FORM)]
+    decided.append(Decided(finding("bouc_wen"), "suspected", {}, None, None))
+    decision = Decision(INCOMPLETE, Reason.INCOMPLETE, tuple(decided))
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.012, left=SimpleNamespace(t=3.0)))
+    shown = Gap(np.full(4, 30.0), np.full(4, 7.0), np.full(4, 1.0), tuple("abcd"))
+    assert reason_in_words(decision, found, DataChecks(8), shown) == (
+        "relaxation is there and closes 79 % of the gap on sealed presses; hysteresis may be there, too; "
+        "1 % of what could be explained has no name yet"
     )

@@ -25,8 +25,6 @@ SHARE_LEFT = 0.05
 """Leftovers: largest share of the explainable that an answer may leave [1]."""
 SHARE_LEFT_ALONE = 0.15
 """Leftovers: the same for a single effect of which every rival leaves twice as much [1]."""
-MOST_BESIDE = 0.5
-"""Leftovers: largest share of what an effect explains beyond the others that its family may be named beside [1]."""
 LEFT_T = 2.0
 """Leftovers: they count from so many standard errors over episodes on [1]."""
 GAP_T = 3.0
@@ -122,11 +120,6 @@ def decide(
     status, reason = _status(found, answer)
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
     levels = [finest(found, f, own.get(f.placed.effect.name)) for f in answer]
-    if reason is Reason.LEFTOVERS:
-        # Much has no name: what has one is told from other families, and not more finely.
-        pairs = zip(answer, levels, strict=True)
-        levels = [Level.FAMILY if level is not None and outweighs(found, f) else None for f, level in pairs]
-        status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else (status, reason)
     if status == "named" and any(stands_in(found, f) for f in answer):
         # One of several names may stand in for a part of what has none: only the others are sure.
         levels = [None if stands_in(found, f) else level for f, level in zip(answer, levels, strict=True)]
@@ -142,11 +135,6 @@ def decide(
         status, reason, tuple(_decided(f, status, found, len(answer), level, own.get(f.placed.effect.name))
                               for f, level in made),
     )  # fmt: skip
-
-
-def outweighs(found: Findings, finding: FoundEffect) -> bool:
-    """Return whether an effect explains, beyond the others, far more than what nothing explains."""
-    return finding.corrected_p is not None and found.left.gain <= MOST_BESIDE * max(finding.bought, 0.0)
 
 
 def stands_in(found: Findings, finding: FoundEffect) -> bool:
@@ -268,8 +256,7 @@ def _decided(
     """Return an effect with its status; whoever reads it alone must not take it for a name that the verdict refuses."""
     values = features(found, finding, count)
     if verdict == INCOMPLETE:
-        sure = {None: "suspected", Level.FAMILY: "ambiguous"}.get(level, "named")
-        return Decided(finding, sure, values, None, level, beside)
+        return Decided(finding, "suspected" if level is None else "named", values, None, level, beside)
     status = "suspected" if verdict == "unknown" else settled(finding) if level is not None else "ambiguous"
     sure = confidence(values) if status == "named" else None
     return Decided(finding, status, values, sure, None if status == "suspected" else level, beside)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
-from tacdata.discrepancy.verdict.decide import LEFT_T, Decided, Decision, Reason
+from tacdata.discrepancy.verdict.decide import LEFT_T, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import worsened
 
@@ -41,7 +41,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             more = "" if found.left.t < LEFT_T else f"; {100 * found.share_left:.1f} % of it is another form"
             return f"{names}: nothing else explains the episodes as well{more}"
         case Reason.RIVALS:
-            return _undecided(answer)
+            return _undecided(decision)
         case Reason.INCOMPLETE:
             return _incomplete(decision, found.share_left, shown)
         case Reason.SEALED:
@@ -61,7 +61,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
 
 def _incomplete(decision: Decision, share: float, shown: Gap | None) -> str:
     """Return what has a name, how fine it is, what it closes, and how much has none."""
-    words = list(dict.fromkeys(at_its_level(e) for e in decision.effects if e.level is not None))
+    words = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is not None))
     open_ones = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is None))
     said = f"{_listed(words, 'and')} {'is' if len(words) == 1 else 'are'} there"
     sealed = shown.document() if shown is not None and len(shown.before) else {}
@@ -72,19 +72,14 @@ def _incomplete(decision: Decision, share: float, shown: Gap | None) -> str:
     return f"{said}; {100 * share:.0f} % of what could be explained has no name yet"
 
 
-def at_its_level(decided: Decided) -> str:
-    """Return an effect's name at the level that holds, with what stays open."""
-    effect = decided.finding.placed.effect
-    if decided.level is Level.FAMILY:
-        return f"{effect.family.value} ({effect.called} fits best)"
-    return effect.called
-
-
-def _undecided(answer: list[FoundEffect]) -> str:
-    """Return what is open: rivals, bounds, episodes that are too few."""
+def _undecided(decision: Decision) -> str:
+    """Return what is open: rivals, bounds, episodes that are too few; and what is not: a family that all share."""
+    answer = [e.finding for e in decision.effects]
     bounds = [f.placed.effect.called for f in answer if f.at_bound]
     weak = [f.placed.effect.called for f in answer if f.necessity < f.needed]
     words = _best(answer)
+    shared = [e.finding.placed.effect.family.value for e in decision.effects if e.level is Level.FAMILY]
+    words += f"; either way it is {_listed(list(dict.fromkeys(shared)), 'and')}" if shared else ""
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
     return words + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
 

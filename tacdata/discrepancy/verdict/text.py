@@ -57,7 +57,7 @@ def _effect(entry: dict[str, Any]) -> list[str]:
     words = "" if sure is None else f", {100 * sure:.0f} % sure"
     status = entry["status"]
     if entry.get("level") == "family":
-        status = f"fits best; named is its family, {entry['family']}"
+        status = f"{status}; its family is not: {entry['family']}"
     lines = [f"  {entry['mechanism']} ({entry['effect']}, {entry['stage']}): {status}{words}"]
     for name, p in entry["parameters"].items():
         if isinstance(p["value"], list):
