@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import yaml
 import zarr
+from running.in_process import tacdata
 from scipy.spatial.transform import Rotation
 from test_exporters import GAINS, demonstration
 
@@ -104,3 +105,22 @@ def test_other_boards_in_one_task_are_refused(tmp_path):
     with pytest.raises(UsageError, match="other fingers or boards"):
         exporter("open_x_tactile").write([one, other], tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("form", ["open_x_tactile", "lerobot", "csv"])
+def test_a_session_of_presses_is_exported_too(tmp_path, form):
+    assert tacdata("example", tmp_path / "first", "-q").returncode == 0
+    shown = tacdata("export", tmp_path / "first", "--out", tmp_path / "out", "--format", form)
+    assert shown.returncode == 0, shown.stderr
+    assert "in frame 'sensor'" in shown.stdout
+    again = sorted(exporter(form).read(tmp_path / "out"), key=lambda targets: targets.recording)
+    recordings = sorted((tmp_path / "first").glob("*.mcap"))
+    for targets, path in zip(again, recordings, strict=True):
+        episode = read_episode(path)
+        assert np.array_equal(targets.time_ns, episode.taxels.sample_ns), "every reading, at its own time"
+        deepest = -1000 * targets.position[:, 0, 2].min()
+        assert deepest == pytest.approx(episode.press.depth, abs=0.02)
+    if form == "open_x_tactile":
+        stores = [zarr.open_group(str(p), mode="r", zarr_format=2) for p in sorted((tmp_path / "out").glob("*.zarr"))]
+        readings = np.concatenate([store["data/right_tactile_data_fingertips"][:] for store in stores])
+        assert readings.shape[1:] == (1, 4, 6) and len(readings) == sum(len(t.time_ns) for t in again)

@@ -1,4 +1,4 @@
-"""The images that a demonstration stores, as they were stored."""
+"""The images that a recording stores, as they were stored."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
-from tacdata.demonstrations.recording.reader import read_demo
 from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.files import topics
 from tacdata.recording.files.camera_arrays import image_times
@@ -18,7 +17,7 @@ def stored_images(path: Path) -> tuple[np.ndarray, list[bytes]]:
     """Return the images of the first camera that stored any.
 
     Args:
-        path: A demonstration's recording.
+        path: A recording, of a demonstration or a press.
 
     Returns:
         Times [ns], shape (n,), int64, rising; and n images, compressed as they came.
@@ -26,12 +25,13 @@ def stored_images(path: Path) -> tuple[np.ndarray, list[bytes]]:
     Raises:
         FormatError: If the recording is damaged.
     """
-    cameras = {topics.image(name): name for name in read_demo(path).rig.cameras}
-    found: dict[str, list[bytes]] = {name: [] for name in cameras.values()}
+    before, after = topics.image("\0").split("\0")
+    found: dict[str, list[bytes]] = {}
 
     def keep(topic: str, message: bytes | memoryview) -> None:
-        if topic in cameras:
-            found[cameras[topic]].append(CompressedImage.FromString(bytes(message)).data)
+        if topic.startswith(before) and topic.endswith(after):
+            name = topic.removeprefix(before).removesuffix(after)
+            found.setdefault(name, []).append(CompressedImage.FromString(bytes(message)).data)
 
     records = read_records(path, images=False, digests=False, seen=keep)
     for name, images in found.items():
