@@ -1,8 +1,9 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from recording_examples import SENSOR, T0, Press, plan, plan_document, rig_document
+from recording_examples import SENSOR, T0, Press, header, plan, plan_document, rig_document
 from typer.testing import CliRunner
 
 from tacdata import documents
@@ -169,12 +170,8 @@ def test_swapped_and_silent_channels_are_found(tmp_path):
     def record(folder, change):
         made = create_session(folder, many, SENSOR, rig_document())
         for number in range(30):
-            press = Press(0, seed=number)
-            object.__setattr__(press.header, "press", many.presses[number])
-            tip = np.tile([[*sites[number], 0.0]], (len(press.sample), 1))
-            depth = np.interp(press.position(press.sample)[:, 2], [-30.8, -30.0], [0.8, 0.0])
-            tip[:, 2] = depth
-            press.counts = change(press._counts(tip))
+            press = Press(0, seed=number, of=replace(header(0), press=many.presses[number]))
+            press.counts = change(press.counts)
             press.write(folder / f"episode-{number:06d}.mcap")
         return check(refresh(made).folder)
 

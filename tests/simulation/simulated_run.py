@@ -140,7 +140,7 @@ def _words(run, faults):
 def _files(run, faults):
     folder = run.world.folder
     if not folder.exists():
-        if run.error is None:
+        if run.error is None and not run.killed:
             yield "there is no session"
         return
     presses = len(run.world.plan.presses)

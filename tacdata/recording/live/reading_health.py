@@ -18,10 +18,10 @@ CHANGES = 20
 """Frames that must have changed before a board counts as one whose readings live [count]."""
 
 
-RATE_NS = 1_500_000_000
+RATE_NS = 1_400_000_000
 """Stretch over which the rate is counted [ns of real time], without its longest gap."""
-RATE_EVERY_NS = 200_000_000
-"""How often it is counted [ns of real time]."""
+RATE_EVERY_NS = 150_000_000
+"""How often it is counted [ns of real time]; only two low counts in a row are one too many."""
 SLOW = 0.6
 """Share of the rate below which a board counts as slow [1]."""
 FEWEST = 3
@@ -46,14 +46,13 @@ class ReadingHealth:
             limits: Least and greatest reading that the frame format can hold [counts].
             rate: Frames per second that the board should send [Hz]; it counts as slow if it falls below what it sent at
                 first, or below this if that is less.
-            speed: Seconds of the host's clock per second of real time. An emulated rig runs faster than a computer's
-                pauses get shorter.
+            speed: Seconds of the clock per second of real time, in which a busy computer delays frames.
         """
-        self._stretch_ns, self._every_ns = round(RATE_NS * speed), round(RATE_EVERY_NS * speed)
         self._limits, self._rate = limits, rate
         self._arrivals: deque[int] = deque()
         self._first_rate: float | None = None
-        self._counted_ns = 0
+        self._counted_ns, self._low = 0, 0
+        self._stretch_ns, self._every_ns = (round(max(speed, 1.0) * ns) for ns in (RATE_NS, RATE_EVERY_NS))
         self._last: np.ndarray | None = None
         self._begun_ns = 0
         self._same = self._longest = self._changes = 0
@@ -100,6 +99,7 @@ class ReadingHealth:
         rate = (len(gaps) - 1) / left
         if self._first_rate is None:
             self._first_rate = min(rate, self._rate) if self._rate else rate
-        if rate >= SLOW * self._first_rate:
+        self._low = self._low + 1 if rate < SLOW * self._first_rate else 0
+        if self._low < 2:
             return ""
         return f"frames come at {rate:.3g} Hz, no longer at {self._first_rate:.3g} Hz"

@@ -68,8 +68,7 @@ class RigStreams(DeviceStreams):
         self._damage_then = self._damage()
         described = devices.board.describe()
         rate = described.get("rate", {}).get("nominal")
-        speed = devices.board.clock.rate
-        self._health_of = lambda: ReadingHealth(reading_limits(described), rate, speed)
+        self._health_of = lambda: ReadingHealth(reading_limits(described), rate, devices.board.clock.rate)
         self._health, self._on_bad_readings, self._quiet_until_ns = self._health_of(), on_bad_readings, 0
         self._board_silence = max(BOARD_SILENCE, SILENT_FRAMES / rate) if rate else self.silence
         self._work["motion controller"] = self._read_status
