@@ -49,6 +49,12 @@ def reading_lag(figures: RecordingFigures) -> float | None:
     return float(np.mean(felt - gone) / 1e6)
 
 
+def loading(figures: RecordingFigures) -> float:
+    """Return how long the way in takes [ms]: a skin with hysteresis leads or lags by a share of it."""
+    press = figures.recording.episode.press
+    return 1e3 * press.deepest / press.speed
+
+
 def _crossings(values: np.ndarray, greatest: float, time_ns: np.ndarray) -> np.ndarray | None:
     """Return when half of the greatest value is first passed upwards and last passed downwards [ns], shape (2,)."""
     above = np.flatnonzero(values > greatest / 2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.recording.check.alignment import missing_ends, other_place, reading_lag
+from tacdata.recording.check.alignment import loading, missing_ends, other_place, reading_lag
 from tacdata.recording.check.camera_findings import camera_warnings
 from tacdata.recording.check.channel_health import spikes
 from tacdata.recording.check.clocks import clock_warnings
@@ -34,6 +34,8 @@ HOLD_MM = 0.05
 """Distance between reported and commanded position in the hold that makes a recording unusable [mm]."""
 LAG_MS = 150.0
 """Warning threshold: delay of the readings against the motion [ms of real time]; skins creep, so less is no proof."""
+LAG_SHARE = 0.25
+"""... and as a share of the way in [1]: hysteresis alone shifts the readings by some 5 %."""
 PLACE_MM = 0.1
 """Distance between where the guide went and what the label says that makes a recording unusable [mm]."""
 NOISE_RATIO = 5.0
@@ -184,7 +186,7 @@ def _together(figures: RecordingFigures) -> list[Judgement]:
     lag = reading_lag(figures)
     off = figures.document["cnc"]["hold_error"] or 0.0
     # Where the guide was not where it should be, nothing can be said of when it was.
-    if lag is not None and off <= HOLD_MM and abs(lag) > LAG_MS * rate:
+    if lag is not None and off <= HOLD_MM and abs(lag) > max(LAG_MS * rate, LAG_SHARE * loading(figures)):
         text = f"they come {lag:+.0f} ms after the motion: measure the delay by a sync tap (record --sync-tap)"
         found.append((WARNING, "taxels", text))
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.recording.check.alignment import reading_lag, slip
+from tacdata.recording.check.alignment import loading, reading_lag, slip
 from tacdata.recording.check.channel_order import (
     Answers,
     answers,
@@ -28,6 +28,8 @@ OFFSET_SHARE = 0.3
 
 LAG_MS = 45.0
 """Delay of one recording's readings against the others' that is reported [ms of real time]."""
+LAG_SHARE = 0.1
+"""... and as a share of the difference in how long the way in takes [1]: the skin's own hysteresis."""
 LAG_DEPTH = 0.2
 """Error of the depth by that delay that makes a recording unusable [mm]."""
 FEWEST = 4
@@ -67,10 +69,11 @@ def _delays(entries: list[RecordingFigures]) -> list[Finding]:
     if len(known) < FEWEST:
         return []
     usual, found = float(np.median([lag for _, lag in known])), []
+    duration = float(np.median([loading(entry) for entry, _ in known]))
     for entry, lag in known:
         episode = entry.recording.episode
         limit = LAG_MS * float(episode.rig.get("clock", {}).get("rate", 1.0))
-        if abs(lag - usual) > limit:
+        if abs(lag - usual) > limit + LAG_SHARE * abs(loading(entry) - duration):
             depth = abs(lag - usual) * 1e-3 * episode.press.speed
             text = f"they come {lag - usual:+.0f} ms later against the motion than in other recordings"
             severity = UNUSABLE if depth > LAG_DEPTH else WARNING
