@@ -158,6 +158,15 @@ def test_a_session_is_checked_as_a_whole(session):
     assert "no MCAP file" in report.text
 
 
+def test_recover_ends_as_mcap_recover_does(tmp_path):
+    whole = Press().write(tmp_path / "whole.mcap")
+    (tmp_path / "cut.mcap").write_bytes(whole.read_bytes()[: whole.stat().st_size * 2 // 3])
+    (tmp_path / "nothing.mcap").write_bytes(whole.read_bytes()[:100])
+    ends = {path.stem: CliRunner().invoke(application(), ["recover", str(path)]) for path in sorted(tmp_path.iterdir())}
+    assert {name: result.exit_code for name, result in ends.items()} == {"whole": 0, "cut": 3, "nothing": 1}
+    assert "messages and" in ends["cut"].output
+
+
 def test_swapped_and_silent_channels_are_found(tmp_path):
     rng = np.random.default_rng(8)
     document = plan_document(1)

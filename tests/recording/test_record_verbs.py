@@ -67,7 +67,7 @@ def test_recover_and_its_refusals_are_words(tmp_path):
     foreign = tmp_path / "x.mcap"
     foreign.write_bytes(b"x" * 100)
     result = tacdata("recover", foreign)
-    assert result.returncode == 3
+    assert result.returncode == 1
     assert "no MCAP file" in result.stderr
     assert "next:" in result.stderr
     assert list(tmp_path.iterdir()) == [foreign]
