@@ -29,6 +29,8 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
     """
     note("gate: is there a gap")
     given = gate(prepare(setting, null_model(setting)))
+    least = min(given.tests.p.min(initial=1.0), given.tests.p_generic)
+    note(f"{'there is a gap' if given.gap else 'there is no gap'}, p = {least:.3f}")
     selection = start(setting, given)
     if given.gap and until in STEPS[2:]:
         selection = race(setting, selection, note)
