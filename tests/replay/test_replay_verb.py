@@ -3,45 +3,17 @@
 import json
 import sys
 
-import numpy as np
 import pytest
 from PIL import Image
-from test_scene import HAND, RATE
+from test_scene import HAND
+from tracked_hand import tracks
 
 from tacdata import documents
 from tacdata.cli import main
-from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
-from tacdata.demonstrations.paths.tracks_file import write_tracks
-from tacdata.sensor import default_sensor
-from tacdata.virtual_rig.world.hand import DIRECTIONS, draw_hand
+from tacdata.virtual_rig.world.hand import draw_hand
 
 WILSON = [(0.0, 0.4899), (0.0456, 0.6994), (0.1500, 0.8500), (0.3006, 0.9544), (0.5101, 1.0)]
 """Wilson's 95 % interval [1] of k successes in 4 trials, from its quadratic with z^2 = 3.841459."""
-
-
-def tracks(folder, hand, task, digest):
-    """Tracks as a perfect tracker and network would give them."""
-    from scipy.spatial.transform import Rotation
-
-    times = np.arange(int(8.4 * RATE)) / RATE
-    found, count = {}, len(times)
-    for name in DIRECTIONS:
-        poses = np.array([hand.tip(name, t) for t in times])
-        depth = np.array([hand.press(name, t)[2] for t in times], np.float32)
-        found[name] = FingerTrack(
-            name, "right", name, poses[:, :3, 3], Rotation.from_matrix(poses[:, :3, :3]).as_quat(),
-            np.tile(1e-8 * np.eye(6), (count, 1, 1)), np.zeros(count, bool), count, 0,
-            np.zeros((count, 24), np.float32),
-            np.repeat(depth, 35 * 26).reshape(count, 35, 26),
-        )  # fmt: skip
-    network = {"hash": "f" * 64, "network": "none", "epoch": 0, "lookahead": 0, "sensor": "0"}
-    made = Demonstration(
-        "episode-000000.mcap", digest, task, "table", RATE, np.rint(times * 1e9).astype(np.int64), found,
-        dict.fromkeys(found, default_sensor()), {}, network, (), {"made_by": "a test"},
-    )  # fmt: skip
-    path = folder / "episode-000000.tracks.parquet"
-    write_tracks(path, made)
-    return path
 
 
 @pytest.fixture
