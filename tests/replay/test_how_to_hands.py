@@ -1,5 +1,6 @@
 """The commands of the pages on hands and robots run as they stand: what needs a rig in the long part, the rest here."""
 
+import importlib.util
 import re
 import shlex
 import subprocess
@@ -16,7 +17,7 @@ from tacdata.virtual_rig.world.hand import draw_hand
 from viewers.pictures import replay_film
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.extend(str(ROOT / "tests" / name) for name in ("demonstrations", "training"))
+sys.path.append(str(ROOT / "tests" / "demonstrations"))
 PAGES = [ROOT / "docs" / "how_to" / name for name in ("hands.md", "own_robot.md")]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FILES, RIG = ("export", "replay", "view"), ("virtual-rig", "record", "track", "live")
@@ -87,13 +88,15 @@ def test_what_needs_tracks_alone_runs(page, folder, monkeypatch):
 @pytest.mark.long("tacdata/commands", "tacdata/virtual_rig", "tacdata/live", reason="a hand, in its own time")
 @pytest.mark.timeout(900)
 def test_what_needs_a_rig_runs(tmp_path):
-    from conftest import build_frames
-
     from training.settings import TrainingSettings
     from training.train import train
 
+    made = importlib.util.spec_from_file_location("training_frames", ROOT / "tests" / "training" / "conftest.py")
+    assert made and made.loader
+    frames = importlib.util.module_from_spec(made)
+    made.loader.exec_module(frames)
     settings = TrainingSettings(arguments={"hidden": 16, "channels": 4}, epochs=1)
-    train(build_frames(), settings, tmp_path / "network", device="cpu", threads=1)
+    train(frames.build_frames(), settings, tmp_path / "network", device="cpu", threads=1)
     wanted = [words for words in commands(PAGES[0]) if needs_rig(words)]
     assert wanted[0][0] == "virtual-rig"
     rig = subprocess.Popen([sys.executable, "-m", "tacdata.cli", *wanted[0]], cwd=tmp_path)

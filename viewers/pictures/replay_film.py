@@ -83,7 +83,7 @@ class ReplayPage:
         self._objects: dict[tuple[str, int], ReplayObjectShape] = {}
         self._pads: dict[tuple[str, int], list[tuple[Circle, Any]]] = {}
         self._lines: list[Any] = []
-        most = 1.1 * max(_strongest(replay) for replay in replays.values()) + 0.1
+        most = 1.3 * max(_strongest(replay) for replay in replays.values()) + 0.1
         for column, (kind, replay) in enumerate(replays.items()):
             for row, up in enumerate((2, 1)):
                 axes = self._axes[row, column]
