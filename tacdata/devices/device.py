@@ -20,13 +20,13 @@ import numpy as np
 from tacdata import registry
 from tacdata.clock import Clock
 from tacdata.errors import DeviceError, UsageError
-from tacdata.wire.delivered import CncStatus, StreamCounts, TaxelFrame
+from tacdata.wire.delivered import CncStatus, OwesAnswer, StreamCounts, TaxelFrame
 
 ROOM, BASE = "tacdata.devices", "device"
 
 __all__ = [
-    "BASE", "ROOM", "Camera", "CncStatus", "Device", "ImageFrame", "Motion", "MotionController", "StandsStill",
-    "StreamCounts", "TaxelBoard", "TaxelFrame", "create",
+    "BASE", "ROOM", "Camera", "CncStatus", "Device", "ImageFrame", "Motion", "MotionController", "OwesAnswer",
+    "StandsStill", "StreamCounts", "TaxelBoard", "TaxelFrame", "create",
 ]  # fmt: skip
 
 

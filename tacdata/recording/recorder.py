@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tacdata.devices.device import OwesAnswer
 from tacdata.errors import DeviceError, TacdataError, UsageError
 from tacdata.plans import Plan, Press
 from tacdata.recording.clocks.clock_model import StreamLatency
@@ -267,9 +268,16 @@ class Recorder:
         position = self._change_indenter(tap, position, streams)
         before, self._latencies = self._latencies, {}
         streams.set_latencies({})
-        path = file_names.next_sync_tap(self.out)
         course = tap_motion.steps(tap, self.plan, self.rig.registration_for(tap.indenter_name))
-        position = self._record(tap, position, streams, limits, path, course)
+        path = file_names.next_sync_tap(self.out)
+        try:
+            position = self._record(tap, position, streams, limits, path, course)
+        except OwesAnswer as error:
+            if streams.fault or not self._motion.lifted or self.devices.cnc.position_lost:
+                raise
+            self._say(f"{error.given}; the indenter was lifted, and the sync tap is tried once more")
+            position, path = self._motion.go_on(), file_names.next_sync_tap(self.out)
+            position = self._record(tap, position, streams, limits, path, course)
         found = delays.measure(read_recording(path))
         for words in (*found.words, *changes(session, found.latencies)):
             self._say(words)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 
-from tacdata.devices.device import CncStatus, TaxelFrame
+from tacdata.devices.device import CncStatus, OwesAnswer, TaxelFrame
 from tacdata.errors import DeviceError, FormatError, TacdataError
 from tacdata.recording.live.guarded_motion import GuardedMotion
 from tacdata.recording.live.interruption import Interruption
@@ -21,6 +21,8 @@ from tacdata.rig import Rig
 
 PATIENCE = 5.0
 """Timeout of the first frames and of a reading [s of real time, and of the rig's clock]."""
+LIFT_SPEED = 5.0
+"""Speed of the lift after a stall of the controller [mm/s]."""
 SIDEWAYS = 0.01
 """A move of less than this in x and y counts as vertical [mm]."""
 LOOK = 0.002
@@ -49,11 +51,12 @@ class GuardedProbe(Probe):
 
     def __init__(
         self, rig: Rig, devices: RigDevices, streams: RigStreams, motion: GuardedMotion, height: float,
-        interruption: Interruption,
+        interruption: Interruption, say: Callable[[str], None] = lambda words: None,
     ) -> None:  # fmt: skip
         """Use open devices and running streams; ``height`` [mm, machine] is a safe height."""
         self._rig, self._devices, self._streams, self._motion = rig, devices, streams, motion
         self._height, self._sink, self._interruption = height, _Sink(), interruption
+        self._say, self._retried = say, False
         streams.record_into(cast(Any, self._sink))
         self._position = self._begin()
         self._rested_ns = rig.clock.now_ns()
@@ -90,12 +93,32 @@ class GuardedProbe(Probe):
         if np.allclose(position, self._position, atol=1e-9):
             return
         try:
+            self._drive(position, speed)
+        except OwesAnswer as error:
+            if not self._lifted_to_try_again(error):
+                raise
+            self._drive(position, speed)
+        self._rested_ns = self._rig.clock.now_ns()
+        self.lowest = min(self.lowest, position[2])
+
+    def _drive(self, position: Position, speed: float) -> None:
+        try:
             self._position = self._motion.drive(self._way(position, speed), self._position, self._streams, None)
         except BaseException:
             self.stopped = True
             raise
-        self._rested_ns = self._rig.clock.now_ns()
-        self.lowest = min(self.lowest, position[2])
+
+    def _lifted_to_try_again(self, error: OwesAnswer) -> bool:
+        """After a controller's first stall: lift the indenter; return whether the way may be tried once more."""
+        if self._retried or self._streams.fault or self._devices.cnc.position_lost:
+            return False
+        self._retried = True
+        self._motion.lift(self._height, LIFT_SPEED)
+        if not self._motion.lifted:
+            return False
+        self._say(f"{error.given}; the indenter was lifted, and the way is tried once more")
+        self._position, self.stopped = self._motion.go_on(), False
+        return True
 
     def _way(self, position: Position, speed: float) -> tuple[Step, ...]:
         """Return the steps there: sideways only at the higher of the two heights, so that nothing is hit."""
@@ -143,7 +166,7 @@ class GuardedProbe(Probe):
 @contextmanager
 def guarded_probe(
     rig: Rig, devices: RigDevices, height: float, speed: float, interruption: Interruption | None = None,
-    motion: GuardedMotion | None = None,
+    motion: GuardedMotion | None = None, say: Callable[[str], None] = lambda words: None,
 ) -> Iterator[GuardedProbe]:  # fmt: skip
     """Yield a probe on open devices, lifted to ``height`` [mm, machine] at ``speed`` [mm/s].
 
@@ -155,7 +178,7 @@ def guarded_probe(
     without_cameras = replace(devices, cameras={})
     off_path = motion.off_path
     with RigStreams(without_cameras, {}, motion.stop, off_path=off_path) as streams, interruption.kept():
-        probe = GuardedProbe(rig, devices, streams, motion, height, interruption)
+        probe = GuardedProbe(rig, devices, streams, motion, height, interruption, say)
         try:
             probe.rise(speed)
             yield probe

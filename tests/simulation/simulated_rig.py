@@ -98,8 +98,22 @@ class World:
             line.attach(self.computer)
         self.schedule.extend(seconds)
 
-    def record(self, resume=False, **controller):
+    def record(self, resume=False, sync_tap=False, **controller):
         """Run the recorder, with settings of the controller; return the session, or raise what it raises."""
+        rig = self.rig(**controller)
+
+        def work():
+            with Interruption(self.computer) as interruption:
+                recorder = Recorder(
+                    rig, SENSOR, self.plan, self.folder, resume, interruption=interruption, ask=self._asked,
+                    say=self.said.append, sync_tap=sync_tap,
+                )
+                return recorder.run(lambda summary: True)
+
+        return self.computer.run(work)
+
+    def rig(self, **controller):
+        """Return the rig as its file describes it, on this computer's clock."""
         document = {
             "version": "1.0", "name": "simulated",
             "cnc": {"driver": "grbl", "port": self.cnc_line.path, **controller},
@@ -108,17 +122,7 @@ class World:
             "envelope": ENVELOPE,
         }  # fmt: skip
         clock = Clock(EPOCH + START, START, 1.0, self.computer)
-        rig = replace(from_document(document, "simulated"), clock=clock)
-
-        def work():
-            with Interruption(self.computer) as interruption:
-                recorder = Recorder(
-                    rig, SENSOR, self.plan, self.folder, resume, interruption=interruption, ask=self._asked,
-                    say=self.said.append,
-                )
-                return recorder.run(lambda summary: True)
-
-        return self.computer.run(work)
+        return replace(from_document(document, "simulated"), clock=clock)
 
     def repair(self, lost):
         """Do what a person does: plug in, close the door, make room; and switch the controller off and on if its

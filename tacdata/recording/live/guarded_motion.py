@@ -175,6 +175,18 @@ class GuardedMotion:
         self._at = x, y, max(z, height)
         return f"the indenter was lifted off the skin, straight up from {z:.3f} to {max(z, height):.3f} mm"
 
+    def go_on(self) -> Position:
+        """After a stop and a lift: accept steps again, and return where the guide stands [mm].
+
+        Raises:
+            DeviceError: If it was not lifted.
+        """
+        if not self.lifted or self._at is None:
+            raise DeviceError("the indenter was not lifted", "a lifted indenter", "free it by hand, then start again")
+        self._halted.clear()
+        self._lifted, self._rest = "", None
+        return self._at
+
     @property
     def lifted(self) -> bool:
         """Whether the tip was lifted after the last stop."""

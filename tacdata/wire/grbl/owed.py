@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from tacdata.clock import Clock
 from tacdata.errors import DeviceError
-from tacdata.wire.delivered import CncStatus
+from tacdata.wire.delivered import CncStatus, OwesAnswer
 from tacdata.wire.patience import REAL_FLOOR, Patience
 
 IDLE, IDLE_FLOOR = 2.0, 1.5
@@ -54,7 +54,7 @@ class Watch:
         if last is None or last.state != "Idle" or last.sent_ns < self._due_ns or not self._owed.idle_ends_it:
             self._idle.restart()
         elif self._idle.over():
-            return DeviceError(
+            return OwesAnswer(
                 f"the controller stands idle and still owes {self._owed.what}{self._said}",
                 f"an answer within {IDLE:g} s after the motion has ended",
                 "check cable and ground (an answer was lost or damaged on its way) and the firmware (it may have "
