@@ -26,9 +26,9 @@ OFFSET_SHARE = 0.3
 """... and its minimum share of the channel's strongest answer [1], so that slow relaxation is not reported."""
 
 
-LAG_MS = 45.0
+LAG_MS = 40.0
 """Delay of one recording's readings against the others' that is reported [ms of real time]."""
-LAG_SHARE = 0.1
+LAG_SHARE = 0.06
 """... and as a share of the difference in how long the way in takes [1]: the skin's own hysteresis."""
 LAG_DEPTH = 0.2
 """Error of the depth by that delay that makes a recording unusable [mm]."""
