@@ -24,7 +24,10 @@ from tacdata.exporters.exporter import Exporter, new_folder
 from tacdata.replay.targets import FingertipTargets
 
 AREAS = {"thumb": 0, "index": 1, "middle": 2, "ring": 3, "little": 4}
-"""Functional area of a fingertip [1]; unknown kinds are counted on from 5."""
+"""Functional area of a fingertip [1]: thumb and index as in the published examples, the others in their order.
+
+Unknown kinds are counted on from 5.
+"""
 GRIPPER = 28
 """Slot of a gripper's opening among the joints of a hand [1]."""
 SIDE = 224
