@@ -148,7 +148,8 @@ class DeviceStreams(ABC):
         return {name: device.counts for name, device in (self._boards | self._cameras).items()}
 
     def _run(self, name: str, read: Callable[[], int]) -> None:
-        patience = Patience(self._silence_of(name), host=self._host)
+        # A look comes each `POLL`, and later on a computer that is far too busy: that is no silence of the device.
+        patience = Patience(self._silence_of(name), step=2 * POLL, host=self._host)
         while not self._stop.is_set():
             self._passes[name] = self._passes.get(name, 0) + 1
             try:
