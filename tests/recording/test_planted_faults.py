@@ -262,6 +262,12 @@ def spike(p):
     p.counts[p.while_still(), 4] += 3000
 
 
+@fault(WARN, "taxels", "the board repeats one frame: no channel changes for 5 frames")
+def frames_held(p):
+    row = p.while_still()
+    p.counts[row : row + 5] = p.counts[row]
+
+
 @fault(WARN, "camera side", "no image$")
 def dead_camera(p):
     p.images, p.pictures = [], []

@@ -177,6 +177,20 @@ def spikes(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Ju
     return [found[channel] for channel in sorted(found)]
 
 
+def held_frames(counts: np.ndarray, noise: np.ndarray) -> int:
+    """Return the most frames in a row in which no channel changes [count]; 0 for a board that is quiet or dead.
+
+    Args:
+        counts: Readings [counts], shape (n, taxels).
+        noise: Noise of each channel [counts], shape (taxels,).
+    """
+    if len(counts) < 2 or np.isnan(noise).all() or np.nanmedian(noise) <= LIVE or (counts == counts[:1]).all():
+        return 0
+    same = np.concatenate([[False], (counts[1:] == counts[:-1]).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(same.astype(int)))
+    return int((edges[1::2] - edges[::2]).max(initial=0)) + 1 if len(edges) else 0
+
+
 def _lasting(counts: np.ndarray, threshold: np.ndarray) -> list[tuple[int, int, float]]:
     change = np.diff(counts, axis=0)
     padded = np.pad(change, ((2, 2), (0, 0)), mode="edge")

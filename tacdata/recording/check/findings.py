@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.recording.check.alignment import loading, missing_ends, other_place, reading_lag
 from tacdata.recording.check.camera_findings import camera_warnings
-from tacdata.recording.check.channel_health import spikes
+from tacdata.recording.check.channel_health import held_frames, spikes
 from tacdata.recording.check.clocks import clock_warnings
 from tacdata.recording.check.figures import COUNTS, RecordingFigures
 from tacdata.recording.check.imported import imported_findings, is_imported
@@ -38,6 +38,8 @@ LAG_SHARE = 0.25
 """... and as a share of the way in [1]: hysteresis alone shifts the readings by some 5 %."""
 PLACE_MM = 0.1
 """Distance between where the guide went and what the label says that makes a recording unusable [mm]."""
+HELD = 4
+"""Frames in a row without any change from which a live board counts as held [count]."""
 NOISE_RATIO = 5.0
 """Warning threshold: noise of a channel over the median noise [1]."""
 DEAD_DEPTH = 0.3
@@ -157,6 +159,8 @@ def _channels(figures: RecordingFigures) -> list[Judgement]:
         found.append((UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"))
     noise = np.array([np.nan if v is None else v for v in values["idle_noise"]])
     response = np.array([np.nan if v is None else v for v in values["response"]])
+    if (held := held_frames(counts, noise)) >= HELD:
+        found.append((WARNING, "taxels", f"the board repeats one frame: no channel changes for {held} frames"))
     begin_ns = figures.recording.episode.taxels.sample_ns[:1]
     for spike in spikes(figures.recording.episode, noise, response):
         at = (spike.time_ns - int(begin_ns[0])) * 1e-9
