@@ -148,7 +148,8 @@ def _files(run, faults):
     if run.error is None and not run.killed and len(finished) < presses:
         yield f"it ended well with {len(finished)} of {presses} presses"
     partial = list(folder.glob(f"*{file_names.PARTIAL}"))
-    if partial and not run.killed and run.world.computer.disk.refused_ns is None:
+    hurried = isinstance(run.error, KeyboardInterrupt)  # a second one ends the closing, too; --resume renames the file
+    if partial and not (run.killed or hurried) and run.world.computer.disk.refused_ns is None:
         yield f"left half written: {[path.name for path in partial]}"
     for path in [*finished.values(), *file_names.unfinished(folder)]:
         if path.stat().st_size == 0 or path in run.before:

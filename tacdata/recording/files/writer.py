@@ -23,6 +23,7 @@ from tacdata.errors import DeviceError, UsageError
 from tacdata.plans import Press
 from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.polled_clock import PolledClock
+from tacdata.recording.clocks.stream_pairs import stream_pairs
 from tacdata.recording.files import file_names, topics
 from tacdata.recording.files.chunked_file import ChunkedFile
 from tacdata.recording.motion.move_times import Command
@@ -275,6 +276,8 @@ class EpisodeWriter:
                 raise self._failure
             for name, model in (clock_models or {}).items():
                 self._file.describe(f"clock_model/{name}", model.document)
+            known = {k: m.latency for k, m in (clock_models or {}).items() if isinstance(m, ClockModel)}
+            self._file.describe("sync", stream_pairs(known))
             for name, count in (counts or {}).items():
                 self._file.describe(f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()})
             self._file.describe("episode", {"complete": json.dumps(complete), "reason": reason})
