@@ -108,7 +108,13 @@ def test_what_needs_a_rig_runs(tmp_path):
     finally:
         rig.terminate()
         rig.wait(60)
-    (study,) = (words for words in commands(PAGES[0]) if words[0] == "grasp-study")
-    typed(study, tmp_path)
     assert len(list((tmp_path / "demos").glob("episode-*.mcap"))) == 2
     assert any("predicted depth up to" in words for words in said.values())
+
+
+@pytest.mark.long("tacdata/commands", "tacdata/grasping", "training", reason="a network is trained, and oranges lifted")
+@pytest.mark.timeout(1800)
+def test_the_study_of_grasps_runs(tmp_path):
+    (study,) = (words for words in commands(PAGES[0]) if words[0] == "grasp-study")
+    typed(study, tmp_path)
+    assert (tmp_path / "study").is_dir()
