@@ -176,12 +176,16 @@ def test_a_signal_stops_the_search_and_nothing_is_written(virtual, monkeypatch, 
     assert signal.getsignal(number) == before
 
 
-def test_a_lost_answer_ends_the_search_with_the_tip_lifted_and_words(virtual, monkeypatch, capfd):
+def test_a_second_lost_answer_ends_the_search_with_the_tip_lifted_and_words(virtual, monkeypatch, capfd):
+    """After the first the search is done once more."""
     left = [30]
 
     def lose(text):
         left[0] -= text == "ok"
-        return None if text == "ok" and left[0] == 0 else text
+        if left[0]:
+            return text
+        left[0] = 30
+        return None
 
     virtual.controller.inject_wire(to_host=lose)
     code, _, loud = run(monkeypatch, capfd, "register", "--rig", virtual.path, "--yes")

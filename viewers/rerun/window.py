@@ -20,6 +20,9 @@ from viewers.rerun.shield import LOOPBACK, shielded
 GRPC_PORT, WEB_PORT = 9876, 9090
 """Rerun's own ports; others are taken where these are in use."""
 
+_BY_SIGNAL = 128
+"""Exit status of a program that a signal ended, less the signal's number, as POSIX shells count."""
+
 
 def has_display() -> bool:
     """Say whether a window can be opened."""
@@ -155,7 +158,7 @@ def _ended_in_order() -> Iterator[None]:
     """Unwind when this process is asked to end, so that no viewer outlives it; a handler that is set already stays."""
 
     def end(number: int, _: object) -> None:
-        raise SystemExit(128 + number)
+        raise SystemExit(_BY_SIGNAL + number)
 
     asked = (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
     main = threading.current_thread() is threading.main_thread()  # only there may handlers be set
