@@ -152,7 +152,10 @@ def _files(run, faults):
     if partial and not (run.killed or hurried) and run.world.computer.disk.refused_ns is None:
         yield f"left half written: {[path.name for path in partial]}"
     for path in [*finished.values(), *file_names.unfinished(folder)]:
-        if path.stat().st_size == 0 or path in run.before:
+        # What the run before left half written is renamed by --resume: it was judged with that run's faults.
+        left = path.with_name(path.name.split(".")[0] + file_names.PARTIAL)
+        earlier = path in run.before or (path not in finished.values() and left in run.before)
+        if path.stat().st_size == 0 or earlier:
             continue
         if path in finished.values() or run.world.computer.disk.refused_ns is None:
             yield from _frames(run, faults, path)
