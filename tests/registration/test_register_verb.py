@@ -5,6 +5,7 @@ import re
 import signal
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -168,7 +169,17 @@ def registration_of(rig, sensor):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_stops_the_search_and_nothing_is_written(virtual, monkeypatch, capfd, number):
     before = signal.getsignal(number)
-    threading.Timer(2.0, os.kill, (os.getpid(), number)).start()
+
+    def send():
+        """A second into the search; without its handler the signal would end the test process."""
+        deadline = time.monotonic() + 60
+        while signal.getsignal(number) == before and time.monotonic() < deadline:
+            time.sleep(0.05)
+        time.sleep(1.0)
+        if signal.getsignal(number) != before:
+            os.kill(os.getpid(), number)
+
+    threading.Thread(target=send, daemon=True).start()
     code, _, loud = run(monkeypatch, capfd, "register", "--rig", virtual.path, "--yes")
     assert code == 130, loud
     assert re.search(r"(?s)motion: (stopped|at rest) at .*data:   nothing was written", loud), loud
