@@ -170,12 +170,16 @@ def registration_of(rig, sensor):
 def test_a_signal_stops_the_search_and_nothing_is_written(virtual, monkeypatch, capfd, number):
     before = signal.getsignal(number)
 
+    def place():
+        return virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000).copy()
+
+    begin = place()
+
     def send():
-        """A second into the search; without its handler the signal would end the test process."""
+        """In the search, once it moves; without a handler the signal would end the test process."""
         deadline = time.monotonic() + 60
-        while signal.getsignal(number) == before and time.monotonic() < deadline:
+        while np.abs(place() - begin).max() < 1.0 and time.monotonic() < deadline:
             time.sleep(0.05)
-        time.sleep(1.0)
         if signal.getsignal(number) != before:
             os.kill(os.getpid(), number)
 
