@@ -104,7 +104,31 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
 
     found["urdf"] = urdf.encode(), ".urdf", robot
     found["mcap"] = _recording(folder), ".mcap", read_recording
+    for ending in (".mcap", ".db3"):
+
+        def topic(path: Path) -> object:
+            return read_table(path, {"table": "/taxels"})
+
+        found[f"bag{ending}"] = _bag(folder, ending), ending, topic
     return found
+
+
+def _bag(folder: Path, ending: str) -> bytes:
+    """Return a bag of ROS 2 with one topic of readings."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    floats = types.types["std_msgs/msg/Float32MultiArray"]
+    layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    plugin = StoragePlugin.MCAP if ending == ".mcap" else StoragePlugin.SQLITE3
+    bag = folder / f"bag{ending[1:]}"
+    with Writer(bag, version=9, storage_plugin=plugin) as writer:
+        connection = writer.add_connection("/taxels", floats.__msgtype__, typestore=types)
+        for number in range(100):
+            message = floats(layout=layout, data=np.arange(6, dtype=np.float32) + number)
+            writer.write(connection, 10**18 + number * 10**7, types.serialize_cdr(message, floats.__msgtype__))
+    return next(bag.glob(f"*{ending}")).read_bytes()
 
 
 def _recording(folder: Path) -> bytes:

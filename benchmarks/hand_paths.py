@@ -21,7 +21,8 @@ from tacdata.demonstrations.paths.path_faults import gaps
 from tacdata.demonstrations.paths.sightings import sightings_of
 from tacdata.demonstrations.recording.rig import demo_rig_of
 from tacdata.recording.episode import TagStream
-from tacdata.virtual_rig.demo import EYES, FINGERS, INTRINSICS, _look_at
+from tacdata.virtual_rig.demo import AIM, EYES, FINGERS, INTRINSICS
+from tacdata.virtual_rig.optics.scene import looking_at
 from tacdata.virtual_rig.world.hand import PERIOD, draw_hand
 
 SPREAD = 0.0002, float(np.radians(0.03))
@@ -38,7 +39,7 @@ def rig_of(seed):
     rng = np.random.default_rng([seed, 13])
     cameras, truth = {}, {}
     for name, place in EYES.items():
-        pose = _look_at(place)
+        pose = looking_at(place, AIM)
         turn = Rotation.from_rotvec(rng.normal(0, SPREAD[1], 3)) * Rotation.from_matrix(pose[:3, :3])
         truth[name] = pose
         cameras[name] = {

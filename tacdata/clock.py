@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from tacdata.host import COMPUTER, Host
 
 
 @dataclass(frozen=True)
@@ -19,16 +20,23 @@ class Clock:
     """`time.monotonic_ns()` at the origin [ns]."""
     rate: float = 1.0
     """Seconds shown per real second; 1 with real devices."""
+    host: Host = field(default=COMPUTER, compare=False, repr=False)
+    """Whose time it is; whoever has the clock takes threads and waiting from it too."""
 
     @classmethod
-    def start(cls, rate: float = 1.0) -> Clock:
+    def start(cls, rate: float = 1.0, host: Host = COMPUTER) -> Clock:
         """Return a clock that shows the present time now and runs at ``rate``."""
-        return cls(time.time_ns(), time.monotonic_ns(), rate)
+        return cls(host.time_ns(), host.monotonic_ns(), rate, host)
+
+    @property
+    def document(self) -> dict[str, float]:
+        """The three numbers, as a rig file holds them."""
+        return {"epoch_ns": self.epoch_ns, "origin_ns": self.origin_ns, "rate": self.rate}
 
     def now_ns(self) -> int:
         """Return the time shown [ns since 1970]."""
-        return self.epoch_ns + int(self.rate * (time.monotonic_ns() - self.origin_ns))
+        return self.epoch_ns + int(self.rate * (self.host.monotonic_ns() - self.origin_ns))
 
     def sleep(self, seconds: float) -> None:
         """Wait for ``seconds`` of this clock's time [s]."""
-        time.sleep(max(seconds, 0.0) / self.rate)
+        self.host.sleep(max(seconds, 0.0) / self.rate)

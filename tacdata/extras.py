@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
-from importlib.metadata import PackageNotFoundError, requires
+from importlib.metadata import PackageNotFoundError, distribution, requires
 from types import TracebackType
 
 from tacdata.errors import PackageError
@@ -34,12 +35,27 @@ def missing_package(error: ImportError, asked: str, instead: str = "") -> Packag
     rooms = (room for asker in _askers(error.__traceback__) for room in ROOMS if f"{asker}.".startswith(f"{room}."))
     extra = next((ROOMS[room] for room in rooms if ROOMS[room] in extras), extras[0])
     name = package if package == module else f"{module.capitalize()} ({package})"
-    line = f"pip install 'tacdata[{extra}]' (from a clone: pip install '.[{extra}]')"
+    line = install_line(extra)
     return PackageError(
         f"{asked} needs {name}, which is not installed",
         f"an install with the extra {extra}",
         f"{line}, or {instead}" if instead else line,
     )
+
+
+def install_line(extra: str) -> str:
+    """Return the command that installs an extra from where this install came: a clone, a file, or the package index."""
+    try:
+        record = distribution("tacdata").read_text("direct_url.json")
+    except PackageNotFoundError:
+        return f"pip install '.[{extra}]' in the clone"
+    if record is None:
+        return f"pip install 'tacdata[{extra}]'"
+    origin = json.loads(record)
+    if "dir_info" in origin:
+        return f"pip install '.[{extra}]' in the clone"
+    system = f"{origin['vcs_info']['vcs']}+" if "vcs_info" in origin else ""
+    return f"pip install 'tacdata[{extra}] @ {system}{origin['url']}'"
 
 
 def extras_of(package: str) -> tuple[str, ...]:

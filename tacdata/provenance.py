@@ -14,7 +14,28 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-EQUAL_VERSIONS: dict[str, tuple[Any, str]] = {}
+_FARM = [
+    "59c1258e2cd26f7d4d0a7cff4ae2a35df91e461fa26361e1222c87ae74816ded",
+    "6281e5837cb8d35bac2449babfaca779592257e270400c737c160ffecf448ac6",
+    "78a9489cf1a9c2e60f37af4beb2ef5160308766343ef2480205f18349d603238",
+]
+_ALIKE = "12 presses, 180 arrays: equal to the last bit"
+EQUAL_VERSIONS: dict[str, tuple[Any, str]] = {
+    # tacdata.skin, tacdata.indenters
+    "1977f9099c306f209979b6bbd5f0329011656853c4e2acb9abe8cbc672db5f61": (
+        "9d52ea98c6b708e1f5a724d14c8fcaf86a092e55882c91fa91b57574e8fd2629", _ALIKE,
+    ),
+    "f6723a6dbe97df24222276487e450eeb04b41b3d004819fbf700392d9d8f68c6": (
+        "e4c1d022f42d681255d4dc8438075601194e5828c16138807f71cbf19e06b149", _ALIKE,
+    ),
+    # label_farm.presses: without spreads, with them
+    "6a824e685eab6018c2b9362d1e76e5fcf2462d494270c0515279cf2d2f2c510a": (_FARM, _ALIKE),
+    "5df0c127767136566545f3c453699fe976d4d9e088e6685f98e81bf3cb451b62": (_FARM, _ALIKE),
+    # label_farm.labels
+    "ae5e19a9ac1b765ded74fd73b9aa57b12860dff27eb1fb23e442c8e192ae25e8": (
+        "c8cb8754334be9625504fedba56cf3dfe2f27bc6d95c42069666fca50d790fac", _ALIKE,
+    ),
+}
 """Version of code -> (what an older release called it, how it was shown that their results are identical).
 
 Stored labels and solutions of the older release then stay current. An entry ends by itself: whoever changes the code

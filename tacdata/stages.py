@@ -76,7 +76,8 @@ class Line:
 
 
 def _run(line: list[str]) -> int:
-    process = _start(line)
+    # With ``--json`` words go to standard error, those of the stages too: standard output is the result alone.
+    process = _start(line, stdout=sys.stderr if sys.stdout is sys.stderr else None)
     try:
         return process.wait()
     except BaseException:

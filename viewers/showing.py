@@ -31,12 +31,17 @@ class Output:
     @property
     def opens(self) -> bool:
         """Whether somebody is to look now."""
-        return self.web or not (self.save or self.picture or self.video)
+        return self.web or not self.files
 
     @property
     def only_web(self) -> bool:
         """Whether a browser is all that is asked for."""
-        return self.web and not (self.save or self.picture or self.video)
+        return self.web and not self.files
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that are asked for."""
+        return [file for file in (self.save, self.picture, self.video) if file]
 
     def prepare(self) -> None:
         """Import what is going to draw, which takes as long as reading a large file."""
@@ -105,7 +110,7 @@ def show_saved(path: Path, output: Output) -> None:
     Raises:
         UsageError: If it is to be saved or drawn again.
     """
-    if output.save or output.picture or output.video:
+    if output.files:
         given = f"{path} with --save, --picture or --video"
         raise UsageError(given, "a recording, session, dataset, ...", "leave them out")
     show_file(path, output.web)

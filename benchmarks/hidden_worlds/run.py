@@ -100,7 +100,8 @@ def line(answer):
     return f"{verdict['status']} {' + '.join(told)} {answer['seconds']:.0f} s"
 
 
-if __name__ == "__main__":
+def chosen(words=None):
+    """Return what was typed, or is given."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("blocks", nargs="+", choices=[*BLOCKS, "all"])
@@ -115,6 +116,10 @@ if __name__ == "__main__":
     parser.add_argument("--without-truth", action="store_true", help="take what is true out of the library")
     parser.add_argument("--engine", type=Path, default=REPOSITORY, help="folder that holds the package to judge with")
     parser.add_argument("--show", action="store_true", help="print what was hidden beside what was found")
-    chosen = parser.parse_args()
-    chosen.blocks = list(BLOCKS) if "all" in chosen.blocks else chosen.blocks
-    main(chosen)
+    found = parser.parse_args(words)
+    found.blocks = list(BLOCKS) if "all" in found.blocks else found.blocks
+    return found
+
+
+if __name__ == "__main__":
+    main(chosen())

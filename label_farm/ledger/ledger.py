@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from label_farm.ledger.tables import (
+    DROP_UNWANTED,
     FIRST_EXPIRED,
     FIRST_WAITING,
     GIVE_BACK,
@@ -23,6 +24,7 @@ from label_farm.ledger.tables import (
     OPEN,
     TABLES,
     TAKE,
+    UNWANTED,
     WAITING_LIKE_IT,
 )
 from label_farm.presses.job import Job
@@ -185,7 +187,7 @@ class Ledger:
             priority: Larger comes first; raises that of a job already waiting.
             run: Who asks, if the asking is to be taken back some day (`withdraw`).
         """
-        listed = list(jobs) if run else jobs
+        listed = list(jobs)
         rows = ((job.key, job.model, job.batch, json.dumps(job.document), -priority) for job in listed)
         with self._transaction():
             self._db.executemany(
@@ -196,6 +198,8 @@ class Ledger:
                 " WHERE state <> 1",
                 rows,
             )
+            again = ((-priority, job.key) for job in listed)
+            self._db.executemany(f"UPDATE job SET rank = ? WHERE key = ? AND state = 1 AND rank = {UNWANTED}", again)
             if run:
                 wishes = ((run, job.key, -priority) for job in listed)
                 self._db.executemany("INSERT OR REPLACE INTO wish (run, key, rank) VALUES (?, ?, ?)", wishes)
@@ -208,6 +212,7 @@ class Ledger:
         """
         now = time.monotonic()
         with self._transaction():
+            self._db.execute(f"{DROP_UNWANTED} AND model = ? AND lease < ?", (model, now))
             first = self._db.execute(FIRST_WAITING, (model,)).fetchone()
             if first is None:
                 keys = [row[0] for row in self._db.execute(FIRST_EXPIRED, (model, now))]
@@ -280,6 +285,7 @@ class Ledger:
         held = "WHERE state = 1 AND owner = ?"
         with self._transaction():
             count = self._db.execute(f"SELECT count(*) FROM job {held}", (owner,)).fetchone()[0]
+            self._db.execute(f"{DROP_UNWANTED} AND owner = ?", (owner,))
             if not blame:
                 self._db.execute(f"{GIVE_BACK}, tries = tries - 1 {held}", (owner,))
             elif count > 1:
@@ -291,10 +297,12 @@ class Ledger:
 
     def release_dead(self) -> None:
         """Give back what dead processes of this machine held, and all leases from before a restart."""
-        self._db.execute(f"{GIVE_BACK} WHERE state = 1 AND boot <> ?", (self._boot,))
+        for statement in (DROP_UNWANTED, f"{GIVE_BACK} WHERE state = 1"):
+            self._db.execute(f"{statement} AND boot <> ?", (self._boot,))
         for owner in [row[0] for row in self._db.execute("SELECT DISTINCT owner FROM job WHERE state = 1")]:
             if is_dead(owner):
-                self._db.execute(f"{GIVE_BACK} WHERE state = 1 AND owner = ?", (owner,))
+                for statement in (DROP_UNWANTED, f"{GIVE_BACK} WHERE state = 1"):
+                    self._db.execute(f"{statement} AND owner = ?", (owner,))
 
     def last_change(self) -> int:
         """Return the running number of the latest change."""
@@ -331,7 +339,9 @@ class Ledger:
         return sum(self._db.execute(count.format(state), (most,)).fetchone()[0] for state in (WAITING, LEASED))
 
     def withdraw(self, run: str) -> int:
-        """Withdraw a run's jobs; those that no other run wants and no worker holds leave the queue.
+        """Withdraw a run's jobs; those that no other run wants leave the queue.
+
+        One that a worker holds is solved to its end, but not taken up again if that worker gives it back or dies.
 
         Returns:
             How many jobs left the queue.
@@ -341,6 +351,10 @@ class Ledger:
             removed = self._db.executemany(
                 "DELETE FROM job WHERE key = ? AND state = 0 AND key NOT IN (SELECT key FROM wish)", keys
             ).rowcount
+            self._db.executemany(
+                f"UPDATE job SET rank = {UNWANTED} WHERE key = ? AND state = 1 AND key NOT IN (SELECT key FROM wish)",
+                keys,
+            )
             self._rank(keys)
         return max(removed, 0)
 

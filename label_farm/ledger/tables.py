@@ -46,3 +46,6 @@ TAKE = (
     " WHERE key = ? RETURNING document, tries"
 )
 GIVE_BACK = "UPDATE job SET state = 0, owner = NULL"
+UNWANTED = 2**40
+"""Rank of a job in work whose runs were all withdrawn: its result counts, but nobody solves it a second time."""
+DROP_UNWANTED = f"DELETE FROM job WHERE rank = {UNWANTED} AND state = 1"

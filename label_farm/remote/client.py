@@ -5,12 +5,13 @@ from __future__ import annotations
 import http.client
 import json
 import re
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
 from typing import Any
 
-from tacdata.errors import DeviceError, FormatError, TacdataError, UsageError
+from tacdata.errors import DeviceError, FormatError, SolveError, TacdataError, UsageError
 
 TOKEN = "TACDATA_FARM_TOKEN"
 URL = "TACDATA_FARM_URL"
@@ -61,6 +62,20 @@ class Client:
         body = json.dumps({} if document is None else document).encode()
         return self._document(self.send("POST", path, body, {"Content-Type": "application/json"}))
 
+    def planned(self, number: str, seconds: float) -> dict[str, Any]:
+        """Return a submission once the service has looked at its recordings, or as it stands after a while.
+
+        Args:
+            number: Which.
+            seconds: Longest wait [s].
+        """
+        end = time.monotonic() + seconds
+        entry = self.get(self.submission(number))
+        while entry["state"] in ("waiting", "planning") and time.monotonic() < end:
+            time.sleep(0.2)
+            entry = self.get(self.submission(number))
+        return entry
+
     def _document(self, answer: bytes) -> Any:
         try:
             return json.loads(answer)
@@ -107,6 +122,17 @@ class Client:
             raise DeviceError(
                 f"no answer from {self.url}: {reason}", "a service that runs there", "start it: `tacdata farm up`"
             ) from None
+
+
+def refusal(entry: dict[str, Any]) -> SolveError:
+    """Return why a submission was refused, in the service's own words."""
+    given, *others = entry["reason"].split("\n  ")
+    said = {key: words for key, _, words in (line.partition(":") for line in others)}
+    return SolveError(
+        f"submission {entry['id']} is refused: {given}",
+        said.get("allowed", "a session whose every episode can be labelled").strip(),
+        said.get("next", "mend what is said above and submit again").strip(),
+    )
 
 
 def _is_address(url: str) -> bool:

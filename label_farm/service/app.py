@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from label_farm.ledger.ledger import Ledger
 from label_farm.service.foreman import Foreman
 from label_farm.service.guard import Guard
+from label_farm.service.metrics import add_metrics
 from label_farm.service.receiving import add_receiving
 from label_farm.service.results import add_results
 from label_farm.service.submission import Submission
@@ -85,6 +86,7 @@ def application(foreman: Foreman, token: str = "") -> Guard:
     add_receiving(api, foreman)
     add_results(api, foreman)
     add_work(api, foreman)
+    add_metrics(api, lambda: _farm(foreman), lambda: [submission.state for submission, _ in foreman.states()])
     return Guard(api, token)
 
 

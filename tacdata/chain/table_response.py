@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import spline_filter
+from scipy.ndimage import spline_filter1d
 
 from tacdata.chain.response import Response
 from tacdata.errors import FormatError, UsageError
@@ -45,11 +45,8 @@ class TableResponse(Response):
         self.gain, self.offset = gain, offset
         self._rough = False
         both = np.concatenate([load, force[..., None]], axis=-1)
-        self._splines = [
-            _Table.of(np.stack([spline_filter(each[..., c], order=3) for c in range(each.shape[-1])], axis=-1))
-            for each in both
-        ]
-        self._nodes = [_Table.of(each) for each in both]
+        self._splines = [_Table.of(_coefficients(each)) for each in both]
+        self._nodes = [_Table.of(_continued(each)) for each in both]
         self._channels = load.shape[-1]
         self._kept: dict[int, _Answer] = {}
         self._forces: dict[int, np.ndarray] = {}
@@ -178,7 +175,7 @@ class _Answer:
 
 @dataclass(frozen=True)
 class _Table:
-    """One tool's coefficients or nodes, mirrored at the ends: the four nodes of a place always exist."""
+    """One tool's coefficients or nodes, with what lies beyond the ends: the four nodes of a place always exist."""
 
     both: np.ndarray
     """Loads, then the force, padded (`tacdata.chain.lanes`), shape (a, b, d, lanes)."""
@@ -187,11 +184,40 @@ class _Table:
 
     @classmethod
     def of(cls, values: np.ndarray) -> _Table:
-        """Return the table of loads and force, shape (a, b, d, channels + 1)."""
+        """Return the table of loads and force, shape (a, b, 1 + d + 2, channels + 1): depth has its ends already."""
         from tacdata.chain.lanes import padded
 
-        around = np.pad(values, ((1, 2), (1, 2), (1, 2), (0, 0)), mode="reflect")
+        around = np.pad(values, ((1, 2), (1, 2), (0, 0), (0, 0)), mode="reflect")
         return cls(padded(around), padded(around[..., -1:]))
+
+
+def _coefficients(values: np.ndarray) -> np.ndarray:
+    """Return the coefficients of cubic B-splines through values, shape (a, b, d, k): shape (a, b, 1 + d + 2, k).
+
+    Places are mirrored at their ends. Depth is even about contact, and not-a-knot at its deep end: a mirror there would
+    bend loads that still grow flat over the last nodes.
+    """
+    filtered = spline_filter1d(spline_filter1d(values, order=3, axis=0), order=3, axis=1)
+    count = values.shape[2]
+    matrix = np.zeros((count + 2, count + 2))
+    for k in range(count):
+        matrix[k, k : k + 3] = 1 / 6, 4 / 6, 1 / 6
+    matrix[count, [0, 2]] = 1.0, -1.0
+    matrix[count + 1, -5:] = 1.0, -4.0, 6.0, -4.0, 1.0
+    inverse = np.linalg.inv(matrix)[:, :count]
+    inner = np.einsum("kd,abdc->abkc", inverse, filtered, optimize=True)
+    return np.concatenate([inner, inner[:, :, -1:]], axis=2)
+
+
+def _continued(values: np.ndarray) -> np.ndarray:
+    """Return nodes with those beyond the ends of depth, shape (a, b, 1 + d + 2, k): even, and on the last cubic."""
+    beyond = []
+    last = values[:, :, -4:]
+    for _ in range(2):
+        following = -last[:, :, :1] + 4 * last[:, :, 1:2] - 6 * last[:, :, 2:3] + 4 * last[:, :, 3:4]
+        beyond.append(following)
+        last = np.concatenate([last[:, :, 1:], following], axis=2)
+    return np.concatenate([values[:, :, 1:2], values, *beyond], axis=2)
 
 
 def _key(pose: np.ndarray, tool: np.ndarray) -> int:

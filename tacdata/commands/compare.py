@@ -51,7 +51,7 @@ def run(
         scene = _models(path, spec or [], episode)
     print("\n".join(scene.found))
     showing.show(scene, output)
-    return Result({"compared": scene.title, "found": scene.found, "written": [f for f in (save, picture, video) if f]})
+    return Result({"compared": scene.title, "found": scene.found, "written": output.files})
 
 
 def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tacdata import stages
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
 from tacdata.errors import SolveError, UsageError
 
 ORDER = 100
@@ -27,7 +27,7 @@ def run(
         float, typer.Option(min=1.0, max=16.0, help="Virtual seconds per second; less on a busy machine.")
     ] = 4.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the plan, the virtual world and the training.")] = 1,
-) -> None:
+) -> Result:
     """Run the main job once against a virtual rig, in a few minutes, and say where everything lies."""
     place = _Place(_new_folder(out))
     recording, learning = place.recording(presses, seed), place.learning(epochs, seed)
@@ -46,9 +46,12 @@ def run(
     except KeyboardInterrupt:
         print(f"\nstopped at stage {line.number}: what was finished is in {place.folder}", file=sys.stderr)
         raise
-    print(f"\nthe whole job took {stages.clock_face(time.monotonic() - begin)}; it left")
+    took = time.monotonic() - begin
+    print(f"\nthe whole job took {stages.clock_face(took)}; it left")
     for what, path in place.products.items():
         print(f"  {what:<14} {path}" + ("" if path.exists() else "   MISSING"))
+    left = {what: path for what, path in place.products.items() if path.exists()}
+    return Result({"folder": place.folder, "seconds": took, "left": left})
 
 
 class _Place:

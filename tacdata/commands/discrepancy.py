@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -18,7 +19,7 @@ def run(
     recordings: Annotated[
         list[Path], typer.Argument(help="Recordings (.mcap) or session folders; several sessions in one verdict.")
     ],
-    out: Annotated[Path, typer.Option(help="New folder: verdict.json, .txt, .png, residuals.parquet, a new spec.")],
+    out: Annotated[Path, typer.Option(help="New folder: verdict.html, .json, .txt, .png, residuals.parquet, a spec.")],
     spec: Annotated[
         Path | None,
         typer.Option(help="Model spec (schemas/model_spec.schema.json); else a response fitted to the recordings."),
@@ -40,8 +41,15 @@ def run(
     if fem:
         spec = _solved(recordings, spec, out)
     model = read_spec(spec)
+    begun = time.monotonic()
     with console.status("reading") as status:
-        written = judge(recordings, model, out, status.update, stop_after)
+
+        def told(words: str) -> None:
+            status.update(words)
+            line = f"{time.monotonic() - begun:5.0f} s  {words}"
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+        written = judge(recordings, model, out, told, stop_after)
     print("base: " + ("a response fitted to these recordings" if spec is None else str(spec)))
     print(written.text, end="")
     console.print(f"written: {written.folder}", markup=False, highlight=False, soft_wrap=True)

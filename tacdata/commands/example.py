@@ -21,6 +21,7 @@ def run(
 ) -> Result:
     """Copy a small recording that ships with tacdata, check it and draw one press of it."""
     from tacdata.example import DEEPEST, copy_session
+    from tacdata.extras import install_line
     from viewers.pictures.backend import PictureBackend
     from viewers.source import scene_at
 
@@ -34,8 +35,8 @@ def run(
     say(f"next: open {out / PICTURE}, then")
     for command, purpose in (
         (f"tacdata browse {out}", "list its presses"),
-        (f"tacdata view {out}", "turn one in 3D (pip install 'tacdata[view]')"),
-        ("tacdata demo", "run the whole pipeline (pip install 'tacdata[all]')"),
+        (f"tacdata view {out}", f"turn one in 3D ({install_line('view')})"),
+        ("tacdata demo", f"run the whole pipeline ({install_line('all')})"),
     ):
         say(f"  {command:<{len(str(out)) + 18}}{purpose}")
     return Result({"check": report.document, "press": {"number": DEEPEST, "found": scene.found}, "folder": out,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,17 +12,22 @@ from tacdata.commands.command import TOOLS, Result
 from tacdata.errors import Exit
 
 if TYPE_CHECKING:
+    from tacdata.demonstrations.demonstration import Demonstration
     from tacdata.replay.targets import FingertipTargets
 
 ORDER = 121
 PANEL = TOOLS
+SESSION = "session.json"
+"""What a folder of recorded presses holds."""
 
 
 def run(
-    path: Annotated[Path, typer.Argument(help="A folder that tacdata track worked up, or one of its recordings.")],
+    path: Annotated[
+        Path, typer.Argument(help="A folder that tacdata track worked up, one of its recordings, or a session.")
+    ],
     out: Annotated[Path, typer.Option(help="Folder to make.")],
     form: Annotated[
-        str, typer.Option("--format", help="A file's name in tacdata/exporters: lerobot, csv, parquet, joints, ...")
+        str, typer.Option("--format", help="A file's name in tacdata/exporters: lerobot, csv, open_x_tactile, ...")
     ] = "lerobot",
     direct: Annotated[
         bool, typer.Option("--direct", help="Targets as the fingertips were seen, not moved by what was felt.")
@@ -41,11 +47,14 @@ def run(
     from tacdata.exporters.exporter import exporter
     from tacdata.replay.targets import check_guesses, doubts, targets_of
 
-    writer = exporter(form, robot)
-    files = [path_of(p) for p in read_demo_session(path).episodes] if path.is_dir() else [_tracks(path)]
+    writer = exporter(form, robot, path if path.is_dir() else path.parent)
+    if (path / SESSION).is_file():
+        demonstrations, direct = _presses(path), True
+    else:
+        files = [path_of(p) for p in read_demo_session(path).episodes] if path.is_dir() else [_tracks(path)]
+        demonstrations = map(read_tracks, files)
     episodes = []
-    for file in files:
-        made = read_tracks(file)
+    for made in demonstrations:
         chosen = None if direct else read_gains(gains).of(task or made.task)
         episodes.append(targets_of(made, chosen, finger or ()))
         if not with_guesses:
@@ -64,6 +73,16 @@ def run(
     told = [{"recording": t.recording, "kind": t.kind, "targets": len(t.time_ns), "notes": _notes(t)} for t in episodes]
     unfit = bool(limits) and writer.needs_robot
     return Result({"targets": told, "limits": limits, "folder": out}, Exit.UNFIT if unfit else Exit.DONE)
+
+
+def _presses(session: Path) -> Iterator[Demonstration]:
+    """Read the presses of a session, one at a time: there the tip is commanded, and nothing is to be compensated."""
+    from tacdata.recording.files.reader import read_episode
+    from tacdata.recording.session import read_session
+    from tacdata.replay.pressed import pressed
+
+    for recording in read_session(session).episodes:
+        yield pressed(read_episode(recording))
 
 
 def _notes(targets: FingertipTargets) -> list[str]:

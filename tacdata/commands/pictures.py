@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import TOOLS, Result
 
 ORDER = 170
 PANEL = TOOLS
@@ -20,7 +20,7 @@ def run(
     ),
     verdict: Annotated[Path | None, typer.Option(help="A verdict folder, for its page too.")] = None,
     demonstration: Annotated[Path | None, typer.Option(help="A tracked demonstration, for its page too.")] = None,
-) -> None:
+) -> Result:
     """Draw the pictures of README and tutorial from what the demo made: small enough for the repository."""
     from tacdata.errors import UsageError
     from viewers.browse.list_sources import episodes_at
@@ -40,3 +40,4 @@ def run(
             drawn.append(small_page(scene_at(path), out / name))
     for path in drawn:
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+    return Result({"written": [{"file": path, "bytes": path.stat().st_size} for path in drawn]})

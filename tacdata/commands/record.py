@@ -124,8 +124,8 @@ def _by_hand(
         raise UsageError(f"--demo with {', '.join(unwanted)}", "--rig, --out, --task", "the demo rig names the sensors")
     try:
         session = record_by_hand(rig, out, task, seconds, count, resume)
-    except KeyboardInterrupt:
-        print(f"interrupted: what was recorded is in {out}", file=sys.stderr)
+    except KeyboardInterrupt as error:
+        print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
         raise typer.Exit(Exit.INTERRUPTED) from None
     print(f"{len(session.episodes)} demonstrations in {out}")
     suggest("track", out)

@@ -17,11 +17,12 @@ def run(
     file: Annotated[Path, typer.Argument(help="The damaged recording (MCAP).")],
     out: Annotated[Path | None, typer.Option(help="Where to write the repaired copy; default beside it.")] = None,
 ) -> Result:
-    """Write a repaired copy of a recording that a crash cut off."""
+    """Write a repaired copy of a recording that a crash cut off: 0 if all is there, 3 with a loss, 1 if nothing is."""
+    from tacdata.errors import Exit
     from tacdata.recording.files.recover import recover
 
     found = recover(file, out)
     for damage in found.damage or ["nothing was wrong with it"]:
         print(f"{file.name}: {damage}")
     print(f"{found.messages} messages and {found.attachments} attachments are in {found.path}")
-    return Result(found)
+    return Result(found, Exit.FORMAT if found.damage else Exit.DONE)

@@ -142,8 +142,9 @@ def _touch(
             raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
         require_found(why_lost(devices.cnc), safe, _agreed)
         _mount(rig, specimen)
-        with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption, motion) as probe:
-            found = register(probe, sensor, rig.registration, settings, say=lambda text: say(f"  {text}"))
+        told = lambda text: say(f"  {text}")  # noqa: E731
+        with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption, motion, told) as probe:
+            found = register(probe, sensor, rig.registration, settings, say=told)
     return document_of(found, rig, sensor, specimen, controller), found.text
 
 

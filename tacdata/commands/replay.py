@@ -22,18 +22,31 @@ def run(
     task: Annotated[str | None, typer.Option(help="Task whose gains are taken; default: the demonstration's.")] = None,
     gains: Annotated[Path | None, typer.Option(help="Gains file (YAML); default: the paper's.")] = None,
     seeds: Annotated[int, typer.Option(min=1, max=10000, help="Trials of each kind, a world of its own each.")] = 40,
-    radius: Annotated[float, typer.Option(help="Radius of the ball [mm].")] = 35.0,
-    mass: Annotated[float | None, typer.Option(help="Of the object [kg]; default: ball 0.18, eraser 0.12.")] = None,
+    thing: Annotated[
+        str | None, typer.Option("--object", help="ball, can, box or eraser; default: an eraser to wipe, else a ball.")
+    ] = None,
+    radius: Annotated[
+        float | None, typer.Option(help="Half the object's width between the fingers, a ball's radius [mm].")
+    ] = None,
+    mass: Annotated[float | None, typer.Option(help="Of the object [kg]; default: the object's own.")] = None,
     stiffness: Annotated[float, typer.Option(help="Of the springs that hold the robot's fingertips [N/m].")] = 300.0,
     out: Annotated[Path | None, typer.Option(help="File for the result (JSON).")] = None,
     view: Annotated[Path | None, typer.Option(help="Rerun file (.rrd): the first one's replays, undisturbed.")] = None,
     video: Annotated[Path | None, typer.Option(help="The same as a film (.mp4 or .gif).")] = None,
     find_gain: Annotated[
-        float | None, typer.Option(metavar="MM", help="Find the smallest gain that presses every skin so deep.")
-    ] = None,
+        bool, typer.Option("--find-gain", help="Find the smallest gain that holds the object in preliminary trials.")
+    ] = False,
     gain_from: Annotated[
         Path | None, typer.Option(help="With --find-gain: find it on this recording, and try it on the others.")
     ] = None,
+    preliminary: Annotated[int, typer.Option(min=1, max=1000, help="Preliminary trials of --find-gain.")] = 20,
+    most_slip: Annotated[
+        float, typer.Option(metavar="MM", help="With --find-gain: how far the object may slide along a pad.")
+    ] = 3.0,
+    most_force: Annotated[float, typer.Option(metavar="N", help="With --find-gain: the largest force on a pad.")] = 6.0,
+    least_grip: Annotated[
+        float, typer.Option(help="With --find-gain: how many times the load friction at the pads must carry.")
+    ] = 2.0,
     with_guesses: Annotated[
         bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
     ] = False,
@@ -43,6 +56,7 @@ def run(
     from tacdata.demonstrations.compensation import read_gains
     from tacdata.demonstrations.paths.tracks_file import read_tracks
     from tacdata.errors import UsageError
+    from tacdata.replay.gain_search import GripDemand
     from tacdata.replay.scene import scene_of
     from tacdata.replay.targets import check_guesses, doubts
     from tacdata.replay.trials import Trials, result
@@ -50,11 +64,14 @@ def run(
     for file in (out, view, video):
         if file is not None and file.exists():
             raise UsageError(f"{file} exists", "a new file", "choose another name")
-    if gain_from is not None and find_gain is None:
-        raise UsageError("--gain-from without --find-gain", "a depth to find the gain for", "add --find-gain MM")
-    if not 1 <= radius <= 200 or not 0 < (mass or 0.1) <= 10 or not 1 <= stiffness <= 1e5:
-        given = f"a ball of {radius:g} mm, {mass or 0:g} kg; springs of {stiffness:g} N/m"
-        raise UsageError(given, "1 to 200 mm, up to 10 kg, 1 to 100000 N/m", "correct them")
+    if gain_from is not None and not find_gain:
+        raise UsageError("--gain-from without --find-gain", "both or none", "add --find-gain")
+    given = {"radius": (radius, 1, 200, "mm"), "mass": (mass, 0.001, 10, "kg"), "stiffness": (stiffness, 1, 1e5, "N/m")}
+    given |= {"most-slip": (most_slip, 0.1, 100, "mm"), "most-force": (most_force, 0.1, 1000, "N")}
+    given["least-grip"] = (least_grip, 0.1, 100, "times the load")
+    for option, (value, least, most, unit) in given.items():
+        if value is not None and not least <= value <= most:
+            raise UsageError(f"--{option} {value:g}", f"{least:g} to {most:g} {unit}", "correct it")
     made = [read_tracks(_tracks(path)) for path in paths]
     source = read_tracks(_tracks(gain_from)) if gain_from is not None else made[0]
     names = {task or one.task for one in (*made, source)}
@@ -64,16 +81,15 @@ def run(
         raise UsageError(f"{gain_from} among those tried", "other recordings than that", "try others")
     name = names.pop()
     weight = {} if mass is None else {"mass": mass}
-    scene = scene_of(name, radius=radius / 1000, stiffness=stiffness, **weight)
-    published = read_gains(gains).of(name)
-    chosen, known = None, {"compensated": published}
-    if find_gain is not None:
-        found = Trials(source, {}, scene).smallest_gain(find_gain)
-        print(f"the smallest gain for {find_gain:g} mm is {found:.4f} m/mm for every finger ({source.recording})")
-        if gain_from is None:
-            return Result({"gain": found, "recording": source.recording})
-        chosen = {"recording": source.recording, "hash": source.recording_hash, "depth": find_gain}
-        known["chosen"] = dict.fromkeys(published, found)
+    scene = scene_of(name, thing, None if radius is None else radius / 1000, stiffness=stiffness, **weight)
+    known, chosen = {"compensated": read_gains(gains).of(name)}, None
+    if find_gain:
+        training = Trials(source, {}, scene)
+        if not with_guesses:
+            check_guesses(training.seen)
+        found = training.find_gain(GripDemand(preliminary, most_slip / 1000, most_force, least_grip))
+        print(f"found on {source.recording}: {found.text}")
+        chosen, known["chosen"] = (source, found), dict.fromkeys(source.tracks, found.gain)
     tried = [Trials(one, known, scene) for one in made]
     for one in tried:
         if not with_guesses:
@@ -106,12 +122,12 @@ def _save(view: Path | None, video: Path | None, tried: Trials, scene: ReplaySce
 
     shown = {kind: tried.one(kind, scene) for kind in tried.paths}
     if view is not None:
-        save_replays(view, shown, scene.sizes)
+        save_replays(view, shown, tried.seen)
     if video is not None:
-        film_replays(video, shown, scene.sizes)
+        film_replays(video, shown, tried.seen)
     for kind, outcome in shown.items():
         forces = ", ".join(f"{name} {force:.2f} N" for name, force in outcome.force.items())
-        print(f"undisturbed, {kind}: {'held' if outcome.held else 'lost'} ({forces})")
+        print(f"undisturbed, {kind}: {outcome.reason} ({forces})")
     if view is not None:
         print(f"saved {view}; look at it with: tacdata view {view}")
     if video is not None:

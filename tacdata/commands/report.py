@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
 from tacdata.progress import say
 
 ORDER = 66
@@ -26,7 +26,7 @@ def run(
     ] = None,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
-) -> None:
+) -> Result:
     """Write one self-contained HTML page: tables, best, median and worst cases, splits, reliability.
 
     Runs of one network and recipe that differ in their seed are put together, mean ± SD.
@@ -58,6 +58,7 @@ def run(
     sheet = markdown(protocols(read_frames(trials), trained[0])) if trials else ""
     documents.write_text(out, page(scored, sheet))
     print(f"report: {out}")
+    return Result({"runs": [{"title": run.name, **run.evaluation.document} for run in scored], "report": out})
 
 
 def _folders(given: list[Path]) -> list[Path]:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands import browse
-from tacdata.commands.command import PIPELINE
+from tacdata.commands.command import PIPELINE, Result
 
 ORDER = 70
 PANEL = PIPELINE
@@ -34,7 +34,7 @@ def run(
     foxglove: Annotated[
         Path | None, typer.Option(help="Write a layout (.json) with which Foxglove shows the recording itself.")
     ] = None,
-) -> None:
+) -> Result:
     """Look at an episode, a demonstration, targets or a verdict, in a window or browser, or save what is to be seen."""
     from viewers import output_file, showing
     from viewers.live import following
@@ -45,20 +45,22 @@ def run(
 
         write_foxglove_layout(path, foxglove)
         print(f"saved {foxglove}; in Foxglove open {path}, then Layouts, Import from file")
-        return
+        return Result({"written": [foxglove]})
     output = showing.Output(save, picture, video, web)
     output.check()
     path = following.meant(path) if episode is None else path
     if path.suffix == output_file.RERUN and path.is_file():
         showing.show_saved(path, output)
-        return
-    if output.opens and following.is_growing(path) and not (save or picture or video):
+        return Result({"shown": path, "written": []})
+    if output.opens and following.is_growing(path) and not output.files:
         following.follow(path, web)
-        return
+        return Result({"shown": path, "written": []})
     if output.only_web and episode is None and _is_list(path):
         browse.serve(path, labels, predictions)
-        return
-    showing.show(scene_at(path, labels, predictions, episode, output.prepare), output)
+        return Result({"shown": path, "written": []})
+    scene = scene_at(path, labels, predictions, episode, output.prepare)
+    showing.show(scene, output)
+    return Result({"shown": scene.title, "found": scene.found, "written": output.files})
 
 
 def _is_list(path: Path) -> bool:

@@ -28,6 +28,9 @@ def run(
     ] = False,
     cameras: Annotated[int, typer.Option(help="with --demo: cameras on the hand, 1 or 2")] = 2,
     task: Annotated[str, typer.Option(help="with --demo: grasp (a ball) or wipe (with an eraser)")] = "grasp",
+    thing: Annotated[
+        str | None, typer.Option("--object", help="with --demo: what is grasped: ball, can or box; default ball")
+    ] = None,
     nub: Annotated[
         float | None,
         typer.Option(metavar="MM", help="with --demo: fingers press round nubs of this radius on ball or eraser"),
@@ -54,6 +57,8 @@ def run(
         raise UsageError("--hide with --demo", "one of them", "leave one out")
     if task != "grasp" and not demo:
         raise UsageError(f"--task {task} without --demo", "--demo --task wipe", "add --demo")
+    if thing is not None and not demo:
+        raise UsageError(f"--object {thing} without --demo", f"--demo --object {thing}", "add --demo")
     if nub is not None and not demo:
         raise UsageError(f"--nub {nub:g} without --demo", f"--demo --nub {nub:g}", "add --demo")
     stopped = threading.Event()
@@ -65,8 +70,9 @@ def run(
         from tacdata.virtual_rig.world.hand import RADIUS
 
         rig = VirtualDemo(
-            directory, 0.5 if speed is None else speed, seed, cameras, fault, skin, task, RADIUS if nub is None else nub
-        )
+            directory, 0.5 if speed is None else speed, seed, cameras, fault, skin, task,
+            RADIUS if nub is None else nub, thing,
+        )  # fmt: skip
     else:
         rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skin, rough, secret)
     try:

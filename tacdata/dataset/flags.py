@@ -6,6 +6,10 @@ A flag names the recording by its hash, so that it stays true when a dataset is 
 
 from __future__ import annotations
 
+import getpass
+import socket
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -32,6 +36,24 @@ class Flag:
     reason: str
     """Why, in words."""
     flagged_at: str = ""
+    """Date and time, ISO 8601."""
+    flagged_by: str = ""
+    """Who set it aside: user@computer."""
+
+
+@dataclass(frozen=True)
+class FlagChange:
+    """A flag that was set, or taken away."""
+
+    recording: str
+    """SHA-256 of the recording's file (hex)."""
+    file: str
+    """Name of the recording."""
+    reason: str
+    """Why it was set aside; empty where it was taken back."""
+    by: str
+    """Who: user@computer."""
+    at: str
     """Date and time, ISO 8601."""
 
 
@@ -69,16 +91,29 @@ def set_flag(folder: Path, recording: str, file: str, reason: str) -> Flag:
     if not reason or len(reason) > LONGEST:
         given = "a flag without a reason" if not reason else f"a reason of {len(reason)} letters"
         raise UsageError(given, f"1 to {LONGEST} letters", "say in a sentence what is wrong with the episode")
-    flag = Flag(recording, file, reason, datetime.now(UTC).isoformat(timespec="seconds"))
-    _write(folder, read_flags(folder) | {recording: flag})
+    flag = Flag(recording, file, reason, datetime.now(UTC).isoformat(timespec="seconds"), _who())
+    change = FlagChange(recording, file, reason, flag.flagged_by, flag.flagged_at)
+    _write(folder, read_flags(folder) | {recording: flag}, [change])
     return flag
 
 
 def clear_flag(folder: Path, recording: str) -> None:
     """Take a flag away; nothing happens where there is none."""
     flags = read_flags(folder)
-    if flags.pop(recording, None) is not None:
-        _write(folder, flags)
+    if (flag := flags.pop(recording, None)) is not None:
+        at = datetime.now(UTC).isoformat(timespec="seconds")
+        _write(folder, flags, [FlagChange(recording, flag.file, "", _who(), at)])
+
+
+def read_history(folder: Path) -> list[FlagChange]:
+    """Return every change of a session's or dataset's flags, the oldest first; those before version 1.1 are not known.
+
+    Raises:
+        FormatError: If the file is damaged.
+    """
+    path = path_of(folder)
+    entries = documents.read(path, "flags").get("history", []) if path.is_file() else []
+    return [FlagChange(**entry) for entry in entries]
 
 
 def carry_flags(session: Path, dataset: Path) -> list[Flag]:
@@ -99,7 +134,8 @@ def carry_flags(session: Path, dataset: Path) -> list[Flag]:
     held = {record.recording for record in metadata.read_records(dataset).values()}
     carried = {key: flag for key, flag in read_flags(session).items() if key in held and key not in own}
     if carried:
-        _write(dataset, carried | own)
+        told = [change for change in read_history(session) if change.recording in carried]
+        _write(dataset, carried | own, told)
     return list(carried.values())
 
 
@@ -117,6 +153,15 @@ def flagged_episodes(dataset: Dataset) -> dict[int, str]:
     }
 
 
-def _write(folder: Path, flags: dict[str, Flag]) -> None:
+def _write(folder: Path, flags: dict[str, Flag], changes: Sequence[FlagChange]) -> None:
     entries = [asdict(flag) for flag in sorted(flags.values(), key=lambda flag: (flag.file, flag.recording))]
-    documents.write(path_of(folder), {"version": schemas.version("flags"), "flags": entries}, "flags")
+    history = [asdict(change) for change in (*read_history(folder), *changes)]
+    document = {"version": schemas.version("flags"), "flags": entries, "history": history}
+    documents.write(path_of(folder), document, "flags")
+
+
+def _who() -> str:
+    """Return who works here: user@computer; the user is left out where the system knows none."""
+    with suppress(OSError, KeyError):
+        return f"{getpass.getuser()}@{socket.gethostname()}"
+    return socket.gethostname()

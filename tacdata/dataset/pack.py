@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tacdata import documents, provenance
 from tacdata.dataset import frames
-from tacdata.dataset.format import features
+from tacdata.dataset.format import features, folder, metadata
 from tacdata.dataset.writer import DatasetWriter
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import Label, file_names, read_label, table
@@ -127,6 +127,12 @@ def refuse_existing(out: Path, append: bool) -> None:
         UsageError: If ``out`` exists and is not to be appended to.
     """
     if out.exists() and not append:
+        if (out / metadata.MAIN).exists() and not (out / folder.INFO).exists():
+            raise UsageError(
+                f"{out} holds a first episode that was never finished, and nothing else",
+                "a folder that does not exist yet",
+                "give --append: the unfinished episode is replaced",
+            )
         raise UsageError(
             f"{out} exists",
             "a folder that does not exist yet",

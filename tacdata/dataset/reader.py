@@ -147,8 +147,7 @@ def read_dataset(root: Path, cache_folder: Path | None = None) -> Dataset:
             raise FormatError(
                 f"{root}: episode {row.index} is of sensor {key:015x}, which {metadata.MAIN} lacks",
                 ", ".join(f"{k:015x} ({sensors[full].name})" for k, full in by_key.items()),
-                "put the meta/tacdata.json of the dataset that this episode comes from back "
-                "(tacdata.dataset.restore), or delete the episode",
+                "tacdata dataset restore, with the dataset that this episode comes from; or tacdata dataset delete",
             )
         record = records.get(_single(root, columns[features.RECORD], row, "records"))
         episodes.append(DatasetEpisode(row.index, row.start, row.stop, " / ".join(row.tasks), by_key[key], record))
@@ -156,7 +155,7 @@ def read_dataset(root: Path, cache_folder: Path | None = None) -> Dataset:
     if nameless:
         _warn(
             f"{root}: {len(nameless)} of {len(episodes)} episodes (first: {nameless[0]}) lost their records; "
-            f"tacdata.dataset.restore finds their records in the dataset that this one was made from"
+            f"tacdata dataset restore finds their records in the dataset that this one was made from"
         )
     return Dataset(root, columns, tuple(episodes), sensors, info["fps"], digest)
 

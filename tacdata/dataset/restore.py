@@ -10,10 +10,10 @@ import numpy as np
 from tacdata.dataset import cache
 from tacdata.dataset.format import features, folder, metadata
 from tacdata.dataset.format.metadata import EpisodeRecord
-from tacdata.errors import FormatError
+from tacdata.errors import FormatError, UsageError
 
 
-def restore(root: Path, sources: Iterable[Path]) -> list[int]:
+def restore(root: Path | str, sources: Path | str | Iterable[Path | str]) -> list[int]:
     """Write meta/tacdata.json and the records of a dataset that lerobot deleted from, split or merged.
 
     Frames carry the hashes of their sensor and record, so only what belongs to them is taken from the
@@ -21,15 +21,20 @@ def restore(root: Path, sources: Iterable[Path]) -> list[int]:
 
     Args:
         root: The edited dataset.
-        sources: Datasets that it was made from.
+        sources: Datasets that it was made from, or the only one.
 
     Returns:
         Numbers of the episodes whose record was not found.
 
     Raises:
+        UsageError: If a source does not exist.
         FormatError: If no source describes the sensor of some frames.
     """
     root = Path(root)
+    origins = [sources] if isinstance(sources, str | Path) else list(sources)
+    for source in map(Path, origins):
+        if not source.is_dir():
+            raise UsageError(f"no folder {source}", "datasets that this one was made from", "check the path")
     info = folder.read_info(root)
     rows = folder.read_rows(root, info)
     wanted: set[int] = set()
@@ -42,7 +47,7 @@ def restore(root: Path, sources: Iterable[Path]) -> list[int]:
     records: dict[int, EpisodeRecord] = metadata.read_records(root)
     present = set(records)
     rate = float(info["fps"])
-    for source in (root, *map(Path, sources)):
+    for source in (root, *map(Path, origins)):
         main = metadata.read_main(source)
         if main is None:
             continue
@@ -54,7 +59,7 @@ def restore(root: Path, sources: Iterable[Path]) -> list[int]:
         raise FormatError(
             f"{root}: no source describes the sensor {min(lacking):015x}",
             "the datasets that it was made from",
-            "name them all",
+            "name them all: tacdata dataset restore DATASET SOURCE SOURCE ...",
         )
     metadata.write_main(root, sensors, rate)
     for key in keys:

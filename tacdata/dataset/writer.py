@@ -8,6 +8,7 @@ the dataset and is replaced by the next append.
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -104,7 +105,7 @@ class DatasetWriter:
         )
 
     def append(self, columns: dict[str, np.ndarray], record: EpisodeRecord, task: str) -> int:
-        """Append one episode and bring it to the disk.
+        """Append one episode and bring it to the disk; a first one that is broken off leaves no folder.
 
         Args:
             columns: Every column of `features.DTYPES` but the two hashes, and those of `features.EXTRA` that the
@@ -119,6 +120,15 @@ class DatasetWriter:
             UsageError: If the dataset holds this recording already.
             FormatError: If columns are missing, of the wrong shape, or not finite.
         """
+        fresh = not self.root.exists()
+        try:
+            return self._append(columns, record, task)
+        except BaseException:
+            if fresh and not (self.root / folder.INFO).exists():
+                shutil.rmtree(self.root, ignore_errors=True)
+            raise
+
+    def _append(self, columns: dict[str, np.ndarray], record: EpisodeRecord, task: str) -> int:
         if record.recording in self.recordings:
             raise UsageError(f"{self.root} holds {record.recording_file} already", "each episode once", "leave it out")
         if record.sensor != self.sensor.content_hash:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,8 +15,6 @@ LARGEST = 10
 DEFAULT = Path(__file__).with_name("gains.yaml")
 MOST = 0.1
 """Largest plausible gain [m/mm]: 10 cm of target per millimetre felt. The paper's are near 0.01."""
-STEPS = 12
-"""Gains tried between zero and the largest before the interval is bisected [count]."""
 
 
 @dataclass(frozen=True)
@@ -109,41 +106,3 @@ def compensate(position: np.ndarray, normal: np.ndarray, depth: np.ndarray, gain
             "the same number of each, normals of length 1", "give fingertip poses with their depths",
         )  # fmt: skip
     return position + gain * np.nan_to_num(np.asarray(depth, float))[:, None] * normal
-
-
-def smallest_gain(
-    reached: Callable[[float], float], wanted: float, largest: float = 0.03, tolerance: float = 1e-4
-) -> float:
-    """Return the smallest gain [m/mm] that reaches a contact depth.
-
-    Gains are tried upwards in equal steps, because a grasp need not respond monotonically (an object can slip away).
-    The first interval that reaches the depth is bisected until it is narrower than ``tolerance``.
-
-    Args:
-        reached: Function from gain [m/mm] to the contact depth [mm] of a replay, on the robot or in simulation.
-        wanted: Contact depth wanted [mm].
-        largest: Largest gain tried [m/mm].
-        tolerance: Width of the final interval [m/mm].
-
-    Raises:
-        UsageError: If no gain up to the largest reaches it, or an argument is invalid.
-    """
-    if not 0 < wanted < np.inf or not 0 < largest < np.inf or not 0 < tolerance < np.inf:
-        raise UsageError(f"depth {wanted} mm, gain up to {largest} m/mm", "positive numbers", "correct them")
-    low, best = 0.0, -np.inf
-    for gain in np.linspace(0.0, largest, STEPS + 1):
-        depth = float(reached(float(gain)))
-        best = max(best, depth)
-        if depth >= wanted:
-            high = float(gain)
-            break
-        low = float(gain)
-    else:
-        raise UsageError(
-            f"a contact depth of {wanted:g} mm; the deepest reached is {best:.3g} mm",
-            f"a depth that gains up to {largest:g} m/mm reach", "ask for a smaller depth, or allow a larger gain",
-        )  # fmt: skip
-    while high - low > tolerance:
-        middle = (low + high) / 2
-        low, high = (low, middle) if float(reached(middle)) >= wanted else (middle, high)
-    return high

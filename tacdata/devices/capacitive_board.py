@@ -48,8 +48,8 @@ class CapacitiveBoard(TaxelBoard):
         self._frames: list[TaxelFrame] = []
         self._seen = bytearray()
         self._fault: DeviceError | None = None
-        self._changed = threading.Condition()
-        self._stopped = threading.Event()
+        self._changed = clock.host.condition()
+        self._stopped = clock.host.event()
         self._thread: threading.Thread | None = None
 
     def describe(self) -> dict[str, Any]:
@@ -78,7 +78,7 @@ class CapacitiveBoard(TaxelBoard):
         self.counts = self._decoder.counts
         self._frames, self._seen, self._fault = [], bytearray(), None
         self._stopped.clear()
-        self._thread = threading.Thread(target=self._listen, name="taxel-board", daemon=True)
+        self._thread = self.clock.host.thread(self._listen, "taxel-board")
         self._thread.start()
         with self._changed:
             self._changed.wait_for(lambda: self._frames or self._fault, FIRST_FRAME)

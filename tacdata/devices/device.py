@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -19,13 +20,13 @@ import numpy as np
 from tacdata import registry
 from tacdata.clock import Clock
 from tacdata.errors import DeviceError, UsageError
-from tacdata.wire.delivered import CncStatus, StreamCounts, TaxelFrame
+from tacdata.wire.delivered import CncStatus, OwesAnswer, StreamCounts, TaxelFrame
 
 ROOM, BASE = "tacdata.devices", "device"
 
 __all__ = [
-    "BASE", "ROOM", "Camera", "CncStatus", "Device", "ImageFrame", "Motion", "MotionController", "StandsStill",
-    "StreamCounts", "TaxelBoard", "TaxelFrame", "create",
+    "BASE", "ROOM", "Camera", "CncStatus", "Device", "ImageFrame", "Motion", "MotionController", "OwesAnswer",
+    "StandsStill", "StreamCounts", "TaxelBoard", "TaxelFrame", "create",
 ]  # fmt: skip
 
 
@@ -106,6 +107,9 @@ class TaxelBoard(Device):
 
 class MotionController(Device):
     """Base class of motion controllers with three axes."""
+
+    before_homing: Callable[[], None] = staticmethod(lambda: None)
+    """Called before `open` homes the machine; raises if it must not."""
 
     @abstractmethod
     def settings(self) -> dict[str, str]:

@@ -89,6 +89,7 @@ class Grbl(MotionController):
             if is_locked:
                 if not self.home_first:
                     raise locked(link, self._answers)
+                self.before_homing()
                 self.home()
                 self._read(link)
             self._cautions = straighten(link)

@@ -8,11 +8,12 @@ from typing import Any
 
 from tacdata.chain import Course
 from tacdata.discrepancy.data.checks import DataChecks, check
+from tacdata.discrepancy.levels.margins import beside_remainder
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.search.find import find
 from tacdata.discrepancy.search.findings import Findings
-from tacdata.discrepancy.verdict.decide import Decision, decide
+from tacdata.discrepancy.verdict.decide import Decision, adequate, answer_of, decide
 from tacdata.discrepancy.verdict.document import document
 from tacdata.discrepancy.verdict.residual_slices import Slice, slices
 from tacdata.discrepancy.verdict.sealed import chosen, gap, without_readings
@@ -46,8 +47,10 @@ def judge(
     1. Seal some episodes: their readings are not looked at.
     2. Check the data: wiring, units, what is missing.
     3. Find: regressors, noise, gate, race, elimination, rivals, leftovers (`tacdata.discrepancy.search.find`).
-    4. Decide: named, ambiguous, unknown or none.
-    5. Show the gap on the sealed episodes, and write it all down.
+    4. Open the sealed episodes: how much smaller is their gap?
+    5. Decide: named (all of it, or some beside a remainder), ambiguous, unknown or none. Sealed episodes can take a
+       name away; they never give one.
+    6. Write it all down.
 
     Args:
         course: The recordings.
@@ -65,9 +68,10 @@ def judge(
     setting = _setting(without_readings(course, sealed), spec, without, correct_p)
     checks = check(setting)
     found = find(setting, note, until)
-    decision = decide(found, checks)
+    beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
     note("the gap on sealed episodes")
     shown = gap(course, found, sealed)
+    decision = decide(found, checks, beside, shown)
     before, after = ([], []) if until == "gate" else (slices(found.problem), slices(found.final))
     written = document(decision, found, checks, (before, after), parents or {}, shown)
     return Verdict(written, checks, found, decision, before, after)

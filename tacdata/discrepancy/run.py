@@ -12,6 +12,7 @@ from tacdata import documents, provenance
 from tacdata.discrepancy.data.recordings import course_of
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.spec import Spec
+from tacdata.discrepancy.page.verdict_page import verdict_page
 from tacdata.discrepancy.search.findings import STEPS
 from tacdata.discrepancy.verdict import residual_table
 from tacdata.discrepancy.verdict.before_and_after import beside_model
@@ -20,7 +21,7 @@ from tacdata.discrepancy.verdict.sealed import chosen
 from tacdata.discrepancy.verdict.text import in_text
 from tacdata.errors import UsageError
 
-VERDICT, TEXT, PICTURE, SPEC = "verdict.json", "verdict.txt", "verdict.png", "spec.json"
+VERDICT, TEXT, PICTURE, PAGE, SPEC = "verdict.json", "verdict.txt", "verdict.png", "verdict.html", "spec.json"
 """Files of the folder; the new spec only where something was named."""
 
 
@@ -67,6 +68,7 @@ def run(
     draw(verdict.found, verdict.before, verdict.after, verdict.document, out / PICTURE)
     residuals = beside_model(course, verdict.found, chosen(course))
     residual_table.write(out / residual_table.FILE, residuals, provenance.content_hash(verdict.document))
+    documents.write_text(out / PAGE, verdict_page(verdict.document, residuals))
     if verdict.decision.status == "named":
         effects = [e.finding for e in verdict.decision.effects]
         following = spec.with_effects([f.placed for f in effects], [f.error for f in effects], VERDICT)

@@ -5,6 +5,7 @@ from tacdata.effects.effect import (
     ROOM,
     AtRest,
     Effect,
+    Family,
     GainKind,
     Growth,
     LikeGain,
@@ -16,6 +17,6 @@ from tacdata.effects.effect import (
 )
 
 __all__ = [
-    "BASE", "ROOM", "AtRest", "Effect", "GainKind", "Growth", "LikeGain", "Parameter", "Placed", "Scale", "library",
-    "load",
+    "BASE", "ROOM", "AtRest", "Effect", "Family", "GainKind", "Growth", "LikeGain", "Parameter", "Placed", "Scale",
+    "library", "load",
 ]  # fmt: skip

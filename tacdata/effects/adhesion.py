@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Adhesion(Effect):
@@ -18,6 +18,7 @@ class Adhesion(Effect):
     stage = "contact"
     moves = ("signal", "force")
     group = "loading and unloading"
+    family = Family.CONTACT
     equation = (
         "q = q_e - a k exp(-(d / w)^2) while it leaves after contact, k the pattern at a tenth of the deepest depth"
     )

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class AirGap(Effect):
@@ -18,6 +18,7 @@ class AirGap(Effect):
     stage = "taxel"
     moves = ("signal",)
     group = "depth offset"
+    family = Family.CONTACT
     equation = "s_i = max(0, s_i - g_i) above idle"
     source = "standard form"
     experiment = "slow approach over every taxel: onset against slope"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import dead_band
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class Backlash(Effect):
@@ -19,6 +19,7 @@ class Backlash(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal", "force")
     group = "loading and unloading"
+    family = Family.FRICTION_AND_PLAY
     equation = "d = play_{b/2}(z) + b/2: after reversal nothing moves for b"
     source = "play operator; Brokate & Sprekels, Hysteresis and Phase Transitions, ch. 2"
     experiment = (

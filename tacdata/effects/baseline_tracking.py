@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class BaselineTracking(Effect):
@@ -19,6 +19,7 @@ class BaselineTracking(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "hold time"
+    family = Family.DELAY_AND_FILTER
     equation = "b' = r (s - b), read s - b above idle: long presses decay to zero and undershoot on release"
     source = "NXP AN3891, baseline system of the MPR121"
     experiment = "switch it off; hold long: the plateau is zero, and what is lost comes back negative after release"

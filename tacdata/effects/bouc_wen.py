@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import slipping
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class BoucWen(Effect):
@@ -19,11 +19,12 @@ class BoucWen(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
+    family = Family.FRICTION_AND_PLAY
     equation = "q = q_e (1 - a (1 - z) / 2), dz/dd = (1 - z sgn d') / w, z = -1 at every touch"
     source = "Bouc-Wen of exponent 1: Wen, J. Eng. Mech. Div. 102 (1976) 249; Dahl, The Aerospace Corp. TOR-158 (1968)"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
     parameters = (
-        Parameter("a", "1", "lost share of load while unloading", 0.08, -0.95, 0.95),
+        Parameter("a", "1", "lost share of load while unloading", 0.08, 0.0, 0.95),
         Parameter("w", "1", "way by which it turns, over the deepest press", 0.12, 0.01, 2.0, grid=(0.04, 0.12, 0.35)),
     )
     at_rest = AtRest.STAYS

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Bulge(Effect):
@@ -18,6 +18,7 @@ class Bulge(Effect):
     stage = "mechanics"
     moves = ("label", "signal")
     group = "lateral spread"
+    family = Family.CROSSTALK
     equation = "q_i = q_i - k sum_j w_ij q_j, w = exp(-((r_ij / p - l) / (0.35 l))^2), p the least pitch"
     source = "a bonded layer that keeps its volume rises at about its thickness: Johnson, Contact Mechanics, sec. 5.8"
     experiment = "flat punch against sphere: the sign of far neighbours"

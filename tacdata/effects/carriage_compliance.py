@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tacdata.chain import Course, Response
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 from tacdata.effects.frame_compliance import given_way
 
 __all__ = ["CarriageCompliance"]
@@ -17,6 +17,7 @@ class CarriageCompliance(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal", "force")
     group = "depth curvature"
+    family = Family.KINEMATICS
     equation = "d = z - c F(d) / max F(d), by fixed-point steps; seen by the tag"
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564: h = z - F C_f"
     experiment = "press a rigid block while the tag is in view"

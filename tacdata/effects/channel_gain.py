@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, GainKind, Parameter
+from tacdata.effects.effect import Effect, Family, GainKind, Parameter
 
 
 class ChannelGain(Effect):
@@ -18,6 +18,7 @@ class ChannelGain(Effect):
     stage = "taxel"
     moves = ("signal",)
     group = "per channel"
+    family = Family.RESPONSE_CURVE
     equation = "s_i = (1 + e_i) s_i above idle"
     source = "standard form"
     experiment = "uniform pressure, or presses between taxels: a gain follows the channel, inhomogeneity the place"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import delayed
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class ClockSkew(Effect):
@@ -19,6 +19,7 @@ class ClockSkew(Effect):
     stage = "timing"
     moves = ("signal",)
     group = "lag"
+    family = Family.DELAY_AND_FILTER
     equation = "s(t) = s_e(t - r (t - T/2))"
     source = "standard form"
     experiment = "an early and a late sync event"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class Creep(Effect):
@@ -19,6 +19,7 @@ class Creep(Effect):
     stage = "mechanics"
     moves = ("signal",)
     group = "hold time"
+    family = Family.SKIN_MEMORY
     equation = "q = q_e - f (q_e - L_tau q_e): a share f follows the path late"
     source = "standard linear solid seen by its strain; Ferry, Viscoelastic Properties of Polymers, ch. 3"
     experiment = (

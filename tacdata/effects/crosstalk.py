@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Crosstalk(Effect):
@@ -18,6 +18,7 @@ class Crosstalk(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "lateral spread"
+    family = Family.CROSSTALK
     equation = "s_i = s_i + k (s_{i-1} + s_{i+1}) above idle"
     source = "standard form"
     experiment = "charge one channel electrically: traces, not distance"

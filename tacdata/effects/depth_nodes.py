@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 CLOSE = 0.2
 """Smooth curves through depths that stand closer, over the deepest press, follow any contact [1]."""
@@ -21,6 +21,7 @@ class DepthNodes(Effect):
     stage = "simulator"
     moves = ("label", "signal")
     group = "simulator"
+    family = Family.SIMULATION
     form_error = 0.02
     equation = "s = s + s sin(2 pi d / p) a sin-cos pair, p the spacing of solved depths"
     source = "standard form"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Drift(Effect):
@@ -18,6 +18,7 @@ class Drift(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "clock"
+    family = Family.DRIFT
     equation = "s_i = s_i + r_i t / T, T the length of the recordings"
     source = "standard form"
     experiment = "readings without contact, through the whole session"

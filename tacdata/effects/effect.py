@@ -49,6 +49,31 @@ class Parameter:
     """Whether every channel has its own."""
 
 
+class Family(StrEnum):
+    """What kind of thing an effect is, as a lab would go about it. A verdict may name the family before the effect."""
+
+    SKIN_MEMORY = "memory of the skin"
+    """The skin relaxes, creeps, softens or wears."""
+    FRICTION_AND_PLAY = "friction and play"
+    """Readings or the tip hang back, whatever the rate."""
+    DELAY_AND_FILTER = "delay and filtering"
+    """Readings, or the guide, come late."""
+    KINEMATICS = "kinematics"
+    """The tip is elsewhere than the guide says."""
+    CONTACT = "contact"
+    """How the tool meets the skin, and the skin its support."""
+    RESPONSE_CURVE = "stiffness and response curve"
+    """How much a taxel says of how much depth."""
+    DRIFT = "gain and offset in time"
+    """Readings change with the clock or with temperature."""
+    CROSSTALK = "crosstalk and spread"
+    """Taxels say what happens at others."""
+    SIMULATION = "simulation"
+    """The simulation, not the world."""
+    OTHER = "of no family"
+    """A family of its own."""
+
+
 class AtRest(StrEnum):
     """What becomes of an effect while the tip stands still. Presses of one rate show nothing else of it."""
 
@@ -110,6 +135,8 @@ class Effect(ABC):
     """What it changes: tag, label, signal, force."""
     group: ClassVar[str]
     """Ambiguity group: effects that look alike in ordinary presses."""
+    family: ClassVar[Family] = Family.OTHER
+    """What kind of thing it is; the same for all forms of a mechanism."""
     equation: ClassVar[str]
     """What it does."""
     source: ClassVar[str]

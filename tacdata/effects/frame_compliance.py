@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 STEPS = 5
 """Fixed-point steps, each half way: a frame that gives 0.3 of the depth is right within 1 % of it [1]."""
@@ -35,6 +35,7 @@ class FrameCompliance(Effect):
     stage = "kinematics"
     moves = ("label", "signal", "force")
     group = "depth curvature"
+    family = Family.KINEMATICS
     equation = "d = z - c F(d) / max F(d), by fixed-point steps"
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564: h = z - F C_f"
     experiment = (

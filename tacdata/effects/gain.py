@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, GainKind, Parameter
+from tacdata.effects.effect import Effect, Family, GainKind, Parameter
 
 
 class Gain(Effect):
@@ -18,6 +18,7 @@ class Gain(Effect):
     stage = "taxel"
     moves = ("signal",)
     group = "amplitude"
+    family = Family.RESPONSE_CURVE
     equation = "s = (1 + e) s above idle"
     source = "standard form"
     experiment = "a reference capacitor; force"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.effects.effect import Effect, Growth, Parameter
+from tacdata.effects.effect import Effect, Family, Growth, Parameter
 
 
 class GainDrift(Effect):
@@ -18,6 +18,7 @@ class GainDrift(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "clock"
+    family = Family.DRIFT
     equation = "s = s (1 + k (t / T - 1/2)) above idle"
     source = "standard form"
     experiment = "the same reference press through the session; a reference capacitor"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class GantrySag(Effect):
@@ -18,6 +18,7 @@ class GantrySag(Effect):
     stage = "kinematics"
     moves = ("label", "signal", "force")
     group = "depth offset"
+    family = Family.KINEMATICS
     equation = "d -> d + k (x^2 + y^2) / L^2, L the largest distance from the centre"
     source = "standard form"
     experiment = "move the sensor on the bed: it follows the machine"

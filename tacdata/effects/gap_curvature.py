@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class GapCurvature(Effect):
@@ -18,6 +18,7 @@ class GapCurvature(Effect):
     stage = "taxel"
     moves = ("signal",)
     group = "depth curvature"
+    family = Family.RESPONSE_CURVE
     equation = "s = s + k s^2 / S above idle, S the largest"
     source = "parallel plate: C = eps A / (g - u)"
     experiment = "two indenters: collapses on the reading itself"

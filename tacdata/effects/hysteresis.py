@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class Hysteresis(Effect):
@@ -19,13 +19,14 @@ class Hysteresis(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
+    family = Family.FRICTION_AND_PLAY
     equation = (
         "q = q_e - a q_e / F_e (F_e - mean of stop_r F_e over r of 0.05, 0.15, 0.4 of the largest force), anew at "
         "every touch: what nothing presses holds no friction"
     )
     source = "Prandtl-Ishlinskii; Brokate & Sprekels, ch. 2"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
-    parameters = (Parameter("a", "1", "share carried by friction", 0.1, -1.0, 3.0),)
+    parameters = (Parameter("a", "1", "share carried by friction", 0.1, 0.0, 3.0),)
     at_rest = AtRest.STAYS
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

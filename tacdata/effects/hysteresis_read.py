@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 THRESHOLDS = (0.25, 0.6, 1.0)
 """Of the elements that slip, over the largest of them [1]: about as many at any."""
@@ -22,6 +22,7 @@ class HysteresisRead(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
+    family = Family.FRICTION_AND_PLAY
     equation = (
         "r = r_e (max(0, F - a (mean of play_w F + w over w up to w_max - F)) / F)^m, F = F_e^(1/m) over its largest, "
         "anew at every touch"
@@ -29,7 +30,7 @@ class HysteresisRead(Effect):
     source = "Prandtl-Ishlinskii; Brokate & Sprekels, ch. 2; slipping elements: Iwan, J. Appl. Mech. 34 (1967)"
     experiment = "slow loops at three rates: the loop's area stays as the rate goes to 0, and its width grows with load"
     parameters = (
-        Parameter("a", "1", "share of load carried by friction", 0.1, -0.5, 3.0),
+        Parameter("a", "1", "share of load carried by friction", 0.1, 0.0, 3.0),
         Parameter("w", "1", "largest half band over the largest load", 0.2, 0.005, 2.0, grid=(0.06, 0.15, 0.4)),
         Parameter("m", "1", "power of load by which readings grow", 1.0, 0.3, 4.0, grid=(1.0, 1.7)),
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import delayed
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 LONG = 0.25
 """A longer delay is of clocks, not of sensors [s]."""
@@ -22,6 +22,7 @@ class Latency(Effect):
     stage = "timing"
     moves = ("signal",)
     group = "lag"
+    family = Family.DELAY_AND_FILTER
     equation = "s(t) = s_e(t - L)"
     source = "standard form"
     experiment = "three rates: constant in time, and edges keep their shape"

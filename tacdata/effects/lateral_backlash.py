@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import dead_band
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class LateralBacklash(Effect):
@@ -19,6 +19,7 @@ class LateralBacklash(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal")
     group = "lateral"
+    family = Family.FRICTION_AND_PLAY
     equation = "x = play_{b/2}(x), y = play_{b/2}(y): half the play aside of the command, on the side it came from"
     source = "play operator"
     experiment = "the same place approached from +x, -x, +y, -y"

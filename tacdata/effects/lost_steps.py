@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class LostSteps(Effect):
@@ -18,6 +18,7 @@ class LostSteps(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal", "force")
     group = "depth offset"
+    family = Family.KINEMATICS
     equation = "d -> d + dz from a share s of the episodes on"
     source = "standard form"
     experiment = "home again, and repeat the reference press"

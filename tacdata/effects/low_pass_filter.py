@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class LowPassFilter(Effect):
@@ -19,6 +19,7 @@ class LowPassFilter(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "lag"
+    family = Family.DELAY_AND_FILTER
     equation = "tau s' + s = s_e"
     source = "standard form"
     experiment = "edges: a filter rounds them, a delay keeps their shape; spectrum of noise without contact"

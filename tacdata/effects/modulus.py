@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, LikeGain, Parameter
+from tacdata.effects.effect import Effect, Family, LikeGain, Parameter
 
 
 class Modulus(Effect):
@@ -18,6 +18,7 @@ class Modulus(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "amplitude"
+    family = Family.RESPONSE_CURVE
     equation = "q = (1 + e) q_e"
     source = "linear elasticity: loads scale with the modulus"
     experiment = "a load cell or a kitchen scale under one press; a Shore coupon of the same batch"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class NominalPose(Effect):
@@ -18,6 +18,7 @@ class NominalPose(Effect):
     stage = "simulator"
     moves = ("label", "signal", "force")
     group = "simulator"
+    family = Family.SIMULATION
     equation = "pose -> pose + k (tag - commanded)"
     source = "standard form"
     experiment = "simulate again at the measured pose"

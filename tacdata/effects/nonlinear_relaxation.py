@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class NonlinearRelaxation(Effect):
@@ -19,6 +19,7 @@ class NonlinearRelaxation(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "hold time"
+    family = Family.SKIN_MEMORY
     equation = "q = q_e - f L_tau (q_e d / D), D the deepest depth"
     source = "quasi-linear form; Fung, Biomechanics, ch. 7"
     experiment = "step and hold at four depths on fresh sites"

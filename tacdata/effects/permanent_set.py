@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class PermanentSet(Effect):
@@ -18,6 +18,7 @@ class PermanentSet(Effect):
     stage = "mechanics"
     moves = ("label", "signal", "force")
     group = "depth offset"
+    family = Family.SKIN_MEMORY
     equation = "d -> d - e D_k / D (1 - exp(-k / 5)), k presses before at that place, D_k the deepest of them"
     source = "standard form"
     experiment = "return to a place after a long rest; compare with one never pressed"

@@ -9,7 +9,7 @@ from scipy.special import erfcinv
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import low_passes
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 ROOTS = 6
 """First-order means in place of the root."""
@@ -27,6 +27,7 @@ class Poroelasticity(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "hold time"
+    family = Family.SKIN_MEMORY
     equation = (
         "q = q_e - f (q_e - g * q_e'), g(t) = 0.491 exp(-0.908 sqrt(t / tau)) + 0.509 exp(-1.679 t / tau), "
         "tau = R d / D_eff: proportional to the contact radius squared"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_passes
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class PowerCreep(Effect):
@@ -19,6 +19,7 @@ class PowerCreep(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "hold time"
+    family = Family.SKIN_MEMORY
     equation = "q = q_e - f mean of L_tau q_e over tau in geometric steps of 3 from tau0 to 243 tau0"
     source = "broad spectrum; Ferry, ch. 4"
     experiment = (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Proximity(Effect):
@@ -18,6 +18,7 @@ class Proximity(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "depth offset"
+    family = Family.CONTACT
     equation = "s_i = s_i + a w_i exp(d / l) for d < 0, w_i by the pattern at a tenth of the deepest depth"
     source = "standard form"
     experiment = "plastic against metal indenter, grounded or not"

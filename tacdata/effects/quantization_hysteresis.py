@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class QuantizationHysteresis(Effect):
@@ -19,6 +19,7 @@ class QuantizationHysteresis(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "loading and unloading"
+    family = Family.FRICTION_AND_PLAY
     equation = "s = play_w(s) + w: the reading follows through a dead band of fixed width in counts"
     source = "play operator; comparators with hysteresis"
     experiment = "histogram of first differences; loops of any size have the same width in counts"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class Relaxation(Effect):
@@ -19,6 +19,7 @@ class Relaxation(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "hold time"
+    family = Family.SKIN_MEMORY
     equation = "q = q_e - f L_tau q_e, L_tau the first-order mean with time constant tau"
     source = "standard linear solid; Ferry, Viscoelastic Properties of Polymers, ch. 3"
     experiment = (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Rotation(Effect):
@@ -18,6 +18,7 @@ class Rotation(Effect):
     stage = "kinematics"
     moves = ("label", "signal")
     group = "lateral"
+    family = Family.KINEMATICS
     equation = "(x, y) -> (x - theta y, y + theta x)"
     source = "standard form"
     experiment = "presses far from the centre at all four corners"

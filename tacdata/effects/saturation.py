@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Saturation(Effect):
@@ -18,6 +18,7 @@ class Saturation(Effect):
     stage = "taxel"
     moves = ("signal",)
     group = "depth curvature"
+    family = Family.RESPONSE_CURVE
     equation = "s = s / (1 + k |s| / S) above idle, S the largest"
     source = "standard form"
     experiment = "histogram of readings: pile-up at a value of the reading, not of depth"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import delayed
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class ScanSkew(Effect):
@@ -19,6 +19,7 @@ class ScanSkew(Effect):
     stage = "timing"
     moves = ("signal",)
     group = "lag"
+    family = Family.DELAY_AND_FILTER
     equation = "s_i(t) = s_i(t - i D / (channels - 1))"
     source = "standard form"
     experiment = "fast presses over several channels: the delay is linear in the channel's number"

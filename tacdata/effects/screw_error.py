@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class ScrewError(Effect):
@@ -18,6 +18,7 @@ class ScrewError(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal")
     group = "depth offset"
+    family = Family.KINEMATICS
     equation = "d -> d + s sin(2 pi d / p) + c cos(2 pi d / p) - c, p no longer than the stroke"
     source = "standard form"
     experiment = "slow presses over several periods: the residual's spectrum in commanded position"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class SeatingGap(Effect):
@@ -18,6 +18,7 @@ class SeatingGap(Effect):
     stage = "contact"
     moves = ("label", "signal", "force")
     group = "depth offset"
+    family = Family.CONTACT
     equation = "q = max(0, q_e - g largest q_e)"
     source = "standard form"
     experiment = "map of onsets over the skin: constant is a zero error, a dome is a gap"

@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import AtRest, Effect, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
 class ServoLag(Effect):
@@ -19,6 +19,7 @@ class ServoLag(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal", "force")
     group = "lag"
+    family = Family.DELAY_AND_FILTER
     equation = "(tau / 2)^2 d'' + tau d' + d = z: critically damped"
     source = "standard form"
     experiment = "other accelerations at the same speed; a tag sees it"

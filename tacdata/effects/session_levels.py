@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 LEAST = 4
 """Fewer sessions have no more freedom than a shift from one to the next."""
@@ -21,6 +21,7 @@ class SessionLevels(Effect):
     stage = "kinematics"
     moves = ("label", "signal", "force")
     group = "depth offset"
+    family = Family.KINEMATICS
     equation = "d -> d + sum of dz_k cos(pi k (session + 1/2) / sessions), k of 1 to 3"
     source = "discrete cosine transform: any levels of four sessions; Ahmed et al., IEEE Trans. Comput. C-23 (1974) 90"
     experiment = "home and touch off several times"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class SessionZero(Effect):
@@ -18,6 +18,7 @@ class SessionZero(Effect):
     stage = "kinematics"
     moves = ("label", "signal", "force")
     group = "depth offset"
+    family = Family.KINEMATICS
     equation = "d -> d + dz (session - mean session)"
     source = "standard form"
     experiment = "home and touch off several times"

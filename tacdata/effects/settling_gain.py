@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.effects.effect import Effect, Growth, Parameter
+from tacdata.effects.effect import Effect, Family, Growth, Parameter
 
 
 class SettlingGain(Effect):
@@ -18,6 +18,7 @@ class SettlingGain(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "clock"
+    family = Family.DRIFT
     equation = "s = s (1 + k exp(-t / tau)) above idle"
     source = "first-order approach to the temperature at work"
     experiment = "the same reference press through the session; a reference capacitor"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Skew(Effect):
@@ -18,6 +18,7 @@ class Skew(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal")
     group = "lateral"
+    family = Family.KINEMATICS
     equation = "x -> x + g y"
     source = "standard form"
     experiment = "corner presses with a tag"

@@ -9,7 +9,7 @@ from scipy.special import erf
 
 from tacdata.chain import State
 from tacdata.chain.memory import running_max
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Softening(Effect):
@@ -20,6 +20,7 @@ class Softening(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
+    family = Family.SKIN_MEMORY
     equation = "q = q_e (1 - a erf((W_max - W) / (m W_all))), W = d^2.5 at that place, W_all its largest"
     source = "Ogden & Roxburgh, Proc. R. Soc. A 455 (1999) 2861"
     experiment = (

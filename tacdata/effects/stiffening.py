@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Stiffening(Effect):
@@ -18,6 +18,7 @@ class Stiffening(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "depth curvature"
+    family = Family.RESPONSE_CURVE
     equation = "q = q_e (1 + k d / D), D the deepest depth"
     source = "second term of a series in strain; Yeoh, Rubber Chem. Technol. 66 (1993) 754"
     experiment = "two indenters: a law of the taxel collapses on the reading, one of the skin on depth over radius"

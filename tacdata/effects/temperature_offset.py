@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class TemperatureOffset(Effect):
@@ -18,6 +18,7 @@ class TemperatureOffset(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "temperature"
+    family = Family.DRIFT
     equation = "s_i = s_i + k_i (T - T_mean) / 10"
     source = "standard form"
     experiment = "readings without contact at several temperatures"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class TemperatureStiffness(Effect):
@@ -18,6 +18,7 @@ class TemperatureStiffness(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "temperature"
+    family = Family.DRIFT
     equation = "q = q_e (1 + k (T - T_mean) / 10)"
     source = "entropic elasticity, G ~ T; Treloar, The Physics of Rubber Elasticity"
     experiment = "readings without contact at several temperatures: they move by electronics, pressed ones by both"

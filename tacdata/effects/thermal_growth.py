@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class ThermalGrowth(Effect):
@@ -18,6 +18,7 @@ class ThermalGrowth(Effect):
     stage = "kinematics"
     moves = ("label", "signal", "force")
     group = "depth offset"
+    family = Family.KINEMATICS
     equation = "d -> d + dz (1 - exp(-t / tau))"
     source = "standard form"
     experiment = "touch-off every few presses; readings without contact stay as they are"

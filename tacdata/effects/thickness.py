@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, LikeGain, Parameter
+from tacdata.effects.effect import Effect, Family, LikeGain, Parameter
 
 STEP = 0.05
 """Half the step of differences to the side [mm]."""
@@ -29,6 +29,7 @@ class Thickness(Effect):
     stage = "mechanics"
     moves = ("label", "signal", "force")
     group = "amplitude"
+    family = Family.RESPONSE_CURVE
     equation = (
         "q = q_e (1 - e (1 + d / D) / 2) exp(-e (2 + r grad ln q_e)): a thicker layer is softer, and spreads more"
     )

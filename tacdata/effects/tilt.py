@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class Tilt(Effect):
@@ -18,6 +18,7 @@ class Tilt(Effect):
     stage = "kinematics"
     moves = ("label", "signal", "force")
     group = "depth offset"
+    family = Family.KINEMATICS
     equation = "d -> d + a x + b y"
     source = "standard form"
     experiment = "touch-off at three corners"

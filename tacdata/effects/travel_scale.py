@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter, Scale
+from tacdata.effects.effect import Effect, Family, Parameter, Scale
 
 
 class TravelScale(Effect):
@@ -18,6 +18,7 @@ class TravelScale(Effect):
     stage = "kinematics"
     moves = ("tag", "label", "signal")
     group = "amplitude"
+    family = Family.KINEMATICS
     equation = "(x, y, d) -> (1 + k) (x, y, d)"
     source = "standard form"
     experiment = "gauge block or tag over a long travel"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter, Scale
+from tacdata.effects.effect import Effect, Family, Parameter, Scale
 
 
 class ViewScale(Effect):
@@ -18,6 +18,7 @@ class ViewScale(Effect):
     stage = "view"
     moves = ("tag",)
     group = "amplitude"
+    family = Family.KINEMATICS
     equation = "what is seen of (x, y, d) is (1 + s) (x, y, d)"
     source = "standard form"
     experiment = "a gauge block, or a second camera: the readings do not follow what one of two observers sees wrong"

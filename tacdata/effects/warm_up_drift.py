@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class WarmUpDrift(Effect):
@@ -18,6 +18,7 @@ class WarmUpDrift(Effect):
     stage = "readout"
     moves = ("signal",)
     group = "clock"
+    family = Family.DRIFT
     equation = "s = s + a exp(-t / tau), alike in all channels"
     source = "standard form"
     experiment = "readings without contact from power-on"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Growth, Parameter
+from tacdata.effects.effect import Effect, Family, Growth, Parameter
 
 
 class WearIn(Effect):
@@ -18,6 +18,7 @@ class WearIn(Effect):
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
+    family = Family.SKIN_MEMORY
     equation = "q = q_e (1 - a (1 - exp(-k / n))), k presses at that place before"
     source = "standard form"
     experiment = "ten presses at a virgin place, an hour of rest, then again"

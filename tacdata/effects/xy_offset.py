@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter
 
 
 class XyOffset(Effect):
@@ -18,6 +18,7 @@ class XyOffset(Effect):
     stage = "kinematics"
     moves = ("label", "signal")
     group = "lateral"
+    family = Family.KINEMATICS
     equation = "(x, y) -> (x + dx, y + dy)"
     source = "standard form"
     experiment = (

@@ -25,9 +25,9 @@ class Exporter(ABC):
     needs_robot = False
     """Whether `write` needs a robot file (`schemas/robot.schema.json`)."""
 
-    def __init__(self, robot: Path | None = None) -> None:
-        """Keep the robot file, if there is one."""
-        self.robot = robot
+    def __init__(self, robot: Path | None = None, recordings: Path | None = None) -> None:
+        """Keep the robot file and the folder of the recordings, where there are any; the latter hold the images."""
+        self.robot, self.recordings = robot, recordings
 
     @abstractmethod
     def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
@@ -70,14 +70,14 @@ def new_folder(out: Path) -> None:
         raise UsageError(given, "a place to write", "choose another --out") from None
 
 
-def exporter(name: str, robot: Path | None = None) -> Exporter:
-    """Return the exporter of a format.
+def exporter(name: str, robot: Path | None = None, recordings: Path | None = None) -> Exporter:
+    """Return the exporter of a format, given a robot file and the folder of the recordings, if there are any.
 
     Raises:
         UsageError: If there is no such format, or it needs a robot file.
     """
     kind: Any = registry.load(ROOM, BASE, name, Exporter)
-    made: Exporter = kind(robot)
+    made: Exporter = kind(robot, recordings)
     if made.needs_robot and robot is None:
         raise UsageError(f"format {name} without a robot", "--robot ROBOT.yaml", "describe the robot in a file")
     return made

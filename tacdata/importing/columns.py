@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.text_layout import THOUSANDS
 from tacdata.importing.units import composed, factor, split_unit
 
 Selector = str | int | list[Any]
@@ -89,10 +90,7 @@ def numbers(table: SourceTable, names: list[str], missing: list[float], where: s
     for name in names:
         values = table.column(name)
         if values.dtype == object:
-            raise FormatError(
-                f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}",
-                "numbers", "name another column, or add the texts that stand for no value to the file's missing",
-            )  # fmt: skip
+            raise _text(table, name, values, where)
         values = values.astype(float)
         parts.append(values[:, None] if values.ndim == 1 else values)
     joined = np.concatenate(parts, axis=1) if parts else np.empty((table.rows, 0))
@@ -118,6 +116,19 @@ def axis(
     given = entry.get("unit") or table.units.get(name) or split_unit(name)[1] or unit
     values = numbers(table, [name], missing, where)[:, 0]
     return values * factor(given, unit, where) * entry.get("scale", 1.0) + entry.get("offset", 0.0)
+
+
+def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> FormatError:
+    """Return the error of a column of text, which may be numbers in another dress."""
+    known = [str(value).strip() for value in values.tolist() if value is not None]
+    given = f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}"
+    if known and sum(bool(THOUSANDS.fullmatch(text)) for text in known) > len(known) / 2:
+        return FormatError(
+            f"{given}: numbers with a sign between thousands", "numbers", "save it again without that sign"
+        )
+    return FormatError(
+        given, "numbers", "name another column, or add the texts that stand for no value to the file's missing"
+    )
 
 
 def _example(values: np.ndarray) -> Any:

@@ -17,7 +17,7 @@ from tacdata.importing import recording_file
 from tacdata.importing.formats.source_format import SourceTable, read_table
 from tacdata.importing.presses import presses_of
 from tacdata.importing.recording_file import ImportedPress
-from tacdata.importing.source_files import FileSet, file_sets
+from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash
 from tacdata.importing.trials import split_tables
 from tacdata.recording import session
 from tacdata.recording.files import file_names
@@ -112,12 +112,12 @@ class _Import:
     def _presses(
         self, files: FileSet, label: str, whole: dict[str, SourceTable], rows: dict[str, SourceTable]
     ) -> Iterator[ImportedPress]:
-        below = self.source if self.source.is_dir() else self.source.parent
+        below = self.source.parent if is_one(self.source) else self.source
         record = {
             "version": schemas.version("import_record"), "name": self.mapping["name"],
             "source": self.mapping.get("source", ""), "trial": label,
             "files": [
-                {"path": path.relative_to(below).as_posix(), "sha256": provenance.file_hash(path),
+                {"path": path.relative_to(below).as_posix(), "sha256": source_hash(path),
                  "rows": whole[name].rows}
                 for name, path in files.paths.items()
             ],
@@ -156,7 +156,9 @@ class _Import:
 def plan_of(name: str, presses: list[Any]) -> dict[str, Any]:
     """Return a document of a plan that describes the imported presses; tacdata never executed it."""
     slowest = min(press.speed for press in presses)
-    motion = {"clearance": 1.0, "travel_speed": slowest, "approach_speed": slowest, "press_speed": slowest,
+    # A recording that touches nothing has a negative depth: the plan flies lower than that.
+    clearance = 1.0 + max(0.0, *(-press.depth for press in presses))
+    motion = {"clearance": clearance, "travel_speed": slowest, "approach_speed": slowest, "press_speed": slowest,
               "hold": 0.0, "rest": 0.0}  # fmt: skip
     entries = [
         {"indenter": p.indenter_name, "x": p.x, "y": p.y, **p.angles, "depth": p.depth, "speed": p.speed,

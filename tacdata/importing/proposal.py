@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 import schemas
-from tacdata.errors import UsageError
-from tacdata.importing.formats.source_format import SourceTable, read_table
+from tacdata.errors import TacdataError, UsageError
+from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
+from tacdata.importing.source_files import files_below, is_one
 from tacdata.importing.units import plain, quantity_of, split_unit
 
 SHORT = ("s", "ms", "us", "ns", "min", "h", "d")
@@ -29,6 +30,8 @@ GUESSES = {
 """Meaning of a column by its name without the unit."""
 GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
 """Words that mark a length as measured beside the commanded one."""
+INSIDE = "::"
+"""Between a file's path and the table inside it."""
 SHOWN = 30
 """Columns that are listed per file."""
 
@@ -41,27 +44,35 @@ def described(source: Path) -> tuple[dict[str, SourceTable], str]:
     """
     if not source.exists():
         raise UsageError(f"no file or folder {source}", "measured data", "check the path")
-    paths = [source] if source.is_file() else sorted(p for p in source.rglob("*") if p.is_file())
+    paths = [source] if is_one(source) else files_below(source)
     tables: dict[str, SourceTable] = {}
     count: dict[str, int] = {}
     refused = []
     for path in paths:
-        kind = re.sub(r"\d+", "#", path.relative_to(source).as_posix() if path != source else path.name)
+        below = path.relative_to(source) if path != source else Path(path.name)
+        kind = re.sub(r"\d+", "#", below.with_suffix("").as_posix()) + below.suffix  # the 3 of .db3 counts nothing
         count[kind] = count.get(kind, 0) + 1
         if count[kind] > 1:
             continue
         try:
-            tables[kind] = read_table(path, {})
+            for name in tables_in(path):
+                tables[f"{kind}{INSIDE}{name}" if name else kind] = read_table(path, {"table": name} if name else {})
+        except ModuleNotFoundError:
+            raise
         except Exception as error:  # a README beside the data is no error
-            refused.append(f"{kind}: {type(error).__name__}")
+            if is_one(source) and isinstance(error, TacdataError):
+                raise
+            refused.append(error.given if isinstance(error, TacdataError) else f"{kind}: {type(error).__name__}")
     if not tables:
         raise UsageError(
             f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
-            "CSV, NPZ, Parquet or MATLAB files", "check the path, or convert the files",
+            "CSV, Excel, NPZ, Parquet or MATLAB files, or bags of ROS 2", "check the path, or convert the files",
         )  # fmt: skip
     lines = []
-    for kind, table in tables.items():
-        lines.append(f"{kind} ({count[kind]} file{'s' * (count[kind] > 1)}): {table.rows} rows")
+    for key, table in tables.items():
+        kind, _, inside = key.partition(INSIDE)
+        files = f"{count[kind]} file{'s' * (count[kind] > 1)}"
+        lines.append(f"{kind} ({files}){f', {inside}' if inside else ''}: {table.rows} rows")
         lines += [_line(table, name) for name in list(table.columns)[:SHOWN]]
         if len(table.columns) > SHOWN:
             lines.append(f"    and {len(table.columns) - SHOWN} more columns")
@@ -92,7 +103,8 @@ def proposed_mapping(source: Path, tables: dict[str, SourceTable]) -> dict[str, 
     """Return a mapping's document for the tables, as far as their names allow."""
     aliases: dict[str, str] = {}
     for kind in tables:
-        alias = re.sub(r"\W+", "_", Path(kind).stem.lower()).strip("_") or "data"
+        path, _, inside = kind.partition(INSIDE)
+        alias = re.sub(r"\W+", "_", (inside or Path(path).stem).lower()).strip("_") or "data"
         while alias in aliases:
             alias += "_"
         aliases[alias] = kind
@@ -162,16 +174,17 @@ def _roles(table: SourceTable) -> dict[str, list[str]]:
 
 
 def _file(kind: str, table: SourceTable, roles: dict[str, list[str]]) -> dict[str, Any]:
-    path = kind
-    for k in range(kind.count("#")):
+    path, _, inside = kind.partition(INSIDE)
+    for k in range(path.count("#")):
         path = path.replace("#", f"{{part{k}}}", 1)
+    found: dict[str, Any] = {"path": path, **({"table": inside} if inside else {})}
     if "time" not in roles:
-        return {"path": path, "time": {"rate": 100.0}}
+        return found | {"time": {"rate": 100.0}}
     if [table.columns[name].dtype for name in roles["time"]] == [object, object]:
         # A date and a time of day.
-        return {"path": path, "time": {"column": roles["time"]}}
+        return found | {"time": {"column": roles["time"]}}
     unit = plain(table.units.get(roles["time"][0], ""))
-    return {"path": path, "time": {"column": roles["time"][0], **({"unit": unit} if unit in SHORT else {})}}
+    return found | {"time": {"column": roles["time"][0], **({"unit": unit} if unit in SHORT else {})}}
 
 
 def _axis(table: SourceTable, name: str) -> dict[str, Any]:

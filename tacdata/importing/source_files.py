@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.importing.units import composed
 
@@ -26,11 +27,36 @@ class FileSet:
         return " ".join(self.parts.values())
 
 
+FOLDERS = (".zarr",)
+"""Endings of folders that count as one file."""
+
+
+def is_one(path: Path) -> bool:
+    """Return whether a path is a file, or a folder that counts as one."""
+    return path.is_file() or (path.is_dir() and path.suffix in FOLDERS)
+
+
+def files_below(folder: Path) -> list[Path]:
+    """Return the files below a folder, sorted; a folder that counts as one stands for all that is in it."""
+    found = []
+    for path in sorted(folder.iterdir()):
+        found += [path] if is_one(path) else files_below(path) if path.is_dir() else []
+    return sorted(found)
+
+
+def source_hash(path: Path) -> str:
+    """Return the SHA-256 of a file, or of the names and contents of the files of a folder (hex)."""
+    if path.is_file():
+        return provenance.file_hash(path)
+    inside = sorted(p for p in path.rglob("*") if p.is_file())
+    return provenance.content_hash({p.relative_to(path).as_posix(): provenance.file_hash(p) for p in inside})
+
+
 def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
     """Return every set of files below a folder, or the one file that was given.
 
     Args:
-        source: A folder, or a file if the mapping names one kind of file only.
+        source: A folder, or a file if the mapping names one kind of file only, however many tables in it.
         files: ``files`` of the mapping.
 
     Raises:
@@ -39,13 +65,13 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
     """
     if not source.exists():
         raise UsageError(f"no file or folder {source}", "measured data", "check the path")
-    if source.is_file():
-        if len(files) != 1:
+    if is_one(source):
+        if len({entry["path"] for entry in files.values()}) != 1:
             raise UsageError(
                 f"{source} is one file, the mapping names {len(files)} ({', '.join(files)})",
                 "the folder that holds them", "give the folder",
             )  # fmt: skip
-        return [FileSet({}, {next(iter(files)): source})]
+        return [FileSet({}, dict.fromkeys(files, source))]
     matches = {name: _matches(source, entry["path"]) for name, entry in files.items()}
     for name, found in matches.items():
         if not found:
@@ -91,7 +117,7 @@ def _matches(source: Path, pattern: str) -> list[tuple[dict[str, str], Path]]:
     tokens = re.split(r"(\*\*/|\*|\{\w+\})", composed(pattern))
     regex = "".join(re.sub(r"^(\*\*/|\*|\{\w+\})$", part, t) if k % 2 else re.escape(t) for k, t in enumerate(tokens))
     found = []
-    for path in sorted(p for p in source.rglob("*") if p.is_file()):
+    for path in files_below(source):
         if match := re.fullmatch(regex, composed(path.relative_to(source).as_posix())):
             found.append((match.groupdict(), path))
     return sorted(found, key=lambda item: [_natural(value) for value in item[0].values()])
@@ -102,5 +128,5 @@ def _natural(text: str) -> list[tuple[int, int, str]]:
 
 
 def _listing(source: Path) -> str:
-    names = sorted(p.relative_to(source).as_posix() for p in source.rglob("*") if p.is_file())
+    names = [p.relative_to(source).as_posix() for p in files_below(source)]
     return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "") or "nothing"

@@ -22,6 +22,10 @@ MISSING = (
 )  # fmt: skip
 """Texts that stand for a missing value in any file."""
 DELIMITERS = ("\t", ";", ",", "|", " ")
+GUESSED = ("delimiter", "decimal")
+"""Options of a mapping that can be told from the file instead."""
+THOUSANDS = re.compile(r"[-+]?\d{1,3}(([.,' \u00a0\u202f])\d{3})(\2\d{3})*([.,]\d+)?")
+"""A number with a sign between its thousands."""
 SAMPLE = 400
 """Lines that are examined."""
 
@@ -46,7 +50,7 @@ class TextLayout:
 
 def is_comment(line: str, missing: tuple[str, ...] = ()) -> bool:
     """Return whether a line is a comment: it begins like one, and not with a text that stands for a missing value."""
-    bare = line.lstrip().lstrip('"\'')
+    bare = line.lstrip().lstrip("\"'")
     return bare.startswith(COMMENTS) and not bare.startswith((*SHEET_ERRORS, *(text for text in missing if text)))
 
 
@@ -64,14 +68,15 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     delimiter = delimiter or _delimiter(lines_of_data)
     rows = [split(line, delimiter) for line in lines_of_data]
     width = Counter(len(row) for row in rows[-max(len(rows) // 2, 1) :]).most_common(1)[0][0] if rows else 0
-    decimal = options.get("decimal") or _decimal(rows, delimiter)
+    decimal = options.get("decimal") or _decimal(rows)
     first = _first_row(rows, width, decimal)
     if first is None:
         raise FormatError(
-            f"{origin}: no row of numbers among its first {len(lines)} lines",
+            f"{origin}: no row of numbers among its first {len(lines)} lines{_as_given(options)}",
             "a text file of columns, with or without a header",
-            "give delimiter, decimal, skip or header under files in the mapping",
+            _otherwise(text, options, origin) or "give delimiter, decimal, skip or header under files in the mapping",
         )
+    _refuse_commas_for_both(rows[:first], rows[first:], delimiter, width, origin)
     header = [row for row in rows[:first] if len(row) in (width, width - 1, width + 1) and any(row)]
     header = header or _commented_header(lines[skip:], lines_of_data[first], delimiter, width)
     if options.get("header") is False:
@@ -81,6 +86,44 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     sample = [row for row in rows[first:] if len(row) == width]
     kinds = tuple(_kind([row[k] for row in sample], decimal) for k in range(width))
     return TextLayout(delimiter, decimal, start, names, units, kinds)
+
+
+def _as_given(options: dict[str, Any]) -> str:
+    """Return what the mapping says of the layout, as the end of a sentence."""
+    given = [f"{name} {options[name]!r}" for name in GUESSED if name in options]
+    return f", read with {' and '.join(given)} as the mapping says" if given else ""
+
+
+def _otherwise(text: str, options: dict[str, Any], origin: str) -> str:
+    """Return what would read a file that the mapping's delimiter or decimal sign does not; "" if nothing would."""
+    rest = {name: value for name, value in options.items() if name not in GUESSED}
+    if len(rest) == len(options):
+        return ""
+    try:
+        found = text_layout(text, rest, origin)
+    except FormatError:
+        return ""
+    delimiter = {"\t": "tab", " ": "space"}.get(found.delimiter, found.delimiter)
+    return f"write delimiter: {delimiter!r} and decimal: {found.decimal!r} in the mapping, by which it can be read"
+
+
+def _refuse_commas_for_both(
+    before: list[list[str]], rows: list[list[str]], delimiter: str, width: int, origin: str
+) -> None:
+    """Refuse rows whose commas part the fields and stand for decimal points: the header has fewer names than fields.
+
+    Raises:
+        FormatError: If they do.
+    """
+    names = len(before[-1]) if before else width
+    wide = [row for row in rows if len(row) == width]
+    whole = all(re.fullmatch(r"[-+]?\d+", field) for row in wide for field in row)
+    if delimiter == "," and names + 1 < width <= 2 * names and whole:
+        raise FormatError(
+            f"{origin}: {names} names in the header, and {width} whole numbers a row: its commas part the fields and "
+            "stand for decimal points too",
+            "one sign for each", "save it again with semicolons or tabs between the fields, or with decimal points",
+        )  # fmt: skip
 
 
 def _commented_header(lines: list[str], first: str, delimiter: str, width: int) -> list[list[str]]:
@@ -118,9 +161,7 @@ def _delimiter(lines: list[str]) -> str:
     return ","
 
 
-def _decimal(rows: list[list[str]], delimiter: str) -> str:
-    if delimiter == ",":
-        return "."
+def _decimal(rows: list[list[str]]) -> str:
     fields = [field for row in rows for field in row]
     commas = sum(bool(re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", field)) for field in fields)
     points = sum(bool(re.fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", field)) for field in fields)

@@ -139,6 +139,8 @@ class Plan:
     motion: MotionSettings
     presses: tuple[Press, ...]
     purpose: str = ""
+    on_bad_readings: str = "stop"
+    """What happens when the board freezes, saturates or becomes slow: "stop", "pause" or "go on"."""
     document: dict[str, Any] | None = None
     """The file's document, unchanged."""
 
@@ -173,7 +175,8 @@ class Plan:
                     f"above -{motion.clearance:g} mm", "fly lower, or enlarge motion/clearance",
                 )  # fmt: skip
             presses.append(_press(index, entry, indenters[name], motion))
-        return cls(document["name"], motion, tuple(presses), document.get("purpose", ""), document)
+        purpose, wanted = document.get("purpose", ""), document.get("on_bad_readings", "stop")
+        return cls(document["name"], motion, tuple(presses), purpose, wanted, document)
 
     def check_against(self, sensor: Sensor) -> None:
         """Refuse presses that would miss the skin or pierce it.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from tacdata.devices.device import OwesAnswer
 from tacdata.errors import DeviceError, TacdataError, UsageError
 from tacdata.plans import Plan, Press
 from tacdata.recording.clocks.clock_model import StreamLatency
@@ -20,7 +20,8 @@ from tacdata.recording.live.ending import ending, on_disk
 from tacdata.recording.live.guarded_motion import WATCH, GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
-from tacdata.recording.live.lost_position import Ask, require_found, why_lost
+from tacdata.recording.live.lost_position import Ask, require_found, require_free, why_lost
+from tacdata.recording.live.reading_health import BadReadings
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion import sync_tap as tap_motion
@@ -49,8 +50,6 @@ FIRST_SEARCH = 20.0
 
 class Recorder:
     """One session of recording.
-
-    Example: ``Recorder(rig, sensor, plan, Path("session")).run(confirm=lambda summary: True)``
 
     Example:
         ``Recorder(rig, sensor, plan, Path("session")).run(confirm=lambda summary: True)``
@@ -126,6 +125,8 @@ class Recorder:
         try:
             return self._open_and_record(session, wanted, confirm)
         except BaseException as error:
+            if isinstance(error, BadReadings) and self._paused(error):
+                return self.run(lambda summary: True)
             lost = self.devices.cnc.position_lost
             with suppress(TacdataError):  # the fault itself must be reported first
                 if lost and self.out.exists():
@@ -133,9 +134,25 @@ class Recorder:
             error.add_note(self._ending(lost))
             raise
 
+    def _paused(self, error: BadReadings) -> bool:
+        """After bad readings: whether a person has put them right and lets the session go on, as the plan allows."""
+        if self.plan.on_bad_readings != "pause" or not self._motion.lifted or self.devices.cnc.position_lost:
+            return False
+        self._say(f"PAUSED: {error.given}; the tip is lifted")
+        question = f"Put the board right: {error.remedy.split(', then')[0]}. Go on with this press? [y/N] "
+        if not self._ask(question):
+            return False
+        self.resume, self._motion = True, GuardedMotion(self.devices.cnc, self.rig.clock, self._interruption)
+        return True
+
+    def _say_bad(self, words: str) -> None:
+        self._say(f"WARNING: {words}; it goes on, as the plan says")
+
     def _open_and_record(
         self, session: Session | None, wanted: tuple[int, ...], confirm: Callable[[Preflight], bool]
     ) -> Session:
+        if session:  # earlier presses may have left the tip in the skin
+            self.devices.cnc.before_homing = lambda why=session.position_lost: require_free(why, self._ask)
         with self.devices.opened() as devices:
             cnc = devices.cnc
             limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))
@@ -149,7 +166,7 @@ class Recorder:
             session = find_position(session)
             with RigStreams(
                 devices, self.rig.cameras, self._motion.stop, self._detect, self._watch, self.rig.fingers,
-                self._motion.off_path,
+                self._motion.off_path, self._say_bad if self.plan.on_bad_readings == "go on" else None,
             ) as streams:  # fmt: skip
                 try:
                     with self._interruption.kept():
@@ -199,18 +216,19 @@ class Recorder:
                 self._progress(done, len(wanted), sum(left[done:]) / self.rig.clock.rate)
 
     def _wait_for_streams(self, streams: RigStreams) -> None:
-        end = time.monotonic() + FIRST_FRAME
+        host = self.rig.clock.host
+        end = host.monotonic() + FIRST_FRAME
         while streams.frames < 2 or streams.position is None:
             if streams.fault:
                 raise streams.fault
             self._interruption.check()
-            if time.monotonic() > end:
+            if host.monotonic() > end:
                 raise streams.nothing_yet(FIRST_FRAME)
-            time.sleep(WATCH)
-        end = time.monotonic() + FIRST_SEARCH
-        while not streams.searching and not streams.fault and time.monotonic() < end:
+            host.sleep(WATCH)
+        end = host.monotonic() + FIRST_SEARCH
+        while not streams.searching and not streams.fault and host.monotonic() < end:
             self._interruption.check()
-            time.sleep(WATCH)
+            host.sleep(WATCH)
 
     def _rise(self, streams: RigStreams) -> Position:
         """Go straight up to the clearance height; return the position there [mm]."""
@@ -250,9 +268,16 @@ class Recorder:
         position = self._change_indenter(tap, position, streams)
         before, self._latencies = self._latencies, {}
         streams.set_latencies({})
-        path = file_names.next_sync_tap(self.out)
         course = tap_motion.steps(tap, self.plan, self.rig.registration_for(tap.indenter_name))
-        position = self._record(tap, position, streams, limits, path, course)
+        path = file_names.next_sync_tap(self.out)
+        try:
+            position = self._record(tap, position, streams, limits, path, course)
+        except OwesAnswer as error:
+            if streams.fault or not self._motion.lifted or self.devices.cnc.position_lost:
+                raise
+            self._say(f"{error.given}; the indenter was lifted, and the sync tap is tried once more")
+            position, path = self._motion.go_on(), file_names.next_sync_tap(self.out)
+            position = self._record(tap, position, streams, limits, path, course)
         found = delays.measure(read_recording(path))
         for words in (*found.words, *changes(session, found.latencies)):
             self._say(words)

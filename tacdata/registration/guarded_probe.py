@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 
-from tacdata.devices.device import CncStatus, TaxelFrame
+from tacdata.devices.device import CncStatus, OwesAnswer, TaxelFrame
 from tacdata.errors import DeviceError, FormatError, TacdataError
 from tacdata.recording.live.guarded_motion import GuardedMotion
 from tacdata.recording.live.interruption import Interruption
@@ -22,6 +21,8 @@ from tacdata.rig import Rig
 
 PATIENCE = 5.0
 """Timeout of the first frames and of a reading [s of real time, and of the rig's clock]."""
+LIFT_SPEED = 5.0
+"""Speed of the lift after a stall of the controller [mm/s]."""
 SIDEWAYS = 0.01
 """A move of less than this in x and y counts as vertical [mm]."""
 LOOK = 0.002
@@ -50,11 +51,12 @@ class GuardedProbe(Probe):
 
     def __init__(
         self, rig: Rig, devices: RigDevices, streams: RigStreams, motion: GuardedMotion, height: float,
-        interruption: Interruption,
+        interruption: Interruption, say: Callable[[str], None] = lambda words: None,
     ) -> None:  # fmt: skip
         """Use open devices and running streams; ``height`` [mm, machine] is a safe height."""
         self._rig, self._devices, self._streams, self._motion = rig, devices, streams, motion
         self._height, self._sink, self._interruption = height, _Sink(), interruption
+        self._say, self._retried = say, False
         streams.record_into(cast(Any, self._sink))
         self._position = self._begin()
         self._rested_ns = rig.clock.now_ns()
@@ -69,14 +71,14 @@ class GuardedProbe(Probe):
         return self._position
 
     def _begin(self) -> Position:
-        end = time.monotonic() + PATIENCE
+        end = self._rig.clock.host.monotonic() + PATIENCE
         while self._streams.position is None or len(self._sink.frames) < 2:
             self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
-            if time.monotonic() > end:
+            if self._rig.clock.host.monotonic() > end:
                 raise self._streams.nothing_yet(PATIENCE)
-            time.sleep(LOOK)
+            self._rig.clock.host.sleep(LOOK)
         return self._streams.position
 
     def go(self, position: Position, speed: float) -> None:
@@ -91,12 +93,32 @@ class GuardedProbe(Probe):
         if np.allclose(position, self._position, atol=1e-9):
             return
         try:
+            self._drive(position, speed)
+        except OwesAnswer as error:
+            if not self._lifted_to_try_again(error):
+                raise
+            self._drive(position, speed)
+        self._rested_ns = self._rig.clock.now_ns()
+        self.lowest = min(self.lowest, position[2])
+
+    def _drive(self, position: Position, speed: float) -> None:
+        try:
             self._position = self._motion.drive(self._way(position, speed), self._position, self._streams, None)
         except BaseException:
             self.stopped = True
             raise
-        self._rested_ns = self._rig.clock.now_ns()
-        self.lowest = min(self.lowest, position[2])
+
+    def _lifted_to_try_again(self, error: OwesAnswer) -> bool:
+        """After a controller's first stall: lift the indenter; return whether the way may be tried once more."""
+        if self._retried or self._streams.fault or self._devices.cnc.position_lost:
+            return False
+        self._retried = True
+        self._motion.lift(self._height, LIFT_SPEED)
+        if not self._motion.lifted:
+            return False
+        self._say(f"{error.given}; the indenter was lifted, and the way is tried once more")
+        self._position, self.stopped = self._motion.go_on(), False
+        return True
 
     def _way(self, position: Position, speed: float) -> tuple[Step, ...]:
         """Return the steps there: sideways only at the higher of the two heights, so that nothing is hit."""
@@ -113,7 +135,7 @@ class GuardedProbe(Probe):
 
     def read(self, frames: int) -> StillReading:
         """Collect frames sampled since the guide came to rest; see the base."""
-        end = time.monotonic() + PATIENCE + PATIENCE * frames / 30 / self._rig.clock.rate
+        end = self._rig.clock.host.monotonic() + PATIENCE + PATIENCE * frames / 30 / self._rig.clock.rate
         while True:
             rows = [counts for sample_ns, counts in list(self._sink.frames) if sample_ns >= self._rested_ns]
             if len(rows) >= frames:
@@ -121,11 +143,11 @@ class GuardedProbe(Probe):
             self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
-            if time.monotonic() > end:
+            if self._rig.clock.host.monotonic() > end:
                 raise DeviceError(
                     f"{len(rows)} of {frames} frames within the time", "a board that keeps its rate", "check the board"
                 )
-            time.sleep(LOOK)
+            self._rig.clock.host.sleep(LOOK)
         taken = np.array(rows[:frames])
         self._sink.frames.clear()
         spread = taken.std(axis=0, ddof=1) if frames > 1 else np.zeros(taken.shape[1])
@@ -138,13 +160,13 @@ class GuardedProbe(Probe):
             self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
-            time.sleep(LOOK)
+            self._rig.clock.host.sleep(LOOK)
 
 
 @contextmanager
 def guarded_probe(
     rig: Rig, devices: RigDevices, height: float, speed: float, interruption: Interruption | None = None,
-    motion: GuardedMotion | None = None,
+    motion: GuardedMotion | None = None, say: Callable[[str], None] = lambda words: None,
 ) -> Iterator[GuardedProbe]:  # fmt: skip
     """Yield a probe on open devices, lifted to ``height`` [mm, machine] at ``speed`` [mm/s].
 
@@ -156,7 +178,7 @@ def guarded_probe(
     without_cameras = replace(devices, cameras={})
     off_path = motion.off_path
     with RigStreams(without_cameras, {}, motion.stop, off_path=off_path) as streams, interruption.kept():
-        probe = GuardedProbe(rig, devices, streams, motion, height, interruption)
+        probe = GuardedProbe(rig, devices, streams, motion, height, interruption, say)
         try:
             probe.rise(speed)
             yield probe

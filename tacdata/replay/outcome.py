@@ -3,7 +3,7 @@
 A fingertip is a soft sphere held by springs (the compliance of joints and controllers; an infinitely stiff robot would
 need no compensation). A direct replay brings the pads to where they were seen, so that the springs hardly press.
 Targets that are moved into the object stretch them. Coulomb friction and gravity in MuJoCo decide whether the object is
-lifted.
+held.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from tacdata.errors import UsageError
 from tacdata.replay.grasp import touching
 from tacdata.replay.scene import ReplayScene
-from tacdata.replay.scene_model import PAD, SceneModel
+from tacdata.replay.scene_model import PAD, Rollout, SceneModel
 from tacdata.replay.targets import FingertipTargets
 
 HIGH = 0.9
@@ -25,7 +25,7 @@ HELD = 0.5
 LEAST_LIFT = 0.01
 """Smallest lift, and smallest movement of a wipe, that counts [m]."""
 BEHIND = 0.015
-"""Distance behind the fingers from which an eraser is lost [m]."""
+"""Distance behind the fingers from which an object is lost [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,28 +34,50 @@ class ReplayOutcome:
 
     held: bool
     lift: float
-    """Lowest height of the ball above its start, while the fingers are high [m]."""
+    """Lowest height of the object above its start, while the fingers are high [m]."""
     force: dict[str, float]
     """Finger -> mean normal force in that time [N]."""
     depth: dict[str, float]
     """Finger -> mean depth of the simulated skin in that time [mm]."""
+    grip: float
+    """Grip factor [1]: friction that all pads together can carry over the load, median while all touch, until it is
+    lost. Below 1 the object cannot be held.
+    """
+    slip: float
+    """Largest distance that the object has slid along a pad, from the full touch until it ends or is lost [m]."""
+    behind: float
+    """Largest distance of the object behind the fingers in that time [m]: in height, or along the strokes of a wipe."""
+    decided: float
+    """Time at which the verdict falls [s]: when the object is lost, or when the lift or the wipe has ended."""
+    scene: ReplayScene
+    fingers: tuple[str, ...]
+    """Order of the fingers in the arrays, f of them."""
     time: np.ndarray
     """Times of the replay [s], shape (n,)."""
-    ball: np.ndarray
-    """Centre of the ball [m], shape (n, 3)."""
-    tips: np.ndarray
-    """Centres of the fingertips' pads [m], shape (n, f, 3)."""
-    slip: float = 0.0
-    """Distance of an eraser behind the fingertips along the strokes [m]; 0 for a ball."""
+    path: Rollout
+    """Motion, forces and slip at these times."""
+
+    @property
+    def reason(self) -> str:
+        """Why the object was held or lost, in a sentence."""
+        carried, load = self.grip * self.scene.load, self.scene.load
+        need = "it weighs" if self.scene.task == "grasp" else "the wipe drags with"
+        how = f"friction at the pads can carry {carried:.1f} N, {need} {load:.1f} N"
+        slid = f"it slid by {1000 * self.slip:.1f} mm along a pad"
+        if self.held:
+            return f"held: {how} ({self.grip:.1f} times), {slid}"
+        if self.grip < 1:
+            return f"lost at {self.decided:.1f} s: {how}"
+        return f"lost at {self.decided:.1f} s, though {how}: {slid}"
 
 
-def ball_centre(targets: FingertipTargets, touch: int, radius: float) -> np.ndarray:
-    """Return a ball's centre in a row in which all fingers touch it [m], shape (3,).
+def object_centre(targets: FingertipTargets, touch: int, reach: float) -> np.ndarray:
+    """Return an object's centre in a row in which all fingers touch it [m], shape (3,).
 
-    Each pad touches the ball, so the centre lies a radius along its normal, less the depth that it felt.
+    Each pad touches the object, so the centre lies ``reach`` [m] along its normal, less the depth that it felt.
     """
-    reach = (radius - np.nan_to_num(targets.depth[touch]) / 1000)[:, None]
-    return (targets.seen[touch] + reach * normals(targets)[touch]).mean(axis=0)
+    distance = (reach - np.nan_to_num(targets.depth[touch]) / 1000)[:, None]
+    return (targets.seen[touch] + distance * normals(targets)[touch]).mean(axis=0)
 
 
 def normals(targets: FingertipTargets) -> np.ndarray:
@@ -67,29 +89,39 @@ def normals(targets: FingertipTargets) -> np.ndarray:
 def replay_targets(targets: FingertipTargets, scene: ReplayScene, centre: np.ndarray) -> ReplayOutcome:
     """Return the outcome of a replay for an object whose centre starts at ``centre`` [m].
 
-    A ball is held if it stays high while the fingers are. An eraser is held if it never falls behind the fingers'
-    strokes.
+    An object that is lifted is held if it stays high while the fingers are. An eraser is held if it never falls behind
+    the fingers' strokes.
 
     Raises:
         UsageError: If the targets do not lift, or wipe.
     """
     pads = targets.position - PAD * normals(targets)
-    high = _high(pads) if scene.task == "grasp" else _wiping(pads, targets)
+    wiped, touch = scene.task == "wipe", touching(targets)
+    high = _wiping(pads, touch) if wiped else _high(pads)
     if scene.bias:
         pads = pads + np.array(scene.bias)
     ground = np.array(centre) + scene.place
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     path = SceneModel(scene, pads[0], ground).run(pads, seconds)
-    lowest = float((path.ball[high, 2] - ground[2]).min())
-    force = {name: float(path.force[high, k].mean()) for k, name in enumerate(targets.fingers)}
-    depth = {name: float(1000 * path.depth[high, k].mean()) for k, name in enumerate(targets.fingers)}
-    slip = 0.0
-    if scene.task == "grasp":
-        held = lowest > HELD * _lift(pads)
+    first, last = int(np.argmax(touch)), int(np.flatnonzero(high)[-1])
+    behind = _behind(path.tips.mean(axis=1), path.centre, first, high if wiped else None)
+    lowest = float((path.centre[high, 2] - ground[2]).min())
+    if wiped:
+        held = behind[: last + 1].max() < BEHIND
     else:
-        slip = _slip(path.tips[high].mean(axis=1), path.ball[high])
-        held = slip < BEHIND
-    return ReplayOutcome(bool(held), lowest, force, depth, seconds, path.ball, path.tips, slip)
+        held = lowest > HELD * _lift(pads)
+    late = np.flatnonzero(behind[: last + 1] > BEHIND)
+    end = last if held or not len(late) else int(late[0])
+    rows = slice(min(first, end), end + 1)
+    pressing = path.force[rows].sum(axis=1)[touch[rows]] if touch[rows].any() else path.force[rows].sum(axis=1)
+    names = targets.fingers
+    return ReplayOutcome(
+        bool(held), lowest, dict(zip(names, path.force[high].mean(axis=0).tolist(), strict=True)),
+        dict(zip(names, (1000 * path.depth[high].mean(axis=0)).tolist(), strict=True)),
+        float(scene.friction * np.median(pressing) / scene.load),
+        float(np.linalg.norm(path.slid[rows] - path.slid[rows.start], axis=-1).max()), float(behind[rows].max()),
+        float(seconds[end]), scene, names, seconds, path,
+    )  # fmt: skip
 
 
 def _lift(pads: np.ndarray) -> float:
@@ -103,9 +135,9 @@ def _high(pads: np.ndarray) -> np.ndarray:
     return height > height.min() + HIGH * lift
 
 
-def _wiping(pads: np.ndarray, targets: FingertipTargets) -> np.ndarray:
+def _wiping(pads: np.ndarray, touch: np.ndarray) -> np.ndarray:
     """Return the rows from the first stroke to the last: while all fingers touch."""
-    rows = touching(targets)
+    rows = touch.copy()
     rows[np.argmax(rows) : len(rows) - np.argmax(rows[::-1])] = rows.any()
     stroke = np.ptp(pads[rows].mean(axis=1), axis=0).max() if rows.any() else 0.0
     if stroke < LEAST_LIFT:
@@ -113,8 +145,20 @@ def _wiping(pads: np.ndarray, targets: FingertipTargets) -> np.ndarray:
     return rows
 
 
-def _slip(fingers: np.ndarray, eraser: np.ndarray) -> float:
-    """Return the distance of the eraser behind the fingers, along their main direction of movement [m]."""
-    moved = fingers - fingers[0]
-    along = np.linalg.svd(moved - moved.mean(axis=0), full_matrices=False)[2][0]
-    return float(np.abs((eraser - eraser[0] - moved) @ along).max())
+def _behind(fingers: np.ndarray, centre: np.ndarray, first: int, wiping: np.ndarray | None) -> np.ndarray:
+    """Return the object's distance behind the fingers since a first row [m], shape (n,); 0 before.
+
+    Args:
+        fingers: Mean of the pads [m], shape (n, 3).
+        centre: The object's centre [m], shape (n, 3).
+        first: Row from which it is counted.
+        wiping: Rows of the strokes, whose main direction counts; None for a lift, whose height counts.
+    """
+    apart = centre - centre[first] - (fingers - fingers[first])
+    if wiping is None:
+        behind = -apart[:, 2]
+    else:
+        moved = fingers[wiping] - fingers[wiping].mean(axis=0)
+        behind = np.abs(apart @ np.linalg.svd(moved, full_matrices=False)[2][0])
+    behind[:first] = 0.0
+    return behind

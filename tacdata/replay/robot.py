@@ -82,12 +82,12 @@ def read_robot(path: Path) -> Robot:
                 f"{path}: {what} {', '.join(unknown)}, not in {urdf.name}", ", ".join(sorted(map(str, known))),
                 f"name a {what} of the URDF",
             )  # fmt: skip
+    found = {name: joint.find("limit") for name, joint in joints.items()}
     try:
         _locked(root)
+        limits = {name: float(limit.get("velocity", "nan")) for name, limit in found.items() if limit is not None}
     except ValueError as error:
         raise FormatError(f"{urdf}: {error}", "numbers as limits", "correct the URDF") from None
-    found = {name: joint.find("limit") for name, joint in joints.items()}
-    limits = {name: float(limit.get("velocity", "nan")) for name, limit in found.items() if limit is not None}
     velocity = {n: v for n, v in limits.items() if np.isfinite(v) and v > 0} | document.get("velocity", {})
     tips = {
         name: (entry["link"], pose_matrix({**HERE, **entry}, f"{path}: fingers/{name}"))

@@ -1,4 +1,4 @@
-"""Robot and object of a replay: a ball on a table, or an eraser on a board, and fingertips on springs."""
+"""Robot and object of a replay: what lies on the support, and fingertips on springs."""
 
 from __future__ import annotations
 
@@ -7,31 +7,70 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.errors import UsageError
+
+GRAVITY = 9.81
+"""[m/s^2]"""
+SPREADS: dict[str, dict[str, Any]] = {
+    "mass": {"distribution": "uniform", "half_width": 0.2, "unit": "1", "of": "the scene's value"},
+    "stiffness": {"distribution": "uniform", "half_width": 0.2, "unit": "1", "of": "the scene's value"},
+    "friction": {"distribution": "uniform", "half_width": 0.15, "unit": "1", "of": "the scene's value"},
+    "place": {"distribution": "uniform", "half_width": 0.0015, "unit": "m", "of": "x and y of the object"},
+    "bias": {"distribution": "normal", "sd": 0.0007, "unit": "m", "of": "each axis of each fingertip's targets"},
+}
+"""How a seed's scene differs from the undisturbed one; `drawn` draws from it."""
+
+
+@dataclass(frozen=True)
+class ReplayObject:
+    """What is lifted or wiped with."""
+
+    geometry: str
+    """MuJoCo's name of its shape."""
+    sizes: tuple[float, ...]
+    """MuJoCo's sizes [m]: radius, radius and half the height, or half the sizes; the first lies between the fingers."""
+    mass: float
+    """[kg]"""
+    pull: float = 0.0
+    """Force that pulls it onto its support, beside its weight [N]."""
+
+    @property
+    def height(self) -> float:
+        """Height of its centre above the support [m]."""
+        return self.sizes[-1]
+
+
+OBJECTS = {
+    "ball": ReplayObject("sphere", (0.035,), 0.18),
+    "can": ReplayObject("cylinder", (0.033, 0.05), 0.2),
+    "box": ReplayObject("box", (0.03, 0.04, 0.045), 0.15),
+    "eraser": ReplayObject("box", (0.025, 0.055, 0.015), 0.12, pull=2.0),
+}
+"""A small apple, a can that is half empty, a carton, and an eraser that a magnet holds to its board."""
+
 
 @dataclass(frozen=True)
 class ReplayScene:
-    """Parameters of robot and object; `drawn` gives their spreads."""
+    """Parameters of robot and object; `SPREADS` are theirs over seeds."""
 
-    radius: float = 0.035
-    """Radius of the ball [m]."""
-    mass: float = 0.18
-    """Its mass [kg]: a small apple."""
+    name: str = "ball"
+    """Name of the object."""
+    body: ReplayObject = OBJECTS["ball"]
+    """The object."""
+    mass: float = OBJECTS["ball"].mass
+    """Its mass in this scene [kg]."""
     friction: float = 0.8
-    """Coulomb coefficient between skin and ball [1]."""
+    """Coulomb coefficient between skin and object [1]."""
     stiffness: float = 300.0
     """Stiffness of the springs that hold a fingertip at its target [N/m]."""
     skin: float = 3000.0
     """Stiffness of the skin [N/m]."""
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Offset of the ball from its position in the demonstration [m]."""
+    """Offset of the object from its position in the demonstration [m]."""
     task: str = "grasp"
-    """"grasp": a ball is lifted; "wipe": an eraser is moved to and fro on a board."""
-    eraser: tuple[float, float, float] = (0.025, 0.055, 0.015)
-    """Half the sizes of the eraser [m]: between the fingers, along the strokes, in height."""
+    """"grasp": the object is lifted; "wipe": it is moved to and fro on its support."""
     board_friction: float = 0.5
     """Coulomb coefficient between the object and what it lies on [1]."""
-    pull: float = 0.0
-    """Force that pulls the object onto its support, beside its weight [N]."""
     bias: tuple[tuple[float, float, float], ...] = ()
     """Offset of each fingertip's targets in the robot's frame [m]: calibration, another hand's shape."""
 
@@ -39,48 +78,54 @@ class ReplayScene:
     def document(self) -> dict[str, Any]:
         """The scene as plain data."""
         values = asdict(self)
-        lists = {"place": list(self.place), "eraser": list(self.eraser), "bias": [list(shift) for shift in self.bias]}
-        return {**values, **lists}
-
-    @property
-    def geometry(self) -> str:
-        """MuJoCo's name of the object's shape."""
-        return "sphere" if self.task == "grasp" else "box"
-
-    @property
-    def sizes(self) -> tuple[float, ...]:
-        """Its size parameters for MuJoCo [m]."""
-        return (self.radius,) if self.task == "grasp" else self.eraser
-
-    @property
-    def height(self) -> float:
-        """Height of its centre above the support [m]."""
-        return self.radius if self.task == "grasp" else self.eraser[2]
+        body = {**values.pop("body"), "sizes": list(self.body.sizes)}
+        del body["mass"]  # the scene's own counts
+        return {**values, **body, "place": list(self.place), "bias": [list(shift) for shift in self.bias]}
 
     @property
     def reach(self) -> float:
-        """Distance from its centre to the fingers' contact [m]."""
-        return self.radius if self.task == "grasp" else self.eraser[0]
+        """Distance from the object's centre to the fingers' contact [m]."""
+        return self.body.sizes[0]
+
+    @property
+    def load(self) -> float:
+        """Force that friction at the fingers must carry [N]: the weight of what is lifted, or the drag of a wipe."""
+        weight = self.mass * GRAVITY
+        return weight if self.task == "grasp" else self.board_friction * (weight + self.body.pull)
 
 
-def scene_of(task: str, **values: Any) -> ReplayScene:
-    """Return the usual scene of a task; a wipe's eraser weighs 120 g and holds to its board by a magnet of 2 N.
+def scene_of(task: str, name: str | None = None, width: float | None = None, **values: Any) -> ReplayScene:
+    """Return the usual scene of a task.
 
     Args:
         task: A demonstration's task; all but "wipe" are grasps.
+        name: One of `OBJECTS`; by default an eraser to wipe with, and else a ball.
+        width: Half its width between the fingers, a ball's radius [m]; by default the object's own.
         values: Fields that differ from the usual ones.
+
+    Raises:
+        UsageError: If there is no such object.
     """
-    wiped: dict[str, Any] = {"mass": 0.12, "pull": 2.0} if task == "wipe" else {}
-    return ReplayScene(task="wipe" if task == "wipe" else "grasp", **{**wiped, **values})
+    wiped = task == "wipe"
+    chosen = name or ("eraser" if wiped else "ball")
+    if chosen not in OBJECTS:
+        raise UsageError(f"object {chosen!r}", ", ".join(OBJECTS), "name one of them")
+    body = OBJECTS[chosen]
+    if width is not None:
+        body = replace(body, sizes=(width, *body.sizes[1:]))
+    return ReplayScene(chosen, body, **{"mass": body.mass, "task": "wipe" if wiped else "grasp", **values})
 
 
 def drawn(scene: ReplayScene, fingers: int, seed: int) -> ReplayScene:
-    """Return the scene of a seed: mass and stiffness +-20 %, friction +-15 %, ball +-1.5 mm, fingertips 0.7 mm."""
+    """Return the scene of a seed, with the spreads of `SPREADS`."""
     rng = np.random.default_rng([seed, 21])
-    x, y = rng.uniform(-0.0015, 0.0015, 2).tolist()
-    shifts = rng.normal(0, 0.0007, (fingers, 3)).tolist()
+
+    def off(name: str) -> float:
+        return float(rng.uniform(-SPREADS[name]["half_width"], SPREADS[name]["half_width"]))
+
+    place, bias = (off("place"), off("place"), 0.0), rng.normal(0, SPREADS["bias"]["sd"], (fingers, 3))
     return replace(
-        scene, mass=scene.mass * float(rng.uniform(0.8, 1.2)), stiffness=scene.stiffness * float(rng.uniform(0.8, 1.2)),
-        friction=scene.friction * float(rng.uniform(0.85, 1.15)), place=(x, y, 0.0),
-        bias=tuple((a, b, c) for a, b, c in shifts),
+        scene, mass=scene.mass * (1 + off("mass")), stiffness=scene.stiffness * (1 + off("stiffness")),
+        friction=scene.friction * (1 + off("friction")), place=place,
+        bias=tuple((a, b, c) for a, b, c in bias.tolist()),
     )  # fmt: skip

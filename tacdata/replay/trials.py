@@ -9,11 +9,11 @@ from scipy.stats import binomtest
 
 import schemas
 from tacdata import provenance
-from tacdata.demonstrations.compensation import smallest_gain
 from tacdata.demonstrations.demonstration import Demonstration
+from tacdata.replay.gain_search import FoundGain, GripDemand, GripSearch
 from tacdata.replay.grasp import cut, first_grasp
-from tacdata.replay.outcome import ReplayOutcome, ball_centre, replay_targets
-from tacdata.replay.scene import ReplayScene, drawn
+from tacdata.replay.outcome import ReplayOutcome, object_centre, replay_targets
+from tacdata.replay.scene import SPREADS, ReplayScene, drawn
 from tacdata.replay.targets import FingertipTargets, targets_of
 
 DIRECT = "direct"
@@ -37,25 +37,26 @@ class Trials:
         whole = targets_of(made, next(iter(gains.values())) if gains else dict.fromkeys(made.tracks, 0.0))
         self._span = first_grasp(whole)
         self.seen = cut(whole, self._span[0], self._span[2])
-        self._centre = ball_centre(whole, self._span[1], scene.reach)
+        self._centre = object_centre(whole, self._span[1], scene.reach)
         self.paths = {DIRECT: self._cut(None), **{kind: self._cut(own) for kind, own in gains.items()}}
 
     def one(self, kind: str, scene: ReplayScene) -> ReplayOutcome:
         """Return the outcome of one trial, of a kind of replay, in a scene."""
         return replay_targets(self.paths[kind], scene, self._centre)
 
-    def smallest_gain(self, wanted: float) -> float:
-        """Return the smallest common gain [m/mm] at which every skin is pressed to a depth [mm] while holding.
+    def find_gain(self, demand: GripDemand) -> FoundGain:
+        """Return the smallest common gain that meets a demand in scenes of its own, which no trial below has.
 
         Raises:
-            UsageError: If none reaches it.
+            UsageError: If none does.
         """
+        fingers = self.paths[DIRECT].fingers
 
-        def reached(gain: float) -> float:
-            path = self._cut(dict.fromkeys(self.paths[DIRECT].fingers, gain))
-            return min(replay_targets(path, self._scene, self._centre).depth.values())
+        def outcome(gain: float, seed: int) -> ReplayOutcome:
+            path = self._cut(dict.fromkeys(fingers, gain))
+            return replay_targets(path, drawn(self._scene, len(fingers), seed), self._centre)
 
-        return smallest_gain(reached, wanted)
+        return GripSearch(outcome, demand).find()
 
     def trials(self, seeds: int) -> list[dict[str, Any]]:
         """Run all trials of seeds 0, 1, ...; return them as plain data."""
@@ -66,7 +67,8 @@ class Trials:
                 end = self.one(kind, world)
                 found.append(
                     {"recording": self.made.recording, "seed": seed, "kind": kind, "held": bool(end.held),
-                     "lift": end.lift, "slip": end.slip, "force": end.force, "depth": end.depth}
+                     "reason": end.reason, "decided": end.decided, "lift": end.lift, "slip": end.slip,
+                     "behind": end.behind, "grip": end.grip, "force": end.force, "depth": end.depth}
                 )  # fmt: skip
         return found
 
@@ -75,7 +77,7 @@ class Trials:
 
 
 def result(
-    tried: Sequence[Trials], seeds: int, scene: ReplayScene, chosen: dict[str, Any] | None = None
+    tried: Sequence[Trials], seeds: int, scene: ReplayScene, chosen: tuple[Demonstration, FoundGain] | None = None
 ) -> dict[str, Any]:
     """Return the result over recordings and seeds (`schemas/replay_result.schema.json`).
 
@@ -83,7 +85,7 @@ def result(
         tried: One or more demonstrations.
         seeds: Trials of each kind and demonstration.
         scene: The undisturbed scene.
-        chosen: Recording and depth for which the gain of the kind "chosen" was found.
+        chosen: Demonstration on which the gain of the kind "chosen" was found, and that gain.
     """
     found = [trial for one in tried for trial in one.trials(seeds)]
     kinds, first = list(tried[0].paths), tried[0]
@@ -92,7 +94,7 @@ def result(
     return {
         "version": schemas.version("replay_result"), "recording": first.made.recording, "task": first.made.task,
         "gains": gains["compensated"],
-        "scene": {**scene.document, "spreads": " ".join((drawn.__doc__ or "").split())},
+        "scene": {**scene.document, "spreads": SPREADS},
         **{kind: rate([t for t in found if t["kind"] == kind]) for kind in kinds},
         "recordings": [
             {"name": one.made.recording, "hash": one.made.recording_hash,
@@ -101,9 +103,13 @@ def result(
              }}
             for k, one in enumerate(tried) for trials in (found[k * seeds * len(kinds) : (k + 1) * seeds * len(kinds)],)
         ],
-        **({"gain_chosen": {**chosen, "gains": gains["chosen"]}} if chosen else {}),
+        **({"gain_chosen": _chosen(*chosen, gains["chosen"])} if chosen else {}),
         "trials": found, "provenance": provenance.stamp("tacdata replay", parents, {"seeds": seeds}),
     }  # fmt: skip
+
+
+def _chosen(made: Demonstration, found: FoundGain, gains: dict[str, float]) -> dict[str, Any]:
+    return {"recording": made.recording, "hash": made.recording_hash, "gains": gains, **found.document}
 
 
 def rate(trials: Sequence[dict[str, Any]]) -> dict[str, Any]:

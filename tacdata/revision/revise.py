@@ -251,7 +251,7 @@ def _next(
     recordings: list[Path], held: Comparison, verdict: dict[str, Any], asked: RevisionOptions, out: Path, note: Note
 ) -> dict[str, Any]:
     status = verdict["status"]
-    if status not in ("ambiguous", "unknown"):
+    if status not in ("ambiguous", "unknown", "named, incomplete"):
         return {"plan": None, "presses": [], "remark": ""}
     sessions = _sessions(recordings)
     found = rivals(held, verdict, note=note)

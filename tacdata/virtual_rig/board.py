@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -54,18 +53,21 @@ class VirtualBoard:
 
     def __init__(
         self, clock: Clock, layout: FrameFormat, timing: Timing, read: Callable[[int], np.ndarray],
-        baud: int = 115200, seed: int = 0,
+        baud: int = 115200, seed: int = 0, port: VirtualPort | None = None,
     ) -> None:  # fmt: skip
-        """Stream ``read(sample time [ns]) -> counts, shape (channels,)`` in the given frame format."""
+        """Stream ``read(sample time [ns]) -> counts, shape (channels,)`` in the given frame format.
+
+        ``port`` is the line to the host, by default a pseudo-terminal.
+        """
         self.clock, self.timing, self.baud = clock, timing, baud
-        self.port = VirtualPort(baud, seed)
+        self.port = port or VirtualPort(baud, seed)
         self._encoder, self._read = Encoder(layout), read
         self._rng = np.random.default_rng([seed, 4])
         self._line: deque[tuple[int, int]] = deque()  # (when it has left the board [ns], byte)
         self._packets: deque[tuple[int, bytes]] = deque()
         self._counter = 0
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="virtual-board", daemon=True)
+        self._stopped = clock.host.event()
+        self._thread = clock.host.thread(self._run, "virtual-board")
 
     def start(self) -> None:
         """Switch on."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,10 @@ from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import VirtualBoard, draw_timing
 from tacdata.virtual_rig.optics.camera import VirtualCamera
+from tacdata.virtual_rig.optics.noise_stretch import NoiseStretch
+from tacdata.virtual_rig.optics.scene import looking_at
 from tacdata.virtual_rig.rig import BAUDS, board_format
-from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, draw_hand
+from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, THINGS, draw_hand
 from tacdata.virtual_rig.world.world import World, draw
 
 NAME = "virtual demonstration"
@@ -27,16 +29,22 @@ INTRINSICS = {"width": 800, "height": 600, "fx": 880.0, "fy": 880.0, "cx": 399.5
 FACES = ("+x", "-x", "+y", "-y", "+z")
 TIP = {"position": [10.0, 0.0, -18.0], "quaternion": [1.0, 0.0, 0.0, 0.0], "method": "drawing", "residual": 0.1}
 EYES = {"left": (0.10, -0.36, 0.36), "right": (-0.08, 0.37, 0.35)}
-"""Positions of the cameras [m]; both look at the ball."""
+"""Positions of the cameras [m]."""
+AIM = (0.0, 0.0, 0.085)
+"""Point that both cameras look at [m]: where the ball is lifted."""
 RATE = 20.0
 """Images a second of the rig's clock [Hz]."""
 DELAY = 0.05
 """Minimum latency from exposure to arrival of an image [s]; the rig file states it, as if a sync tap had measured it.
 """
+SILENT_AFTER = 60.0
+"""Time after which the fault "silent-finger" closes the middle finger's port [s of the rig's clock]."""
 FAULTS = ("no-tag", "turned-tag", "swapped-fingers", "silent-finger")
 """Faults on demand: the index finger's tags covered for a second; its upper tag turned by 180 deg; the cubes of index
-and middle finger exchanged; the middle finger's board silent after three seconds.
+and middle finger exchanged; the middle finger's board silent after `SILENT_AFTER`.
 """
+GRASPED = tuple(name for name in THINGS if name != "eraser")
+"""Objects of the task grasp."""
 NUBS = 1.0, 200.0
 """Smallest and largest radius of what presses a skin [mm]."""
 FACE_UP = "-x"
@@ -58,7 +66,7 @@ class VirtualDemo:
 
     def __init__(
         self, directory: Path, speed: float = 1.0, seed: int = 0, cameras: int = 2, fault: str | None = None,
-        sensor: Sensor | None = None, task: str = "grasp", nub: float = RADIUS,
+        sensor: Sensor | None = None, task: str = "grasp", nub: float = RADIUS, thing: str | None = None,
     ) -> None:  # fmt: skip
         """Set up a hand whose clock runs ``speed`` times as fast as real time.
 
@@ -71,6 +79,7 @@ class VirtualDemo:
             sensor: The skin on every finger.
             task: One of `TASKS`.
             nub: Radius of what presses each skin [mm].
+            thing: Object that is grasped, one of `GRASPED`; by default the ball, to wipe always the eraser.
 
         Raises:
             UsageError: If a number is out of range or there is no such fault or task.
@@ -81,10 +90,14 @@ class VirtualDemo:
             raise UsageError(f"fault {fault!r}", ", ".join(FAULTS), "name one of them")
         if task not in TASKS:
             raise UsageError(f"task {task!r}", ", ".join(TASKS), "name one of them")
+        if thing is not None and (task == "wipe" or thing not in GRASPED):
+            raise UsageError(
+                f"object {thing!r} for task {task!r}", f"grasp with {', '.join(GRASPED)}", "choose another"
+            )
         if not NUBS[0] <= nub <= NUBS[1]:
             raise UsageError(f"nubs of {nub:g} mm", f"{NUBS[0]:g} to {NUBS[1]:g} mm", "choose another radius")
         self.directory, self.path, self.fault, self.seed = directory, directory / "demo_rig.yaml", fault, seed
-        self.hand = replace(draw_hand(seed, task), nub=nub)
+        self.hand = replace(draw_hand(seed, task, thing), nub=nub)
         self.clock, self.sensor = Clock.start(speed), sensor or default_sensor()
         self.start_ns = self.clock.now_ns()
         layout = board_format(self.sensor)
@@ -97,8 +110,8 @@ class VirtualDemo:
             )
             for k, name in enumerate(DIRECTIONS)
         }  # fmt: skip
-        self.eyes = {name: _look_at(EYES[name]) for name in list(EYES)[:cameras]}
-        self._rng = np.random.default_rng([seed, 12])
+        self.eyes = {name: looking_at(EYES[name], AIM) for name in list(EYES)[:cameras]}
+        self._noise = NoiseStretch(np.random.default_rng([seed, 12]))
         self.cameras = {
             name: VirtualCamera(self.clock, RATE, self._painter(pose), DELAY, seed, ahead=True)
             for name, pose in self.eyes.items()
@@ -109,7 +122,7 @@ class VirtualDemo:
         """The demo rig file's document (`schemas/demo_rig.schema.json`)."""
         worlds = np.random.default_rng([self.seed, 13])
         return {
-            "version": schemas.version("demo_rig"), "name": NAME, "clock": asdict(self.clock),
+            "version": schemas.version("demo_rig"), "name": NAME, "clock": self.clock.document,
             "boards": {
                 name: {
                     "driver": "capacitive_board", "port": board.port.path, "baud": board.baud,
@@ -138,8 +151,9 @@ class VirtualDemo:
         boards = [f"{name:<7} {board.port.path}  {self.layout.rate:g} Hz" for name, board in self.boards.items()]
         return [
             *boards, *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
-            f"{self.hand.task} every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} times real time",
-            *([f"fault: {self.fault}"] if self.fault else []),
+            f"{self.hand.task} ({self.hand.thing}) every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} "
+            "times real time",
+            *([f"fault: {self.fault}{_when(self.fault)}"] if self.fault else []),
         ]  # fmt: skip
 
     def seconds(self, time_ns: int) -> float:
@@ -177,7 +191,7 @@ class VirtualDemo:
 
         def read(sampled_ns: int) -> np.ndarray:
             seconds = self.seconds(sampled_ns)
-            if self.fault == "silent-finger" and finger == "middle" and seconds > 3.0:
+            if self.fault == "silent-finger" and finger == "middle" and seconds > SILENT_AFTER:
                 self.boards[finger].port.close()
             x, y, depth = self.hand.press(finger, seconds)
             return world.readings(np.array([x, y, -depth]), ball, 0.0, sampled_ns)
@@ -187,7 +201,7 @@ class VirtualDemo:
     def _painter(self, eye: np.ndarray) -> Callable[[int], np.ndarray]:
         from tacdata.virtual_rig.optics.render import render_scene
 
-        world_to_eye, tip = np.linalg.inv(eye), _tip_on_cube()
+        world_to_eye, tip = np.linalg.inv(eye), tip_on_cube()
 
         def draw_image(exposed_ns: int) -> np.ndarray:
             seconds = self.seconds(exposed_ns)
@@ -195,7 +209,7 @@ class VirtualDemo:
                 (world_to_eye @ self.hand.tip(name, seconds) @ np.linalg.inv(tip), self._cube(name, seconds))
                 for name in DIRECTIONS
             ]
-            return render_scene(cubes, INTRINSICS, self._rng)
+            return render_scene(cubes, INTRINSICS, self._noise)
 
         return draw_image
 
@@ -210,22 +224,15 @@ class VirtualDemo:
         return carried
 
 
-def _tip_on_cube() -> np.ndarray:
+def _when(fault: str) -> str:
+    return f", {SILENT_AFTER:g} s of its clock after the start" if fault == "silent-finger" else ""
+
+
+def tip_on_cube() -> np.ndarray:
+    """Return the fingertip's frame in that of its cube, shape (4, 4) [m]."""
     matrix = np.diag([1.0, -1.0, -1.0, 1.0])
     matrix[:3, 3] = np.array(TIP["position"]) / 1000
     return matrix
-
-
-def _look_at(place: tuple[float, float, float]) -> np.ndarray:
-    """Return the frame of a camera that looks at the place where the ball is lifted, shape (4, 4) [m]."""
-    forward = np.array([0.0, 0.0, 0.085]) - place
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-    pose[:3, 3] = place
-    return pose
 
 
 def _world(camera: str, pose: np.ndarray, rng: np.random.Generator) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import VirtualBoard, draw_timing
 from tacdata.virtual_rig.firmware.controller import Controller
 from tacdata.virtual_rig.optics.camera import VirtualCamera
+from tacdata.virtual_rig.optics.noise_stretch import NoiseStretch
 from tacdata.virtual_rig.optics.scene import CUBE, INTRINSICS, draw_scene
 from tacdata.virtual_rig.world.hidden import HiddenWorld
 from tacdata.virtual_rig.world.mounting import Mounted
@@ -86,7 +87,7 @@ class VirtualRig:
         self.layout = layout
         self.board = VirtualBoard(self.clock, layout, timing, self._readings, baud, seed)
         self.scene = draw_scene(seed, NOMINAL.to_machine(0.0, 0.0, 0.0))
-        self._rng = np.random.default_rng([seed, 7])
+        self._noise = NoiseStretch(np.random.default_rng([seed, 7]))
         rate = min(30.0, IMAGES / speed)
         self.camera = VirtualCamera(self.clock, rate, self._picture, seed=seed) if camera else None
 
@@ -98,7 +99,7 @@ class VirtualRig:
         document: dict[str, Any] = {
             "version": schemas.version("rig"),
             "name": NAME,
-            "clock": asdict(self.clock),
+            "clock": self.clock.document,
             "cnc": {"driver": "grbl", "port": self.controller.port.path, "baud": 115200},
             "board": {
                 "driver": "capacitive_board", "port": self.board.port.path, "baud": self.board.baud,
@@ -179,7 +180,7 @@ class VirtualRig:
         from tacdata.virtual_rig.optics.render import render_cube
 
         pose = self.scene.camera_cube(self.controller.position_at(exposed_ns))
-        return render_cube(pose, INTRINSICS, CUBE, self._rng)
+        return render_cube(pose, INTRINSICS, CUBE, self._noise)
 
 
 def _claim(directory: Path, path: Path) -> IO[str]:

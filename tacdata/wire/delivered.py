@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tacdata.errors import DeviceError
+
 
 @dataclass(frozen=True)
 class TaxelFrame:
@@ -53,3 +55,7 @@ class StreamCounts:
     """Bytes skipped while resynchronizing."""
     notes: list[str] = field(default_factory=list)
     """Further remarks for a person, as sentences."""
+
+
+class OwesAnswer(DeviceError):
+    """The controller stands idle and can no longer send what it owes: an answer was lost, or the firmware stalled."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from tacdata.host import COMPUTER, Host
 
 REAL_FLOOR = 1.0
 """Shortest timeout of any wait for a device [s, real time], however fast the clock runs."""
@@ -17,27 +17,28 @@ class Patience:
     system's buffers. So a gap between two checks counts as one step, not as silence of the device. After a stall there
     is time to ask before anything is judged.
 
-    Example: ``patience = Patience(3.0)``; in a loop ``if patience.over(): raise ...``
-
     Example:
         ``patience = Patience(3.0)``; in a loop ``if patience.over(): raise ...``
     """
 
-    def __init__(self, seconds: float, rate: float = 1.0, floor: float = REAL_FLOOR, step: float = STEP) -> None:
+    def __init__(
+        self, seconds: float, rate: float = 1.0, floor: float = REAL_FLOOR, step: float = STEP,
+        host: Host = COMPUTER,
+    ) -> None:  # fmt: skip
         """Allow ``seconds`` [s of a clock that runs at ``rate``], and never less than ``floor`` [s, real time].
 
-        ``step`` [s, real time] should be longer than the time between two looks.
+        ``step`` [s, real time] should be longer than the time between two looks. ``host`` tells the time.
         """
-        self._limit, self._step = max(seconds / rate, floor), step
+        self._host, self._limit, self._step = host, max(seconds / rate, floor), step
         self.restart()
 
     def restart(self) -> None:
         """Restart, because something was received."""
-        self._waited, self._looked = 0.0, time.monotonic()
+        self._waited, self._looked = 0.0, self._host.monotonic()
 
     def over(self) -> bool:
         """Check the clock; return whether the time is up."""
-        now = time.monotonic()
+        now = self._host.monotonic()
         self._waited += min(now - self._looked, self._step)
         self._looked = now
         return self._waited > self._limit

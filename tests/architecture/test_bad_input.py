@@ -95,7 +95,7 @@ CASES = [
     ("check", "empty", "empty", {2, 3}),
     ("check", "words.mcap", "words.mcap", {2, 3}),
     ("recover", "nothing.mcap", "nothing.mcap", {2}),
-    ("recover", "words.mcap", "words.mcap", {3}),
+    ("recover", "words.mcap", "words.mcap", {1}),
     ("label", "nothing", "nothing", {2}),
     ("label", "empty", "empty", {2, 3}),
     ("pack", "nothing --out new", "nothing", {2}),

@@ -11,8 +11,9 @@ import pytest
 from packaging.requirements import Requirement
 from typer.testing import CliRunner
 
-from tacdata import cli
+from tacdata import cli, extras
 from tacdata.errors import Exit, PackageError
+from tacdata.example.shipped import copy_session
 from tacdata.extras import ALL, IMPORTED_AS, extras_of, missing_package
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -68,7 +69,7 @@ for package in json.loads(sys.argv[2]):
 print(json.dumps(found))
 """
 FIRST_LOOK = """
-from tacdata import cli
+from tacdata import cli, extras
 for line in json.loads(sys.argv[2]):
     sys.argv = ["tacdata", *line]
     try:
@@ -123,7 +124,7 @@ def test_every_light_room_can_be_imported_without_the_extras(beyond):
     for module, remedy in failed.items():
         rooms = [room for room in ROOMS if f"{module}.".startswith(f"{room}.")]
         assert rooms, f"{module} needs more than the plain install: {remedy}"
-        assert f"tacdata[{ROOMS[rooms[0]]}]" in remedy, f"{module}: {remedy}"
+        assert f"'.[{ROOMS[rooms[0]]}]'" in remedy, f"{module}: {remedy}"
 
 
 def test_a_first_look_works_without_the_extras(beyond, tmp_path):
@@ -155,15 +156,34 @@ def test_a_first_look_works_without_the_extras(beyond, tmp_path):
 )
 def test_a_verb_says_the_install_line_of_what_it_lacks(arguments, module, extra, beyond, tmp_path):
     code = "from tacdata.cli import main\nsys.argv = ['tacdata', *json.loads(sys.argv[2])]\nmain()"
-    run("from tacdata.cli import main\nsys.argv = ['tacdata', 'example', 'first', '-q']\nmain()", beyond, cwd=tmp_path)
+    copy_session(tmp_path / "first")
     (tmp_path / "case.json").write_text("{}")
     command = [sys.executable, "-c", LIGHT + code, beyond, json.dumps(arguments)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == Exit.PACKAGE, done.stderr
-    assert f"pip install 'tacdata[{extra}]' (from a clone: pip install '.[{extra}]')" in done.stderr
+    assert f"pip install '.[{extra}]' in the clone" in done.stderr
     assert IMPORTED_AS.get(module, module) in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "verdict").exists()
+
+
+@pytest.mark.parametrize(
+    ("origin", "line"),
+    [
+        ({"url": "file:///home/a/tacdata", "dir_info": {"editable": True}}, "pip install '.[farm]' in the clone"),
+        ({"url": "file:///a/tacdata.whl", "archive_info": {}}, "pip install 'tacdata[farm] @ file:///a/tacdata.whl'"),
+        ({"url": "https://a/t.git", "vcs_info": {"vcs": "git"}}, "pip install 'tacdata[farm] @ git+https://a/t.git'"),
+        (None, "pip install 'tacdata[farm]'"),
+    ],
+)
+def test_an_extra_is_installed_from_where_this_install_came(monkeypatch, origin, line):
+    class Installed:
+        def read_text(self, name):
+            assert name == "direct_url.json"
+            return json.dumps(origin) if origin else None
+
+    monkeypatch.setattr(extras, "distribution", lambda _: Installed())
+    assert extras.install_line("farm") == line
 
 
 def test_a_missing_package_is_one_error_in_the_process_too(monkeypatch):
@@ -197,8 +217,8 @@ def test_who_asks_decides_where_two_extras_bring_a_package():
             return missing_package(error, "x")
 
     assert extras_of("torch") == ("fem", "learn")
-    assert "tacdata[fem]" in asked_in("tacdata.skin.model").remedy
-    assert "tacdata[learn]" in asked_in("training.train").remedy
+    assert "'.[fem]'" in asked_in("tacdata.skin.model").remedy
+    assert "'.[learn]'" in asked_in("training.train").remedy
 
 
 def test_every_package_of_an_extra_is_known_by_the_name_it_is_imported_by():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates
 
 from tacdata.chain.table_response import TableResponse
@@ -11,6 +12,13 @@ def truth(pose):
     x, y, depth = pose.T
     spread = 1.0 + 0.3 * depth
     return np.maximum(depth, 0.0) ** 1.5 * np.exp(-((x - 0.4) ** 2 + y**2) / (2 * spread**2))
+
+
+def at_depth(table, place):
+    """Return a table's value at node coordinates."""
+    ends = (1, np.zeros(table.shape[:2])), "not-a-knot"
+    level = CubicSpline(np.arange(9), table, 2, ends)(place[2])
+    return map_coordinates(level, place[:2, None], order=3, mode="mirror")[0]
 
 
 def table(nodes):
@@ -40,7 +48,7 @@ def test_rougher_says_the_same_at_nodes():
 
 
 def test_places_are_read_by_the_cubic_splines_through_the_nodes():
-    """Against scipy's, node coordinates in x, y and the root of depth, ends mirrored."""
+    """Against scipy's: places mirrored at their ends; the root of depth even at contact, not-a-knot at the deep end."""
     rng, shape = np.random.default_rng(2), (7, 6, 9)
     x, y, depth = np.linspace(-3, 3, 7), np.linspace(-2, 2, 6), np.linspace(0, 1, 9) ** 2
     load, force = rng.normal(size=(2, *shape, 5)), rng.normal(size=(2, *shape))
@@ -52,8 +60,17 @@ def test_places_are_read_by_the_cubic_splines_through_the_nodes():
     read = made.load(pose, tool)
     for c, found in ((0, read[:, 0]), (4, read[:, 4]), (None, made.force(pose, tool))):
         tables = force if c is None else load[..., c]
-        both = [map_coordinates(table, there, order=3, mode="mirror") for table in tables]
+        both = [np.array([at_depth(table, place) for place in there.T]) for table in tables]
         expected = np.where(pose[:, 2] > 0, np.choose(tool, both), 0.0)
         np.testing.assert_allclose(found, expected, atol=1e-12)
     fresh = made.with_tools([0, 1])
     np.testing.assert_array_equal(fresh.force(pose, tool), made.force(pose, tool), "alone, as beside the loads")
+
+
+def test_the_deepest_presses_of_a_table_are_as_right_as_the_others():
+    """Loads still grow at the deepest solved press; what lies just above it must not be bent flat."""
+    made = table(9)
+    depth = np.linspace(0.8, 1.0, 50)
+    pose = np.column_stack([0 * depth, 0 * depth, depth])
+    wrong = made.load(pose, np.zeros(50, dtype=int))[:, 0] / truth(pose) - 1
+    assert np.abs(wrong).max() < 1e-4, "mirrored there, they are off by 7.6 %"

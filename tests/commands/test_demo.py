@@ -17,6 +17,11 @@ from tacdata.commands import demo
 from tacdata.errors import UsageError
 
 FARM = Path(__file__).resolve().parents[1] / "label_farm"
+STAND_INS = {
+    "label": ("--factory", "fast_model:FastModel", "--workers", "2"),
+    "train": ("--network", "direct", "--idle-share", "0.2"),
+}
+"""What makes a stage short, by its verb."""
 DEMO = [sys.executable, "-m", "tacdata.cli", "demo"]
 
 
@@ -70,14 +75,13 @@ def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
 
 @pytest.fixture
 def quick_stages(monkeypatch):
-    """Stages run in this process, and a stand-in model solves the presses."""
+    """Stages run in this process; a stand-in model solves the presses, and the smallest network learns them."""
     monkeypatch.syspath_prepend(FARM)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(FARM), str(FARM.parents[1])]))
 
     def run(line):
         arguments = line[line.index("tacdata.cli") + 1 :]
-        stand_in = ["--factory", "fast_model:FastModel", "--workers", "2"] if arguments[0] == "label" else []
-        ended = tacdata(*arguments, *stand_in)
+        ended = tacdata(*arguments, *STAND_INS.get(arguments[0], ()))
         print(ended.stdout, ended.stderr)
         return ended.returncode
 

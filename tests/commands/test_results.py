@@ -16,8 +16,9 @@ from tacdata.example.shipped import SESSION
 ROOT = Path(__file__).resolve().parents[2]
 APP = cli.application()
 REPORT = (
-    "browse", "check", "compare", "discrepancy", "evaluate", "example", "generalize", "label", "list", "pack", "plan",
-    "protocols", "record", "register", "replay", "revise", "solve", "success", "surrogate", "train",
+    "browse", "check", "compare", "demo", "discrepancy", "evaluate", "example", "generalize", "label", "list", "pack",
+    "pictures", "plan", "protocols", "record", "register", "replay", "report", "revise", "solve", "success",
+    "surrogate", "train", "view",
     "farm cancel", "farm dataset", "farm fetch", "farm status", "farm submit",
 )  # fmt: skip
 """Verbs that find something out."""

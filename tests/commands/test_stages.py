@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import redirect_stdout
 
 import pytest
 
@@ -58,6 +59,14 @@ def test_stages_run_in_order_and_print_what_would_be_typed(scripts, tmp_path, ca
     assert "[1/2] first" in shown
     assert "[2/2] second" in shown
     assert shown.count("$ tacdata ") == 2
+
+
+def test_words_of_a_stage_stay_out_of_a_result(scripts, capfd):
+    """With ``--json`` only the result goes to standard output."""
+    with redirect_stdout(sys.stderr):
+        stages.Line(1, "").run("a", ["print('from the stage')"])
+    shown = capfd.readouterr()
+    assert shown.out == "" and "from the stage" in shown.err
 
 
 def test_a_failure_carries_the_exit_code_of_its_verb(scripts):

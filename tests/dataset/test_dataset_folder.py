@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -138,6 +139,7 @@ def test_a_crash_costs_only_the_episode_being_written(tmp_path: Path, monkeypatc
 
     real = documents.write_text
     with monkeypatch.context() as patch:
+        patch.setattr(shutil, "rmtree", lambda *_, **__: None)  # a power cut tidies nothing up
         if stage == "info":
             patch.setattr(
                 documents,
@@ -158,6 +160,27 @@ def test_a_crash_costs_only_the_episode_being_written(tmp_path: Path, monkeypatc
     assert [e.press.index for e in dataset.episodes] == list(range(earlier + 2))
     assert stats(root)["index"]["count"] == [20 * (earlier + 2)]
     assert not list(root.rglob(".*"))
+
+
+def test_an_interrupted_first_episode_leaves_no_folder(tmp_path: Path, monkeypatch) -> None:
+    root = tmp_path / "d"
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(folder, "write_stats", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            packed(root)
+        assert not root.exists()
+        packed_before = tmp_path / "other"
+        patch.setattr(shutil, "rmtree", lambda *_, **__: None)
+        with pytest.raises(KeyboardInterrupt):
+            packed(packed_before)
+    with pytest.raises(UsageError, match="never finished") as error:
+        packed(packed_before)
+    assert "--append" in error.value.remedy
+    assert len(read_dataset(packed(packed_before, append=True)).episodes) == 3
 
 
 def test_a_killed_process_leaves_a_readable_dataset(tmp_path: Path) -> None:

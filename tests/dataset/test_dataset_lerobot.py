@@ -2,12 +2,17 @@
 
 import json
 import os
+import shlex
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import press_example as example
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import torch
 
@@ -251,3 +256,50 @@ def test_a_dataset_that_lerobot_never_finished(lerobot, packed: Path, tmp_path: 
     pack([example.episode(9, FRAMES)], example.label, root, append=True)
     same_as_recorded(lerobot.open(root), [0, 1, 2, 3, 9])
     assert (root / metadata.RECORDS).read_text().count("\n") == COUNT + 1
+
+
+def older(root: Path) -> None:
+    """A folder as lerobot wrote it up to 0.3: a file an episode, its metadata as lines of JSON."""
+    shapes = {"observation.state": 2, "timestamp": 1, "frame_index": 1, "episode_index": 1, "index": 1, "task_index": 1}
+    described = {k: {"dtype": "float32" if k[0] in "ot" and k != "task_index" else "int64", "shape": [n], "names": None}
+                 for k, n in shapes.items()}  # fmt: skip
+    frames_of = np.arange(FRAMES)
+    for number in range(2):
+        table = {
+            "observation.state": pa.FixedSizeListArray.from_arrays(pa.array(np.ones(2 * FRAMES, np.float32)), 2),
+            "timestamp": (frames_of / 30).astype(np.float32), "frame_index": frames_of,
+            "episode_index": np.full(FRAMES, number), "index": frames_of + number * FRAMES,
+            "task_index": np.zeros(FRAMES, np.int64),
+        }  # fmt: skip
+        path = root / f"data/chunk-000/episode_{number:06d}.parquet"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(pa.table(table), path)
+    info = {
+        "codebase_version": "v2.1", "robot_type": "x", "total_episodes": 2, "total_frames": 2 * FRAMES,
+        "total_tasks": 1, "total_videos": 0, "total_chunks": 1, "chunks_size": 1000, "fps": 30,
+        "splits": {"train": "0:2"}, "video_path": None, "features": described,
+        "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
+    }  # fmt: skip
+    stats = {k: {**{s: [0.5] * n for s in ("min", "max", "mean", "std")}, "count": [FRAMES]} for k, n in shapes.items()}
+    lines = {
+        "tasks": [{"task_index": 0, "task": "press"}],
+        "episodes": [{"episode_index": k, "tasks": ["press"], "length": FRAMES} for k in range(2)],
+        "episodes_stats": [{"episode_index": k, "stats": stats} for k in range(2)],
+    }
+    (root / "meta").mkdir()
+    (root / "meta/info.json").write_text(json.dumps(info))
+    for name, entries in lines.items():
+        (root / f"meta/{name}.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+
+
+def test_a_folder_of_the_version_before_is_refused_with_the_command_that_converts_it(lerobot, tmp_path: Path) -> None:
+    root = tmp_path / "my set"
+    older(root)
+    with pytest.raises(FormatError, match=r"LeRobot format v2\.1") as error:
+        read_dataset(root)
+    command = shlex.split(error.value.remedy.split("  (")[0])
+    done = subprocess.run([sys.executable, *command[1:]], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert lerobot.open(root).num_frames == 2 * FRAMES
+    with pytest.raises(FormatError, match="LeRobot dataset without"):
+        read_dataset(root)

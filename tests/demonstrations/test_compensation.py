@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tacdata.demonstrations.compensation import compensate, contact_depth, read_gains, smallest_gain
+from tacdata.demonstrations.compensation import compensate, contact_depth, read_gains
 from tacdata.errors import FormatError, UsageError
 
 
@@ -61,19 +61,3 @@ def test_a_gains_file_is_checked(tmp_path):
     path.write_text(yaml.safe_dump({**document, "fingers": ["thumb", "thumb"], "tasks": {"turn": [0.001, 0.01]}}))
     with pytest.raises(FormatError, match="non-unique"):
         read_gains(path)
-
-
-def test_the_smallest_gain_that_reaches_a_depth_is_found():
-    found = smallest_gain(lambda gain: 200 * max(gain - 0.002, 0), 0.6, tolerance=1e-5)
-    assert found == pytest.approx(0.005, abs=1.1e-5) and 200 * (found - 0.002) >= 0.6
-    assert smallest_gain(lambda gain: 1.0, 0.6) == 0.0
-
-
-def test_of_an_uneven_answer_the_first_gain_that_reaches_it_is_taken():
-    """An object may slip away under a large gain; the first stretch that reaches the depth counts."""
-    found = smallest_gain(lambda gain: 1.0 if 0.004 < gain < 0.009 else 0.0, 0.6)
-    assert 0.004 < found < 0.0042
-    with pytest.raises(UsageError, match="the deepest reached"):
-        smallest_gain(lambda gain: 0.1, 0.6)
-    with pytest.raises(UsageError, match="positive"):
-        smallest_gain(lambda gain: 0.1, -1.0)

@@ -1,14 +1,12 @@
 """Where a camera stands: by a robot with a cube, and by a board."""
 
-import sys
-
 import cv2
 import numpy as np
 import pytest
 import yaml
+from running.in_process import tacdata
 from scipy.spatial.transform import Rotation
 
-from tacdata.cli import main
 from tacdata.demonstrations.camera_pose.board_pose import board_poses
 from tacdata.demonstrations.camera_pose.hand_eye import board_world, hand_eye
 from tacdata.demonstrations.camera_pose.hand_eye_pairs import solve_pairs
@@ -119,18 +117,11 @@ def test_a_board_on_the_table_gives_the_camera():
         board_poses([("empty", np.full((480, 640), 90, np.uint8))], board, intrinsics)
 
 
-def run(arguments):
-    """Type the verb; return its exit code."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["tacdata", "calibrate-world", *map(str, arguments)])
-        try:
-            main()
-        except SystemExit as end:
-            return end.code or 0
-    return 0
+def run(*arguments):
+    return tacdata("calibrate-world", *arguments)
 
 
-def test_images_of_a_robot_that_carries_a_cube_give_a_file_that_a_demo_rig_takes(tmp_path, capsys):
+def test_images_of_a_robot_that_carries_a_cube_give_a_file_that_a_demo_rig_takes(tmp_path):
     cube = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}
     intrinsics = {"width": 640, "height": 480, "fx": 700.0, "fy": 700.0, "cx": 319.5, "cy": 239.5}
     eye, rng, entries = pose([0.0, 0.0, 0.3], [0.3, -0.1, 0.1]), np.random.default_rng(1), []
@@ -141,19 +132,18 @@ def test_images_of_a_robot_that_carries_a_cube_give_a_file_that_a_demo_rig_takes
     document = {"version": "1.0", "camera": "eye", "frame": "base", "intrinsics": intrinsics, "tag_cube": cube}
     (tmp_path / "pairs.yaml").write_text(yaml.safe_dump({**document, "pairs": entries}))
     out = tmp_path / "world.yaml"
-    assert run(["--pairs", tmp_path / "pairs.yaml", "--out", out]) == 0
-    assert "camera eye stands at 0.30" in capsys.readouterr().out
+    assert "camera eye stands at 0.30" in run("--pairs", tmp_path / "pairs.yaml", "--out", out).stdout
     found = CameraWorld.from_document(yaml.safe_load(out.read_text()), "world.yaml")
     place, turn = off(found.matrix, eye)
     assert place < 0.001 and turn < 0.004 and found.poses >= 8
-    assert run(["--pairs", tmp_path / "pairs.yaml", "--out", out]) == 2
-    assert "calibrations are not overwritten" in capsys.readouterr().err
-    assert run(["--out", tmp_path / "new.yaml"]) == 2
-    assert run(["--pairs", tmp_path / "none.yaml", "--out", tmp_path / "new.yaml"]) == 2
+    again = run("--pairs", tmp_path / "pairs.yaml", "--out", out)
+    assert again.returncode == 2 and "calibrations are not overwritten" in again.stderr
+    assert run("--out", tmp_path / "new.yaml").returncode == 2
+    assert run("--pairs", tmp_path / "none.yaml", "--out", tmp_path / "new.yaml").returncode == 2
     assert not (tmp_path / "new.yaml").exists()
 
 
-def test_images_of_a_board_give_it_too(tmp_path, capsys):
+def test_images_of_a_board_give_it_too(tmp_path):
     board, truth = Board(9, 6, 25.0, 18.0, "4X4_50"), pose([0.5, 0.3, 0.1], [-0.1, -0.08, 0.45])
     intrinsics = {"width": 640, "height": 480, "fx": 605.0, "fy": 602.0, "cx": 320.0, "cy": 240.0, "distortion": []}
     sheet = np.pad(draw_squares(board, 40), 40, constant_values=255)
@@ -171,9 +161,10 @@ def test_images_of_a_board_give_it_too(tmp_path, capsys):
     (tmp_path / "camera.yaml").write_text(yaml.safe_dump(found))
     files = {"board": "board.yaml", "calibration": "camera.yaml", "out": "eye.yaml"}
     given = [word for option, file in files.items() for word in (f"--{option}", tmp_path / file)]
-    assert run([*given, "--images", tmp_path / "none"]) == 2
-    assert run([*given, "--images", tmp_path / "views", "--camera", "eye"]) == 0
-    assert "put  world: eye.yaml  into the camera's entry" in capsys.readouterr().out
+    assert run(*given, "--images", tmp_path / "none").returncode == 2
+    done = run(*given, "--images", tmp_path / "views", "--camera", "eye")
+    assert done.returncode == 0, done.stderr
+    assert "put  world: eye.yaml  into the camera's entry" in done.stdout
     world = CameraWorld.from_document(yaml.safe_load((tmp_path / "eye.yaml").read_text()), "eye")
     place, turn = off(world.matrix, np.linalg.inv(truth))
     assert world.camera == "eye" and place < 0.002 and turn < 0.004

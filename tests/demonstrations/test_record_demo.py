@@ -150,8 +150,26 @@ def test_a_missing_board_is_named_by_its_finger_and_leaves_nothing_behind(tmp_pa
     path = documents_of(tmp_path)
     out = tmp_path / "demos"
     assert run(["record", "--demo", "--rig", str(path), "--out", str(out), "--seconds", "1"]) == 4
-    assert "error: board of " in capsys.readouterr().err
+    words = capsys.readouterr().err
+    assert "error: board of " in words
+    assert words.endswith("  data:   nothing was written\n  then:   the same command\n")
     assert not out.exists()
+
+
+def test_the_last_words_of_an_interrupted_demonstration_say_what_is_on_disk(recorded, tmp_path, monkeypatch, capsys):
+    path, out = documents_of(tmp_path), tmp_path / "demos"
+
+    def broken_off(self):
+        (out / "episode-000000.mcap").write_bytes(recorded[0].read_bytes())
+        (out / "episode-000001.partial.mcap").touch()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(DemoRecorder, "__enter__", broken_off)
+    assert run(["record", "--demo", "--rig", str(path), "--out", str(out), "--seconds", "1"]) == 130
+    words = capsys.readouterr().err
+    assert "interrupted\n  data:   1 demonstrations are complete in " in words
+    assert "data:   broken off, readable: episode-000001.partial.mcap\n" in words
+    assert words.endswith("then:   the same command with --resume\n")
 
 
 def test_arguments_that_do_not_fit_are_refused(tmp_path, capsys):

@@ -7,21 +7,24 @@ from demo_examples import HAND, START, rig
 
 from tacdata.clock import Clock
 from tacdata.demonstrations.paths.second_look import look_again
+from tacdata.demonstrations.paths.tracking import track
 from tacdata.demonstrations.recording.reader import read_demo
 from tacdata.demonstrations.recording.recorder import DemoHeader
+from tacdata.errors import FormatError
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.tags import look
-from tacdata.virtual_rig.demo import FINGERS, INTRINSICS, _look_at, _tip_on_cube
+from tacdata.virtual_rig.demo import AIM, FINGERS, INTRINSICS, tip_on_cube
 from tacdata.virtual_rig.optics.render import render_scene
+from tacdata.virtual_rig.optics.scene import looking_at
 
-EYE = _look_at((0.10, -0.36, 0.36))
+EYE = looking_at((0.10, -0.36, 0.36), AIM)
 TIMES = 0.2 + 0.05 * np.arange(8)
 
 
 def image(seconds, rng):
     """What the camera sees of the hand."""
     cubes = [
-        (np.linalg.inv(EYE) @ HAND.tip(name, seconds) @ np.linalg.inv(_tip_on_cube()), entry["cube"])
+        (np.linalg.inv(EYE) @ HAND.tip(name, seconds) @ np.linalg.inv(tip_on_cube()), entry["cube"])
         for name, entry in FINGERS["fingers"].items()
     ]
     return render_scene(cubes, INTRINSICS, rng)
@@ -43,6 +46,38 @@ def recorded(tmp_path):
     found = look(image(TIMES[0], rng), INTRINSICS, bench.document["fingers"], None)
     assert set(found.tips) == set(FINGERS["fingers"])
     return writer.close(True, "", {}, {})
+
+
+def mirror(image):
+    return np.ascontiguousarray(image[:, ::-1])
+
+
+def aruco(_):
+    markers = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_50)
+    page = np.full((INTRINSICS["height"], INTRINSICS["width"]), 255, np.uint8)
+    page[100:200, 100:200] = cv2.aruco.generateImageMarker(markers, 7, 100)
+    return page
+
+
+@pytest.mark.parametrize(
+    ("seen", "found", "remedy"),
+    [(mirror, "5 of 5 images show mirrored tags", "mirroring off"), (aruco, "family ArUco 5x5", "family 36h11"),
+     (lambda image: 255 - image, "white on black", "black on white"), (lambda image: image // 2 * 0, "", "light")],
+    ids=["mirrored", "aruco", "inverted", "dark"],
+)  # fmt: skip
+def test_why_no_tag_is_seen_is_looked_for_and_named(tmp_path, seen, found, remedy):
+    bench, rng = rig(), np.random.default_rng(0)
+    writer = EpisodeWriter(
+        tmp_path / "episode-000000.mcap", DemoHeader(bench.document, {name: {} for name in bench.boards}, "grasp"),
+        Clock(START, START, 1.0), ("eye",), tuple(bench.fingers), tuple(bench.boards),
+    )  # fmt: skip
+    picture = seen(image(TIMES[0], rng))
+    for number in range(20):
+        stamp = START + number * 50_000_000
+        writer.image("eye", stamp, stamp, number, cv2.imencode(".png", picture)[1].tobytes(), -1)
+    with pytest.raises(FormatError, match="no finger was seen") as error:
+        track(look_again(read_demo(writer.close(True, "", {}, {}))))
+    assert found in error.value.given and remedy in error.value.remedy
 
 
 def test_every_stored_image_is_searched_and_a_damaged_one_costs_no_other(recorded):

@@ -53,8 +53,12 @@ def session(tmp_path_factory):
 
 
 def test_imported_recordings_are_judged_into_a_folder(session, tmp_path):
-    written = run([session], read_spec(None), tmp_path / "verdict")
+    said: list[str] = []
+    written = run([session], read_spec(None), tmp_path / "verdict", said.append)
     answer = documents.read(tmp_path / "verdict" / "verdict.json", "verdict")
+    assert any(words.startswith("there is a gap, p = 0.0") for words in said)
+    assert any(words.startswith("so far: ") for words in said), "what was found is said on the way"
+    assert answer["status"] in (tmp_path / "verdict" / "verdict.html").read_text()
     assert answer["data"]["episodes"] == 12
     assert answer["status"] in ("named", "ambiguous")
     assert any("latency" in (e["mechanism"], *e["alternatives"]) for e in answer["effects"])

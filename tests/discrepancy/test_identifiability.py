@@ -125,6 +125,6 @@ def test_a_staircase_of_one_rate_tells_what_stays_from_what_catches_up():
     assert stairs(long) and stairs(short) and not stairs(course()) and not stairs(staircase(0.2))
     assert lookalikes(long, load("hysteresis"), {}) == ()
     assert set(lookalikes(short, load("hysteresis"), {})) == {"creep", "relaxation"}
-    assert set(lookalikes(long, load("latency"), {})) == {"low_pass_filter", "servo_lag"}
+    assert set(lookalikes(long, load("latency"), {})) == {"low_pass_filter", "servo_lag", "viscosity"}
     assert lookalikes(long, load("relaxation"), {"tau": 0.5}) == ()
     assert "hysteresis" in lookalikes(long, load("relaxation"), {"tau": 6.0})

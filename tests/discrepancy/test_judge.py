@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,8 +22,9 @@ from tacdata.discrepancy.verdict.decide import Decision, adequate, decide, settl
 from tacdata.discrepancy.verdict.document import document
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.residual_slices import slices
+from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import in_text
-from tacdata.effects import load
+from tacdata.effects import Placed, load
 
 FEW = ("latency", "low_pass_filter", "relaxation", "backlash", "proportional_hysteresis", "drift", "creep")
 """Effects raced in these tests: enough to be confused, few enough to be quick."""
@@ -131,8 +133,11 @@ def test_a_channel_is_named_by_what_calibration_leaves_open(gain, named):
     gains = np.array([gain, -gain, *np.tile([0.12, -0.12], 11)])
     prior, own = {"channel_gain": 0.05}, load("channel_gain")
     setting = SimpleNamespace(nuisance=prior, channel_gain=own, course=SimpleNamespace(force=None))
-    made = gains_beyond_calibration(SimpleNamespace(gains=gains, problem=SimpleNamespace(setting=setting)))
+    problem, halves = SimpleNamespace(setting=setting), np.stack([gains, gains])
+    made = gains_beyond_calibration(SimpleNamespace(gains=gains, halves=halves, problem=problem))
     assert [settled(m) for m in made] == ([named] if named else [])
+    halves = np.stack([0 * gains, 2 * gains])
+    assert not gains_beyond_calibration(SimpleNamespace(gains=gains, halves=halves, problem=problem)), "no constant"
     assert all(m.needed == BEYOND for m in made)
 
 
@@ -162,6 +167,27 @@ def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():
     assert required_margin(common, rare) >= 1, "the episodes must be on its side, however rare the other is"
     # A standard error squared is two nats of likelihood: what is left of odds is the same.
     assert np.exp(-(required_margin(rare, common) ** 2) / 2) / rare.odds == pytest.approx(np.exp(-(alike**2) / 2))
+
+
+@pytest.mark.parametrize(
+    ("explained", "before", "after", "status"),
+    [(400.0, 2.0, 1.2, "named"), (400.0, 2.0, 2.1, "unknown"), (20.0, 2.0, 2.1, "named")],
+)
+def test_sealed_episodes_that_should_show_a_name_can_take_it_away(explained, before, after, status):
+    """Four of 44: an answer that explains 400 in all should show 36 there; one of 20 need not show its 2."""
+    one = FoundEffect(Placed(load("latency"), {"L": np.array(0.05)}), {}, (), (), {}, 9.0, corrected_p=0.001)
+    setting = SimpleNamespace(
+        course=course(episodes=8), channel_gain=None, response=FittedResponse(course(episodes=8)), nuisance={}
+    )
+    fields = {
+        "effects": (one,), "until": "decide", "gap": True, "tests": SimpleNamespace(p_generic=0.001),
+        "left": SimpleNamespace(t=0.0, gain=0.0), "share_left": 0.0, "loudness": 2.0, "explained": explained,
+        "values": np.ones(40), "gains": np.zeros(3), "energy": (np.ones(40),) * 2,
+        "problem": SimpleNamespace(setting=setting, null=SimpleNamespace(odd=())),
+    }  # fmt: skip
+    found = cast(Any, SimpleNamespace(**fields))
+    shown = Gap(np.full(4, before), np.full(4, after), np.ones(4), tuple("abcd"))
+    assert decide(found, DataChecks(44), (), shown).status == status
 
 
 def test_few_episodes_carry_no_verdict():

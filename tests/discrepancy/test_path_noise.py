@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.discrepancy.data.path_noise import resolved, without_noise
+from tacdata.discrepancy.data.path_noise import resolved, without_dropouts, without_noise
 
 RATE = 100.0
 
@@ -67,3 +67,18 @@ def test_readings_beside_a_corner_that_positions_leave_out_are_not_known(speed, 
     if not known:
         assert not told[np.abs(asked - 1e9) < 3e7].any(), "beside the corner"
         assert told[np.abs(asked - 1e9) > 5e8].all(), "elsewhere"
+
+
+def test_single_zeros_of_a_position_are_set_aside_and_nothing_else():
+    """Each would cut a press in two; a path that is given by its corners turns at single positions."""
+    time, _, read = stairs(0.002)
+    path = read + np.array([3.0, -1.0, 0.0])
+    holes = [60, 180, 333]
+    torn = path.copy()
+    torn[holes] = 0.0
+    mended, lost = without_dropouts(time, torn)
+    assert lost == 3 and np.abs(mended - path).max() < 0.02
+    assert without_dropouts(time, path)[1] == 0
+    corners = np.tile([[0.0, 0, -0.3], [0, 0, 1.0], [0, 0, -0.3], [0, 0, -0.3]], (50, 1))
+    at = np.cumsum(np.tile([1.0, 1.0, 1.0, 9.0], 50)) * 1e9
+    assert without_dropouts(at, corners)[1] == 0

@@ -43,7 +43,9 @@ def test_one_press_alone_is_answered_in_words():
     assert made.document["status"] == "unknown" and "1 episodes cannot carry" in made.document["why"]
 
 
-def test_units_that_cannot_be_right_give_no_name():
+def test_a_unit_that_was_stated_is_believed_and_a_doubt_is_a_remark():
+    """A soft skin may be pressed by 80 mm."""
     own = course(delay=0.05, episodes=12)
-    made = judge(replace(own, tip=own.tip * 1e-3), read_spec(None), until="fit")
-    assert made.document["status"] == "unknown" and "is the depth in mm" in made.document["why"]
+    made = judge(replace(own, tip=own.tip * 80), read_spec(None), until="gate")
+    assert "stopped after gate: a gap" in made.document["why"]
+    assert any("is the depth in mm" in words for words in made.document["remarks"])

@@ -6,8 +6,9 @@ from typing import Any, cast
 import numpy as np
 
 from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
-from tacdata.discrepancy.verdict.decide import Decided, Decision, Reason
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import in_text
@@ -31,7 +32,7 @@ def document(status="named", effects=(), limits=None, sealed=None, share=0.02) -
         "left": {"before": 3.316, "after": 1.612, "share": share, "t": 3.0}, "located": ["everywhere"], "next": [],
         "remarks": [], "limits": limits or {}, "untested": [], "unjudgeable": {"frame_compliance": "x", "tilt": "y"},
         "sealed": {"episodes": 4, "before": 18.489, "after": 20.374, "ceiling": 1.286, "closed": -0.11,
-                   "interval": [-0.58, 0.66]} | (sealed or {}),
+                   "interval": [-0.58, 0.66], "certain": False, "after_interval": [15.1, 26.3]} | (sealed or {}),
     }  # fmt: skip
 
 
@@ -72,9 +73,12 @@ def test_what_is_worse_is_not_called_better():
 def test_a_gap_that_becomes_wider_on_sealed_episodes_is_told_of():
     worse = line(in_text(document("unknown", [effect("power_creep")])), "4 sealed")
     assert worse == "4 sealed episodes: 18.489 before, 20.374 after: worse by 10 %, 1.286 at best"
-    closed = {"after": 2.0, "ceiling": 1.286, "closed": 0.96, "interval": [0.9, 1.0]}
+    closed = {"after": 2.0, "ceiling": 1.286, "closed": 0.94, "interval": [0.9, 1.0], "certain": True}
     better = line(in_text(document("named", [effect("power_creep")], sealed=closed)), "4 sealed")
-    assert better.endswith("1.286 at best; 96 % of the gap closed (90 %: 90 to 100 %)")
+    assert better.endswith("1.286 at best; 94 % of the gap closed (90 %: 90 to 100 %)")
+    wide = {"after": 2.0, "interval": [-0.3, 1.4], "after_interval": [1.1, 3.4]}
+    vague = line(in_text(document("named", [effect("power_creep")], sealed=wide)), "4 sealed")
+    assert vague.endswith("2.000 after (90 %: 1.1 to 3.4), 1.286 at best"), "four presses carry no share"
 
 
 def finding(name, *rivals):
@@ -118,4 +122,23 @@ def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
     assert both == (
         "something is missing; latency and relaxation together come closest and leave 10 % of what could be explained, "
         "so they are not the names, or not all of it"
+    )
+
+
+def test_a_family_that_all_rivals_share_is_said():
+    decided = Decided(finding("low_pass_filter", "latency"), "ambiguous", {}, None, Level.FAMILY)
+    decision = Decision("ambiguous", Reason.RIVALS, (decided,))
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.1, left=SimpleNamespace(t=3.0)))
+    assert reason_in_words(decision, found, DataChecks(8)).endswith("; either way it is delay and filtering")
+
+
+def test_what_stays_named_is_told_from_what_stands_in():
+    decided = [Decided(finding("power_creep"), "named", {}, None, Level.FORM)]
+    decided.append(Decided(finding("bouc_wen"), "suspected", {}, None, None))
+    decision = Decision(INCOMPLETE, Reason.INCOMPLETE, tuple(decided))
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.012, left=SimpleNamespace(t=3.0)))
+    shown = Gap(np.full(4, 30.0), np.full(4, 7.0), np.full(4, 1.0), tuple("abcd"))
+    assert reason_in_words(decision, found, DataChecks(8), shown) == (
+        "relaxation is there and closes 79 % of the gap on sealed presses; hysteresis may be there, too; "
+        "1 % of what could be explained has no name yet"
     )

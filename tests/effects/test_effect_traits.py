@@ -13,17 +13,28 @@ import tacdata.effects
 from tacdata.chain import predict
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.nuisances import pose_errors
 from tacdata.discrepancy.noise.null_model import null_model
+from tacdata.discrepancy.regressors.candidates import build
+from tacdata.discrepancy.regressors.model_error import model_error_columns
 from tacdata.discrepancy.search.find import find
 from tacdata.discrepancy.search.findings import FoundEffect
 from tacdata.discrepancy.search.j_test import j_statistic
 from tacdata.discrepancy.search.problem import prepare
+from tacdata.discrepancy.search.rivals import RIVAL_Z, required_margin
 from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
 from tacdata.discrepancy.verdict.decide import decide
+from tacdata.discrepancy.verdict.document import document
 from tacdata.effects import Placed, library, load
-from tacdata.revision.labels.relabel import moves_labels
+from tacdata.example.shipped import SESSION
+from tacdata.recording import read_episode, read_session
+from tacdata.revision.labels.confirm import touches_fem
+from tacdata.revision.labels.pose_path import moved_episodes
+from tacdata.revision.labels.relabel import changed_skin, moves_labels
+from tacdata.sensor import default_sensor
 
 FILE = '''
 """A file of a test."""
@@ -91,18 +102,30 @@ def read_with(effect, size, rates):
         readings=np.zeros((rows, 9)), session=np.zeros(16, dtype=int), site=np.zeros(16, dtype=int),
         names=tuple(f"press {k}" for k in range(16)), force=None, tag=None, temperature=None,
     )  # fmt: skip
-    truth = predict(course, response, [Placed(effect, {"k": np.array(size)})]).signal
+    truth = predict(course, response, [Placed(effect, {effect.parameters[0].name: np.array(size)})]).signal
     return replace(course, readings=truth + rng.normal(size=truth.shape)), response
 
 
 def test_a_new_file_is_raced_and_named(newcomer):
-    effect = newcomer("at_rest = AtRest.CATCHES_UP", unit="s")
+    remark = "def remark(self, values): return 'look at the clocks'"
+    effect = newcomer("at_rest = AtRest.CATCHES_UP", remark, unit="s")
     assert effect.name in {e.name for e in library()}
     course, response = read_with(effect, 0.1, (0.5, 2.0))
     found = find(Setting(course, response, [effect, load("backlash"), load("drift")]))
     decision = decide(found, DataChecks(course.episodes))
     assert [e.finding.placed.effect.name for e in decision.effects] == ["newcomer"]
     assert decision.status == "named" and not decision.effects[0].finding.rivals
+    assert "look at the clocks" in document(decision, found, DataChecks(course.episodes), ([], []), {})["remarks"]
+
+
+@pytest.mark.parametrize("mechanism", ["low_pass_filter", ""])
+def test_another_form_of_a_mechanism_is_no_rival_of_it(newcomer, mechanism):
+    effect = newcomer(f'mechanism = "{mechanism}"', unit="s")
+    course, response = read_with(load("low_pass_filter"), 0.1, (0.5, 2.0))
+    found = find(Setting(course, response, [effect, load("low_pass_filter")]))
+    (decided,) = decide(found, DataChecks(course.episodes)).effects
+    named = {decided.finding.placed.effect.called, *decided.finding.rivals}
+    assert named == ({"low_pass_filter"} if mechanism else {"low_pass_filter", "newcomer"})
 
 
 def test_one_that_needs_two_rates_is_not_split_by_one(newcomer):
@@ -152,7 +175,9 @@ def test_one_that_resembles_a_gain_is_its_rival_without_a_force_reading(newcomer
         setting = SimpleNamespace(
             nuisance=prior, channel_gain=load("channel_gain"), course=SimpleNamespace(force=force)
         )
-        found = SimpleNamespace(gains=np.full(24, 0.2), problem=SimpleNamespace(setting=setting))
+        found = SimpleNamespace(
+            gains=np.full(24, 0.2), halves=np.full((2, 24), 0.2), problem=SimpleNamespace(setting=setting)
+        )
         (gain,) = gains_beyond_calibration(found)
         assert gain.placed.effect.name == "gain" and gain.rivals == rivals
 
@@ -189,22 +214,80 @@ def test_one_that_follows_the_clock_is_held_against_others_that_do(newcomer, clo
     assert asked == [clock]
 
 
-def test_one_that_each_episode_has_of_its_own_is_a_nuisance(newcomer):
-    effect = newcomer()
-    course, response = read_with(effect, 0.1, (1.0,))
-    before = pose_errors(Setting(course, response, []), []).shape[2]
-    type(effect).each_episode = True
-    assert pose_errors(Setting(course, response, []), []).shape[2] == before + 1
+def own_errors():
+    return pose_errors(Setting(pressed(), Springs(), []), []).shape[2]
 
 
-def test_what_delays_readings_or_changes_the_skin_moves_labels_and_says_so(newcomer):
-    effect = newcomer(
-        "changes_skin = True",
-        "def delay(self, values): return 0.0",
-        "def remark(self, values): return 'look at the clocks'",
-    )
-    placed = Placed(effect, {"k": np.array(0.1)})
-    assert moves_labels([placed]) and not moves_labels([Placed(load("drift"), {})])
-    assert effect.remark(placed.values) == "look at the clocks"
-    late = Placed(load("latency"), {"L": np.array(0.4)})
-    assert moves_labels([late]) and "0.40 s late" in late.effect.remark(late.values)
+@pytest.fixture(scope="module")
+def own_errors_of_the_library():
+    """How many errors an episode has of its own; counted before a file is added."""
+    return own_errors()
+
+
+@pytest.mark.parametrize(("traits", "more"), [(("each_episode = True",), 1), ((), 0)])
+def test_one_that_each_episode_has_of_its_own_is_a_nuisance(own_errors_of_the_library, newcomer, traits, more):
+    newcomer(*traits)
+    assert own_errors() == own_errors_of_the_library + more
+
+
+def test_one_that_delays_readings_moves_the_labels_with_them(newcomer):
+    effect = newcomer("def delay(self, values): return float(values['k'])", unit="s")
+    placed, still = ([Placed(effect, {"k": np.array(size)})] for size in (0.4, 0.0))
+    assert moves_labels(placed) and not moves_labels(still)
+    recorded = [read_episode(read_session(SESSION).episodes[0])]
+    (before,), (after,) = moved_episodes(recorded, still), moved_episodes(recorded, placed)
+    assert np.array_equal(after.tip_ns - before.tip_ns, np.full(len(before.tip_ns), 400_000_000))
+    assert np.array_equal(after.tip, before.tip)
+
+
+def test_one_that_changes_the_skin_has_labels_solved_anew(newcomer):
+    effect = newcomer("changes_skin = True", "def thickness_factor(self, values): return 1 + float(values['k'])")
+    placed = [Placed(effect, {"k": np.array(0.1)})]
+    assert moves_labels(placed) and touches_fem(placed)
+    sensor = default_sensor()
+    assert changed_skin(sensor, placed).skin.thickness == pytest.approx(1.1 * sensor.skin.thickness)
+
+
+def test_one_that_does_neither_leaves_the_labels(newcomer):
+    placed = [Placed(newcomer(), {"k": np.array(0.1)})]
+    assert not moves_labels(placed) and not touches_fem(placed)
+    assert changed_skin(default_sensor(), placed) is None
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_tag_sees_what_it_can(newcomer, seen):
+    effect = newcomer(f"seen_by_tag = {seen}", stage="kinematics")
+    before, after = (
+        predict(pressed(), Springs(), [Placed(effect, {"k": np.array(size)})]) for size in (0.0, 0.1)
+    )  # fmt: skip
+    assert not np.array_equal(after.pose, before.pose)
+    assert np.array_equal(after.tag, before.tag) != seen
+
+
+def test_one_that_cannot_be_judged_is_refused_with_its_reason(newcomer):
+    effect = newcomer("def unjudgeable(self, course, response): return 'no wind was recorded'")
+    board = build(pressed(), Springs(), [], [effect])
+    assert board.unjudgeable == {"newcomer": "no wind was recorded"} and not board.candidates
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_a_fitted_response_takes_up_nothing_of_one_that_differs_between_channels(newcomer, apart):
+    effect = newcomer(f"by_channel = {apart}", stage="kinematics")
+    course, _ = read_with(effect, 0.1, (0.5, 2.0))
+    fitted = FittedResponse(course)
+    columns = taken_up(course, fitted, [Placed(effect, {"k": np.array(0.1)})])
+    assert np.array_equal(columns, fitted.features(course.reduced)) == apart
+
+
+@pytest.mark.parametrize(("traits", "wrong"), [(("form_error = 0.0",), False), ((), True)])
+def test_an_equation_may_be_as_wrong_as_it_says(newcomer, traits, wrong):
+    placed = [Placed(newcomer(*traits), {"k": np.array(0.1)})]
+    columns = model_error_columns(pressed(), Springs(), placed)
+    assert columns.shape[2] > 0 and np.any(columns) == wrong
+
+
+def test_one_that_is_rare_has_to_be_farther_ahead(newcomer):
+    effect, usual = newcomer("odds = 0.1"), load("latency")
+    assert required_margin(effect, usual) == pytest.approx(np.sqrt(RIVAL_Z**2 + 2 * np.log(10)))
+    assert required_margin(usual, usual) == pytest.approx(RIVAL_Z)
+    assert required_margin(usual, effect) < RIVAL_Z

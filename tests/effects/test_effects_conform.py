@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from tacdata.chain import STAGES, Chain, Course, Response, Tool, predict
-from tacdata.effects import Placed, library, load
+from tacdata.effects import Family, Placed, library, load
 
 EFFECTS = library()
 GROUPS = {
@@ -108,6 +108,14 @@ def test_it_moves_what_it_says_and_nothing_else(effect):
     if "force" not in effect.moves and effect.stage != "kinematics":
         assert not moved("force")
     assert np.isfinite(after.signal).all()
+
+
+def test_every_effect_has_a_family_and_all_forms_of_a_mechanism_have_the_same():
+    families = {}
+    for effect in EFFECTS:
+        families.setdefault(effect.called, set()).add(effect.family)
+    assert all(len(own) == 1 for own in families.values())
+    assert {f for own in families.values() for f in own} == set(Family) - {Family.OTHER}
 
 
 def test_every_ambiguity_group_has_an_effect_and_a_simulator_of_its_own():

@@ -388,3 +388,9 @@ def test_a_robot_file_is_checked(tmp_path):
         read_robot(path)
     with pytest.raises(UsageError, match="no fingertip for middle"):
         Kinematics(read_robot(robot(tmp_path)), ("middle",))
+
+
+@pytest.mark.parametrize("change", [('velocity="5.0"', 'velocity="fast"'), ('lower="-0.5"', 'lower="here"')])
+def test_a_limit_that_is_no_number_is_refused(tmp_path, change):
+    with pytest.raises(FormatError, match="numbers as limits"):
+        read_robot(robot(tmp_path, fingers_urdf().replace(*change, 1)))

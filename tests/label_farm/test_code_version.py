@@ -22,7 +22,8 @@ COARSE = replace(SENSOR, map=replace(SENSOR.map, pixels_x=12, pixels_y=12, pixel
 
 
 @pytest.fixture(autouse=True)
-def no_version_is_remembered():
+def no_version_is_remembered(monkeypatch):
+    monkeypatch.setattr(provenance, "EQUAL_VERSIONS", {})
     provenance.code_hash.cache_clear()
     yield
     provenance.code_hash.cache_clear()

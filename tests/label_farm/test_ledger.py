@@ -177,6 +177,32 @@ def test_withdrawn_jobs_leave_unless_another_run_wants_them(ledger):
     assert {lease.job.x for lease in ledger.claim("w", MODEL, 9)} == {2, 3}
 
 
+@pytest.mark.parametrize("end", ["given back", "killed", "silent", "restarted"])
+def test_a_withdrawn_job_in_work_is_not_solved_again(tmp_path, end):
+    owner = "w" if end != "restarted" else f"{owner_name().split('/')[0]}/999999999"
+    with Ledger(tmp_path / "ledger.sqlite", -1.0 if end == "silent" else 30.0) as ledger:
+        ledger.enqueue(jobs(1), run="mine")
+        ledger.enqueue(jobs(2)[1:], run="yours")
+        assert len(ledger.claim(owner, MODEL, 2)) == 2
+        ledger.withdraw("mine")
+        assert ledger.counts()[LEASED] == 2, "it is solved to its end"
+        if end == "restarted":
+            ledger.release_dead()
+        elif end != "silent":
+            ledger.release(owner, blame=end == "killed")
+        assert [lease.job.x for lease in ledger.claim("other", MODEL, 9)] == [1.0]
+        assert sum(ledger.counts().values()) == 1
+
+
+def test_a_withdrawn_job_in_work_that_is_asked_for_anew_is_given_back(ledger):
+    ledger.enqueue(jobs(1), run="mine")
+    (lease,) = ledger.claim("w", MODEL)
+    ledger.withdraw("mine")
+    ledger.enqueue(jobs(1), run="again")
+    ledger.release("w", blame=False)
+    assert ledger.claim("other", MODEL)[0].job == lease.job
+
+
 def test_models_are_offered_by_the_priority_of_their_first_job(ledger):
     ledger.register({MODEL: {}, "b" * 64: {}, "c" * 64: {}})
     ledger.enqueue(jobs(2))

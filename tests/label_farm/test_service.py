@@ -69,6 +69,22 @@ def test_two_people_submit_and_the_more_urgent_comes_first(busy):
     assert len((busy.folder / "solves.log").read_text().splitlines()) == 8, "nothing is solved again"
 
 
+def test_prometheus_reads_what_the_page_shows(busy):
+    status, headers, content = ask(busy, "/metrics")
+    assert status == 200 and headers["Content-Type"].startswith("text/plain; version=0.0.4")
+    told = {}
+    for line in content.decode().splitlines():
+        if not line.startswith("#"):
+            name, _, value = line.rpartition(" ")
+            told[name] = float(value)
+    state = busy.client().get("/api/state")
+    assert told['tacdata_farm_presses{state="solved"}'] == state["presses"]["solved"] == 8
+    assert [told[f'tacdata_farm_submissions{{state="{s}"}}'] for s in ("done", "refused")] == [3, 0]
+    worker = state["workers"][0]
+    assert told[f'tacdata_farm_worker_done_total{{worker="{worker["owner"]}",device="cpu"}}'] == worker["done"] == 8
+    assert told["tacdata_farm_paused"] == 0
+
+
 def test_a_preview_is_a_picture_of_the_deepest_frame(busy):
     status, headers, content = ask(busy, "/api/submissions/000001/labels/2.png")
     assert status == 200 and content.startswith(b"\x89PNG") and 0.7 < float(headers["X-Depth"]) <= 0.8
@@ -164,6 +180,11 @@ def test_failures_keep_their_reason_and_a_broken_session_is_refused(tmp_path):
         assert "skin.yaml" in refused[2]["reason"] and "next:" in refused[2]["reason"]
         shown = verb("farm", "status", "000001", "--url", service.url, "--wait")
         assert shown.returncode == 5 and "episode 2: no label" in shown.stdout
+        shown = verb("farm", "submit", "broken", "--url", service.url)
+        assert shown.returncode == 5 and "submission 000005 is refused: " in shown.stderr, shown.stderr
+        assert "session.json" in shown.stderr and shown.stderr.count("next:") == shown.stderr.count("allowed:") == 1
+        shown = verb("farm", "submit", "broken", "--url", service.url, "--wait", "0")
+        assert shown.returncode == 0 and "is filed" in shown.stdout
 
 
 def test_a_killed_service_goes_on_where_it_stood(tmp_path):

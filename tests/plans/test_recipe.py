@@ -1,11 +1,10 @@
-import sys
 from itertools import pairwise
 
 import numpy as np
 import pytest
 import yaml
+from running.in_process import tacdata
 
-from tacdata import cli
 from tacdata.errors import FormatError
 from tacdata.plans import Plan, read_plan
 from tacdata.plans.recipe import write_out
@@ -136,27 +135,22 @@ def test_sides_overshoot_and_recovery_are_driven():
     )
 
 
-def run(monkeypatch, capfd, *arguments):
-    monkeypatch.setattr(sys, "argv", ["tacdata", "plan", *map(str, arguments)])
-    code = 0
-    try:
-        cli.main()
-    except SystemExit as caught:
-        code = caught.code or 0
-    return code, "".join(capfd.readouterr())
+def run(*arguments):
+    done = tacdata("plan", *arguments)
+    return done.returncode, done.stdout + done.stderr
 
 
-def test_the_verb_writes_a_recipe_out_with_a_summary_and_a_picture(tmp_path, monkeypatch, capfd):
+def test_the_verb_writes_a_recipe_out_with_a_summary_and_a_picture(tmp_path):
     source = tmp_path / "recipe.yaml"
     block = {"indenter": ["ball", "pin"], "at": {"kind": "taxels"}, "depths": [0.3, 0.6], "purpose": "mine"}
     source.write_text(yaml.safe_dump(recipe(block)))
-    code, said = run(monkeypatch, capfd, source, "--out", tmp_path / "plan.yaml", "--picture", tmp_path / "plan.png")
+    code, said = run(source, "--out", tmp_path / "plan.yaml", "--picture", tmp_path / "plan.png")
     assert code == 0, said
     assert "96 presses at 24 sites" in said
     assert "2 mountings" in said
     assert len(read_plan(tmp_path / "plan.yaml").presses) == 96
     assert (tmp_path / "plan.png").read_bytes()[:4] == b"\x89PNG"
-    code, said = run(monkeypatch, capfd, tmp_path / "plan.yaml")
+    code, said = run(tmp_path / "plan.yaml")
     assert code == 0
     assert "96 presses" in said
     for arguments, word in (
@@ -165,7 +159,7 @@ def test_the_verb_writes_a_recipe_out_with_a_summary_and_a_picture(tmp_path, mon
         ((source, "--presses", "4", "--out", tmp_path / "new.yaml"), "the file says both"),
         (("training",), "nowhere to write"),
     ):
-        code, said = run(monkeypatch, capfd, *arguments)
+        code, said = run(*arguments)
         assert code == 2
         assert word in said
 

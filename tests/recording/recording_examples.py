@@ -80,9 +80,9 @@ def header(number=0, camera=False):
 class Press:
     """What a perfect rig does in one press, and what its streams then say; edit it to plant faults."""
 
-    def __init__(self, number=0, seed=0, rate=30.0, camera=False):
+    def __init__(self, number=0, seed=0, rate=30.0, camera=False, of=None):
         self.rng, self.number, self.camera = np.random.default_rng([seed, number]), number, camera
-        self.header = header(number, camera)
+        self.header = of or header(number, camera)
         bench = rig(camera=camera)
         self.commands, self.path = [], []
         self._carry_out(bench)

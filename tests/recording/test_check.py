@@ -1,8 +1,9 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from recording_examples import SENSOR, T0, Press, plan, plan_document, rig_document
+from recording_examples import SENSOR, T0, Press, header, plan, plan_document, rig_document
 from typer.testing import CliRunner
 
 from tacdata import documents
@@ -157,6 +158,15 @@ def test_a_session_is_checked_as_a_whole(session):
     assert "no MCAP file" in report.text
 
 
+def test_recover_ends_as_mcap_recover_does(tmp_path):
+    whole = Press().write(tmp_path / "whole.mcap")
+    (tmp_path / "cut.mcap").write_bytes(whole.read_bytes()[:-30])
+    (tmp_path / "nothing.mcap").write_bytes(whole.read_bytes()[:100])
+    ends = {path.stem: CliRunner().invoke(application(), ["recover", str(path)]) for path in sorted(tmp_path.iterdir())}
+    assert {name: result.exit_code for name, result in ends.items()} == {"whole": 0, "cut": 3, "nothing": 1}
+    assert "messages and" in ends["cut"].output
+
+
 def test_swapped_and_silent_channels_are_found(tmp_path):
     rng = np.random.default_rng(8)
     document = plan_document(1)
@@ -169,12 +179,8 @@ def test_swapped_and_silent_channels_are_found(tmp_path):
     def record(folder, change):
         made = create_session(folder, many, SENSOR, rig_document())
         for number in range(30):
-            press = Press(0, seed=number)
-            object.__setattr__(press.header, "press", many.presses[number])
-            tip = np.tile([[*sites[number], 0.0]], (len(press.sample), 1))
-            depth = np.interp(press.position(press.sample)[:, 2], [-30.8, -30.0], [0.8, 0.0])
-            tip[:, 2] = depth
-            press.counts = change(press._counts(tip))
+            press = Press(0, seed=number, of=replace(header(0), press=many.presses[number]))
+            press.counts = change(press.counts)
             press.write(folder / f"episode-{number:06d}.mcap")
         return check(refresh(made).folder)
 

@@ -2,12 +2,15 @@ import time
 
 import numpy as np
 import pytest
+from recording_examples import Press
 
 from tacdata.clock import Clock
 from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.envelope_fit import EnvelopeFit, fit
 from tacdata.recording.clocks.polled_clock import polled_clock
 from tacdata.recording.clocks.running_clock import StreamClock
+from tacdata.recording.clocks.stream_pairs import stream_pairs
+from tacdata.recording.files.mcap_records import read_records
 
 START = 1_760_000_000_000_000_000
 
@@ -266,3 +269,17 @@ def test_model_survives_its_document():
     whole = ClockModel(9, START, 1e7, 80, START, 2e6, 1e6, 5e5, 0.001, "device_ns", None, (old,))
     whole = whole.with_latency(StreamLatency(6_000_000, 200_000))
     assert ClockModel.from_document(whole.document) == whole
+
+
+def test_every_pair_of_streams_says_its_offset_or_that_it_was_not_measured():
+    known = {"taxels": StreamLatency(6_100_000, 300_000), "camera a": StreamLatency(40_000_000, 400_000)}
+    pairs = stream_pairs({**known, "camera b": None})
+    assert pairs["taxels - motion"] == "+6.10 +- 0.30 ms, taken off"
+    assert pairs["camera a - taxels"] == "+33.90 +- 0.50 ms, taken off"
+    assert pairs["camera b - taxels"] == pairs["camera b - motion"] == "not measured (record --sync-tap)"
+    assert len(pairs) == 6
+
+
+def test_the_pairs_stand_in_the_file(tmp_path):
+    metadata = read_records(Press().write(tmp_path / "episode-000000.mcap")).metadata
+    assert metadata["sync"] == {"taxels - motion": "not measured (record --sync-tap)"}

@@ -1,10 +1,11 @@
 """`tacdata check` against a table of planted faults: each is named, and nothing is said of clean recordings."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from recording_examples import SENSOR, T0, Press, plan_document, rig_document
+from recording_examples import SENSOR, T0, Press, header, plan_document, rig_document
 
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts
@@ -240,6 +241,33 @@ def guide_stops_short(p):
     ]
 
 
+@fault(WARN, "taxels", r"they come \+2\d\d ms after the motion: measure the delay by a sync tap")
+def readings_late(p):
+    late = np.searchsorted(p.sample, p.sample - 250 * MS)
+    p.counts = p.counts[late]
+
+
+@fault(BAD, "taxels", r"they end \d{4} ms before the press does")
+def readings_end_early(p):
+    p.drop(int(np.searchsorted(p.sample, p.end - 4000 * MS)), len(p.sample))
+
+
+@fault(BAD, "label", r"the guide went to x 1.00, y 0.50, depth 0.80 mm, and the label says x 3.00, y 0.50")
+def label_of_another_place(p):
+    object.__setattr__(p.header, "press", replace(p.header.press, x=3.0))
+
+
+@fault(WARN, "taxels", r"channel 4 has a spike of \+(29|30)\d\d counts at .* while still")
+def spike(p):
+    p.counts[p.while_still(), 4] += 3000
+
+
+@fault(WARN, "taxels", "the board repeats one frame: no channel changes for 5 frames")
+def frames_held(p):
+    row = p.while_still()
+    p.counts[row : row + 5] = p.counts[row]
+
+
 @fault(WARN, "camera side", "no image$")
 def dead_camera(p):
     p.images, p.pictures = [], []
@@ -367,12 +395,8 @@ def session_of(folder, change):
     made = create_session(folder, plan, SENSOR, rig_document())
     gain = np.random.default_rng(3).normal(1, 0.08, 24)
     for number in range(24):
-        press = Press(0, seed=number)
-        object.__setattr__(press.header, "press", plan.presses[number])
-        depth = np.interp(press.position(press.sample)[:, 2], [-30.8, -30.0], [0.8, 0.0])
-        tip = np.column_stack([np.tile(SITES[number], (len(depth), 1)), depth])
-        counts = press._counts(tip)
-        press.counts = change(number, np.round(9000 + gain * (counts - 9000)))
+        press = Press(0, seed=number, of=replace(header(0), press=plan.presses[number]))
+        press.counts = change(number, np.round(9000 + gain * (press.counts - 9000)))
         press.write(folder / f"episode-{number:06d}.mcap")
     return check(refresh(made).folder)
 
@@ -393,6 +417,10 @@ def offset(number, counts):
     return counts
 
 
+def louder(number, counts):
+    return counts + (number == 5) * np.round(np.random.default_rng(1).normal(0, 40, counts.shape))
+
+
 def mute(number, counts):
     counts[:, 9] = np.round(9000 + np.random.default_rng(number).normal(0, 5, len(counts)))
     return counts
@@ -411,9 +439,15 @@ SESSION_FAULTS = {
     ]),
     "plug turned": (lambda number, counts: counts[:, ::-1], [(BAD, "as if the array were turned by 180 deg")]),
     "gain step": (weaker, [(BAD, "channel 14 answers 0.4. times as strongly from about")]),
-    "offset step": (offset, [(WARN, r"idle reading of channel 7 steps by \+1500 counts before episode-000010")]),
+    "offset step": (offset, [(WARN, r"idle reading of channel 7 steps by \+1[45]\d\d counts before episode-000010")]),
     "mute channel": (mute, [(BAD, "channel 9 did not answer")]),
     "no contact": (no_contact, [(BAD, "no channel answered to any press")]),
+    "one recording late": (lambda number, counts: np.roll(counts, 3, axis=0) if number == 5 else counts, [
+        (WARN, r"they come \+100 ms later against the motion than in other recordings: 0.10 mm of depth"),
+    ]),
+    "louder": (louder, [
+        (WARN, r"its noise is \d+ times that of the session's quiet recordings"),
+    ]),
     "nothing": (lambda number, counts: counts, []),
 }  # fmt: skip
 

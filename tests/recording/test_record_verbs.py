@@ -1,4 +1,4 @@
-"""The verbs as a lab types them, each in a process of its own."""
+"""The verbs as a lab types them; what moves the rig in a process of its own."""
 
 import os
 import signal
@@ -9,6 +9,7 @@ import time
 import pytest
 import yaml
 from recording_examples import plan_document
+from running import in_process
 
 from tacdata.recording import read_session
 from tacdata.recording.files import file_names
@@ -29,7 +30,7 @@ def bench(tmp_path):
 
 
 def test_record_asks_records_and_refuses_to_overwrite(bench, tmp_path):
-    result = tacdata(*bench, stdin=subprocess.DEVNULL)
+    result = in_process.tacdata(*bench, answer="")
     assert result.returncode == 2
     assert "not confirmed" in result.stderr
     assert "Traceback" not in result.stderr
@@ -37,10 +38,10 @@ def test_record_asks_records_and_refuses_to_overwrite(bench, tmp_path):
     result = tacdata(*bench, input="y\n")
     assert result.returncode == 0, result.stderr
     assert "2 of 2 presses recorded" in result.stdout
-    result = tacdata(*bench, "--yes")
+    result = in_process.tacdata(*bench, "--yes")
     assert result.returncode == 2
     assert "--resume" in result.stderr
-    result = tacdata(*bench, "--yes", "--resume")
+    result = in_process.tacdata(*bench, "--yes", "--resume")
     assert result.returncode == 0
     assert len(read_session(tmp_path / "session").episodes) == 2
 
@@ -66,8 +67,8 @@ def test_a_signal_stops_and_the_session_can_be_resumed(bench, tmp_path, number):
 def test_recover_and_its_refusals_are_words(tmp_path):
     foreign = tmp_path / "x.mcap"
     foreign.write_bytes(b"x" * 100)
-    result = tacdata("recover", foreign)
-    assert result.returncode == 3
+    result = in_process.tacdata("recover", foreign)
+    assert result.returncode == 1
     assert "no MCAP file" in result.stderr
     assert "next:" in result.stderr
     assert list(tmp_path.iterdir()) == [foreign]
@@ -77,7 +78,7 @@ def test_a_missing_port_is_said_in_words(bench, tmp_path):
     rig = yaml.safe_load(bench[2].read_text())
     rig["cnc"]["port"] = "/dev/tty-not-there"
     (tmp_path / "rig.yaml").write_text(yaml.safe_dump(rig))
-    result = tacdata("record", "--rig", tmp_path / "rig.yaml", *bench[3:], "--yes")
+    result = in_process.tacdata("record", "--rig", tmp_path / "rig.yaml", *bench[3:], "--yes")
     assert result.returncode == 4
     assert "/dev/tty-not-there" in result.stderr
     assert not (tmp_path / "session").exists()

@@ -3,45 +3,17 @@
 import json
 import sys
 
-import numpy as np
 import pytest
 from PIL import Image
-from test_scene import HAND, RATE
+from test_scene import HAND
+from tracked_hand import tracks
 
 from tacdata import documents
 from tacdata.cli import main
-from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
-from tacdata.demonstrations.paths.tracks_file import write_tracks
-from tacdata.sensor import default_sensor
-from tacdata.virtual_rig.world.hand import DIRECTIONS, draw_hand
+from tacdata.virtual_rig.world.hand import draw_hand
 
 WILSON = [(0.0, 0.4899), (0.0456, 0.6994), (0.1500, 0.8500), (0.3006, 0.9544), (0.5101, 1.0)]
 """Wilson's 95 % interval [1] of k successes in 4 trials, from its quadratic with z^2 = 3.841459."""
-
-
-def tracks(folder, hand, task, digest):
-    """Tracks as a perfect tracker and network would give them."""
-    from scipy.spatial.transform import Rotation
-
-    times = np.arange(int(8.4 * RATE)) / RATE
-    found, count = {}, len(times)
-    for name in DIRECTIONS:
-        poses = np.array([hand.tip(name, t) for t in times])
-        depth = np.array([hand.press(name, t)[2] for t in times], np.float32)
-        found[name] = FingerTrack(
-            name, "right", name, poses[:, :3, 3], Rotation.from_matrix(poses[:, :3, :3]).as_quat(),
-            np.tile(1e-8 * np.eye(6), (count, 1, 1)), np.zeros(count, bool), count, 0,
-            np.zeros((count, 24), np.float32),
-            np.repeat(depth, 35 * 26).reshape(count, 35, 26),
-        )  # fmt: skip
-    network = {"hash": "f" * 64, "network": "none", "epoch": 0, "lookahead": 0, "sensor": "0"}
-    made = Demonstration(
-        "episode-000000.mcap", digest, task, "table", RATE, np.rint(times * 1e9).astype(np.int64), found,
-        dict.fromkeys(found, default_sensor()), {}, network, (), {"made_by": "a test"},
-    )  # fmt: skip
-    path = folder / "episode-000000.tracks.parquet"
-    write_tracks(path, made)
-    return path
 
 
 @pytest.fixture
@@ -71,6 +43,8 @@ def test_rates_come_with_wilson_intervals(tracked, tmp_path, capsys):
     for kind in ("direct", "compensated"):
         assert found[kind]["of"] == 4 == sum(trial["kind"] == kind for trial in found["trials"])
         assert found[kind]["wilson_95"] == pytest.approx(WILSON[found[kind]["held"]], abs=1e-4)
+    assert found["scene"]["spreads"]["mass"]["half_width"] == 0.2 and found["scene"]["sizes"] == [0.035]
+    assert all(trial["reason"].startswith("held" if trial["held"] else "lost") for trial in found["trials"])
     assert view.stat().st_size > 10_000
     with Image.open(film) as shown:
         assert getattr(shown, "n_frames", 1) > 20 and shown.size[0] > 500
@@ -82,9 +56,10 @@ def test_rates_come_with_wilson_intervals(tracked, tmp_path, capsys):
 def test_bad_arguments_end_in_words(tracked, tmp_path, capsys):
     for arguments, words in (
         ([tracked, "--task", "pour"], "no gains for task"),
-        ([tracked, "--radius", "0"], "a ball of 0 mm"),
+        ([tracked, "--radius", "0"], "--radius 0"),
+        ([tracked, "--object", "pear"], "ball, can, box, eraser"),
         ([tmp_path / "none.mcap"], "no file"),
-        ([tracked, "--find-gain", "50"], "deepest reached"),
+        ([tracked, "--find-gain", "--mass", "9"], "no gain up to"),
     ):
         assert run(["replay", *arguments]) == 2
         assert words in capsys.readouterr().err
@@ -100,7 +75,7 @@ def wiping(tmp_path, seed):
 def test_an_eraser_is_lost_without_compensation_and_a_gain_chosen_elsewhere_holds_it(tmp_path, capsys):
     training, first, second = (wiping(tmp_path, seed) for seed in (1, 2, 3))
     out, view = tmp_path / "wipe.json", tmp_path / "wipe.rrd"
-    chosen = ["--find-gain", "0.3", "--gain-from", training]
+    chosen = ["--find-gain", "--preliminary", "4", "--gain-from", training]
     assert run(["replay", first, second, "--seeds", "2", "--out", out, "--view", view, *chosen]) == 0
     found = json.loads(out.read_text())
     documents.check(found, "replay_result", "result")
@@ -109,8 +84,10 @@ def test_an_eraser_is_lost_without_compensation_and_a_gain_chosen_elsewhere_hold
     assert found["compensated"]["held"] >= 3 and found["chosen"]["of"] == 4
     assert [one["rates"]["direct"]["of"] for one in found["recordings"]] == [2, 2]
     assert found["gain_chosen"]["hash"] == "1" * 64 and 0 < found["gain_chosen"]["gains"]["thumb"] < 0.03
-    behind = [trial["slip"] for trial in found["trials"] if trial["kind"] == "direct"]
-    assert min(behind) > 0.03  # it stays where the first stroke began
+    assert found["gain_chosen"]["demand"] == {"trials": 4, "slip": 0.003, "force": 6.0, "grip": 2.0}
+    assert found["gain_chosen"]["slip"] <= 0.003 and found["gain_chosen"]["grip"] >= 2.0
+    behind = [trial["behind"] for trial in found["trials"] if trial["kind"] == "direct"]
+    assert min(behind) > 0.015  # the strokes leave it behind
     assert view.stat().st_size > 10_000
     capsys.readouterr()
     for arguments, words in (

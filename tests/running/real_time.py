@@ -1,5 +1,6 @@
 """What drives devices in real time is tried again if it failed while the machine stood still, and only then."""
 
+import functools
 import os
 import signal
 import threading
@@ -19,6 +20,7 @@ STILL = 0.02
 """A thread that wakes so much too late was kept from the machine [s]; an emulated carriage moves 0.2 mm meanwhile."""
 
 
+@functools.cache
 def in_real_time(path):
     """Return whether the tests of a file, a path in this folder, watch the clock."""
     return path.relative_to(TESTS).parts[0] in ROOMS or path.name in RIGS

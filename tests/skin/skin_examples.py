@@ -164,7 +164,7 @@ def _law_kernel(kind):
     law = kind()
     energy_of, stress_of, tangent_of = law.energy_function(), law.stress_function(), law.tangent_function()
 
-    @wp.kernel(module="unique")
+    @wp.kernel(module="unique", enable_backward=False)
     def values(
         F: wp.array(dtype=wp.mat33d),
         dF: wp.array(dtype=wp.mat33d),

@@ -11,7 +11,7 @@ from tacdata.errors import SolveError
 from tacdata.sensor import default_sensor
 from tacdata.sensor.sensor import ContactProperties, Skin
 from tacdata.skin.contact.contact_surface import face_quadrature
-from tacdata.skin.mesh import elements
+from tacdata.skin.mesh import build, elements
 from tacdata.skin.mesh.build import PINNED, MeshSettings, build_mesh, make_mesh, mesh_key, surface
 from tacdata.skin.mesh.coarser import RATIOS, coarser
 from tacdata.skin.mesh.skin_mesh import SkinMesh, quality
@@ -130,7 +130,9 @@ def test_the_surface_given_to_the_mesher_is_closed():
     assert surface(bumps_sensor()).is_watertight
 
 
-def test_a_skin_whose_faces_collapse_is_refused_with_its_volume():
+def test_a_skin_whose_faces_collapse_is_refused_with_its_volume(monkeypatch):
+    """At the first refusal; that others are tried first stands in test_skin_meshing.py."""
+    monkeypatch.setattr(build, "_REFUSALS", 1)
     sensor = replace(slab_sensor(), skin=Skin(6.0, 6.0, 0.05, 0.0))
     with pytest.raises(SolveError, match=r"the skin 1.8 mm\^3") as failure:
         SkinModel(sensor, ModelSettings(mesh=MeshSettings(outer=0.9, interior=1.5)))

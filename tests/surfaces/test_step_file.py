@@ -97,5 +97,5 @@ def test_what_is_no_step_file_is_refused(tmp_path):
 def test_without_the_package_the_error_names_it(tmp_path, monkeypatch):
     (tmp_path / "box.step").write_text("")
     monkeypatch.setitem(sys.modules, "cascadio", None)
-    with pytest.raises(PackageError, match=r"tacdata\[step\].* or export the solid as STL"):
+    with pytest.raises(PackageError, match=r"\[step\].* or export the solid as STL"):
         read_closed(tmp_path / "box.step", 1.0, "skin")

@@ -122,7 +122,7 @@ def test_what_cannot_be_used_is_refused_in_words(folder, tmp_path, monkeypatch, 
 def test_why_no_board_is_found_is_looked_for_and_named(changes, is_mirrored, words):
     pattern = replace(BOARD, **changes)
     picker = ViewPicker(pattern, still=False)
-    for k, image in enumerate(images(4)):
+    for k, image in enumerate(images(2)):
         assert not picker.take(np.ascontiguousarray(image[:, ::-1]) if is_mirrored else image, f"image {k}")
     with pytest.raises(FormatError, match="in the others") as caught:
         picker.check_board()

@@ -6,6 +6,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
+from running.in_process import tacdata
 
 from tacdata.errors import UsageError
 from training.generalization import generalize
@@ -77,6 +78,22 @@ def test_seeds_are_put_together_and_judged_by_the_papers_means(outcomes):
     assert verdicts([replace(group, values=worse)])[0].startswith("direct, split episode: no metric better")
 
 
+def test_a_claim_must_beat_the_baselines_of_the_same_table(outcomes):
+    runs = [(s.name, s.evaluation.document) for s in scored(outcomes)]
+    group = groups(runs)[0]
+    wanted = [d["baselines"]["mean"]["iou"]["mean"] for _, d in runs[:2]]
+    assert group.baselines["mean"]["iou"] == pytest.approx(sum(wanted) / 2)
+    good = {m: v * 0 + (0.9 if m == "iou" else 0.001) for m, v in group.values.items()}
+    weak = {name: {m: 0.5 if m == "iou" else 0.002 for m in good} for name in ("mean", "linear")}
+    better = replace(group, values=good, baselines=weak)
+    assert better.stands_out("iou") and "every baseline in" in verdicts([better])[0]
+    reached = replace(better, baselines={**weak, "mean": {**weak["mean"], "iou": 0.9}})
+    assert reached.beats_the_paper("iou") and not reached.stands_out("iou")
+    assert "but a predictor without a network reaches it too" in verdicts([reached])[0]
+    unknown = replace(better, baselines={})
+    assert not unknown.stands_out("iou") and "no baseline was scored" in verdicts([unknown])[0]
+
+
 class Tags(HTMLParser):
     """Collects what a page refers to, and whether its elements are closed."""
 
@@ -124,9 +141,11 @@ def test_runs_are_reported_by_the_verb(outcomes, tmp_path, monkeypatch):
     shown = call("generalize", tmp_path / "data", "--out", tmp_path / "runs", *options, "--split", "specimen")
     assert "split specimen is not possible" in shown
     assert (tmp_path / "runs/report.html").read_text().startswith("<!doctype html>")
-    call("report", tmp_path / "runs", "--out", tmp_path / "page.html", "--device", "cpu", "--threads", 1)
+    words = ["--out", tmp_path / "page.html", "--device", "cpu", "--threads", 1, "--json"]
+    (run,) = json.loads(tacdata("report", tmp_path / "runs", *words).stdout)["runs"]
     assert "direct" in (tmp_path / "page.html").read_text()
     with pytest.raises(UsageError, match="exists"):
         call("report", tmp_path / "runs", "--out", tmp_path / "page.html")
     scores = json.loads((tmp_path / "runs/direct-episode-0/scores/scores.json").read_text())
     assert next(entry["level"] for entry in scores["uncertainty"]["levels"]) == 0.5
+    assert "direct" in run["title"] and run["uncertainty"] == scores["uncertainty"]

@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import socket
 import subprocess
+import sys
 import time
 import urllib.request
 from pathlib import Path
@@ -46,11 +48,40 @@ def test_the_web_viewer_serves_on_the_loopback_only(episode, tmp_path):
         assert server.poll() is None
         with urllib.request.urlopen(f"http://127.0.0.1:{parts.port}/", timeout=10) as answer:
             assert b"<html" in answer.read().lower()
+            allowed = dict(part.split(" ", 1) for part in answer.headers["Content-Security-Policy"].split("; "))
+        # What the page in the browser may call: this machine, and nobody who counts users.
+        reached = {word for word in allowed["connect-src"].split() if word.startswith(("http", "*", "https"))}
+        assert reached == {"http://127.0.0.1:*", "http://localhost:*"}
+        with urllib.request.urlopen(f"http://127.0.0.1:{parts.port}/re_viewer_bg.wasm") as code:
+            assert code.headers["Content-Type"] == "application/wasm" and "Content-Security-Policy" in code.headers
+            assert len(code.read()) == int(code.headers["rerun-final-length"])
         if (outside := other_address()) is not None:
             assert not listens(outside, parts.port)
             assert not listens(outside, grpc.port)
     assert server.poll() is not None
     assert not listens("127.0.0.1", parts.port)
+
+
+SERVED = """
+import sys
+from pathlib import Path
+from viewers.rerun import window
+with window.web_server(Path(sys.argv[1])) as (server, _):
+    print(server.pid, flush=True)
+    window.until_interrupted()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_no_viewer_outlives_who_started_it(episode, tmp_path, number):
+    RerunBackend(tmp_path / "e.rrd").draw(episode_scene(episode))
+    command = [sys.executable, "-c", SERVED, str(tmp_path / "e.rrd")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        viewer = int(process.stdout.readline())
+        process.send_signal(number)
+        assert process.wait(60) == (0 if number == signal.SIGINT else 128 + number)
+    assert not Path(f"/proc/{viewer}").exists()
 
 
 def test_usage_statistics_are_off_and_the_users_setting_is_left_alone():

@@ -1,5 +1,6 @@
 """The verb as it is typed."""
 
+import json
 import sys
 from functools import partial
 
@@ -26,8 +27,11 @@ def view(monkeypatch):
 
 
 def test_file_and_picture_are_written_without_a_display(view, session, tmp_path):
-    done = view(session, "--save", tmp_path / "new" / "e.rrd", "--picture", tmp_path / "new" / "e.png")
+    done = view(session, "--save", tmp_path / "new" / "e.rrd", "--picture", tmp_path / "new" / "e.png", "--json")
     assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["written"] == [str(tmp_path / "new" / name) for name in ("e.rrd", "e.png")]
+    assert "episode-000003" in told["shown"]
     assert (tmp_path / "new" / "e.rrd").read_bytes()[:3] == b"RRF"
     assert (tmp_path / "new" / "e.png").read_bytes()[:4] == b"\x89PNG"
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == ["e.png", "e.rrd"]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tacdata.virtual_rig.world.hand import DIRECTIONS, ERASER, LIFT, STROKE, TASKS, TIMES, draw_hand
+from tacdata.virtual_rig.world.hand import DIRECTIONS, LIFT, STROKE, TASKS, THINGS, TIMES, draw_hand
 
 MOMENTS = np.arange(TIMES[2], TIMES[5], 0.02)
 
@@ -33,7 +33,20 @@ def test_a_wipe_goes_to_and_fro_twice_and_a_grasp_goes_up():
     turns = np.flatnonzero(np.diff(np.sign(np.diff(along[np.abs(along) > 2]))))
     assert len(turns) == 4
     apart = 1000 * (wiped["index"][:, 0, 3] - wiped["thumb"][:, 0, 3])
-    assert np.abs(apart - 2 * ERASER[0]).max() < 4  # less both depths, and what the hand trembles
+    assert np.abs(apart - 2 * THINGS["eraser"]).max() < 4  # less both depths, and what the hand trembles
     assert max(np.ptp(1000 * poses[:, 2, 3]) for poses in wiped.values()) < 3
     _, lifted = paths("grasp")
     assert np.ptp(1000 * lifted["thumb"][:, 2, 3]) == pytest.approx(LIFT, abs=8)
+
+
+@pytest.mark.parametrize(("thing", "half"), [("ball", 35.0), ("can", 33.0), ("box", 30.0)])
+def test_an_object_is_held_at_its_own_width(thing, half):
+    hand = draw_hand(2, "grasp", thing)
+    tips = {name: 1000 * hand.tip(name, 4.0)[:3, 3] for name in DIRECTIONS}
+    normals = {name: hand.tip(name, 4.0)[:3, 2] for name in DIRECTIONS}
+    # From where each finger touches, half the width along its normal leads to the object's middle.
+    middles = np.array([tips[name] + (half - hand.depth[name]) * normals[name] for name in DIRECTIONS])
+    if thing == "box":
+        assert np.ptp(middles[:, 1]) == pytest.approx(28.0, abs=3.0)
+        middles = middles[:, [0, 2]]
+    assert np.ptp(middles, axis=0).max() < 3.0

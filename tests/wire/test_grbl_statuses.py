@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tacdata.clock import Clock
+from tacdata.host import Host
 from tacdata.wire.grbl import statuses as grbl_statuses
 from tacdata.wire.grbl.lines import parse_status
 from tacdata.wire.grbl.statuses import REPORT_LAG_NS, Statuses
@@ -37,24 +38,33 @@ def test_an_answer_after_a_repeated_query_may_be_the_first_ones_or_the_seconds(s
     assert statuses.take(MACHINE, first + 20_000_000).sent_ns == repeated
 
 
-def test_queries_that_were_answered_together_do_not_slow_down_what_follows(statuses, monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(grbl_statuses.time, "monotonic", lambda: now[0])
+class ByHand(Host):
+    """A computer whose monotonic time is set by hand."""
+
+    shown = 100.0
+
+    def monotonic(self):
+        return self.shown
+
+
+def test_queries_that_were_answered_together_do_not_slow_down_what_follows():
+    host = ByHand()
+    statuses = Statuses(Clock.start(host=host))
     assert statuses.ask()
     first = statuses.asked_ns
     for _ in range(3):
-        now[0] += 0.6
+        host.shown += 0.6
         assert statuses.ask(), "repeated, as the host or the controller stalls"
     assert statuses.take(MACHINE, first + 2_000_000_000).sent_ns == first
-    now[0] += 0.3
+    host.shown += 0.3
     assert not statuses.ask(), "another answer may still come"
-    now[0] += 0.3
+    host.shown += 0.3
     assert statuses.ask(), "none came: all were answered by one report"
     for _ in range(5):
         asked = statuses.asked_ns
-        now[0] += 0.01
+        host.shown += 0.01
         assert statuses.take(MACHINE, asked + 10_000_000).sent_ns == asked
-        now[0] += 0.1
+        host.shown += 0.1
         assert statuses.ask(), "every answer is followed by a query again"
 
 

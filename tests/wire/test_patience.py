@@ -7,46 +7,53 @@ import time
 import pytest
 import serial
 
-from tacdata.wire import patience as patience_file
+from tacdata.host import Host
 from tacdata.wire import serial_port
 from tacdata.wire.patience import Patience
 
 
+class Shown(Host):
+    """A computer whose time is set by hand."""
+
+    time = 100.0
+
+    def monotonic(self):
+        return self.time
+
+
 @pytest.fixture
-def now(monkeypatch):
-    shown = [100.0]
-    monkeypatch.setattr(patience_file.time, "monotonic", lambda: shown[0])
-    return shown
+def host():
+    return Shown()
 
 
-def test_it_runs_out_after_its_time(now):
-    patience = Patience(3.0)
+def test_it_runs_out_after_its_time(host):
+    patience = Patience(3.0, host=host)
     for _ in range(30):
-        now[0] += 0.1
+        host.time += 0.1
         assert not patience.over()
-    now[0] += 0.1
+    host.time += 0.1
     assert patience.over()
     patience.restart()
     assert not patience.over()
 
 
-def test_a_stall_counts_as_one_look(now):
-    patience = Patience(3.0)
-    now[0] += 3600.0
+def test_a_stall_counts_as_one_look(host):
+    patience = Patience(3.0, host=host)
+    host.time += 3600.0
     assert not patience.over()
     for _ in range(27):
-        now[0] += 0.1
+        host.time += 0.1
         assert not patience.over()
-    now[0] += 0.1
+    host.time += 0.1
     assert patience.over()
 
 
-def test_a_fast_clock_leaves_a_floor_of_real_time(now):
-    patience = Patience(3.0, rate=10.0)
+def test_a_fast_clock_leaves_a_floor_of_real_time(host):
+    patience = Patience(3.0, rate=10.0, host=host)
     for _ in range(9):
-        now[0] += 0.1
+        host.time += 0.1
         assert not patience.over()
-    now[0] += 0.2
+    host.time += 0.2
     assert patience.over()
 
 

@@ -63,7 +63,10 @@ def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None
 
 def _overview(result: HtmlPage, found: list[Group], impossible: dict[str, str]) -> None:
     result.heading("Splits, networks and seeds")
-    result.paragraph("Mean over the frames in contact, then mean ± SD over seeds. Bold: better than the paper's mean.")
+    result.paragraph(
+        "Mean over the frames in contact, then mean ± SD over seeds. Bold: better than the paper's mean and than every "
+        "predictor without a network on the same split."
+    )
     heads = ["Network", "Split", "Seeds", "Frames", *(title(m) for m in METRICS), "ms a frame"]
     rows = [
         [g.name, g.split, str(len(g.seeds)), str(g.frames), *(_cell(g, m) for m in METRICS), f"{g.pace:.2f}"]
@@ -73,13 +76,23 @@ def _overview(result: HtmlPage, found: list[Group], impossible: dict[str, str]) 
     metrics = list(METRICS)
     result.table(
         heads,
-        [*rows, paper],
-        lambda row, column: row < len(found) and 4 <= column < 9 and found[row].beats_the_paper(metrics[column - 4]),
+        [*rows, *_baseline_rows(found), paper],
+        lambda row, column: row < len(found) and 4 <= column < 9 and found[row].stands_out(metrics[column - 4]),
     )
     for sentence in verdicts(found):
         result.paragraph(sentence, note=True)
     for split, reason in impossible.items():
         result.paragraph(f"Split {split} was not possible: {reason}", note=True)
+
+
+def _baseline_rows(found: list[Group]) -> list[list[str]]:
+    """Return a row for each predictor without a network and split; networks on one split share their frames."""
+    splits = {group.split: group for group in found if group.baselines}
+    return [
+        [f"without a network: {name}", split, str(len(group.seeds)), str(group.frames),
+         *(number(values[m]) for m in METRICS), ""]
+        for split, group in splits.items() for name, values in group.baselines.items()
+    ]  # fmt: skip
 
 
 def _cell(group: Group, metric: str) -> str:

@@ -21,7 +21,7 @@ def held_out(episodes: tuple[EpisodeSpan, ...], sensor: Sensor, generator: np.ra
         raise FormatError(
             f"the speed of {len(unknown)} episodes is not known, the first is {unknown[0]}",
             "episodes with their record",
-            "give the dataset its records back (tacdata.dataset.restore), or choose another --split",
+            "give the dataset its records back (tacdata dataset restore), or choose another --split",
         )
     speeds = np.array([round(100 * (e.speed or 0.0)) for e in episodes])
     limit = np.sort(speeds)[-share(len(speeds), TEST_SHARE)]

@@ -21,11 +21,12 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from pydantic import BaseModel, Field
 
-from tacdata.dataset.flags import read_flags
+from tacdata.dataset.flags import read_flags, read_history
 from tacdata.errors import TacdataError
 from viewers.browse.episode_list import UNITS, EpisodeList, with_flags
 from viewers.browse.flagging import flag_episode, unflag_episode
-from viewers.rerun.window import GRPC_PORT, LOOPBACK, WEB_PORT, free_port, quiet_environment, running
+from viewers.rerun.shield import LOOPBACK, shielded
+from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
 
 PORT = 9095
 """Where the page is offered; another where it is in use."""
@@ -47,12 +48,13 @@ def browse_server(listed: EpisodeList, labels: Path | None, predictions: Path | 
     Yields:
         The address to open.
     """
-    web = free_port(WEB_PORT)
+    web, grpc = any_port(), free_port(GRPC_PORT)
+    viewer = ["--serve-web", "--bind", LOOPBACK, "--port", str(grpc), "--web-viewer-port", str(web)]
     with tempfile.TemporaryDirectory(prefix="tacdata-browse-") as folder, quiet_environment() as environment:
-        viewer = ["--serve-web", "--bind", LOOPBACK, "--port", str(free_port(GRPC_PORT)), "--web-viewer-port", str(web)]
-        pages = Pages(listed, labels, predictions, Path(folder), f"http://{LOOPBACK}:{web}")
-        with running(viewer, environment), serving(pages, free_port(PORT)):
-            yield f"{pages.address}/"
+        with running(viewer, environment), shielded(web, free_port(WEB_PORT)) as address:
+            pages = Pages(listed, labels, predictions, Path(folder), address)
+            with serving(pages, free_port(PORT)):
+                yield f"{pages.address}/"
 
 
 class Pages:
@@ -79,7 +81,12 @@ class Pages:
 
     def entries(self) -> dict[str, Any]:
         """Return the list, with the flags as they are now."""
-        rows = [asdict(entry) for entry in with_flags(self.listed.entries, read_flags(self.listed.root))]
+        flags = read_flags(self.listed.root)
+        by_file = {flag.file: flag for flag in flags.values()}
+        rows: list[dict[str, Any]] = [asdict(entry) for entry in with_flags(self.listed.entries, flags)]
+        for row in rows:
+            if row["flag"] and (flag := flags.get(row["recording"]) or by_file.get(row["file"])):
+                row |= {"flagged_at": flag.flagged_at, "flagged_by": flag.flagged_by}
         return {
             "root": str(self.listed.root), "units": UNITS, "episodes": rows, "remarks": self.listed.remarks,
             "viewer": self.viewer + "/?hide_welcome_screen&url=" + quote(self.address + "/episode/", safe=""),
@@ -144,6 +151,10 @@ def application(pages: Pages) -> FastAPI:
     @routes.get("/list")
     def entries() -> dict[str, Any]:
         return pages.entries()
+
+    @routes.get("/history")
+    def history() -> list[dict[str, Any]]:
+        return [asdict(change) for change in read_history(pages.listed.root)]
 
     @routes.get("/episode/{number}.rrd")
     def episode(number: int) -> FileResponse:

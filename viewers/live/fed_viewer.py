@@ -6,11 +6,12 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from viewers.rerun.window import GRPC_PORT, LOOPBACK, WEB_PORT, free_port, quiet_environment, running
+from viewers.rerun.shield import LOOPBACK, shielded
+from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
 
 START = 30.0
 """Longest wait for the viewer [s of real time]."""
@@ -39,13 +40,14 @@ def fed_viewer(web: bool) -> Iterator[FedViewer]:
         TimeoutError: If it does not listen.
     """
     with quiet_environment() as environment:
-        port, page = free_port(GRPC_PORT), free_port(WEB_PORT)
+        port, inner = free_port(GRPC_PORT), any_port()
         command = ["--bind", LOOPBACK, "--port", str(port), "--memory-limit", "500MB"]
         if web:
-            command += ["--serve-web", "--web-viewer-port", str(page), "--server-memory-limit", "200MB"]
-        with running(command, environment) as process:
+            command += ["--serve-web", "--web-viewer-port", str(inner), "--server-memory-limit", "200MB"]
+        with running(command, environment) as process, ExitStack() as shield:
             _wait_for(port)
-            address = f"http://{LOOPBACK}:{page}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{port}%2Fproxy"
+            page = shield.enter_context(shielded(inner, free_port(WEB_PORT))) if web else ""
+            address = f"{page}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{port}%2Fproxy"
             yield FedViewer(process, address if web else "", f"rerun+http://{LOOPBACK}:{port}/proxy")
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.demonstrations.compensation import contact_depth
-from tacdata.demonstrations.demonstration import Demonstration
+from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.demonstrations.recording.reader import DemoRecording
-from tacdata.replay.targets import FingertipTargets
+from tacdata.replay.targets import GUESS, FingertipTargets
 
 
 def of_demonstration(
@@ -47,11 +47,23 @@ def _tracks(made: Demonstration) -> list[str]:
             depth = contact_depth(track.depth)
             felt = f", predicted depth to {np.nanmax(depth, initial=0.0):.2f} mm"
         lines.append(
-            f"- **{name}** {track.sightings} sightings, {track.outliers} left out, {track.gap.mean():.0%} bridged{felt}"
+            f"- **{name}** {track.sightings} sightings, {track.outliers} left out, {_bridged(track, made.rate)}{felt}"
         )
     if made.network:
         lines.append(f"- **Depth** is an estimate by {made.network['network']}, checkpoint {made.network['hash'][:12]}")
     return lines
+
+
+def _bridged(track: FingerTrack, rate: float) -> str:
+    """Return how much of a path is bridged, and how much of that is a guess."""
+    spread = np.sqrt(np.max(np.diagonal(track.covariance[:, 3:, 3:], axis1=1, axis2=2), axis=1))
+    guess = track.gap & (spread > GUESS)
+    words = f"{track.gap.mean():.0%} bridged"
+    if not guess.any():
+        return words
+    return (
+        f"{words}, **of which {guess.sum() / rate:.1f} s are a guess** (known to {1000 * spread[guess].max():.0f} mm)"
+    )
 
 
 def of_targets(title: str, targets: FingertipTargets, others: int, joints: dict[str, np.ndarray] | None) -> str:

@@ -137,4 +137,5 @@ def thinned(curves: Curves) -> Curves:
     if len(curves.time_ns) <= thinning.CURVES:
         return curves
     rows = thinning.extremes(np.asarray(curves.values, dtype=float), thinning.CURVES)
-    return replace(curves, time_ns=curves.time_ns[rows], values=curves.values[rows])
+    doubtful = curves.doubtful[rows] if len(curves.doubtful) else curves.doubtful
+    return replace(curves, time_ns=curves.time_ns[rows], values=curves.values[rows], doubtful=doubtful)

@@ -24,14 +24,15 @@ COLORS = [tuple(channel / 255 for channel in hue) for hue in HUES]
 TITLE_LETTERS = 40
 """Letters of a line of a title above bars, of which three sets lie beside each other."""
 FULL = 6
-"""Sets of curves that a page holds."""
+"""Sets of curves that a page holds, unless it shows a hand."""
 
 
 def other_page(scene: Scene) -> Figure:
     """Return the page: words, fingertips in space, maps at up to three moments, bars, curves."""
     text = plain(scene.summary.replace("## ", ""))
     chosen = moments(scene) if scene.maps else ()
-    curves = [c for c in scene.curves if not c.name.startswith("clock/")][:FULL]
+    curves = [c for c in scene.curves if not c.name.startswith("clock/")]
+    curves = curves if scene.kind == "hand" else curves[:FULL]  # of a hand every finger has its own
     rows = (len(curves) + 1) // 2
     bars = max((len(b.values[:MOST_BARS]) for b in scene.bars), default=0)
     heights = {
@@ -85,7 +86,10 @@ def space(figure: SubFigure, scene: Scene) -> None:
             for doubtful, style in ((False, "-"), (True, ":")):
                 for k, strip in enumerate(trail.strips(doubtful)):
                     label = trail.name if k == 0 and not doubtful else None
-                    axes.plot(strip[:, across], strip[:, up], style, color=color, linewidth=1.5, label=label)
+                    axes.plot(
+                        strip[:, across], strip[:, up], style, color=color, linewidth=1.5, label=label,
+                        alpha=0.4 if trail.faint else 1.0,
+                    )  # fmt: skip
         for cloud in scene.clouds:
             own = cloud.position[_most(cloud)]
             axes.plot(*own[:, [across, up]].T, ".", color="0.2", markersize=0.8)
@@ -125,7 +129,7 @@ def bar_chart(axes: Axes, bars: Bars) -> None:
 
 
 def course(axes: Axes, curves: Curves, scene: Scene) -> None:
-    """Draw a set of curves over seconds."""
+    """Draw a set of curves over seconds, grey where they are doubtful."""
     array = next((a for a in scene.arrays if a.values.shape[1] == len(curves.labels)), None)
     colors = taxel_colors(array.columns, array.rows) / 255 if array is not None and len(curves.labels) > 6 else None
     seconds = panels.seconds(scene, curves.time_ns)
@@ -133,6 +137,11 @@ def course(axes: Axes, curves: Curves, scene: Scene) -> None:
         color = tuple(colors[k]) if colors is not None else COLORS[k % len(COLORS)]
         width, alpha = (3.5, 0.4) if label == "measured" else (1.1, 1.0)  # models are drawn over it, and fit it
         axes.plot(seconds, values, color=color, linewidth=width, alpha=alpha, label=label)
+    if len(curves.doubtful):
+        axes.fill_between(
+            seconds, 0, 1, where=curves.doubtful.tolist(), transform=axes.get_xaxis_transform(), color="0.85",
+            zorder=0, label="bridged",
+        )  # fmt: skip
     if len(curves.labels) <= 6:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=7, ncols=6, borderaxespad=0.1)
     axes.set_title(curves.name.replace("_", " ").replace("/", ": "), fontsize=10)

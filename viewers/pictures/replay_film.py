@@ -1,35 +1,49 @@
-"""Replays of a grasp or wipe as a film: from the side and from above, one replay beside the other."""
+"""Replays of a grasp or wipe as a film: one replay beside the other, with what was felt, forces and slip."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle
 
+from tacdata.replay.outcome import ReplayOutcome
+from tacdata.replay.targets import FingertipTargets
 from viewers.output_file import FILMS, new_file
+from viewers.pictures.felt_maps import FeltMaps
 from viewers.pictures.film import MOST, RATE, write_film
-from viewers.rerun.replay import BALL, COLORS, PAD, Replay
+from viewers.pictures.replay_object import ReplayObjectShape
+from viewers.scene.color_scale import HUES
 
-WIDTH, HEIGHT = 4.2, 6.4
-"""Of one replay in a frame [inch]."""
+WIDTH, MAPS, HEIGHT = 4.6, 2.3, 8.6
+"""Widths of a replay and of the depth maps, and height of a frame [inch]."""
 RESOLUTION = 80
 """Dots an inch."""
 MARGIN = 25.0
 """Around all that moves [mm]."""
+PAD = 9.0
+"""Radius at which pads are drawn [mm]."""
+MOST_SLIP = 5.0
+"""Upper end of the slip's axis [mm]; an object that is lost slides farther."""
+LETTERS = 62
+"""Letters of a line of the verdict."""
+NAMES = {"direct": "direct", "compensated": "compensated, gains as given", "chosen": "compensated, gain found"}
+"""Kind of replay -> what stands above it."""
 
 
-def film_replays(path: Path, replays: Mapping[str, Replay], sizes: tuple[float, ...]) -> None:
-    """Write a film of replays, by name.
+def film_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: FingertipTargets) -> None:
+    """Write a film of replays, by kind.
 
     Args:
         path: A new file that ends in .mp4 or .gif.
-        replays: Name -> replay.
-        sizes: Radius of the ball, or half the sizes of the eraser [m]: between the fingers, along the strokes, height.
+        replays: Kind -> its outcome.
+        seen: The targets that were replayed: the predicted maps are their demonstration's.
 
     Raises:
         UsageError: If the file exists, has another ending, or films of its kind cannot be written here.
@@ -37,11 +51,14 @@ def film_replays(path: Path, replays: Mapping[str, Replay], sizes: tuple[float, 
     new_file(path, *FILMS)
     rate, longest = RATE[path.suffix], max(float(replay.time[-1]) for replay in replays.values())
     times = np.linspace(0.0, longest, min(max(round(longest * rate), 2), MOST[path.suffix]))
-    write_film(path, _frames(replays, sizes, times))
+    write_film(path, replay_frames(replays, seen, times))
 
 
-def _frames(replays: Mapping[str, Replay], sizes: tuple[float, ...], times: np.ndarray) -> Iterator[np.ndarray]:
-    page = ReplayPage(replays, sizes)
+def replay_frames(
+    replays: Mapping[str, ReplayOutcome], seen: FingertipTargets, times: np.ndarray
+) -> Iterator[np.ndarray]:
+    """Yield the frames of a film at times since the beginning [s], uint8, shape (height, width, 3) each."""
+    page = ReplayPage(replays, seen)
     canvas = FigureCanvasAgg(page.figure)
     canvas.draw()
     page.figure.set_layout_engine("none")  # laid out once; every frame is alike
@@ -52,58 +69,97 @@ def _frames(replays: Mapping[str, Replay], sizes: tuple[float, ...], times: np.n
 
 
 class ReplayPage:
-    """All replays at one time: a column each, from the side and from above."""
+    """All replays at one time: a column each, from the side and from above, forces and slip; the maps beside."""
 
-    def __init__(self, replays: Mapping[str, Replay], sizes: tuple[float, ...]) -> None:
-        """Draw the beginning; ``replays`` and ``sizes`` [m] as in `film_replays`."""
-        self._replays, self._sizes = replays, 1000 * np.array(sizes)
-        ends = _ends(replays, sizes)
-        heights = [np.ptp(ends[:, 2]), np.ptp(ends[:, 1])]
-        self.figure = Figure(figsize=(WIDTH * len(replays), HEIGHT), dpi=RESOLUTION, layout="constrained")
-        self._axes = self.figure.subplots(2, len(replays), squeeze=False, height_ratios=heights)
-        self._objects: dict[tuple[str, int], Any] = {}
-        self._pads: dict[tuple[str, int], list[Circle]] = {}
-        for column, (name, replay) in enumerate(replays.items()):
+    def __init__(self, replays: Mapping[str, ReplayOutcome], seen: FingertipTargets) -> None:
+        """Draw the beginning; arguments as in `film_replays`."""
+        self._replays, self._gap = replays, seen.gap
+        count = len(replays)
+        self.figure = Figure(figsize=(WIDTH * count + MAPS, HEIGHT), dpi=RESOLUTION, layout="constrained")
+        parts: Any = self.figure.subfigures(1, 2, width_ratios=[WIDTH * count, MAPS])
+        ends = _ends(replays)
+        heights = [*(np.ptp(ends[:, up]) / np.ptp(ends[:, 0]) * 3.0 for up in (2, 1)), 1.2, 1.2]
+        self._axes = parts[0].subplots(4, count, squeeze=False, height_ratios=heights)
+        self._objects: dict[tuple[str, int], ReplayObjectShape] = {}
+        self._pads: dict[tuple[str, int], list[tuple[Circle, Any]]] = {}
+        self._lines: list[Any] = []
+        most = 1.3 * max(_strongest(replay) for replay in replays.values()) + 0.1
+        for column, (kind, replay) in enumerate(replays.items()):
             for row, up in enumerate((2, 1)):
                 axes = self._axes[row, column]
-                axes.set(xlim=ends[:, 0], ylim=ends[:, up], ylabel="z [mm]" if up == 2 else "y [mm]", aspect="equal")
-                self._add(axes, name, up, replay.tips.shape[1])
-            self._axes[1, column].set_xlabel("x [mm]")
+                axes.set(xlim=ends[:, 0], ylim=ends[:, up], aspect="equal")
+                axes.set_ylabel(("side: z" if up == 2 else "above: y") + " [mm]", fontsize=8)
+                self._objects[kind, up] = ReplayObjectShape(axes, replay, up)
+                self._pads[kind, up] = [_pad(axes, name, k) for k, name in enumerate(replay.fingers)]
+            self._axes[1, column].set_xlabel("x [mm]", fontsize=8)
+            for row, name, values, top in (
+                (2, "normal force [N]", replay.path.force, most),
+                (3, "slip [mm]", 1000 * replay.path.slip, MOST_SLIP),
+            ):
+                self._lines.append(_curves(self._axes[row, column], replay, name, values, top, self._gap))
+            self._axes[2, column].legend(loc="upper left", fontsize=7, ncols=4, frameon=False)
+            self._axes[3, column].set_xlabel("time [s]", fontsize=8)
+            for axes in self._axes[:, column]:
+                axes.tick_params(labelsize=7)
+        self._maps = FeltMaps(parts[1], seen)
         self.show(0.0)
-
-    def _add(self, axes: Any, name: str, up: int, count: int) -> None:
-        color, sizes = np.array(BALL) / 255, self._sizes
-        shape = Circle((0, 0), sizes[0], color=color)
-        if len(sizes) > 1:
-            shape = Rectangle((0, 0), 2 * sizes[0], 2 * sizes[up], color=color)
-        pads = [
-            Circle((0, 0), 1000 * PAD, color=np.array(COLORS[k % len(COLORS)]) / 255, alpha=0.8) for k in range(count)
-        ]
-        for patch in (shape, *pads):
-            axes.add_patch(patch)
-        self._objects[name, up], self._pads[name, up] = shape, pads
 
     def show(self, time: float) -> None:
         """Move everything to where it was at a time since the beginning [s]."""
-        for column, (name, replay) in enumerate(self._replays.items()):
+        for line in self._lines:
+            line.set_xdata([time, time])
+        for column, (kind, replay) in enumerate(self._replays.items()):
             row = min(int(np.searchsorted(replay.time, time)), len(replay.time) - 1)
-            ball, tips = 1000 * replay.ball[row], 1000 * replay.tips[row]
             for up in (2, 1):
-                shape = self._objects[name, up]
-                if isinstance(shape, Circle):
-                    shape.center = ball[0], ball[up]
-                else:
-                    shape.set_xy((ball[0] - self._sizes[0], ball[up] - self._sizes[up]))
-                for pad, tip in zip(self._pads[name, up], tips, strict=True):
-                    pad.center = tip[0], tip[up]
-            height = 1000 * float(replay.ball[row, 2] - replay.ball[0, 2])
-            verdict = "held" if replay.held else "lost"
-            words = f"{name}: {verdict}\n{time:.1f} s, object at {height:+.0f} mm"
-            self._axes[0, column].set_title(words, fontsize=10)
+                self._objects[kind, up].show(row)
+                for k, (circle, name) in enumerate(self._pads[kind, up]):
+                    place = 1000 * replay.path.tips[row, k]
+                    circle.center = place[0], place[up]
+                    circle.set_fill(not self._gap[row, k])
+                    below = k % 3 == 2  # the middle finger often hides the index finger
+                    name.set_position((place[0], place[up] - 2.2 * PAD if below else place[up] + PAD))
+            height = 1000 * float(replay.path.centre[row, 2] - replay.path.centre[0, 2])
+            verdict = replay.reason if time >= replay.decided else ""
+            title = f"{NAMES.get(kind, kind)}\n{time:.1f} s, object at {height:+.0f} mm\n"
+            self._axes[0, column].set_title(title + _two_lines(verdict), fontsize=9, loc="left")
+        self._maps.show(min(int(np.searchsorted(replay.time, time)), len(replay.time) - 1))
 
 
-def _ends(replays: Mapping[str, Replay], sizes: tuple[float, ...]) -> np.ndarray:
+def _strongest(replay: ReplayOutcome) -> float:
+    """Return the largest force on a pad until the verdict falls [N]; afterwards empty fingers may hit anything."""
+    return float(replay.path.force[replay.time <= replay.decided].max())
+
+
+def _two_lines(words: str) -> str:
+    lines = fill(words, LETTERS).splitlines()[:2]
+    return "\n".join([*lines, *[" "] * (2 - len(lines))])
+
+
+def _pad(axes: Axes, finger: str, number: int) -> tuple[Circle, Any]:
+    color = tuple(channel / 255 for channel in HUES[number % len(HUES)])
+    circle = Circle((0, 0), PAD, facecolor=color, edgecolor=color, alpha=0.8)
+    axes.add_patch(circle)
+    return circle, axes.text(0, 0, finger, fontsize=7, ha="center", va="bottom", color=color)
+
+
+def _curves(axes: Axes, replay: ReplayOutcome, name: str, values: np.ndarray, most: float, gap: np.ndarray) -> Any:
+    """Draw a quantity of every pad over time, grey where a path is bridged; return the line at the time."""
+    for k, finger in enumerate(replay.fingers):
+        color = tuple(channel / 255 for channel in HUES[k % len(HUES)])
+        axes.plot(replay.time, values[:, k], color=color, linewidth=1.2, label=finger)
+    if gap.any():
+        bridged = gap.any(axis=1).tolist()
+        axes.fill_between(
+            replay.time, 0, 1, where=bridged, transform=axes.get_xaxis_transform(), color="0.85", zorder=0,
+            label="path bridged",
+        )  # fmt: skip
+    axes.set(xlim=(replay.time[0], replay.time[-1]), ylim=(0, most))
+    axes.set_ylabel(name, fontsize=8)
+    return axes.axvline(0.0, color="black", linewidth=1)
+
+
+def _ends(replays: Mapping[str, ReplayOutcome]) -> np.ndarray:
     """Return least and largest x, y and z of all that moves, with a margin [mm], shape (2, 3)."""
-    places = np.concatenate([p.reshape(-1, 3) for replay in replays.values() for p in (replay.ball, replay.tips)])
-    reach = MARGIN + 1000 * max(sizes)
+    places = np.concatenate([p.reshape(-1, 3) for r in replays.values() for p in (r.path.centre, r.path.tips)])
+    reach = MARGIN + 1000 * max(max(replay.scene.body.sizes) for replay in replays.values())
     return np.stack([1000 * places.min(axis=0) - reach, 1000 * places.max(axis=0) + reach])

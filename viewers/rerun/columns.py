@@ -197,7 +197,8 @@ class RerunParts:
 
     def _trail(self, trail: MotionTrail) -> None:
         color = HUES[trail.hue % len(HUES)]
-        for name, doubtful, own in (("seen", False, (*color, 255)), ("bridged", True, (*color, 90))):
+        full, pale = (110, 50) if trail.faint else (255, 90)
+        for name, doubtful, own in (("seen", False, (*color, full)), ("bridged", True, (*color, pale))):
             strips = trail.strips(doubtful)
             if strips:
                 self._static(f"world/paths/{trail.name}/{name}", rr.LineStrips3D(strips, colors=[own]))

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tacdata.errors import UsageError
+from viewers.rerun.shield import LOOPBACK, shielded
 
-LOOPBACK = "127.0.0.1"
 GRPC_PORT, WEB_PORT = 9876, 9090
 """Rerun's own ports; others are taken where these are in use."""
+
+_BY_SIGNAL = 128
+"""Exit status of a program that a signal ended, less the signal's number, as POSIX shells count."""
 
 
 def has_display() -> bool:
@@ -46,10 +51,15 @@ def free_port(preferred: int) -> int:
         try:
             probe.bind((LOOPBACK, preferred))
         except OSError:
-            with socket.socket() as other:
-                other.bind((LOOPBACK, 0))
-                return other.getsockname()[1]
+            return any_port()
     return preferred
+
+
+def any_port() -> int:
+    """Return a free port on the loopback."""
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return probe.getsockname()[1]
 
 
 @contextmanager
@@ -114,21 +124,11 @@ def web_server(file: Path) -> Iterator[tuple[subprocess.Popen, str]]:
     Yields:
         The serving process and the address to open.
     """
-    grpc, web = free_port(GRPC_PORT), free_port(WEB_PORT)
-    with quiet_environment() as environment:
-        command = [
-            executable(),
-            "--serve-web",
-            "--bind",
-            LOOPBACK,
-            "--port",
-            str(grpc),
-            "--web-viewer-port",
-            str(web),
-            str(file),
-        ]
-        with _running(command, environment) as server:
-            yield server, f"http://{LOOPBACK}:{web}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{grpc}%2Fproxy"
+    grpc, web = free_port(GRPC_PORT), any_port()
+    arguments = ["--serve-web", "--bind", LOOPBACK, "--port", str(grpc), "--web-viewer-port", str(web), str(file)]
+    with quiet_environment() as environment, running(arguments, environment) as server:
+        with shielded(web, free_port(WEB_PORT)) as page:
+            yield server, f"{page}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{grpc}%2Fproxy"
 
 
 @contextmanager
@@ -140,16 +140,36 @@ def running(arguments: list[str], environment: dict[str, str]) -> Iterator[subpr
 
 @contextmanager
 def _running(command: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen]:
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        yield process
-    finally:
-        process.terminate()
+    with _ended_in_order():
+        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            process.wait(timeout=10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+            yield process
+        finally:
+            process.terminate()
+            try:
+                process.wait(timeout=10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """Unwind when this process is asked to end, so that no viewer outlives it; a handler that is set already stays."""
+
+    def end(number: int, _: object) -> None:
+        raise SystemExit(_BY_SIGNAL + number)
+
+    asked = (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
+    main = threading.current_thread() is threading.main_thread()  # only there may handlers be set
+    ours = [number for number in asked if main and signal.getsignal(number) is signal.SIG_DFL]
+    for number in ours:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def until_interrupted() -> None:

@@ -46,6 +46,8 @@ class Curves:
     """Times [ns], shape (n,), int64, increasing."""
     values: np.ndarray
     """Values [unit], shape (n, curves); NaN where nothing was measured."""
+    doubtful: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    """Where they are bridged and not measured, shape (n,), bool; empty where none is."""
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,8 @@ class MotionTrail:
     """Where it is a bridge and no measurement, shape (n,), bool."""
     hue: int = 0
     """Which of `color_scale.HUES`."""
+    faint: bool = False
+    """Whether it is drawn pale, beside another path of the same hue."""
 
     def strips(self, doubtful: bool) -> list[np.ndarray]:
         """Return the stretches that are doubtful, or those that are not [mm], each of shape (m, 3), m >= 2."""

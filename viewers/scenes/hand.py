@@ -64,12 +64,13 @@ def targets_scene(
     time, trails, bodies, curves = targets.time_ns, [], [], []
     for k, name in enumerate(targets.fingers):
         wanted, seen = 1000 * targets.position[:, k], 1000 * targets.seen[:, k]
-        trails.append(MotionTrail(f"{name}/seen", seen, targets.gap[:, k], 5))
+        trails.append(MotionTrail(f"{name}/seen", seen, targets.gap[:, k], k, faint=True))
         trails.append(MotionTrail(f"{name}/target", wanted, targets.gap[:, k], k))
         bodies.append(pad(name, time, wanted, targets.quaternion[:, k], None))
-        curves.append(Curves(f"target/{name}", "mm", ("x", "y", "z"), time, wanted))
+        gap = _marked(targets.gap[:, k])
+        curves.append(Curves(f"target/{name}", "mm", ("x", "y", "z"), time, wanted, gap))
         moved = np.linalg.norm(wanted - seen, axis=1)[:, None]
-        curves.append(Curves(f"moved/{name}", "mm", ("by touch",), time, moved))
+        curves.append(Curves(f"moved/{name}", "mm", ("by touch",), time, moved, gap))
     if np.isfinite(targets.depth).any():
         curves.insert(0, Curves("predicted depth", "mm", targets.fingers, time, targets.depth))
     if joints:
@@ -109,8 +110,9 @@ def _with_tracks(scene: Scene, made: Demonstration) -> Scene:
         depth = np.column_stack([contact_depth(t.depth) for t in felt.values() if t.depth is not None])
         curves.append(Curves("predicted depth", "mm", tuple(felt), time, depth))
     for name, track in made.tracks.items():
-        curves.append(Curves(f"fingertip/{name}", "mm", ("x", "y", "z"), time, 1000 * track.position))
-        curves.append(Curves(f"spread/{name}", "mm", ("position",), time, 1000 * spread(track)[:, None]))
+        gap = _marked(track.gap)
+        curves.append(Curves(f"fingertip/{name}", "mm", ("x", "y", "z"), time, 1000 * track.position, gap))
+        curves.append(Curves(f"spread/{name}", "mm", ("position",), time, 1000 * spread(track)[:, None], gap))
         sensor = made.sensors.get(name)
         if sensor is not None and name in felt:
             own = depth_of(name, sensor, time, track, scale)
@@ -128,6 +130,11 @@ def _with_tracks(scene: Scene, made: Demonstration) -> Scene:
             pad(n, time, 1000 * t.position, t.quaternion, made.sensors.get(n)) for n, t in made.tracks.items()
         ),
     )
+
+
+def _marked(gap: np.ndarray) -> np.ndarray:
+    """Return where a path is bridged, shape (n,), or an empty array if nowhere."""
+    return gap if gap.any() else gap[:0]
 
 
 def spread(track: FingerTrack) -> np.ndarray:

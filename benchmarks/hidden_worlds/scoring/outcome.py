@@ -37,9 +37,16 @@ def outcome(truth, verdict):
     whole = [{m["mechanism"], *m["alternatives"]} for m in members]
     expected = truth["expected"]
     if expected == "none":
-        return {"none": "right none", "named": "false name"}.get(status, "false alarm without a name")
+        if status == "none":
+            return "right none"
+        return "false name" if status.startswith("named") and certain else "false alarm without a name"
     if status == "none":
         return "missed"
+    if expected == "part" or status == "named, incomplete":
+        wrong = any(not any(c <= accepted(h) for h in hidden) for c in certain)
+        if wrong or not certain:
+            return "wrong name" if wrong else "unknown"
+        return "overclaim" if expected == "set" else "success" if expected == "part" else "set with the truth"
     if status == "named":
         if expected == "set":
             return "overclaim"

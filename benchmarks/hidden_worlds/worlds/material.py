@@ -36,6 +36,14 @@ def creep(w, s):
     w.load = w.load - 0.12 * s * (w.load - follow)
 
 
+@hidden("skin", "loading and unloading", called=("viscosity",), fitted=True, most=6)
+def viscous_gain(w, s):
+    """Loads rise with the rate of pressing, as its square root."""
+    v = np.gradient(w.pose[:, 2]) / w.step
+    v[w.fresh] = 0
+    w.load = w.load * (1 + 0.06 * s * np.sign(v) * np.sqrt(np.abs(np.clip(v, -4, 4))))[:, None]
+
+
 @hidden("skin", "hold time", fitted=True, most=6)
 def poroelasticity(w, s):
     """Fluid leaves the contact: the time goes with the area under the tip, two modes of diffusion."""

@@ -11,14 +11,6 @@ def outside(stage, group, **more):
     return hidden(stage, group, called=(), fitted=True, **more)
 
 
-@outside("skin", "loading and unloading", most=6)
-def viscous_gain(w, s):
-    """Loads rise with the rate of pressing, as its square root."""
-    v = np.gradient(w.pose[:, 2]) / w.step
-    v[w.fresh] = 0
-    w.load = w.load * (1 + 0.06 * s * np.sign(v) * np.sqrt(np.abs(np.clip(v, -4, 4))))[:, None]
-
-
 @outside("readout", "per channel", most=8)
 def telegraph(w, s):
     """Channels jump between two levels at random, every six seconds."""

@@ -30,17 +30,26 @@ def run(
     tolerance: Annotated[float, typer.Option(min=0.0, help="As of `tacdata label` [mm].")] = 0.005,
     load_step: Annotated[float, typer.Option(help="Largest depth step while loading [mm].")] = 0.25,
     unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
+    wait: Annotated[
+        float, typer.Option(min=0.0, help="Longest wait for the service to look at the recordings [s].")
+    ] = 10.0,
 ) -> Result:
     """Ask for the labels of a session and walk away; `tacdata farm status` says how far they are."""
-    from label_farm.remote.client import Client
+    from label_farm.remote.client import Client, refusal
 
     wish = {
         "session": session, "by": by or f"{getpass.getuser()}@{socket.gethostname()}", "priority": priority,
         "sensor": sensor or None, "dataset": into or None, "redo": redo, "uncertainty": uncertainty,
         "tolerance": tolerance, "load_step": load_step, "unload_step": unload_step,
     }  # fmt: skip
-    filed = Client(url, token).post("/api/submissions", wish)
-    print(f"submission {filed['id']} of {session} is filed")
+    client = Client(url, token)
+    filed = client.post("/api/submissions", wish)
+    print(f"submission {filed['id']} of {session} is filed", flush=True)
+    filed = client.planned(filed["id"], wait) if wait else filed
+    if filed["state"] == "refused":
+        return Result(filed, refusal(filed))
+    if wait and filed["state"] in ("waiting", "planning"):
+        say(f"the service has not looked at its recordings within {wait:g} s: it may still refuse them")
     suggest("farm status", filed["id"])
     say(f"or open {url} in a browser")
     return Result(filed)

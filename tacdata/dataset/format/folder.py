@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from tacdata.dataset.format.statistics import STATISTICS, Statistics, merge
 from tacdata.errors import FormatError, UsageError
 from tacdata.replacement import replacement
 
-CODEBASE_VERSION = "v3.0"
+CODEBASE_VERSION, OLDER = "v3.0", "v2.1"
 FILES_PER_CHUNK = 1000
 INFO, STATS, TASKS = Path("meta/info.json"), Path("meta/stats.json"), Path("meta/tasks.parquet")
 
@@ -106,9 +107,16 @@ def read_info(root: Path) -> dict[str, Any]:
         raise FormatError(
             f"{root / INFO}: LeRobot format {version}" if complete else f"{root / INFO} lacks counts or features",
             f"LeRobot format {CODEBASE_VERSION}",
-            "convert it with lerobot (python -m lerobot.scripts.convert_dataset_v21_to_v30), or pack the session again",
+            _converted(root) if complete and version == OLDER else "convert it with lerobot, or pack the session again",
         )
     return info
+
+
+def _converted(root: Path) -> str:
+    """Return the command of lerobot that brings a folder of the version before to the present one."""
+    name = quote(f"local/{root.resolve().name}")
+    options = f"--repo-id={name} --root={quote(str(root))} --push-to-hub=false"
+    return f"python -m lerobot.scripts.convert_dataset_v21_to_v30 {options}  (the extra learn brings it)"
 
 
 def write_parquet(path: Path, table: pa.Table) -> None:

@@ -12,6 +12,7 @@ import os
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import schemas
@@ -129,8 +130,7 @@ def lost(root: Path) -> FormatError:
     return FormatError(
         f"{root} has no {MAIN}: the tool that last edited it dropped the sensor description and the units",
         f"a dataset with {MAIN} and {RECORDS}",
-        f"copy both files from the dataset that it was made from, or call "
-        f"tacdata.dataset.restore({str(root)!r}, SOURCES)",
+        f"tacdata dataset restore {quote(str(root))} SOURCE, with the dataset or datasets that it was made from",
     )
 
 

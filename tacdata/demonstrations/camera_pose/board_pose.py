@@ -10,8 +10,12 @@ import numpy as np
 from tacdata.demonstrations.paths.motion_filter import exponential
 from tacdata.errors import UsageError
 from tacdata.tags.board import Board
+from tacdata.tags.calibration.board_mismatch import mismatch
 from tacdata.tags.calibration.board_view import find_board
 from tacdata.tags.camera import PinholeCamera
+
+SAMPLE = 4
+"""Images without the board that are kept, to find out why."""
 
 
 def board_poses(
@@ -39,11 +43,12 @@ def board_poses(
         PinholeCamera.from_document(intrinsics),
         np.asarray(board.opencv.getChessboardCorners(), float) / 1000,
     )
-    poses, squares, spreads = [], [], []
+    poses, squares, spreads, empty = [], [], [], []
     for name, image in images:
         camera.check(image)
         view = find_board(image, board, name)
         if view is None:
+            empty = [*empty, image][-SAMPLE:]
             continue
         places = corners[view.ids]
         good, turn, shift = cv2.solvePnP(places, view.corners, camera.matrix, camera.distortion)
@@ -59,8 +64,12 @@ def board_poses(
         variance = float((off**2).sum()) / max(2 * len(off) - 6, 1)
         spreads.append(_camera_spread(places, pose, camera, variance))
     if not poses:
-        allowed = "images with 8 or more of its corners"
-        raise UsageError("no image shows the board", allowed, "check the board file and the light")
+        why = mismatch(empty, board)
+        raise UsageError(
+            "no image shows the board" + (f"; instead, {why.found}" if why else ""),
+            "images with 8 or more of its corners",
+            why.remedy if why else "check the board file and the light",
+        )
     return poses, float(np.sqrt(np.mean(squares))), float(np.median(spreads))
 
 

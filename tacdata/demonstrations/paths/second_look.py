@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
 from tacdata.demonstrations.recording.reader import DemoRecording
+from tacdata.errors import FormatError, UsageError
 from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.episode import TagStream
 from tacdata.recording.files import topics
 from tacdata.recording.files.camera_arrays import image_times
 from tacdata.recording.files.mcap_records import read_records
+from tacdata.tags.detection.unread import Unread, why_unread
 from tacdata.tags.tips import TipPose
 from tacdata.tags.tracker import FingerTracker
+
+SAMPLE = 8
+"""Images, spread over a recording, that a second look takes."""
 
 
 def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambda done: None) -> DemoRecording:
@@ -57,6 +63,29 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
     return replace(
         recording, views=tuple(views), notes=(*notes, *dict.fromkeys(remarks)), searched=searched
     )  # fmt: skip
+
+
+def why_nothing_is_seen(recording: DemoRecording) -> Unread | None:
+    """Return why the stored images of a demonstration show no tag that can be read; None if that is not known."""
+    kept: list[bytes] = []
+    stride, count = 1, 0
+
+    def sample(topic: str, message: bytes | memoryview) -> None:
+        nonlocal stride, count
+        if topic not in image_topics:
+            return
+        if count % stride == 0:
+            kept.append(bytes(message))
+        count += 1
+        if len(kept) == 2 * SAMPLE:
+            stride *= 2
+            kept[:] = kept[::2]
+
+    image_topics = {topics.image(name) for name in recording.rig.cameras}
+    with suppress(UsageError, FormatError):  # the file may be gone by now: then nothing more is known
+        read_records(recording.path, images=False, digests=False, seen=sample)
+    images = (_image(message) for message in kept[:: -(-len(kept) // SAMPLE) or 1])
+    return why_unread([image for image in images if image is not None])
 
 
 def _image(message: bytes) -> np.ndarray | None:

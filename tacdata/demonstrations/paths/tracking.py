@@ -15,6 +15,7 @@ from tacdata.demonstrations.paths import path_faults
 from tacdata.demonstrations.paths.acquisition import acquire
 from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.motion_filter import GATE, Smoothed
+from tacdata.demonstrations.paths.second_look import why_nothing_is_seen
 from tacdata.demonstrations.paths.sightings import FLOOR, Sightings, sightings_of
 from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.errors import FormatError, UsageError
@@ -65,10 +66,7 @@ def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | N
     remarks += [f"{n}: seen in {len(s)} images, too few for a path" for n, s in seen.items() if len(s) < FEWEST]
     seen = {name: found for name, found in seen.items() if len(found) >= FEWEST}
     if not seen or len(times) < 2:
-        raise FormatError(
-            f"{recording.path}: no finger was seen in {FEWEST} images", "one finger with a visible cube",
-            "check light, focus, tag numbers and intrinsics with one image first",
-        )  # fmt: skip
+        raise _nothing_seen(recording)
     paths, settings = {}, {}
     # A finger can only be missing where an image was searched: these are the images' times.
     looked = np.unique(np.concatenate([view.sample_ns for view in recording.views]))
@@ -101,6 +99,15 @@ def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | N
         estimator.identity if estimator else None, tuple(dict.fromkeys(remarks)),
         provenance.stamp("tacdata track", parents, {"rate": rate}),
     )  # fmt: skip
+
+
+def _nothing_seen(recording: DemoRecording) -> FormatError:
+    why = why_nothing_is_seen(recording)
+    return FormatError(
+        f"{recording.path}: no finger was seen in {FEWEST} images" + (f"; {why.found}" if why else ""),
+        "one finger with a visible cube, its tags of the family 36h11",
+        why.remedy if why else "check light, focus, tag numbers and intrinsics with one image first",
+    )
 
 
 def _path(

@@ -11,6 +11,7 @@ from tacdata.demonstrations.recording.recorder import DemoRecorder
 from tacdata.demonstrations.recording.rig import read_demo_rig
 from tacdata.demonstrations.recording.session import DemoSession, open_demo_session
 from tacdata.errors import UsageError
+from tacdata.recording.files import file_names
 from tacdata.recording.live.detection_process import in_background
 from tacdata.tags import look
 
@@ -50,9 +51,20 @@ def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count
                     if stop.asked():
                         break
                 return recorder.session
-        except BaseException:
+        except BaseException as error:
             _forget_if_empty(out, resume)
+            error.add_note(_ending(out))
             raise
+
+
+def _ending(out: Path) -> str:
+    """Return the last lines on the screen: what is on the disk, and what comes next."""
+    if not out.is_dir():
+        return "  data:   nothing was written\n  then:   the same command"
+    broken = file_names.unfinished(out)
+    lines = [f"data:   {len(file_names.finished(out))} demonstrations are complete in {out}"]
+    lines += [f"data:   broken off, readable: {', '.join(path.name for path in broken[-3:])}"] if broken else []
+    return "\n".join(f"  {line}" for line in [*lines, "then:   the same command with --resume"])
 
 
 def _enter() -> bool:

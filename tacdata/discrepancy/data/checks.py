@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tacdata.discrepancy.data.sufficiency import FEWEST_EPISODES, shortcomings, units
+from tacdata.discrepancy.data.idle_lines import idle_lines
+from tacdata.discrepancy.data.single_channels import odd_channels
+from tacdata.discrepancy.data.sufficiency import FEWEST_EPISODES, shortcomings
 from tacdata.discrepancy.data.wiring import miswired
 from tacdata.discrepancy.model.setting import Setting
 
@@ -22,17 +24,17 @@ class DataChecks:
     """Number of episodes."""
     wiring: tuple[str, ...] = ()
     """Channels that are not those of the model: no verdict."""
-    units: tuple[str, ...] = ()
-    """Values of another size than their unit: no verdict."""
     shortcomings: tuple[str, ...] = ()
     """What is missing from the recordings, each with its remedy."""
     base: tuple[str, ...] = ()
     """What the model that they are held against leaves open."""
+    watched: tuple[str, ...] = ()
+    """What idle stretches and single channels show that no effect of the library does."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """What keeps these recordings from any verdict."""
-        return (*self.wiring, *self.units)
+        """What keeps these recordings from any verdict. A unit that was stated is believed: a doubt is a remark."""
+        return self.wiring
 
     @property
     def too_few(self) -> bool:
@@ -45,5 +47,6 @@ def check(setting: Setting) -> DataChecks:
     course, response = setting.course, setting.response
     wiring = () if setting.given else tuple(miswired(course, response))
     return DataChecks(
-        course.episodes, wiring, tuple(units(course)), tuple(shortcomings(course)), (FITTED,) if response.fitted else ()
-    )
+        course.episodes, wiring, tuple(shortcomings(course)),
+        (FITTED,) if response.fitted else (), (*idle_lines(course), *odd_channels(course, response)),
+    )  # fmt: skip

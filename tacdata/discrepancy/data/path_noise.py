@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tacdata.chain.spikes import without_spikes
+
 WINDOWS = (2, 4, 8, 16, 32, 64)
 """Rows on either side that a straight line is laid through [1]."""
 AGREE_Z = 2.0
@@ -13,6 +15,12 @@ LEAST_NOISE = 1e-5
 CORNER = 0.02
 """Where a path turns by more between its positions than this share of its stroke, nobody knows how it turned [1]."""
 
+DROPOUT = 0.05
+"""A position that jumps there and back by this share of the stroke is a dropout [1]..."""
+MOST_LOST = 0.02
+"""...if no larger a share of a sampled path does so [1]..."""
+FEWEST_SAMPLED = 100
+"""...of so many positions, at least: a path that is given by its corners turns at single ones."""
 FEWEST_POSITIONS = 20
 """Fewer positions estimate no noise."""
 REGULAR = 0.9
@@ -105,3 +113,23 @@ def _smoothed(time: np.ndarray, values: np.ndarray, noise: float) -> np.ndarray:
         open_ &= (low <= high) & (reach == width)
         result[open_] = line[open_]
     return result + mean
+
+
+def without_dropouts(time_ns: np.ndarray, tip: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return a path without positions that jump far away and back at once, and how many did.
+
+    A controller that misses an answer writes a zero: each would cut a press in two.
+
+    Args:
+        time_ns: Of the positions, in their order, shape (n,).
+        tip: The positions [mm], shape (n, 3).
+    """
+    step = np.diff(time_ns)
+    if len(tip) < FEWEST_SAMPLED or np.mean(step <= 2 * np.median(step)) < REGULAR:
+        return tip, 0
+    cleaned = without_spikes(tip)
+    far = np.abs(tip - cleaned) > DROPOUT * np.maximum(np.ptp(cleaned, axis=0), 1e-9)
+    lost = far.any(axis=1)
+    if not 0 < lost.mean() < MOST_LOST:
+        return tip, 0
+    return np.where(lost[:, None], cleaned, tip), int(lost.sum())

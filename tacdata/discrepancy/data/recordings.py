@@ -10,7 +10,7 @@ import numpy as np
 from tacdata.chain import Course, Tool
 from tacdata.chain.rows import Rows, rows_of
 from tacdata.discrepancy.data.channels import in_source, readings, usable
-from tacdata.discrepancy.data.path_noise import resolved, without_noise
+from tacdata.discrepancy.data.path_noise import resolved, without_dropouts, without_noise
 from tacdata.discrepancy.data.strokes import strokes
 from tacdata.discrepancy.data.tip_observation import Views, second_views
 from tacdata.errors import FormatError, UsageError
@@ -69,7 +69,7 @@ def course_of(paths: list[Path]) -> Course:
         )  # fmt: skip
     recordings = [r for _, r in every]
     kept, left_out = usable([readings(r) for r in recordings])
-    notes += in_source(recordings, min(counts)) + left_out
+    notes += in_source(recordings, min(counts)) + left_out + _dropouts([e for _, e in found])
     names = sorted({m.name for _, e in found for m in e.measured})
     force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
     views: dict[int, Views] = {}
@@ -105,6 +105,14 @@ def _of_one_sensor(episodes: list[Episode]) -> list[str]:
             "judge them one at a time",
         )  # fmt: skip
     return [f"recordings name {len(names)} sensors ({', '.join(names[:4])}): judge them apart, unless they are one"]
+
+
+def _dropouts(episodes: list[Episode]) -> list[str]:
+    """Return in words how many positions were set aside."""
+    lost = [without_dropouts(e.tip_ns, e.tip)[1] for e in episodes if len(e.tip_ns)]
+    if not any(lost):
+        return []
+    return [f"position: {sum(lost)} values in {np.count_nonzero(lost)} recordings jump there and back: set aside"]
 
 
 def _files(path: Path) -> list[Path]:
@@ -161,7 +169,7 @@ def _strokes_of(
         return []
     tool = _tool(episode)
     made = []
-    tip, _ = without_noise(episode.tip_ns, episode.tip)
+    tip, _ = without_noise(episode.tip_ns, without_dropouts(episode.tip_ns, episode.tip)[0])
     known = resolved(episode.tip_ns, tip[:, 2], time_ns)
     spans = _to_the_end(strokes(episode.tip_ns, tip[:, 2]), tip[:, 2], time_ns)
     for number, (first, last) in enumerate(spans):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.search.findings import FoundEffect
+from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.j_test import NEEDED_Z, necessity
 from tacdata.discrepancy.search.problem import Problem, prepare
@@ -28,6 +28,8 @@ class Answer:
 
     findings: tuple[FoundEffect, ...]
     model: Refined
+    comparisons: tuple[RivalModels, ...] = ()
+    """Of each effect, where rivals were tried."""
 
 
 def eliminate(setting: Setting, selection: Selection, problem: Problem) -> Answer:
@@ -48,7 +50,7 @@ def eliminate(setting: Setting, selection: Selection, problem: Problem) -> Answe
         answer = _needed(setting, selection, model, problem, SWAPS)
         p = _p_values(setting, selection, answer.model)
     found = tuple(replace(f, corrected_p=share) for f, share in zip(answer.findings, p, strict=True))
-    return Answer(found, answer.model)
+    return replace(answer, findings=found)
 
 
 def _needed(setting: Setting, selection: Selection, model: Refined, problem: Problem, swaps: int) -> Answer:
@@ -66,14 +68,15 @@ def _needed(setting: Setting, selection: Selection, model: Refined, problem: Pro
         placed = list(model.placed)
     if len(placed) == 1:
         without = {0: refine(setting, [], null)}
-    made = []
+    made, compared = [], []
     for k in range(len(placed)):
         tried = try_rivals(setting, model, without[k], k, problem, pooled)
         if tried.better is not None and swaps > 0:
             # A rival that was behind to first order is ahead on the chain: it takes the place.
             return _needed(setting, selection, tried.better, problem, swaps - 1)
         made.append(tried.finding)
-    return Answer(tuple(made), model)
+        compared.append(tried.comparison)
+    return Answer(tuple(made), model, tuple(compared))
 
 
 def _p_values(setting: Setting, selection: Selection, model: Refined) -> list[float]:

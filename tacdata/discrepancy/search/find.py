@@ -9,7 +9,7 @@ from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.detection_limits import detection_limits
 from tacdata.discrepancy.search.elimination import Answer, eliminate
 from tacdata.discrepancy.search.findings import STEPS, Findings, FoundEffect
-from tacdata.discrepancy.search.fits import channel_gains
+from tacdata.discrepancy.search.fits import channel_gains, gains_of_halves
 from tacdata.discrepancy.search.gate import Gate, gate
 from tacdata.discrepancy.search.gauss_newton import Refined
 from tacdata.discrepancy.search.leftovers import Leftovers, leftovers
@@ -29,6 +29,8 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
     """
     note("gate: is there a gap")
     given = gate(prepare(setting, null_model(setting)))
+    least = min(given.tests.p.min(initial=1.0), given.tests.p_generic)
+    note(f"{'there is a gap' if given.gap else 'there is no gap'}, p = {least:.3f}")
     selection = start(setting, given)
     if given.gap and until in STEPS[2:]:
         selection = race(setting, selection, note)
@@ -66,7 +68,9 @@ def _findings(
         gap=given.gap, tests=given.tests, effects=answer.findings,
         left=leftovers(final) if until == "decide" else Leftovers(0.0, 0.0), explained=nothing.loss - model.loss,
         energy=(nothing.energy, model.energy), values=problem.grams.rows, problem=problem, final=final,
-        limits=detection_limits(final), gains=channel_gains(final), until=until,
+        limits=detection_limits(final), gains=channel_gains(final),
+        halves=gains_of_halves(final), until=until,
+        comparisons=answer.comparisons, path=tuple(effect.name for effect, _ in selection.explained),
     )  # fmt: skip
 
 

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.search.gauss_newton import Refined
+from tacdata.discrepancy.search.j_test import Pooled
 from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.problem import Problem
 from tacdata.discrepancy.search.score_tests import ScoreTests
@@ -49,6 +52,28 @@ class FoundEffect:
     """P-value corrected for all candidates [1]; None for what calibration shows, which did not race."""
     needed: float = NAMED_Z
     """From which necessity on it is named [1]."""
+    selected_family: float = 1.0
+    """As ``selected``, for its family [1]."""
+    bought: float = float("inf")
+    """By how much half the whitened sum of squares is larger without it [1]."""
+    forms: dict[str, float] = field(default_factory=dict)
+    """Other form of its mechanism -> by how many standard errors over episodes this one is better (J test)."""
+
+
+@dataclass(frozen=True)
+class RivalModels:
+    """The models by which one effect of the answer was held against others in its place."""
+
+    begin: Setting
+    """With the response of the model without it."""
+    current: Refined
+    """The answer."""
+    without: Refined
+    """The answer without the effect."""
+    rivals: dict[str, Refined]
+    """Rival effect -> the model with it in the place."""
+    pooled: Pooled
+    """Shrinkage priors."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +103,14 @@ class Findings:
     gains: np.ndarray
     """Gain of each channel beyond the response's, as calibration finds it [1], shape (channels,); 0 if fitted, NaN for
     channels that these presses do not stir."""
+    halves: np.ndarray
+    """The same in the first and the second half of the session [1], shape (2, channels)."""
     until: str = "decide"
     """The last step that was made, one of `STEPS`."""
+    comparisons: tuple[RivalModels, ...] = ()
+    """Of each effect of the answer; empty where rivals were not tried."""
+    path: tuple[str, ...] = ()
+    """Effects in the order in which forward selection added them."""
 
     @property
     def share_left(self) -> float:

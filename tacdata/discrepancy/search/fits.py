@@ -60,17 +60,27 @@ def best_shapes(problem: Problem, among: np.ndarray | None = None) -> dict[str, 
     return {name: candidate for name, (_, candidate) in best.items()}
 
 
-def channel_gains(problem: Problem) -> np.ndarray:
+def channel_gains(problem: Problem, among: np.ndarray | None = None) -> np.ndarray:
     """Return each channel's gain beyond the response's, as calibration finds it [1], shape (channels,).
 
     0 where the response is fitted; NaN for channels that these presses do not stir.
+
+    Args:
+        problem: With the nuisances of calibration.
+        among: Episodes that are used, all unless given.
     """
     channels, effect = problem.setting.course.channels, problem.setting.channel_gain
     if effect is None:
         return np.zeros(channels)
-    everything = np.arange(len(problem.folds))
+    everything = np.arange(len(problem.folds)) if among is None else among
     _, values = fitted(problem, [], everything)
     first = len(problem.tangent.columns) + len(problem.model_errors)
     own = values[first : first + channels] * effect.amplitudes[0].typical
     information = np.diag(problem.grams.of(everything))[problem.nuisances[:channels] + 1]
     return np.where(information > INFORMED * problem.ridge[:channels], own, np.nan)
+
+
+def gains_of_halves(problem: Problem) -> np.ndarray:
+    """Return the channels' gains in the first and the second half of the session [1], shape (2, channels)."""
+    halves = np.array_split(np.arange(len(problem.folds)), 2)
+    return np.stack([channel_gains(problem, half) for half in halves])

@@ -70,6 +70,7 @@ def race(setting: Setting, selection: Selection, note: Note) -> Selection:
         if best is None or _is_minor(selection, best):
             break
         selection = _added(setting, selection, best)
+        note(f"so far: {' and '.join(p.effect.title for p in selection.model.placed)}")
     return selection
 
 

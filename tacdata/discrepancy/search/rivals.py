@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.regressors.candidates import Candidate
-from tacdata.discrepancy.search.findings import FoundEffect
+from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.fits import best_shapes, fitted
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.j_test import ModelError, Pooled, j_statistic, necessity
@@ -27,6 +28,8 @@ AHEAD = 1.0
 """Rivals: one that is ahead by so many standard errors takes the effect's place [1]."""
 SIMPLER = RIVAL_Z**2 / 2
 """Rivals: one with more numbers is out if half its BIC is larger by so much; as sure as `RIVAL_Z` [1]."""
+OTHER_FORMS = 2
+"""Other forms of the effect's own mechanism that are tried, the best to first order."""
 BOOTSTRAPS = 200
 """Resamplings of the episodes by which selection is judged."""
 
@@ -37,7 +40,9 @@ class Tried:
 
     finding: FoundEffect
     better: Refined | None
-    """The model with a rival in its place, where that is ahead."""
+    """The model with a rival, or another form, in its place, where that is ahead."""
+    comparison: RivalModels
+    """The models that were compared."""
 
 
 def try_rivals(
@@ -59,12 +64,16 @@ def try_rivals(
     each = _first_order_gains(bare, best)
     need = necessity(setting, current, without, problem.null, pooled)
     everything = np.arange(len(bare.folds))
-    margins, losses, rivals = {}, {}, []
+    margins, losses, rivals, models = {}, {}, [], {}
     better: Refined | None = None
-    for name in _close(current, best, each):
+
+    def in_its_place(name: str) -> Refined:
         _, values = fitted(bare, [best[name]], everything)
         first = best[name].placed(values[: len(best[name].columns)], setting.course.channels)
-        other = refine(begin, [*without.placed, first], problem.null)
+        return refine(begin, [*without.placed, first], problem.null)
+
+    for name in _close(current, best, each):
+        other = models[name] = in_its_place(name)
         level = required_margin(mine.effect, best[name].effect)
         margins[name] = j_statistic(current, other, pooled)
         if margins[name] >= level:
@@ -82,10 +91,21 @@ def try_rivals(
         richer = len(other.tangent.knobs) > len(current.tangent.knobs)
         if margins[name] < level and not (richer and other.half_bic > current.half_bic + SIMPLER):
             rivals.append(best[name].called)
+    forms: dict[str, float] = {}
+    for name in _forms(mine.effect, best, each):
+        other = in_its_place(name)
+        forms[name] = j_statistic(current, other, pooled)
+        if better is None and forms[name] < -AHEAD and other.half_bic < current.half_bic:
+            better = other
     error, bounds = current.errors(at)
-    selected = _selected(bare, best, each, mine.effect.called)
-    found = FoundEffect(mine, error, bounds, tuple(dict.fromkeys(rivals)), margins, need, losses, selected)
-    return Tried(found, better)
+    chosen = _chosen(bare, best, each)
+    found = FoundEffect(
+        mine, error, bounds, tuple(dict.fromkeys(rivals)), margins, need, losses,
+        _share(chosen, lambda e: e.called == mine.effect.called),
+        selected_family=_share(chosen, lambda e: e.family is mine.effect.family), forms=forms,
+        bought=without.loss - current.loss,
+    )  # fmt: skip
+    return Tried(found, better, RivalModels(begin, current, without, models, pooled))
 
 
 def required_margin(mine: Effect, rival: Effect) -> float:
@@ -117,15 +137,24 @@ def _close(current: Refined, best: dict[str, Candidate], each: dict[str, np.ndar
     return sorted(close, key=lambda n: -score[n])[:TOP]
 
 
-def _selected(
-    problem: Problem, best: dict[str, Candidate], each: dict[str, np.ndarray], mechanism: str
-) -> float:  # fmt: skip
-    """Return the share of bootstrap samples of the episodes in which a mechanism explains most [1]."""
+def _forms(mine: Effect, best: dict[str, Candidate], each: dict[str, np.ndarray]) -> list[str]:
+    """Return other forms of an effect's mechanism, the best to first order."""
+    own = [n for n, c in best.items() if c.called == mine.called and n != mine.name]
+    return sorted(own, key=lambda n: -float(each[n].sum()))[:OTHER_FORMS]
+
+
+def _chosen(problem: Problem, best: dict[str, Candidate], each: dict[str, np.ndarray]) -> list[Effect]:
+    """Return the effect that explains most of each bootstrap sample of the episodes."""
     if not each:
-        return 0.0
+        return []
     names, count = list(each), len(problem.folds)
     fee = np.array([0.5 * len(best[n].columns) * np.log(max(count, 2)) for n in names])
     pick = np.random.default_rng(11).integers(count, size=(BOOTSTRAPS, count))
     table = np.stack([each[n] for n in names])
     top = np.argmax(table[:, pick].sum(axis=2) - fee[:, None], axis=0)
-    return float(np.mean([best[names[k]].called == mechanism for k in top]))
+    return [best[names[k]].effect for k in top]
+
+
+def _share(chosen: list[Effect], among: Callable[[Effect], bool]) -> float:
+    """Return the share of bootstrap samples in which one of a kind explains most [1]."""
+    return float(np.mean([among(e) for e in chosen])) if chosen else 0.0

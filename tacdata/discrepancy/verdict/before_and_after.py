@@ -7,6 +7,7 @@ import numpy as np
 from tacdata.chain import Course, predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.search.findings import Findings
+from tacdata.discrepancy.verdict.calibration import gains_beyond_calibration
 from tacdata.discrepancy.verdict.residual_slices import PHASES, phases
 from tacdata.discrepancy.verdict.residual_table import Residuals
 
@@ -26,7 +27,8 @@ def beside_model(course: Course, found: Findings, sealed: np.ndarray, most: int 
     streams, reduced, first, last = Streams.of(course), course.reduced, found.problem, found.final
     measured = streams.measured(course)
     before = streams.predicted(predict(course, first.setting.response, list(first.setting.given)))
-    after = streams.predicted(predict(course, last.setting.response, [*last.setting.given, *last.placed]))
+    placed = [*last.setting.given, *last.placed, *(f.placed for f in gains_beyond_calibration(found))]
+    after = streams.predicted(predict(course, last.setting.response, placed))
     scale = first.null.noise
     every = max(int(np.ceil(measured.size / most)), 1)
     kept = slice(None, None, every)

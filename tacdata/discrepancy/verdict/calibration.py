@@ -13,6 +13,8 @@ OUTLYING = 4.0
 """Calibration: ... or, where all gains scatter little, beyond so many of theirs (robust) [1]."""
 WIDE = 2.0
 """Calibration: gains scatter more than it leaves open beyond so many of its standard deviations [1]."""
+STEADY = 0.5
+"""Calibration: a gain is one only if the halves of the session differ by less than this share of it [1]."""
 OBSERVER_SCALE = 0.005
 """Calibration: standard deviation of the scale of a camera or a gauge [1]."""
 
@@ -25,7 +27,7 @@ def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
         return []
     prior, made = setting.nuisance[per_channel.name], []
     common = float(np.median(known))
-    if abs(common) > BEYOND * prior / np.sqrt(len(known)) * 2:
+    if abs(common) > BEYOND * prior / np.sqrt(len(known)) * 2 and _steady(np.nanmedian(found.halves, axis=1), common):
         error = float(1.25 * np.std(known) / np.sqrt(len(known)))
         alike = sorted({e.called for e in library() if e.like_gain is not None})
         rivals = tuple(alike) if setting.course.force is None else ()
@@ -36,9 +38,17 @@ def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
     # Gains may all be worse than calibration was thought to be; else a channel must stand out against its kind.
     usual = prior if spread > WIDE * prior else max(prior, 1.4826 * float(np.median(np.abs(known - common))))
     far = np.abs(own) > (BEYOND if spread > WIDE * prior else OUTLYING) * usual
+    # What changes over the session is no constant: channels that changed places half way, a contact that got loose.
+    far &= _steady(found.halves - np.nanmedian(found.halves, axis=1, keepdims=True), own)
     if far.any():
         made.append(_finding(per_channel, np.where(far, own, 0.0), prior, (), float(np.abs(own).max() / prior)))
     return made
+
+
+def _steady(halves: np.ndarray, whole: np.ndarray | float) -> np.ndarray:
+    """Return whether a gain is the same in both halves of the session; those that one half does not show pass."""
+    apart = np.abs(np.nan_to_num(halves[1] - halves[0]))
+    return apart < STEADY * np.abs(whole)
 
 
 def _finding(effect: Effect, value: np.ndarray, error: float, rivals: tuple[str, ...], necessity: float) -> FoundEffect:

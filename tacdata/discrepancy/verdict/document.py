@@ -14,7 +14,7 @@ from tacdata.chain import Course
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.score_tests import DRAWS
-from tacdata.discrepancy.verdict.decide import Decided, Decision
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.residual_slices import Slice, beside, in_words, outstanding
 from tacdata.discrepancy.verdict.sealed import Gap
@@ -41,7 +41,8 @@ def document(
         shown: The gap on episodes that were sealed before.
     """
     course, placed = found.problem.setting.course, [e.finding.placed for e in decision.effects]
-    remarks = [*checks.wiring, *checks.shortcomings, *(p.effect.remark(p.values) for p in placed), *checks.base]
+    told = [p.effect.remark(p.values) for p in placed]
+    remarks = [*checks.wiring, *checks.watched, *checks.shortcomings, *told, *checks.base]
     tests, noise, values = found.tests, found.problem.null.noise, max(float(found.values.sum()), 1.0)
     return {
         "version": schemas.version("verdict"), "status": decision.status,
@@ -53,6 +54,8 @@ def document(
                  "before": float(2 * found.energy[0].sum() / values),
                  "after": float(2 * found.energy[1].sum() / values), "floor": 1.0},
         "located": located(sliced[0], found) if sliced[0] else [], "slices": beside(*sliced),
+        "located_after": in_words(sliced[1]) if decision.status == INCOMPLETE else [],
+        "path": _path(found),
         "unjudgeable": found.problem.board.unjudgeable,
         "limits": {k: (round(v, 4) if v < LARGEST_LIMIT else None) for k, v in found.limits.items()},
         "untested": untested([e.finding for e in decision.effects]),
@@ -61,6 +64,16 @@ def document(
         "remarks": [words for words in remarks if words], "next": following(decision),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": DRAWS}),
     }  # fmt: skip
+
+
+def _path(found: Findings) -> list[dict[str, Any]]:
+    """Return the effects in the order in which they were added, each with what its absence would cost."""
+    bought = {f.placed.effect.name: max(f.bought, 0.0) for f in found.effects if np.isfinite(f.bought)}
+    whole = max(sum(bought.values()) + found.left.gain, 1e-12)
+    return [
+        {"effect": name, "share": bought[name] / whole if name in bought else None}
+        for name in dict.fromkeys([*found.path, *bought])
+    ]  # fmt: skip
 
 
 def located(before: list[Slice], found: Findings) -> list[str]:
@@ -80,13 +93,26 @@ def _effect(decided: Decided) -> dict[str, Any]:
         if error is not None and value.ndim == 0:
             entry["interval"] = [float(value) - Z90 * error, float(value) + Z90 * error]
         parameters[p.name] = entry
-    return {
+    written = {
         "mechanism": effect.called, "effect": effect.name, "title": effect.title, "stage": effect.stage,
+        "family": effect.family.value, "level": decided.level and decided.level.value,
         "moves": list(effect.moves), "status": decided.status, "alternatives": list(finding.rivals),
-        "parameters": parameters, "margins": {k: float(np.clip(v, -99, 99)) for k, v in finding.margins.items()},
+        "parameters": parameters, "margins": _bounded(finding.margins),
         "necessity": float(np.clip(finding.necessity, -99, 99)), "at_bound": list(finding.at_bound),
         "experiment": effect.experiment, "features": decided.features, "confidence": decided.confidence,
+        "forms": _bounded(finding.forms), "losses": finding.losses,
+        "bought": float(min(finding.bought, 1e12)), "selected_family": finding.selected_family,
     }  # fmt: skip
+    if decided.beside is not None:
+        written["beside_remainder"] = {
+            "necessity": decided.beside.necessity, "margins": _bounded(decided.beside.margins),
+        }  # fmt: skip
+    return written
+
+
+def _bounded(margins: dict[str, float]) -> dict[str, float]:
+    """Return margins that stand in a file [standard errors]."""
+    return {name: float(np.clip(by, -99, 99)) for name, by in margins.items()}
 
 
 def untested(answer: list[FoundEffect]) -> list[str]:
@@ -101,7 +127,7 @@ def following(decision: Decision) -> list[str]:
     """Return experiments, the most useful first."""
     answer = [e.finding for e in decision.effects]
     words = [f"{f.placed.effect.called}: {f.placed.effect.experiment}" for f in answer if f.rivals or f.at_bound]
-    if decision.status == "unknown":
+    if decision.status in ("unknown", INCOMPLETE):
         words += [f"{f.placed.effect.called}: {f.placed.effect.experiment}" for f in answer]
         words.append("the diagnostic plan on this rig: `tacdata plan diagnostic --out diagnostic.yaml`")
     return list(dict.fromkeys(words))

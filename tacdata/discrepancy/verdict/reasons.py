@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import LEFT_T, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
@@ -33,12 +34,18 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             fits = f"; {names} fits best, rivals were not tried" if answer else ""
             return f"stopped after {found.until}: {'a gap' if found.gap else 'no gap'}{fits}"
         case Reason.QUIET:
+            if checks.watched:
+                return f"no effect of the library shows, but {'; '.join(checks.watched)}"
             return "nothing is missing that these recordings would show; see the detection limits"
         case Reason.NAMED:
             more = "" if found.left.t < LEFT_T else f"; {100 * found.share_left:.1f} % of it is another form"
             return f"{names}: nothing else explains the episodes as well{more}"
         case Reason.RIVALS:
-            return _undecided(answer)
+            return _undecided(decision)
+        case Reason.INCOMPLETE:
+            return _incomplete(decision, found.share_left, shown)
+        case Reason.SEALED:
+            return f"{names} fits the presses that were judged; the sealed ones do not bear it out: not the name"
         case Reason.LEFTOVERS:
             return f"something is missing; {_closest(answer, found.share_left, shown)}"
         case Reason.ODD:
@@ -52,11 +59,27 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             return "something is missing that no modelled effect explains"
 
 
-def _undecided(answer: list[FoundEffect]) -> str:
-    """Return what is open: rivals, bounds, episodes that are too few."""
+def _incomplete(decision: Decision, share: float, shown: Gap | None) -> str:
+    """Return what has a name, how fine it is, what it closes, and how much has none."""
+    words = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is not None))
+    open_ones = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is None))
+    said = f"{_listed(words, 'and')} {'is' if len(words) == 1 else 'are'} there"
+    sealed = shown.document() if shown is not None and len(shown.before) else {}
+    if sealed.get("certain") and sealed["closed"] > 0:
+        closes = "closes" if len(words) == 1 else "close"
+        said += f" and {closes} {100 * sealed['closed']:.0f} % of the gap on sealed presses"
+    said += f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else ""
+    return f"{said}; {100 * share:.0f} % of what could be explained has no name yet"
+
+
+def _undecided(decision: Decision) -> str:
+    """Return what is open: rivals, bounds, episodes that are too few; and what is not: a family that all share."""
+    answer = [e.finding for e in decision.effects]
     bounds = [f.placed.effect.called for f in answer if f.at_bound]
     weak = [f.placed.effect.called for f in answer if f.necessity < f.needed]
     words = _best(answer)
+    shared = [e.finding.placed.effect.family.value for e in decision.effects if e.level is Level.FAMILY]
+    words += f"; either way it is {_listed(list(dict.fromkeys(shared)), 'and')}" if shared else ""
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
     return words + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
 

@@ -56,7 +56,7 @@ def slices(problem: Problem) -> list[Slice]:
     speed, depth, phase = course.speed, course.tip[:, 2], phases(course)
     inside, still = phase != PHASES.index("without contact"), phase == PHASES.index("hold")
     parts = [("phase", name, phase == k) for k, name in enumerate(PHASES)]
-    edges = np.quantile(depth[inside], [0, 1 / 3, 2 / 3, 1]) if inside.any() else np.zeros(4)
+    edges = np.quantile(depth[inside], [0, 1 / 3, 2 / 3, 1]).round(6) if inside.any() else np.zeros(4)
     for name, low, high in zip(("shallow", "middle", "deep"), edges[:-1], edges[1:], strict=True):
         parts.append(("depth", f"{name} ({low:.2g} to {high:.2g} mm)", inside & (depth >= low) & (depth <= high)))
     moving = inside & ~still

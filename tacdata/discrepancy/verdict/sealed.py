@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from tacdata.chain import Course, predict
 from tacdata.discrepancy.regressors.generic import histories
 from tacdata.discrepancy.search.findings import Findings
+from tacdata.discrepancy.verdict.calibration import gains_beyond_calibration
 
 SEALED_SHARE = 0.1
 """Share of the episodes that is sealed [1]..."""
@@ -22,6 +23,12 @@ OPEN_EACH = 2
 """Episodes of a place and indenter that stay open, at least."""
 DEEPER = 0.02
 """A sealed episode goes deeper than all open ones of its place by at most this share [1]."""
+FLOOR = 1.0
+"""Mean square of noise alone [1]."""
+LEAST_GAP = 1e-2
+"""A gap that is smaller, over the floor, has no share that is closed [1]."""
+WIDEST = 0.5
+"""A share is stated where its 90 % interval is narrower [1]."""
 BOOTSTRAPS = 2000
 """Bootstrap: resamplings of the sealed episodes."""
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
@@ -69,6 +76,13 @@ class Gap:
     ceiling: np.ndarray
     """The same with what histories of the path predict of the residual, whatever its name [1], shape (k,)."""
     names: tuple[str, ...]
+    without: dict[str, np.ndarray] = field(default_factory=dict)
+    """Effect -> the same with all effects but that one [1], shape (k,)."""
+
+    @property
+    def shrinks(self) -> bool:
+        """Whether the effects make the gap smaller."""
+        return bool(self.after.sum() < self.before.sum())
 
     def document(self) -> dict[str, Any]:
         """Return it as in the verdict."""
@@ -77,23 +91,34 @@ class Gap:
         best = min(float(self.ceiling.mean()), float(self.after.mean()))
         worst = int(np.argmax(self.after))
         pick = np.random.default_rng(0).integers(len(self.before), size=(BOOTSTRAPS, len(self.before)))
-        before, after, ceiling = (v[pick].mean(axis=1) for v in (self.before, self.after, self.ceiling))
-        share = _closed(before, after, np.minimum(ceiling, after))
-        low, high = np.quantile(share, [0.05, 0.95])
+        before, after = (v[pick].mean(axis=1) for v in (self.before, self.after))
+        closed, (low, high) = _closed(self.before.mean(), self.after.mean()), _between(_closed(before, after))
         return {
             "episodes": len(self.before), "share": SEALED_SHARE,
             "rule": f"least SHA-256 of session/name, {LEAST_SEALED} at least",
-            "before": float(self.before.mean()), "after": float(self.after.mean()), "floor": 1.0, "ceiling": best,
-            "closed": float(_closed(self.before.mean(), self.after.mean(), np.array(best))),
-            "interval": [float(low), float(high)],
+            "before": float(self.before.mean()), "after": float(self.after.mean()), "floor": FLOOR, "ceiling": best,
+            "before_interval": _between(before), "after_interval": _between(after),
+            "closed": float(closed), "interval": [low, high], "certain": high - low < WIDEST,
+            "shares": self._shares(float(closed)),
             "worst": {"episode": self.names[worst], "after": float(self.after[worst])},
         }  # fmt: skip
 
+    def _shares(self, closed: float) -> dict[str, float]:
+        """Return each effect's part of the share that is closed: in proportion to what its absence costs."""
+        cost = {name: max(float((own - self.after).mean()), 0.0) for name, own in self.without.items()}
+        whole = sum(cost.values())
+        return {name: closed * by / whole if whole > 0 else 0.0 for name, by in cost.items()}
 
-def _closed(before: np.ndarray, after: np.ndarray, best: np.ndarray) -> np.ndarray:
-    """Return the share of what any model could close that is closed; 0 where there is nothing to close."""
-    room = np.asarray(before - best)
-    return np.where(room > 1e-3 * np.asarray(before), (before - after) / np.maximum(room, 1e-12), 0.0)
+
+def _between(draws: np.ndarray) -> list[float]:
+    """Return a 90 % interval."""
+    return [float(v) for v in np.quantile(draws, [0.05, 0.95])]
+
+
+def _closed(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return the share of the gap above the noise floor that is closed [1]; 0 where there is none."""
+    room = np.asarray(before) - FLOOR
+    return np.where(room > LEAST_GAP, (np.asarray(before) - after) / np.maximum(room, LEAST_GAP), 0.0)
 
 
 def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
@@ -111,13 +136,20 @@ def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
     first = course.readings[rows] - predict(course, response, given).signal[rows]
     model = found.final
     placed = [*model.setting.given, *model.placed]
+    placed += [f.placed for f in gains_beyond_calibration(found)]
     last = course.readings[rows] - predict(course, model.setting.response, placed).signal[rows]
     rest = first - _predicted(course, first, episodes)
     noise = found.problem.null.noise
     scale = noise.scale[: course.channels] / np.sqrt(max(1 - noise.memory**2, 0.02))
     number = course.episode[rows]
     before, after, ceiling = (_squares(r / scale, number, episodes) for r in (first, last, rest))
-    return Gap(before, after, ceiling, tuple(course.names[k] for k in episodes))
+    without = {}
+    for one in found.comparisons:
+        others = [*model.setting.given, *one.without.placed]
+        alone = course.readings[rows] - predict(course, one.without.response, others).signal[rows]
+        [name] = {p.effect.name for p in model.placed} - {p.effect.name for p in one.without.placed}
+        without[name] = _squares(alone / scale, number, episodes)
+    return Gap(before, after, ceiling, tuple(course.names[k] for k in episodes), without)
 
 
 def _squares(residual: np.ndarray, number: np.ndarray, episodes: np.ndarray) -> np.ndarray:

@@ -8,6 +8,8 @@ from tacdata.effects import library
 
 MOST_RIVALS = 6
 """Most rivals that are listed."""
+MOST_UNJUDGED = 6
+"""Effects that cannot be judged are listed up to so many; of more, only their number is given."""
 WEAK_LIMIT = 3.0
 """Effects with a larger detection limit are listed [typical sizes]."""
 
@@ -23,12 +25,16 @@ def in_text(verdict: dict[str, Any]) -> str:
     lines += _sizes(verdict)
     if verdict["located"]:
         lines += ["where it lives:", *(f"  {words}" for words in verdict["located"])]
+    if verdict.get("located_after"):
+        lines += ["where what has no name lives:", *(f"  {words}" for words in verdict["located_after"])]
     if verdict["next"]:
         lines += ["next:", *(f"  {words}" for words in verdict["next"])]
     if verdict["remarks"]:
         lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
     spoken = answered(verdict)
-    lines.append("cannot be judged here: " + ", ".join(sorted(set(verdict["unjudgeable"]) - spoken)))
+    if hidden := sorted(set(verdict["unjudgeable"]) - spoken):
+        few = ", ".join(hidden) if len(hidden) <= MOST_UNJUDGED else f"{len(hidden)} effects; verdict.html says why"
+        lines.append(f"cannot be judged here: {few}")
     weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK_LIMIT) and k not in spoken]
     if weak:
         lines.append("would be seen only at more than three times their usual size: " + ", ".join(sorted(weak)))
@@ -49,7 +55,10 @@ def answered(verdict: dict[str, Any]) -> set[str]:
 def _effect(entry: dict[str, Any]) -> list[str]:
     sure = entry["confidence"] if entry["status"] == "named" else None
     words = "" if sure is None else f", {100 * sure:.0f} % sure"
-    lines = [f"  {entry['mechanism']} ({entry['effect']}, {entry['stage']}): {entry['status']}{words}"]
+    status = entry["status"]
+    if entry.get("level") == "family":
+        status = f"{status}; its family is not: {entry['family']}"
+    lines = [f"  {entry['mechanism']} ({entry['effect']}, {entry['stage']}): {status}{words}"]
     for name, p in entry["parameters"].items():
         if isinstance(p["value"], list):
             lines.append(f"    {name}: {min(p['value']):.4g} to {max(p['value']):.4g} {p['unit']} over the channels")
@@ -95,8 +104,8 @@ def _closed(sealed: dict[str, Any]) -> str:
     best = f", {sealed['ceiling']:.3f} at best"
     if worse := worsened(sealed["before"], sealed["after"]):
         return f": {worse}{best}"
-    if sealed["closed"] <= 0:
-        return f"{best}: nothing that could be closed"
+    if not sealed["certain"]:
+        return f" (90 %: {sealed['after_interval'][0]:.3g} to {sealed['after_interval'][1]:.3g}){best}"
     low, high = sealed["interval"]
     return f"{best}; {100 * sealed['closed']:.0f} % of the gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
 

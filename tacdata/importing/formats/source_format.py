@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -60,6 +62,10 @@ class SourceFormat(ABC):
     endings: ClassVar[tuple[str, ...]]
     """File name endings, lower case, with the dot."""
 
+    def tables(self, path: Path) -> tuple[str, ...]:
+        """Return the tables in a file, of which ``table`` in the options chooses one; ("",) if the file is a table."""
+        return ("",)
+
     @abstractmethod
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read a file.
@@ -81,13 +87,35 @@ def read_table(path: Path, options: dict[str, Any]) -> SourceTable:
         UsageError: If it does not exist or its kind is not known.
         FormatError: If it cannot be read, or holds no rows.
     """
-    if not path.is_file():
+    kind, name = _kind(path, options)
+    with _in_words(path, name):
+        table: SourceTable = kind.read(path, options)
+    if not table.rows:
+        raise FormatError(f"{path} holds no rows of data", "one row or more", "leave it out, or correct the mapping")
+    return table
+
+
+def tables_in(path: Path) -> tuple[str, ...]:
+    """Return the tables that a file holds, ("",) for one that is a single table; raises as `read_table`."""
+    kind, name = _kind(path, {})
+    with _in_words(path, name):
+        return kind.tables(path)
+
+
+def _kind(path: Path, options: dict[str, Any]) -> tuple[SourceFormat, str]:
+    if not path.exists():
         raise UsageError(f"no file {path}", "a file of measured data", "check the path and the mapping's files")
     name = options.get("format") or _by_ending(path)
     kind: type[Any] = registry.load(ROOM, BASE, name, SourceFormat)
+    return kind(), name
+
+
+@contextmanager
+def _in_words(path: Path, name: str) -> Iterator[None]:
+    """Turn what a library raises into an error of the file's format."""
     try:
-        table: SourceTable = kind().read(path, options)
-    except TacdataError:
+        yield
+    except (TacdataError, ModuleNotFoundError):
         raise
     except Exception as error:
         # A damaged file can raise anything in the library that reads it: zlib.error, EOFError, struct.error, ...
@@ -96,9 +124,6 @@ def read_table(path: Path, options: dict[str, Any]) -> SourceTable:
             f"a whole file of the format {name}",
             "copy or save it again; if it is of another kind, name its format in the mapping",
         ) from error
-    if not table.rows:
-        raise FormatError(f"{path} holds no rows of data", "one row or more", "leave it out, or correct the mapping")
-    return table
 
 
 def _by_ending(path: Path) -> str:

@@ -20,6 +20,8 @@ JUMP = 12.0
 """Minimum jump: change between neighbouring frames of a still stretch [times the noise]."""
 JUMP_SHARE = 0.05
 """Minimum jump as a share of the channel's answer to the press [1]; relaxation stays below it."""
+SPIKE, SPIKE_AROUND = 15.0, 5
+"""Distance of a spike from the median around it [times the noise], and the frames of that median [count]."""
 LASTS = 3
 """Frames before and after over which a jump must last; a spike is no jump."""
 
@@ -147,6 +149,46 @@ def jumps(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jum
             if channel not in found or abs(size) > abs(found[channel].size):
                 found[channel] = jump
     return [found[channel] for channel in sorted(found)]
+
+
+def spikes(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jump]:
+    """Return the largest spike of each channel that has one: a reading or two far off those around it, while still.
+
+    Args:
+        episode: The recording.
+        noise: Noise of each channel [counts], shape (taxels,).
+        response: Change of each channel from rest to hold [counts], shape (taxels,).
+    """
+    threshold = SPIKE * np.maximum(np.nan_to_num(noise, nan=np.inf), 0.5)
+    threshold = np.maximum(threshold, JUMP_SHARE * np.abs(np.nan_to_num(response)))
+    found: dict[int, Jump] = {}
+    phase = episode.phase_at(episode.taxels.sample_ns)
+    for name in ("rest", "hold"):
+        rows = np.flatnonzero(phase == PHASES.index(name))[EDGE : -EDGE or None]
+        if len(rows) < SPIKE_AROUND:
+            continue
+        counts = episode.taxels.counts[rows]
+        padded = np.pad(counts, ((SPIKE_AROUND // 2, SPIKE_AROUND // 2), (0, 0)), mode="edge")
+        around = np.median(np.lib.stride_tricks.sliding_window_view(padded, SPIKE_AROUND, axis=0), axis=-1)
+        for place, channel in np.argwhere(np.abs(counts - around) > threshold).tolist():
+            size = float(counts[place, channel] - around[place, channel])
+            if channel not in found or abs(size) > abs(found[channel].size):
+                found[channel] = Jump(channel, int(episode.taxels.sample_ns[rows[place]]), size)
+    return [found[channel] for channel in sorted(found)]
+
+
+def held_frames(counts: np.ndarray, noise: np.ndarray) -> int:
+    """Return the most frames in a row in which no channel changes [count]; 0 for a board that is quiet or dead.
+
+    Args:
+        counts: Readings [counts], shape (n, taxels).
+        noise: Noise of each channel [counts], shape (taxels,).
+    """
+    if len(counts) < 2 or np.isnan(noise).all() or np.nanmedian(noise) <= LIVE or (counts == counts[:1]).all():
+        return 0
+    same = np.concatenate([[False], (counts[1:] == counts[:-1]).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(same.astype(int)))
+    return int((edges[1::2] - edges[::2]).max(initial=0)) + 1 if len(edges) else 0
 
 
 def _lasting(counts: np.ndarray, threshold: np.ndarray) -> list[tuple[int, int, float]]:

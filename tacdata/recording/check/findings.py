@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tacdata.recording.check.alignment import loading, missing_ends, other_place, reading_lag
 from tacdata.recording.check.camera_findings import camera_warnings
+from tacdata.recording.check.channel_health import held_frames, spikes
 from tacdata.recording.check.clocks import clock_warnings
 from tacdata.recording.check.figures import COUNTS, RecordingFigures
 from tacdata.recording.check.imported import imported_findings, is_imported
@@ -30,6 +32,14 @@ LATE_MS = 20.0
 what then looks like a jump at rest."""
 HOLD_MM = 0.05
 """Distance between reported and commanded position in the hold that makes a recording unusable [mm]."""
+LAG_MS = 150.0
+"""Warning threshold: delay of the readings against the motion [ms of real time]; skins creep, so less is no proof."""
+LAG_SHARE = 0.25
+"""... and as a share of the way in [1]: hysteresis alone shifts the readings by some 5 %."""
+PLACE_MM = 0.1
+"""Distance between where the guide went and what the label says that makes a recording unusable [mm]."""
+HELD = 4
+"""Frames in a row without any change from which a live board counts as held [count]."""
 NOISE_RATIO = 5.0
 """Warning threshold: noise of a channel over the median noise [1]."""
 DEAD_DEPTH = 0.3
@@ -58,6 +68,7 @@ def findings(figures: RecordingFigures) -> list[Finding]:
         found = [*imported_findings(figures), *doubts]
     else:
         found = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
+        found += _together(figures)
     found += impossible(figures)
     name = figures.recording.episode.path.name
     return [Finding(severity, stream, name, text) for severity, stream, text in found]
@@ -147,6 +158,14 @@ def _channels(figures: RecordingFigures) -> list[Judgement]:
     if values["saturated"]:
         found.append((UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"))
     noise = np.array([np.nan if v is None else v for v in values["idle_noise"]])
+    response = np.array([np.nan if v is None else v for v in values["response"]])
+    if (held := held_frames(counts, noise)) >= HELD:
+        found.append((WARNING, "taxels", f"the board repeats one frame: no channel changes for {held} frames"))
+    begin_ns = figures.recording.episode.taxels.sample_ns[:1]
+    for spike in spikes(figures.recording.episode, noise, response):
+        at = (spike.time_ns - int(begin_ns[0])) * 1e-9
+        size = f"{spike.size:{'+.0f' if values['unit'] == COUNTS else '+.3g'}} {values['unit']}"
+        found.append((WARNING, "taxels", f"channel {spike.channel} has a spike of {size} at {at:.1f} s while still"))
     if np.isnan(noise).all():
         found.append((WARNING, "taxels", "no idle stretch to measure noise and baseline"))
     else:
@@ -154,6 +173,26 @@ def _channels(figures: RecordingFigures) -> list[Judgement]:
         if len(loud):
             text = f"channel {_list(loud.tolist())} is over {NOISE_RATIO:g} times as noisy as the others"
             found.append((WARNING, "taxels", text))
+    return found
+
+
+def _together(figures: RecordingFigures) -> list[Judgement]:
+    """Judge whether readings, motion and label belong together."""
+    found, rate = [], _rate_of_clock(figures)
+    if words := other_place(figures, PLACE_MM):
+        found.append((UNUSABLE, "label", words))
+    late, short = missing_ends(figures)
+    allowed = max(GAP_MS * rate, 2500 / figures.document["taxels"]["nominal_rate"])
+    if late > allowed:
+        found.append((UNUSABLE, "taxels", f"they begin {late:.0f} ms after the press does"))
+    if short > allowed:
+        found.append((UNUSABLE, "taxels", f"they end {short:.0f} ms before the press does"))
+    lag = reading_lag(figures)
+    off = figures.document["cnc"]["hold_error"] or 0.0
+    # Where the guide was not where it should be, nothing can be said of when it was.
+    if lag is not None and off <= HOLD_MM and abs(lag) > max(LAG_MS * rate, LAG_SHARE * loading(figures)):
+        text = f"they come {lag:+.0f} ms after the motion: measure the delay by a sync tap (record --sync-tap)"
+        found.append((WARNING, "taxels", text))
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tacdata.recording.check.alignment import loading, reading_lag, slip
 from tacdata.recording.check.channel_order import (
     Answers,
     answers,
@@ -25,14 +26,27 @@ OFFSET_SHARE = 0.3
 """... and its minimum share of the channel's strongest answer [1], so that slow relaxation is not reported."""
 
 
+LAG_MS = 40.0
+"""Delay of one recording's readings against the others' that is reported [ms of real time]."""
+LAG_SHARE = 0.06
+"""... and as a share of the difference in how long the way in takes [1]: the skin's own hysteresis."""
+LAG_DEPTH = 0.2
+"""Error of the depth by that delay that makes a recording unusable [mm]."""
+FEWEST = 4
+"""Recordings needed for comparing their delays or noise [count]."""
+LOUDER = 3.0
+"""Warning threshold: noise of a recording over that of the session's quiet ones [1]."""
+
+
 def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
     """Return findings on the channels, from their answers to the session's presses."""
+    apart = [*_delays(entries), *_louder(entries)]
     found = answers(entries)
     if found is None:
-        return []
+        return apart
     if unanswered(found):
         text = "no channel answered to any press: no contact (check the registration), or the board is not the sensor's"
-        return [Finding(UNUSABLE, "taxels", "", text)]
+        return [*apart, Finding(UNUSABLE, "taxels", "", text)]
     moved = misplaced(found)
     texts = [(UNUSABLE, text) for text in _places(found, moved)]
     if quiet := [channel for channel in silent(found) if channel not in moved]:
@@ -42,7 +56,45 @@ def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
         text = f"channel {channel} answers {factor:.2f} times as strongly from about {names[press]} on"
         texts.append((UNUSABLE, text))
     texts += [(WARNING, text) for text in _offsets(entries, found)]
-    return [Finding(severity, "taxels", "", text) for severity, text in texts]
+    if not moved and (slipped := slip(found)):
+        at, (x, y) = slipped
+        words = "the tool or the skin slipped, or the registration changed"
+        texts.append((UNUSABLE, f"answers lie x {x:+.1f}, y {y:+.1f} mm elsewhere from {names[at]} on: {words}"))
+    return [*apart, *(Finding(severity, "taxels", "", text) for severity, text in texts)]
+
+
+def _delays(entries: list[RecordingFigures]) -> list[Finding]:
+    """Find the recordings whose readings are late, or early, against the motion when the others' are not."""
+    known = [(entry, lag) for entry in entries if (lag := reading_lag(entry)) is not None]
+    if len(known) < FEWEST:
+        return []
+    usual, found = float(np.median([lag for _, lag in known])), []
+    duration = float(np.median([loading(entry) for entry, _ in known]))
+    for entry, lag in known:
+        episode = entry.recording.episode
+        limit = LAG_MS * float(episode.rig.get("clock", {}).get("rate", 1.0))
+        if abs(lag - usual) > limit + LAG_SHARE * abs(loading(entry) - duration):
+            depth = abs(lag - usual) * 1e-3 * episode.press.speed
+            text = f"they come {lag - usual:+.0f} ms later against the motion than in other recordings"
+            severity = UNUSABLE if depth > LAG_DEPTH else WARNING
+            found.append(Finding(severity, "taxels", episode.path.name, f"{text}: {depth:.2f} mm of depth"))
+    return found
+
+
+def _louder(entries: list[RecordingFigures]) -> list[Finding]:
+    """Find the recordings in which all channels are noisier than in the session's quiet ones."""
+    noise = [[v for v in entry.document["taxels"]["idle_noise"] if v is not None] for entry in entries]
+    known = [(entry, float(np.median(values))) for entry, values in zip(entries, noise, strict=True) if values]
+    if len(known) < FEWEST:
+        return []
+    quiet = max(float(np.percentile([value for _, value in known], 25)), 0.5)
+    return [
+        Finding(
+            WARNING, "taxels", entry.recording.episode.path.name,
+            f"its noise is {value / quiet:.0f} times that of the session's quiet recordings",
+        )
+        for entry, value in known if value > LOUDER * quiet
+    ]  # fmt: skip
 
 
 def _places(found: Answers, moved: dict[int, int]) -> list[str]:

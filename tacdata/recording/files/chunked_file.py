@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from tacdata.errors import UsageError
+from tacdata.host import COMPUTER, Host
 from tacdata.provenance import code_version
 from tacdata.recording.files.mcap_records import PROFILE
 
@@ -24,7 +24,7 @@ CHUNK_SECONDS = 0.5
 class ChunkedFile:
     """A new MCAP file of protobuf channels. Not thread-safe."""
 
-    def __init__(self, path: Path, chunk_seconds: float = CHUNK_SECONDS) -> None:
+    def __init__(self, path: Path, chunk_seconds: float = CHUNK_SECONDS, host: Host = COMPUTER) -> None:
         """Create the file.
 
         Raises:
@@ -32,14 +32,14 @@ class ChunkedFile:
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            self._stream = path.open("xb")
+            self._stream = host.create(path)
         except FileExistsError:
             raise UsageError(
                 f"{path} exists", "a new file; a recording is never overwritten", "choose another name"
             ) from None
-        self.path = path
+        self.path, self._host = path, host
         self._chunk_seconds = chunk_seconds
-        self._flushed_at = time.monotonic()
+        self._flushed_at = self._host.monotonic()
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
@@ -69,7 +69,7 @@ class ChunkedFile:
 
     def tick(self) -> None:
         """Close the chunk and sync it to the disk if it is old enough; call at least that often."""
-        if time.monotonic() - self._flushed_at >= self._chunk_seconds:
+        if self._host.monotonic() - self._flushed_at >= self._chunk_seconds:
             self.flush()
 
     def flush(self) -> None:
@@ -79,15 +79,14 @@ class ChunkedFile:
             OSError: If the disk refuses it.
         """
         self._writer.flush()
-        os.fsync(self._stream.fileno())
-        self._flushed_at = time.monotonic()
+        self._host.sync(self._stream)
+        self._flushed_at = self._host.monotonic()
 
     def close(self) -> None:
         """Write the summary and close; if the disk refuses, what was written stays readable."""
         try:
             self._writer.finish()
-            self._stream.flush()
-            os.fsync(self._stream.fileno())
+            self._host.sync(self._stream)
         finally:
             self.let_go()
 

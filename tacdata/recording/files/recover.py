@@ -10,7 +10,7 @@ from typing import Any
 from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.errors import DeviceError, Exit, FormatError, UsageError
 from tacdata.provenance import code_version
 from tacdata.recording.files.mcap_records import walk
 
@@ -29,6 +29,12 @@ class Recovered:
     """What was wrong with the old file, as sentences; empty if nothing was."""
 
 
+class NothingRecovered(FormatError):
+    """Not one message of a file can be read."""
+
+    exit_code = Exit.UNFIT
+
+
 def recover(path: Path, target: Path | None = None) -> Recovered:
     """Write what can be read of ``path`` beside it, as ``NAME.recovered.mcap``; the old file is kept.
 
@@ -36,7 +42,7 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
 
     Raises:
         UsageError: If there is no such file or the target exists.
-        FormatError: If it is no MCAP file, or not one message can be read.
+        NothingRecovered: If it is no MCAP file, or not one message can be read.
         DeviceError: If the disk refuses the copy.
     """
     path = Path(path)
@@ -123,14 +129,14 @@ class _Copy:
                 self.writer.add_metadata(record.name, record.metadata)
 
 
-def _nothing(path: Path, found: Recovered) -> FormatError:
+def _nothing(path: Path, found: Recovered) -> NothingRecovered:
     if not found.attachments:
-        return FormatError(
+        return NothingRecovered(
             f"{path} is no MCAP file, or nothing of it can be read",
             "an MCAP file recorded by tacdata",
             "check the path; for a file of another kind, convert it first",
         )
-    return FormatError(
+    return NothingRecovered(
         f"{path} breaks off before its first message: {'; '.join(found.damage) or 'it holds none'}",
         "a recording with at least one message",
         "nothing can be restored; record that press again with tacdata record --resume",

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import queue
-import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -24,6 +23,7 @@ from tacdata.errors import DeviceError, UsageError
 from tacdata.plans import Press
 from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.polled_clock import PolledClock
+from tacdata.recording.clocks.stream_pairs import stream_pairs
 from tacdata.recording.files import file_names, topics
 from tacdata.recording.files.chunked_file import ChunkedFile
 from tacdata.recording.motion.move_times import Command
@@ -130,11 +130,11 @@ class EpisodeWriter:
             raise DeviceError(
                 f"{path} cannot be begun: {error}", "a disk with room for the recording", "make room, then --resume"
             ) from error
-        self._queue: queue.SimpleQueue[tuple[str, int, int, int, bytes] | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[str, int, int, int, bytes] | None] = clock.host.queue()
         self._taken = self._written = 0  # bytes received and bytes written
         self._failure: Exception | None = None
-        self._lock = threading.Lock()
-        self._thread = threading.Thread(target=self._drain, name=f"write {path.name}", daemon=True)
+        self._lock = clock.host.lock()
+        self._thread = clock.host.thread(self._drain, f"write {path.name}")
         self.note("recording begins")
         self._thread.start()
 
@@ -276,6 +276,8 @@ class EpisodeWriter:
                 raise self._failure
             for name, model in (clock_models or {}).items():
                 self._file.describe(f"clock_model/{name}", model.document)
+            known = {k: m.latency for k, m in (clock_models or {}).items() if isinstance(m, ClockModel)}
+            self._file.describe("sync", stream_pairs(known))
             for name, count in (counts or {}).items():
                 self._file.describe(f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()})
             self._file.describe("episode", {"complete": json.dumps(complete), "reason": reason})
@@ -317,7 +319,7 @@ def _begun(
     boards: tuple[str, ...],
 ) -> ChunkedFile:  # fmt: skip
     """Create the file with its channels and attachments and sync it to the disk."""
-    file = ChunkedFile(file_names.partial(path))
+    file = ChunkedFile(file_names.partial(path), host=clock.host)
     for topic, message in topics.FIXED.items():
         file.register(topic, message)
     for board in boards:
@@ -331,5 +333,6 @@ def _begun(
         file.flush()
     except OSError:
         file.let_go()
+        file.path.unlink(missing_ok=True)  # without its attachments nobody can read it
         raise
     return file

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import threading
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
@@ -53,7 +52,8 @@ class DeviceStreams(ABC):
         self._boards = {f"taxels {name}".rstrip(): board for name, board in boards.items()}
         self._cameras = {f"camera {name}": camera for name, camera in cameras.items()}
         self._feed = LiveFeed(watch) if watch else None
-        self._stop, self._lock, self._ending = threading.Event(), threading.Lock(), False
+        self._host = next(iter([*boards.values(), *cameras.values()])).clock.host
+        self._stop, self._lock, self._ending = self._host.event(), self._host.lock(), False
         self._sink: EpisodeWriter | None = None
         self._before: dict[str, StreamCounts] = {}
         self._passes: dict[str, int] = {}
@@ -66,6 +66,10 @@ class DeviceStreams(ABC):
         for view in self._views:
             self._work[f"camera {view.name}"] = self._camera_reader(view)
         self._threads: list[threading.Thread] = []
+
+    def _silence_of(self, name: str) -> float:
+        """Time without data after which a stream counts as silent [s of real time]."""
+        return self.silence
 
     @abstractmethod
     def _silent(self, name: str) -> None:
@@ -85,7 +89,7 @@ class DeviceStreams(ABC):
     def __enter__(self) -> DeviceStreams:
         """Start the threads."""
         self._threads = [
-            threading.Thread(target=self._run, args=item, name=item[0], daemon=True) for item in self._work.items()
+            self._host.thread(self._run, name, (name, read)) for name, read in self._work.items()
         ]
         for thread in self._threads:
             thread.start()
@@ -130,21 +134,22 @@ class DeviceStreams(ABC):
 
     def catch_up(self, patience: float = CATCH_UP) -> None:
         """Wait at most ``patience`` [s of real time] until every stream has handed on what has arrived."""
-        end, self._ending = time.monotonic() + patience, True
+        end, self._ending = self._host.monotonic() + patience, True
         begun = dict(self._passes)
         for thread in self._threads:
             # One pass may have been under way; the one after it began later than this call and has ended.
             while self._passes.get(thread.name, 0) < begun.get(thread.name, 0) + 2:
-                if not thread.is_alive() or time.monotonic() > end:
+                if not thread.is_alive() or self._host.monotonic() > end:
                     break
-                time.sleep(POLL / 10)
+                self._host.sleep(POLL / 10)
         self._ending = False
 
     def _totals(self) -> dict[str, StreamCounts]:
         return {name: device.counts for name, device in (self._boards | self._cameras).items()}
 
     def _run(self, name: str, read: Callable[[], int]) -> None:
-        patience = Patience(self.silence)
+        # A look comes each `POLL`, and later on a computer that is far too busy: that is no silence of the device.
+        patience = Patience(self._silence_of(name), step=2 * POLL, host=self._host)
         while not self._stop.is_set():
             self._passes[name] = self._passes.get(name, 0) + 1
             try:

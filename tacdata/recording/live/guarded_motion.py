@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 
 import numpy as np
 
@@ -27,6 +26,7 @@ LETTING_GO = 10.0
 
 REASON = 1.0
 """How long a stream that stopped the motion may take to give its reason [s of real time]."""
+BY_HAND = "; free it by hand"
 STALL = 3.0
 """Time that this computer may stand still while the guide moves [s of real time]: suspended, or a closed lid."""
 
@@ -37,12 +37,13 @@ class GuardedMotion:
     def __init__(self, cnc: MotionController, clock: Clock, interruption: Interruption | None = None) -> None:
         """Drive ``cnc``; nothing moves before `drive`, which looks for signals that the interruption holds back."""
         self._cnc, self._clock, self._interruption = cnc, clock, interruption or Interruption()
-        self._halted = threading.Event()
+        self._halted = clock.host.event()
         self._rest: Position | None = None  # where it stands after a stop; None: it runs, or does not obey
         self._why = "nothing was stopped"
         self._path: AllowedPath | None = None
         self._at: Position | None = None  # where the last path ended
         self._lifted, self._still = "", False
+        self._rising: float | None = None  # machine height to which a lift is under way, or was when it broke off
 
     def off_path(self, status: CncStatus) -> DeviceError | None:
         """Return what is wrong with where a report says the guide is, by the moves that were sent; or None."""
@@ -71,22 +72,22 @@ class GuardedMotion:
             DeviceError: On a fault, after a feed hold and dropping the queue.
             KeyboardInterrupt: On Ctrl-C, after the same.
         """
-        failure: list[BaseException] = []
-        work = threading.Thread(target=self._carry_out, args=(path, start, writer, failure), daemon=True)
+        failure, host = list[BaseException](), self._clock.host
+        work = self._clock.host.thread(self._carry_out, "motion", (path, start, writer, failure))
         self._allowed.stand(start, self._clock.now_ns())
         self._at = None
         try:
             work.start()
-            looked = time.monotonic()
+            looked = host.monotonic()
             while work.is_alive():
                 work.join(WATCH)
-                looked = _look_again(looked)
+                looked = _look_again(looked, host.monotonic())
                 self._interruption.check()
                 if streams.fault:
                     break
-            end = time.monotonic() + (REASON if self._halted.is_set() else WATCH)
-            while failure and streams.fault is None and time.monotonic() < end:
-                time.sleep(WATCH / 2)  # a stream that stopped the motion is about to give the reason
+            end = host.monotonic() + (REASON if self._halted.is_set() else WATCH)
+            while failure and streams.fault is None and host.monotonic() < end:
+                host.sleep(WATCH / 2)  # a stream that stopped the motion is about to give the reason
             if streams.fault or failure:
                 raise streams.fault or failure[0]
         except BaseException:
@@ -107,6 +108,7 @@ class GuardedMotion:
     def _let_go(self, work: threading.Thread) -> None:
         """After a stop: wait until the motion's thread sends nothing more, then empty the controller's queue."""
         self._rest, self._why, self._lifted = None, "interrupted while it was being stopped", ""
+        self._rising = None
         self._still = False
         work.join(LETTING_GO)
         if work.is_alive():
@@ -152,23 +154,43 @@ class GuardedMotion:
 
     def lift(self, height: float, speed: float) -> str:
         """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; return the result as a sentence."""
-        self._lifted = "the indenter was not lifted (interrupted); free it by hand"
+        self._lifted = f"the indenter was not lifted (interrupted){BY_HAND}"
         self._lifted = self._lift(height, speed)
         return self._lifted
 
     def _lift(self, height: float, speed: float) -> str:
         if self._rest is None:
-            return f"the indenter was not lifted ({self._why}); free it by hand"
+            return f"the indenter was not lifted ({self._why}){BY_HAND}"
         x, y, z = self._rest
         try:
             if z < height:
+                self._rising = height
+                self._lifted = f"the indenter was not lifted all the way (interrupted){BY_HAND}"
                 self._allowed.move((x, y, height), speed, self._clock.now_ns())
                 self._cnc.move((x, y, height), speed)
                 self._cnc.wait_idle(MARGIN + (height - z) / speed)
+                self._rising = None
         except TacdataError as error:
-            return f"the indenter was not lifted: {error.given}; free it by hand"
+            return f"the indenter was not lifted all the way: {error.given}{BY_HAND}"
         self._at = x, y, max(z, height)
         return f"the indenter was lifted off the skin, straight up from {z:.3f} to {max(z, height):.3f} mm"
+
+    def go_on(self) -> Position:
+        """After a stop and a lift: accept steps again, and return where the guide stands [mm].
+
+        Raises:
+            DeviceError: If it was not lifted.
+        """
+        if not self.lifted or self._at is None:
+            raise DeviceError("the indenter was not lifted", "a lifted indenter", "free it by hand, then start again")
+        self._halted.clear()
+        self._lifted, self._rest = "", None
+        return self._at
+
+    @property
+    def lifted(self) -> bool:
+        """Whether the tip was lifted after the last stop."""
+        return self._rest is not None and self._rising is None and self._lifted.startswith("the indenter was lifted")
 
     @property
     def ending(self) -> tuple[str, ...]:
@@ -179,19 +201,21 @@ class GuardedMotion:
             lost = self._cnc.position_lost
             return (f"motion: the machine moved while homing{f', and {lost}: its position is lost' if lost else ''}",)
         if self._lifted or self._halted.is_set():
-            tip = self._lifted or "the indenter was not lifted; free it by hand"
+            tip = self._lifted or f"the indenter was not lifted{BY_HAND}"
             if self._still:
                 return f"motion: stopped ({self._why})", f"tip:    {tip}"
             if self._rest is None:
                 return (f"motion: NOT KNOWN to have stopped ({self._why}); if it moves, press the emergency stop",
                         f"tip:    {tip}")  # fmt: skip
+            if self._rising is not None:
+                up = f"motion: on its way straight up from {_text(self._rest)} to z {self._rising:.2f} mm when it ended"
+                return f"{up}; it stands somewhere on it", f"tip:    {tip}"
             return f"motion: stopped at {_text(self._rest)} mm", f"tip:    {tip}"
         return (f"motion: at rest at {_text(self._at)} mm" if self._at else "motion: NOT KNOWN to have stopped",)
 
 
-def _look_again(looked: float) -> float:
-    """Return the present time [s]; raise if this computer stood still since it ``looked``."""
-    now = time.monotonic()
+def _look_again(looked: float, now: float) -> float:
+    """Return ``now`` [s]; raise if this computer stood still since it ``looked``."""
     if now - looked > STALL:
         raise DeviceError(
             f"this computer stood still for {now - looked:.1f} s while the guide moved (suspended, a closed lid, or "

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+from tacdata.host import COMPUTER, Host
+
 
 class Interruption:
     """Takes Ctrl-C, SIGTERM, and SIGHUP unless it is ignored (nohup), while its context lasts; for the main thread.
@@ -20,8 +22,9 @@ class Interruption:
         ``with Interruption() as interruption, interruption.kept(): ...; interruption.check()``
     """
 
-    def __init__(self) -> None:
+    def __init__(self, host: Host = COMPUTER) -> None:
         """Create it; no signal is taken yet."""
+        self._host = host
         self._asked = self._answered = self._keeping = False
         self._before: dict[int, Any] = {}
 
@@ -31,13 +34,13 @@ class Interruption:
         numbers = [signal.SIGINT, signal.SIGTERM]
         if hang_up is not None and signal.getsignal(hang_up) == signal.SIG_DFL:
             numbers.append(hang_up)
-        self._before = {number: signal.signal(number, self._heard) for number in numbers}
+        self._before = {number: self._host.signal(number, self._heard) for number in numbers}
         return self
 
     def __exit__(self, *exception: object) -> None:
         """Restore the previous signal handlers."""
         for number, handler in self._before.items():
-            signal.signal(number, handler)
+            self._host.signal(number, handler)
 
     def check(self) -> None:
         """Raise what was signalled in the meantime.

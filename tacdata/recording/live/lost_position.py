@@ -28,6 +28,30 @@ def why_lost(cnc: MotionController, remembered: str = "", resumed: bool = False)
     return remembered or cnc.position_lost
 
 
+def require_free(why: str, ask: Ask) -> None:
+    """Ask whether the tip is free, before a locked controller homes: a tip in the skin would be dragged.
+
+    Args:
+        why: Why the position was lost, in words; empty if only the controller says so.
+        ask: Puts the question.
+
+    Raises:
+        DeviceError: If nobody says yes.
+    """
+    why = why or "the controller is locked"
+    question = (
+        f"THE POSITION WAS LOST: {why}.\n"
+        f"The machine is about to home: every axis moves. Is the tip out of the skin, and the way straight up free? "
+        f"[y/N] "
+    )
+    if not ask(question):
+        raise DeviceError(
+            f"the machine was not homed: {why}, and nobody said that the tip is free",
+            "a tip that is out of the skin, with a free way straight up",
+            "free the tip by hand, then start again and say so when asked (--yes does not)",
+        )
+
+
 def require_found(why: str, height: float, ask: Ask) -> None:
     """Ask whether a position that was lost was found again.
 

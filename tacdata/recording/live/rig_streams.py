@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -17,11 +16,15 @@ from tacdata.recording.clocks.polled_clock import PolledClock, polled_clock
 from tacdata.recording.live.detection_process import Detect
 from tacdata.recording.live.device_streams import BOARD, POLL, DeviceStreams
 from tacdata.recording.live.live_feed import Watch
-from tacdata.recording.live.reading_health import ReadingHealth
+from tacdata.recording.live.reading_health import BadReadings, ReadingHealth
 from tacdata.recording.live.rig_devices import RigDevices
 
 TRIPS = 4096
 """Round trips of status reports that are kept for the controller's clock [count]."""
+BOARD_SILENCE, SILENT_FRAMES = 1.8, 5
+"""Time without a frame after which a board counts as silent [s of real time], and in frames of a slow one."""
+AGAIN_NS = 60_000_000_000
+"""Bad readings that a plan goes on with are said again after this time [ns of the host's clock]."""
 TAXELS = "taxels"
 """Name of the only board's stream."""
 
@@ -40,6 +43,7 @@ class RigStreams(DeviceStreams):
         watch: Watch | None = None,
         fingers: dict[str, Any] | None = None,
         off_path: Callable[[CncStatus], TacdataError | None] = lambda status: None,
+        on_bad_readings: Callable[[str], None] | None = None,
     ) -> None:
         """Prepare the threads.
 
@@ -50,6 +54,7 @@ class RigStreams(DeviceStreams):
             detect: Searches an image for the cube; without it images are only stored.
             watch: Called with a sample of the data.
             fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
+            on_bad_readings: Called with words when the board's readings cannot be right, in place of a fault.
             off_path: Called with every status report; returns what is wrong with it (`GuardedMotion.off_path`).
         """
         super().__init__({"": devices.board}, devices.cameras, cameras, fingers, detect, watch)
@@ -61,7 +66,13 @@ class RigStreams(DeviceStreams):
         self.position: tuple[float, float, float] | None = None
         """Latest reported machine position [mm]."""
         self._damage_then = self._damage()
-        self._health = ReadingHealth(reading_limits(devices.board.describe()))
+        described = devices.board.describe()
+        rate = described.get("rate", {}).get("nominal")
+        self._health_of = lambda: ReadingHealth(reading_limits(described), rate, devices.board.clock.rate)
+        self._health, self._on_bad_readings, self._quiet_until_ns = self._health_of(), on_bad_readings, 0
+        # An emulated board faster than time shares this computer: it may wait where a real one goes on.
+        known = rate and devices.board.clock.rate == 1
+        self._board_silence = max(BOARD_SILENCE, SILENT_FRAMES / rate) if known else self.silence
         self._work["motion controller"] = self._read_status
 
     def __enter__(self) -> RigStreams:
@@ -129,16 +140,28 @@ class RigStreams(DeviceStreams):
 
     def _read(self, stream: str, frames: list[TaxelFrame]) -> None:
         for frame in frames:
-            if words := self._health.take(frame.arrival_ns, frame.counts):
-                raise DeviceError(
+            words = self._health.take(frame.arrival_ns, frame.counts)
+            if words and self._on_bad_readings:
+                self._health = self._health_of()
+                if frame.arrival_ns < self._quiet_until_ns:
+                    continue
+                self._quiet_until_ns = frame.arrival_ns + AGAIN_NS
+                self._on_bad_readings(words)
+                if self._sink:
+                    self._sink.note(f"{stream}: {words}", "warning")
+            elif words:
+                raise BadReadings(
                     f"{stream}: {words}", "readings that live",
                     "check the board's supply, its ribbon cable and firmware, then start again; a session goes on "
                     "with --resume",
                 )  # fmt: skip
 
+    def _silence_of(self, name: str) -> float:
+        return self._board_silence if name == BOARD else self.silence
+
     def _silent(self, name: str) -> None:
         if name == BOARD:
-            raise self._no_frames(self.silence)
+            raise self._no_frames(self._board_silence)
         raise DeviceError(
             f"{name}: nothing received for {self.silence:g} s", "a stream that goes on",
             "check cable and power, then start again; a session goes on with --resume",
@@ -161,5 +184,5 @@ class RigStreams(DeviceStreams):
                     self._feed.position(status.arrival_ns, self.position)
                 if self._sink and status.arrival_ns >= self._sink.begun_ns:
                     self._sink.status(status)
-        time.sleep(POLL)
+        self._host.sleep(POLL)
         return len(statuses)

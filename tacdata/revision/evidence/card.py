@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tacdata.discrepancy.verdict.sealed import WIDEST
 from tacdata.revision.evidence.table import in_words
 from training.reports.html_page import HtmlPage
 
@@ -55,9 +56,9 @@ def _tiles(revision: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[str,
     gap = revision["gap"]
     if gap:
         low, high = gap["interval"]
-        closed = "–" if gap["closed"] is None else f"{100 * gap['closed']:.0f} %"
-        spread = "" if low is None else f" ({100 * low:.0f} to {100 * high:.0f} %)"
-        tiles.append((f"of the gap closed{spread}", closed))
+        if gap["closed"] is not None and low is not None and high - low < WIDEST:
+            spread = f" ({100 * low:.0f} to {100 * high:.0f} %)"
+            tiles.append((f"of the gap closed{spread}", f"{100 * gap['closed']:.0f} %"))
         sealed = gap["sealed"]
         tiles.append(("residual before → after (1 is noise)", f"{sealed['before']:.3g} → {sealed['after']:.3g}"))
     moved = revision["labels"]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tacdata.tags.cube.cube import Cube
-from tacdata.tags.cube.face_patch import FacePatch, draw_face, slopes_of
+from tacdata.tags.cube.face_patch import COARSE, FINE, FacePatch, draw_face, slopes_of
 
 STEPS = 4
 """Most Gauss-Newton steps."""
@@ -78,7 +78,7 @@ def align(
     """
     pose = start
     for step in range(max(steps, 1)):
-        patches = _patches(pose, cube, matrix, grey)
+        patches = _patches(pose, cube, matrix, grey, COARSE if step == 0 else FINE)
         used = [p for f, p in patches.items() if f in seen or p.likeness > ENTIRE]
         detected = [p for f, p in patches.items() if f in seen]
         found = _step(used, pose, matrix, cube, None if step == 0 else pose.residual) if steps else None
@@ -165,10 +165,11 @@ def _step(
     return _Step(move, squares / count * inverse[:6, :6], float(turned + moved) * focal / depth)
 
 
-def _patches(pose: Alignment, cube: Cube, matrix: np.ndarray, grey: np.ndarray) -> dict[str, FacePatch]:
+def _patches(pose: Alignment, cube: Cube, matrix: np.ndarray, grey: np.ndarray, detail: float) -> dict[str, FacePatch]:
     """Draw every face that the pose turns to the camera and that lies inside the image."""
     drawn = (
-        (face, draw_face(face, pose.rotation, pose.translation, pose.blur, cube, matrix, grey)) for face in cube.ids
+        (face, draw_face(face, pose.rotation, pose.translation, pose.blur, cube, matrix, grey, detail))
+        for face in cube.ids
     )
     return {face: patch for face, patch in drawn if patch is not None}
 

@@ -9,10 +9,14 @@ import numpy as np
 
 from tacdata.tags.cube.cube import AXES, Cube
 
-FINE = 72
-"""Fine pixels rendered along a tag's side, approximately; one to four per pixel and axis."""
 CELL = 12
 """Texels per cell of the pattern."""
+COARSE, FINE = 0.75, 2.0
+"""Fewest fine pixels rendered per texel [1]: to come near the pose, and for the pose. Few of them shift edges along the
+rows of pixels, all in the same way.
+"""
+FINEST = 8
+"""Most fine pixels rendered per pixel and axis [count]."""
 CLEAR = 2.25
 """Distance from the paper's edge, in blurs [1], within which the background may shine in."""
 FILLED = 0.5
@@ -56,6 +60,7 @@ def draw_face(
     cube: Cube,
     matrix: np.ndarray,
     grey: np.ndarray,
+    detail: float = FINE,
 ) -> FacePatch | None:
     """Return a face's pixels, or None if the pose turns it away or too little of it is in the image.
 
@@ -67,6 +72,7 @@ def draw_face(
         cube: The cube.
         matrix: Camera matrix [px], shape (3, 3).
         grey: Image without distortion, uint8, shape (height, width).
+        detail: Fine pixels rendered per texel, at least [1].
     """
     import cv2
 
@@ -88,7 +94,8 @@ def draw_face(
     plane = matrix @ np.array([half * axes[:, 0], half * axes[:, 1], centre]).T
     plane[:2] -= np.array([[left], [top]]) * plane[2]
     to_plane = np.linalg.inv(plane)
-    fine = min(max(round(FINE * centre[2] / (2 * half * matrix[0, 0])), 1), 4)
+    width = 2 * half * matrix[0, 0] / centre[2]
+    fine = int(np.clip(np.ceil(8 * CELL * detail / width), 1, FINEST))
     model = _drawn(cube.ids[face], to_plane, (int(right - left), int(bottom - top)), blur, fine)
     u, v = np.arange(2.0, right - left - 2), np.arange(2.0, bottom - top - 2)[:, None]
     across, down, depth = (a * u + (b * v + c) for a, b, c in to_plane.tolist())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import queue
-import threading
 from collections import deque
 from collections.abc import Callable
 
@@ -34,13 +33,15 @@ class Controller:
         self, clock: Clock, seed: int = 0, position: tuple[float, float, float] = (-1.0, -1.0, -1.0),
         homed: bool = True, settings: dict[str, str] | None = None,
         offset: tuple[float, float, float] = (0.0, 0.0, 0.0), firmware: str = "Grbl", fresh: bool = False,
+        port: VirtualPort | None = None,
     ) -> None:  # fmt: skip
         """Switch on a machine at ``position`` [mm, machine]; ``offset`` is its G54 [mm].
 
-        ``firmware`` is Grbl or grblHAL; a ``fresh`` one has empty memory.
+        ``firmware`` is Grbl or grblHAL; a ``fresh`` one has empty memory. ``port`` is the line to the host, by
+        default a pseudo-terminal.
         """
         self.clock = clock
-        self.port = VirtualPort(115200, seed)
+        self.port = port or VirtualPort(115200, seed)
         kind = NAMES[firmware]
         self.settings = {**texts.DEFAULTS, **kind.changed, **(settings or {})}
         self._rng = np.random.default_rng(seed)
@@ -57,8 +58,8 @@ class Controller:
         self._out: deque[tuple[int, str]] = deque()
         self._report_ns: int | None = None
         self._faults: queue.SimpleQueue[Callable[[int], None]] = queue.SimpleQueue()
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="virtual-grbl", daemon=True)
+        self._stopped = clock.host.event()
+        self._thread = clock.host.thread(self._run, "virtual-grbl")
 
     @property
     def planner(self) -> Planner:

@@ -35,3 +35,5 @@ class Look:
     """Image behind the cubes, uint8 or float32, shape (height, width); None for an empty bench."""
     jpeg: int | None = None
     """JPEG quality [1 of 100]; None for no compression."""
+    rays: int = 4
+    """Most rays per pixel and axis [count]. Four shift edges along the rows of pixels by up to a tenth of a pixel."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.virtual_rig.optics.look import Look
+from tacdata.virtual_rig.optics.noise_stretch import NoiseStretch
 
 # outward normal and image-right direction of each face, cube frame; right x up = normal
 FACES = {
@@ -37,8 +38,9 @@ CELL = 24
 
 
 def render_cube(
-    pose_camera_cube: np.ndarray, intrinsics: dict[str, Any], cube: dict[str, Any], rng: np.random.Generator
-) -> np.ndarray:
+    pose_camera_cube: np.ndarray, intrinsics: dict[str, Any], cube: dict[str, Any],
+    rng: np.random.Generator | NoiseStretch,
+) -> np.ndarray:  # fmt: skip
     """Return a grey image, uint8, shape (height, width).
 
     Args:
@@ -54,7 +56,7 @@ def render_cube(
 
 def render_scene(
     cubes: Sequence[tuple[np.ndarray, dict[str, Any]]], intrinsics: dict[str, Any],
-    rng: np.random.Generator, look: Look | None = None,
+    rng: np.random.Generator | NoiseStretch, look: Look | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Return a grey image of several cubes, uint8, shape (height, width).
 
@@ -76,7 +78,7 @@ def render_scene(
 
 
 def expose(
-    image: np.ndarray, boxes: list[tuple[int, int, int, int]], look: Look, rng: np.random.Generator
+    image: np.ndarray, boxes: list[tuple[int, int, int, int]], look: Look, rng: np.random.Generator | NoiseStretch
 ) -> np.ndarray:
     """Turn a sharp scene into a camera's image, uint8: blur, light, noise.
 
@@ -117,7 +119,7 @@ def _compose(
     corners = np.array(boxes)
     (left, top), (right, bottom) = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
     box = (int(left), int(top), int(right), int(bottom))
-    fine = max(2, min(4, int(np.sqrt(1.5e6 / ((right - left) * (bottom - top))))))
+    fine = max(2, min(look.rays, int(np.sqrt(1.5e6 / ((right - left) * (bottom - top))))))
     lens = Lens(box, fine, intrinsics)
     grey, share = np.zeros((2, bottom - top, right - left), np.float32)
     for each in poses:

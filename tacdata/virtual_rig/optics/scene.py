@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 INTRINSICS = {"width": 640, "height": 480, "fx": 900.0, "fy": 900.0, "cx": 319.5, "cy": 239.5}
 CUBE = {"side": 20.0, "tag": 16.0, "ids": {"+x": 0, "-x": 1, "+y": 2, "-y": 3, "+z": 4}}
@@ -46,13 +47,25 @@ def draw_scene(seed: int, over: tuple[float, float, float]) -> CubeScene:
     rng = np.random.default_rng([seed, 6])
     cube = np.add(over, (0.0, 0.0, CUBE_HEIGHT))
     eye = cube + CAMERA_OFFSET + rng.normal(0, 4, 3)
-    forward = (cube - eye) / np.linalg.norm(cube - eye)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    camera = np.eye(4)
-    camera[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
-    camera[:3, 3] = eye / 1000
+    camera = looking_at(eye / 1000, cube / 1000)
     riding = np.eye(4)
     riding[:3, :3] = Rotation.from_rotvec(rng.normal(0, 0.5, 3), degrees=True).as_matrix()
     riding[:3, 3] = (np.array([0, 0, CUBE_HEIGHT]) + rng.normal(0, 0.3, 3)) / 1000
     return CubeScene(camera, riding)
+
+
+def looking_at(eye: ArrayLike, target: ArrayLike) -> np.ndarray:
+    """Return the frame of a camera that looks at a point, with the world's z upwards in the image, shape (4, 4).
+
+    Args:
+        eye: The camera's position in the world [m], shape (3,).
+        target: The point [m], shape (3,), not right above or below the camera.
+    """
+    forward = np.subtract(target, eye)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    pose[:3, 3] = eye
+    return pose

@@ -1,7 +1,7 @@
-"""An emulated hand that grasps a ball, or wipes with an eraser, again and again.
+"""An emulated hand that grasps a ball, a can or a box, or wipes with an eraser, again and again.
 
-World: z up; ball or eraser lies on the table about the origin. Fingertip frame: origin on the pad, x along the finger,
-z out of the pad. The object presses the skins with the ball's radius, or by round nubs of a smaller one.
+World: z up; the object lies on the table about the origin. Fingertip frame: origin on the pad, x along the finger, z
+out of the pad. The object presses the skins with the ball's radius, or by round nubs of a smaller one.
 """
 
 from __future__ import annotations
@@ -14,9 +14,13 @@ import numpy as np
 RADIUS = 35.0
 """Radius of the ball [mm]."""
 HEIGHT = 36.0
-"""Height of its centre over the table [mm]."""
+"""Height of the place that is grasped over the table [mm]."""
+THINGS = {"ball": RADIUS, "can": 33.0, "box": 30.0, "eraser": 25.0}
+"""Object -> half its width between the fingers [mm]."""
+FLAT = ("box", "eraser")
+"""Objects with two parallel faces, of which the thumb presses one and the others the other."""
 DIRECTIONS = {"thumb": (-1.0, 0.0, 0.05), "index": (0.93, 0.36, 0.05), "middle": (0.93, -0.36, 0.05)}
-"""From the ball's centre to each finger of a right hand."""
+"""From the object's centre to each finger of a right hand."""
 TIMES = (0.8, 2.0, 2.5, 3.7, 5.7, 6.9, 7.2, 8.2)
 """End times of: waiting, closing, pressing, lifting, holding, lowering, letting go, opening [s]; then it repeats."""
 PERIOD = 8.5
@@ -26,10 +30,10 @@ REACH = 45.0
 LIFT = 90.0
 """Height of the lift [mm]."""
 TASKS = ("grasp", "wipe")
-ERASER = 25.0, 15.0
-"""Half the eraser's width between the fingers, and the height of its middle [mm]."""
+ERASER_HEIGHT = 15.0
+"""Height of the eraser's middle [mm]."""
 ASIDE = {"thumb": 0.0, "index": 14.0, "middle": -14.0}
-"""Position along the eraser that each finger presses [mm]."""
+"""Position along a flat face that each finger presses [mm]."""
 STROKE, STROKES = 40.0, 2
 """Amplitude of wiping to each side [mm], and number of strokes."""
 
@@ -49,6 +53,8 @@ class Hand:
     """"grasp" or "wipe"."""
     nub: float = RADIUS
     """Radius of what presses each skin [mm]: the ball's own, or that of nubs on the object."""
+    thing: str = "ball"
+    """One of `THINGS`."""
 
     @property
     def document(self) -> dict[str, Any]:
@@ -79,8 +85,7 @@ class Hand:
         matrix = np.eye(4)
         matrix[:3, :3] = np.stack([along, np.cross(normal, along), normal], axis=-1)
         x, y, depth = self.press(finger, seconds)
-        half = RADIUS if self.task == "grasp" else ERASER[0]
-        touch = self._middle(finger, t) + out * (half + away - depth)
+        touch = self._middle(finger, t) + out * (THINGS[self.thing] + away - depth)
         # The pad's origin is the array's centre; the contact is offset from it by the skew.
         place = touch - matrix[:3, 0] * x - matrix[:3, 1] * y
         turn = _turn(0.06 * free * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)]))
@@ -90,25 +95,36 @@ class Hand:
 
     def _out(self, finger: str) -> np.ndarray:
         """Return the direction from the object to a finger [1]."""
-        if self.task == "wipe":
+        if self.thing in FLAT:
             return np.array([-1.0 if finger == "thumb" else 1.0, 0.0, 0.0])
-        return np.array(DIRECTIONS[finger]) / np.linalg.norm(DIRECTIONS[finger])
+        out = np.array(DIRECTIONS[finger])
+        if self.thing == "can":
+            out[2] = 0.0  # it stands upright
+        return out / np.linalg.norm(out)
 
     def _middle(self, finger: str, t: float) -> np.ndarray:
         """Return the point of the object that a finger's normal goes through [mm]."""
+        aside = ASIDE[finger] if self.thing in FLAT else 0.0
         if self.task == "wipe":
             along = STROKE * np.sin(2 * np.pi * STROKES * _blend(t, TIMES[2], TIMES[5]))
-            return np.array([0.0, along + ASIDE[finger], ERASER[1]])
+            return np.array([0.0, along + aside, ERASER_HEIGHT])
         lift = LIFT * (_blend(t, TIMES[2], TIMES[3]) - _blend(t, TIMES[4], TIMES[5]))
-        return np.array([0.0, 0.0, HEIGHT + lift])
+        return np.array([0.0, aside, HEIGHT + lift])
 
 
-def draw_hand(seed: int, task: str = "grasp") -> Hand:
-    """Draw a hand at a task from a seed."""
+def draw_hand(seed: int, task: str = "grasp", thing: str | None = None) -> Hand:
+    """Draw a hand at a task from a seed.
+
+    Args:
+        seed: Decides how deep each finger presses, and where.
+        task: One of `TASKS`.
+        thing: One of `THINGS`; by default the ball or, to wipe, the eraser.
+    """
     rng = np.random.default_rng([seed, 11])
     depth = {name: float(rng.uniform(0.7, 1.2)) for name in DIRECTIONS}
     skew = {name: tuple(rng.uniform(-1.0, 1.0, 2).tolist()) for name in DIRECTIONS}
-    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)), task)  # type: ignore[arg-type]
+    held = thing or ("eraser" if task == "wipe" else "ball")
+    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)), task, thing=held)  # type: ignore[arg-type]
 
 
 def _blend(t: float, begin: float, end: float) -> float:

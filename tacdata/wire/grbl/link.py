@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import serial
 
@@ -70,17 +70,17 @@ class GrblLink:
         self._held = False
         self._unanswered: deque[_Line] = deque()
         # It is looked at once a poll.
-        self._silence = Patience(SILENCE, clock.rate, floor=SILENCE, step=max(0.25, 2.0 / (poll_rate * clock.rate)))
+        step = max(0.25, 2.0 / (poll_rate * clock.rate))
+        self._silence = Patience(SILENCE, clock.rate, SILENCE, step, clock.host)
         self._unread = ""  # the latest report that could not be read, since one that could
         self._commanded_ns = clock.now_ns()
         self._welcome_expected, self._reset_asked = True, False
         self.polled = False
-        self._stopped = threading.Event()
-        self._changed = threading.Condition()
-        self._turn = threading.RLock()
+        self._stopped, self._changed = clock.host.event(), clock.host.condition()
+        self._turn = clock.host.lock()
         # Reentrant, because a signal handler may send a feed hold while its own thread is writing a line.
-        self._writing = threading.RLock()
-        self._threads: list[threading.Thread] = []
+        self._writing = clock.host.lock()
+        self._threads: list[Any] = []
 
     @property
     def last(self) -> CncStatus | None:
@@ -267,7 +267,7 @@ class GrblLink:
         )
 
     def _begin(self, work: Callable[[], None], name: str) -> None:
-        thread = threading.Thread(target=work, name=name, daemon=True)
+        thread = self.clock.host.thread(work, name)
         self._threads.append(thread)
         thread.start()
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from tacdata.clock import Clock
 from tacdata.errors import DeviceError
-from tacdata.wire.delivered import CncStatus
+from tacdata.wire.delivered import CncStatus, OwesAnswer
 from tacdata.wire.patience import REAL_FLOOR, Patience
 
 IDLE, IDLE_FLOOR = 2.0, 1.5
@@ -45,15 +45,16 @@ class Watch:
         """Start now."""
         self._owed, self._clock = owed, clock
         self._due_ns = clock.now_ns() + round(min(owed.motion, owed.limit) * 1e9)
-        self._late = Patience(owed.limit, clock.rate, floor=FLOOR if owed.idle_ends_it else REAL_FLOOR)
-        self._idle = Patience(IDLE, clock.rate, floor=IDLE_FLOOR)
+        floor = FLOOR if owed.idle_ends_it else REAL_FLOOR
+        self._late = Patience(owed.limit, clock.rate, floor, host=clock.host)
+        self._idle = Patience(IDLE, clock.rate, IDLE_FLOOR, host=clock.host)
 
     def ending(self, last: CncStatus | None) -> DeviceError | None:
         """Return why the wait must end, or None."""
         if last is None or last.state != "Idle" or last.sent_ns < self._due_ns or not self._owed.idle_ends_it:
             self._idle.restart()
         elif self._idle.over():
-            return DeviceError(
+            return OwesAnswer(
                 f"the controller stands idle and still owes {self._owed.what}{self._said}",
                 f"an answer within {IDLE:g} s after the motion has ended",
                 "check cable and ground (an answer was lost or damaged on its way) and the firmware (it may have "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 
 import numpy as np
@@ -52,7 +51,7 @@ class Statuses:
 
     def ask(self) -> bool:
         """Return whether to send a query now, and count it as sent."""
-        now = time.monotonic()
+        now = self._clock.host.monotonic()
         if self._queries and now - max(self._asked_at, self._answered_at) <= REPEAT:
             return False
         if self._answered:
@@ -68,7 +67,7 @@ class Statuses:
     def take(self, report: StatusReport, arrival_ns: int) -> CncStatus | None:
         """Take a report; return it in mm, or None if its position cannot be known yet."""
         sent_ns = self._queries.popleft() if self._queries else None
-        self._answered_at, self._answered = time.monotonic(), True
+        self._answered_at, self._answered = self._clock.host.monotonic(), True
         if report.offset is not None:
             self.offset = report.offset
         self.unplaced = report.is_work and self.offset is None

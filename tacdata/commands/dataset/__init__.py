@@ -1,0 +1,10 @@
+"""Edits of datasets; each file in this folder is a verb below ``tacdata dataset``."""
+
+from tacdata.commands.command import TOOLS
+
+ORDER = 103
+PANEL = TOOLS
+
+
+def run() -> None:
+    """Edit datasets and keep their records: restore, delete, split, merge."""

@@ -1,0 +1,29 @@
+"""Leave episodes out of a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tacdata.commands.command import Result
+from tacdata.progress import suggest
+
+ORDER = 20
+
+
+def run(
+    dataset: Annotated[Path, typer.Argument(help="Dataset; it stays as it is.")],
+    episodes: Annotated[str, typer.Option(help="Episodes to leave out, such as 0-4,7.")],
+    out: Annotated[Path, typer.Option(help="Folder of the new dataset; must not exist.")],
+) -> Result:
+    """Write a dataset without some of its episodes, by lerobot's tool, with sensors and records kept."""
+    from tacdata.commands.dataset.command import counted, lacking, numbers
+    from tacdata.dataset.edit import delete
+
+    chosen = numbers(episodes)
+    missing = delete(dataset, chosen, out)
+    print(f"{out}: {dataset} without {counted(set(chosen))}; the others are numbered anew{lacking(missing)}")
+    suggest("card", out)
+    return Result({"dataset": out, "without_record": missing})

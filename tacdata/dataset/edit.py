@@ -1,0 +1,185 @@
+"""Deletes from, splits and merges datasets by lerobot's edit tools, and restores what these drop.
+
+A new dataset is written beside its place and renamed when it is whole. Sources stay as they are.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tacdata.dataset.flags import carry_flags
+from tacdata.dataset.format import folder, metadata
+from tacdata.dataset.pack import refuse_existing
+from tacdata.dataset.restore import restore
+from tacdata.errors import FormatError, UsageError
+
+
+def delete(root: Path, episodes: Sequence[int], out: Path) -> list[int]:
+    """Write a dataset without some of its episodes; the others are numbered anew.
+
+    Args:
+        root: The dataset.
+        episodes: Numbers of the episodes to leave out.
+        out: Folder of the new dataset.
+
+    Returns:
+        Numbers of the new dataset's episodes whose record was not found.
+
+    Raises:
+        UsageError: If ``out`` exists, a number is not there, or no episode would stay.
+        FormatError: If the dataset is damaged.
+        ModuleNotFoundError: If lerobot is not installed.
+    """
+    count = _check_numbers(root, episodes)
+    if len(set(episodes)) == count:
+        raise UsageError(
+            f"all {count} episodes of {root} to delete", "at least one that stays", "remove the folder instead"
+        )
+    chosen = sorted(set(episodes))
+
+    def edit(tools: Any, made: Path) -> None:
+        tools.delete_episodes(_open(root), chosen, output_dir=made, repo_id=_name(out))
+
+    return _write(out, [root], edit)[""]
+
+
+def split(root: Path, parts: Mapping[str, Sequence[int]], out: Path) -> dict[str, list[int]]:
+    """Write parts of a dataset as datasets of their own.
+
+    Args:
+        root: The dataset.
+        parts: Name of each part -> numbers of its episodes. Episodes of no part are left out.
+        out: New folder, with a folder for each part in it.
+
+    Returns:
+        Name of each part -> numbers of its episodes whose record was not found.
+
+    Raises:
+        UsageError: If ``out`` exists, a number is not there or in two parts, or a part is empty.
+        FormatError: If the dataset is damaged.
+        ModuleNotFoundError: If lerobot is not installed.
+    """
+    seen: dict[int, str] = {}
+    for name, episodes in parts.items():
+        if not episodes or not name or Path(name).name != name:
+            raise UsageError(
+                f"part {name!r} with {len(episodes)} episodes", "a plain name and one episode or more",
+                "name it as in --part train=0-7",
+            )  # fmt: skip
+        if (twice := next((number for number in episodes if number in seen), None)) is not None:
+            raise UsageError(
+                f"episode {twice} in the parts {seen[twice]} and {name}", "each episode in one part at most",
+                "take it out of one",
+            )  # fmt: skip
+        seen |= dict.fromkeys(episodes, name)
+    _check_numbers(root, list(seen))
+
+    def edit(tools: Any, made: Path) -> None:
+        tools.split_dataset(_open(root), {name: sorted(part) for name, part in parts.items()}, output_dir=made)
+
+    return _write(out, [root], edit, tuple(parts))
+
+
+def merge(roots: Sequence[Path], out: Path) -> list[int]:
+    """Write datasets below each other as one.
+
+    Args:
+        roots: The datasets, in the order of their episodes.
+        out: Folder of the new dataset.
+
+    Returns:
+        Numbers of the new dataset's episodes whose record was not found.
+
+    Raises:
+        UsageError: If ``out`` exists, or two of the datasets hold the same recording.
+        FormatError: If a dataset is damaged, or their columns or rates differ.
+        ModuleNotFoundError: If lerobot is not installed.
+    """
+    if len(roots) < 2:
+        raise UsageError(f"{len(roots)} datasets to merge", "two or more", "name them all")
+    held: dict[str, Path] = {}
+    for root in roots:
+        folder.read_info(root)
+        own = metadata.read_records(root).values()
+        if twice := next((record for record in own if record.recording in held), None):
+            raise UsageError(
+                f"{held[twice.recording]} and {root} both hold {twice.recording_file}",
+                "each recording once: a copy in training and one in the test would flatter a network",
+                "leave it out of one with tacdata dataset delete",
+            )
+        held |= {record.recording: root for record in own}
+
+    def edit(tools: Any, made: Path) -> None:
+        tools.merge_datasets([_open(root) for root in roots], output_repo_id=_name(out), output_dir=made)
+
+    return _write(out, roots, edit)[""]
+
+
+def _check_numbers(root: Path, episodes: Sequence[int]) -> int:
+    """Return how many episodes a dataset has, if all of these are among them."""
+    count = folder.read_info(root)["total_episodes"]
+    if wrong := sorted(number for number in set(episodes) if not 0 <= number < count):
+        raise UsageError(
+            f"{root} has no episode {wrong[0]}", f"0 to {count - 1}", "look at the numbers with tacdata browse"
+        )
+    return count
+
+
+def _write(
+    out: Path, sources: Sequence[Path], edit: Callable[[Any, Path], None], parts: Sequence[str] = ("",)
+) -> dict[str, list[int]]:
+    """Let lerobot write into a hidden folder, restore what it drops, carry the flags along, and rename the folder."""
+    refuse_existing(out, append=False)
+    for source in sources:
+        folder.read_info(source)
+    os.environ.setdefault("HF_HUB_OFFLINE", "1")  # before lerobot is imported: nothing here is on the hub
+    from lerobot.datasets import dataset_tools
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    lacking = {}
+    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as work:
+        made = Path(work) / out.name
+        try:
+            with _quiet():
+                edit(dataset_tools, made)
+        except (ValueError, KeyError, RuntimeError, OSError) as error:
+            reason = next(iter(str(error).splitlines()), type(error).__name__)
+            raise FormatError(
+                f"lerobot cannot write {out}: {reason}",
+                "whole datasets with the same columns, rate and robot_type",
+                "compare their meta/info.json; pack the sessions again if one is damaged",
+            ) from error
+        for part in parts:
+            lacking[part] = restore(made / part, sources)
+            for source in sources:
+                carry_flags(source, made / part)
+        os.replace(made, out)
+    return lacking
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep back what lerobot logs: above all a page on a video decoder, which our datasets have no use for."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+def _open(root: Path) -> Any:
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+    return LeRobotDataset(_name(root), root=root)
+
+
+def _name(root: Path) -> str:
+    """Return what lerobot calls a dataset that is on no hub."""
+    return f"local/{root.resolve().name}"

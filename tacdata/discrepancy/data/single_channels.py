@@ -1,0 +1,132 @@
+"""Single channels that jump, wander or change places during a session: no effect of the library does so."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tacdata.chain import Course, Response, predict
+
+STRONG = 0.2
+"""A channel counts in a press that stirs it by this share of its largest rise [1]."""
+FEWEST = 10
+"""Presses in which a channel is watched, at least."""
+LEAST_JUMP, LEAST_WANDER = 0.08, 0.04
+"""Changes of a gain that are told of [1]..."""
+JUMP_Z, WANDER_Z = 6.0, 8.0
+"""...from so many times the scatter from press to press on [1]."""
+SHARED = 0.4
+"""A change of which the other channels show so much is no single channel's [1]."""
+RUN = 3
+"""Successive presses of a jump, or of a change of places, at least."""
+SWAPPED = 0.3
+"""Two channels changed places where that leaves so much of the misfit, or less [1]."""
+MOST_LISTED = 4
+
+
+def odd_channels(course: Course, response: Response) -> list[str]:
+    """Return in words which channels differ from themselves during the session.
+
+    Args:
+        course: The recordings.
+        response: What presses should do to the channels.
+    """
+    reduced, predicted = course.reduced, predict(course, response, []).signal[course.read]
+    episodes = np.unique(reduced.episode)
+    if len(episodes) < FEWEST:
+        return []
+    rows = [np.flatnonzero(reduced.episode == e) for e in episodes]
+    measured = [_level(reduced.readings[r]) for r in rows]
+    expected = [_level(predicted[r]) for r in rows]
+    swapped = _swaps(course, episodes, measured, expected)
+    taken, places = {c for pair in swapped for c in pair}, list(swapped.values())
+    gains = _gains(measured, expected)
+    return [*places, *_jumps_and_wanders(course, episodes, gains, taken)][:MOST_LISTED]
+
+
+def _level(values: np.ndarray) -> np.ndarray:
+    return values - np.nanmedian(values[: max(len(values) // 10, 1)], axis=0)
+
+
+def _gains(measured: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:
+    """Return each channel's gain in each press [1], shape (presses, channels); NaN where a press hardly stirs it."""
+    power = np.array([np.nansum(np.square(p), axis=0) for p in expected])
+    both = np.array([np.nansum(m * p, axis=0) for m, p in zip(measured, expected, strict=True)])
+    peak = np.array([np.abs(p).max(axis=0) for p in expected])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gains = np.where(peak >= STRONG * peak.max(axis=0), both / power, np.nan)
+        return gains / np.nanmedian(gains, axis=0)
+
+
+def _jumps_and_wanders(course: Course, episodes: np.ndarray, gains: np.ndarray, left_out: set[int]) -> list[str]:
+    words: list[tuple[float, str]] = []
+    for channel in range(gains.shape[1]):
+        known = np.flatnonzero(np.isfinite(gains[:, channel]))
+        if len(known) < FEWEST or channel in left_out:
+            continue
+        own, called = gains[known, channel], course.channel_names[channel]
+        others = _others(gains, channel)[known]
+        scatter = float(1.4826 * np.median(np.abs(np.diff(own) - np.median(np.diff(own)))) / np.sqrt(2))
+        begin, end = _longest(np.abs(own - 1) > max(LEAST_JUMP, JUMP_Z * scatter))
+        change = float(np.median(own[begin:end])) - 1 if end > begin else 0.0
+        if RUN <= end - begin <= len(own) // 2 and abs(np.median(others[begin:end]) - 1) < SHARED * abs(change):
+            first, last = (course.names[int(episodes[known[k]])] for k in (begin, end - 1))
+            healed = "and comes back" if end < len(own) else "to the end"
+            words.append((abs(change), (
+                f"{called}: reads {100 * abs(change):.0f} % {'more' if change > 0 else 'less'} from {first} to {last} "
+                f"{healed}: look at its contact, or leave these presses out"
+            )))  # fmt: skip
+            continue
+        spread = float(np.ptp(_smooth(own)))
+        if spread > max(LEAST_WANDER, WANDER_Z * scatter / np.sqrt(5)) and np.ptp(_smooth(others)) < SHARED * spread:
+            words.append((spread, (
+                f"{called}: its gain wanders by {100 * spread:.0f} % over the session, unlike the others': "
+                "look at its contact and its cable"
+            )))  # fmt: skip
+    return [said for _, said in sorted(words, reverse=True)]
+
+
+def _others(gains: np.ndarray, channel: int) -> np.ndarray:
+    """Return the median gain of all other channels [1], shape (presses,); 1 where none is stirred."""
+    rest = np.delete(gains, channel, axis=1)
+    known = np.isfinite(rest).any(axis=1)
+    result = np.ones(len(gains))
+    result[known] = np.nanmedian(rest[known], axis=1)
+    return result
+
+
+def _smooth(values: np.ndarray) -> np.ndarray:
+    return np.array([np.median(values[max(k - 2, 0) : k + 3]) for k in range(len(values))])
+
+
+def _longest(flags: np.ndarray) -> tuple[int, int]:
+    """Return the longest run of flags as begin and end."""
+    best, begin = (0, 0), 0
+    for k, flag in enumerate([*flags, False]):
+        if not flag:
+            best, begin = ((begin, k) if k - begin > best[1] - best[0] else best), k + 1
+    return best
+
+
+def _swaps(
+    course: Course, episodes: np.ndarray, measured: list[np.ndarray], expected: list[np.ndarray]
+) -> dict[tuple[int, int], str]:  # fmt: skip
+    """Return which two channels changed places in a part of the session, each pair with words."""
+    words, channels = {}, course.channels
+    cross = np.array([
+        [[np.nansum(np.square(m[:, i] - p[:, j])) for j in range(channels)] for i in range(channels)]
+        for m, p in zip(measured, expected, strict=True)
+    ]) if channels <= 32 else np.zeros((0, 0, 0))  # fmt: skip
+    for i in range(len(cross) and channels):
+        for j in range(i + 1, channels):
+            own, other = cross[:, i, i] + cross[:, j, j], cross[:, i, j] + cross[:, j, i]
+            begin, end = _longest(other < SWAPPED * own)
+            rest = np.ones(len(own), dtype=bool)
+            rest[begin:end] = False
+            if end - begin >= RUN and rest.sum() >= RUN and own[rest].sum() < SWAPPED * other[rest].sum():
+                first, last = (course.names[int(episodes[k])] for k in (begin, end - 1))
+                names = course.channel_names
+                words[i, j] = (
+                    f"{names[i]} and {names[j]} read as one another from {first} to {last}: were they swapped? "
+                    "Touch one taxel after the other"
+                )
+    return words

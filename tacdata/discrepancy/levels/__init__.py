@@ -1,0 +1,1 @@
+"""Names beside a flexible remainder, by levels: family, mechanism, form."""

@@ -1,0 +1,60 @@
+"""Each effect of an answer against its rivals beside the remainder: which level of its name holds?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from tacdata.discrepancy.levels.remainder import Remainder, remainder
+from tacdata.discrepancy.search.findings import Findings, RivalModels
+from tacdata.discrepancy.search.j_test import ModelError, j_statistic
+
+
+class Level(Enum):
+    """How fine a name is; the value is what a verdict's file says."""
+
+    FAMILY = "family"
+    MECHANISM = "mechanism"
+    FORM = "form"
+
+
+@dataclass(frozen=True)
+class BesideRemainder:
+    """One effect's evidence beside a remainder of the size that is left."""
+
+    necessity: float
+    """By how many standard errors over episodes the model is worse without it (J test) [1]."""
+    margins: dict[str, float]
+    """Rival effect -> by how many standard errors over episodes this one is better (J test)."""
+
+
+def beside_remainder(found: Findings) -> tuple[BesideRemainder, ...]:
+    """Return each effect's evidence beside the remainder, in the order of the answer.
+
+    A remainder may take up part of what separates two effects. What is left of their difference must carry the name.
+    """
+    if not found.comparisons:
+        return ()
+    left = remainder(found.final)
+    return tuple(_held_against(found, one, at, left) for at, one in enumerate(found.comparisons))
+
+
+def _held_against(found: Findings, one: RivalModels, at: int, left: Remainder) -> BesideRemainder:
+    null, setting = found.final.null, found.problem.setting
+    course = setting.course.reduced
+    alone = ModelError(left.columns, course, null)
+    if one.without.placed:
+        alone = _joined(ModelError.of(one.begin, one.without, null), left)
+    need = j_statistic(one.current, one.without, one.pooled, alone)
+    margins = {}
+    for name, other in one.rivals.items():
+        error = _joined(ModelError.of(one.begin, other, null, len(one.without.placed)), left)
+        margins[name] = j_statistic(one.current, other, one.pooled, error)
+    return BesideRemainder(need, margins)
+
+
+def _joined(error: ModelError, left: Remainder) -> ModelError:
+    """Return what a model's equations may be wrong by together with the remainder."""
+    return replace(error, columns=np.concatenate([error.columns, left.columns], axis=2))

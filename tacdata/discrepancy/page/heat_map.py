@@ -1,0 +1,57 @@
+"""The residual by depth, phase and rate."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.discrepancy.verdict.residual_table import Residuals
+
+FEWEST = 30
+"""Readings of a field of the map, at least."""
+STILL = "hold"
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """Mean squares of what a model leaves, over the noise."""
+
+    rows: tuple[str, ...]
+    """Phases, each at a slow and a fast rate where it moves."""
+    columns: tuple[str, ...]
+    """Depths."""
+    before: np.ndarray
+    """[1], shape (rows, columns); NaN where too little was read."""
+    after: np.ndarray
+    """The same with the effects [1], shape (rows, columns)."""
+
+
+def heat_map(found: Residuals) -> HeatMap:
+    """Return the map of all presses, an offset a press taken off."""
+    first, last = (np.nanmean(np.square(found.standardized(p)), axis=1) for p in (found.before, found.after))
+    inside = found.phase > 0
+    edges = np.quantile(found.depth[inside], [0, 1 / 3, 2 / 3, 1]).round(6) if inside.any() else np.zeros(4)
+    columns = tuple(f"{low:.2g} to {high:.2g} mm" for low, high in itertools.pairwise(edges))
+    within = [(found.depth >= low) & (found.depth <= high) for low, high in itertools.pairwise(edges)]
+    rate = np.abs(found.rate)
+    rows, fields = [], []
+    for k, phase in enumerate(found.phases):
+        if not k:
+            continue
+        own = found.phase == k
+        if phase == STILL or not own.any():
+            rows.append(phase)
+            fields.append(own)
+            continue
+        middle = float(np.median(rate[own]))
+        for name, part in (("slow", own & (rate <= middle)), ("fast", own & (rate > middle))):
+            rows.append(f"{phase}, {name}")
+            fields.append(part)
+    maps = [np.array([[_mean(each, row & column) for column in within] for row in fields]) for each in (first, last)]
+    return HeatMap(tuple(rows), columns, *maps)
+
+
+def _mean(each: np.ndarray, rows: np.ndarray) -> float:
+    return float(np.nanmean(each[rows])) if rows.sum() >= FEWEST else float("nan")

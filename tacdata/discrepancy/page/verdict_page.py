@@ -1,0 +1,177 @@
+"""The verdict as one page of HTML: what was found, how sure, and what to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from tacdata.discrepancy.page import charts
+from tacdata.discrepancy.page.heat_map import heat_map
+from tacdata.discrepancy.page.telling import ToldPress, telling
+from tacdata.discrepancy.verdict.residual_table import Residuals
+from tacdata.effects import Family, load
+
+MOST_RIVALS = 4
+"""Rivals of an effect that have a line, the nearest."""
+LOOPS = {Family.SKIN_MEMORY.value, Family.FRICTION_AND_PLAY.value, Family.DELAY_AND_FILTER.value}
+"""Families whose effects show as loops over depth."""
+REST, NOISE = "no name yet", "noise"
+
+
+@dataclass(frozen=True)
+class Part:
+    """One section of the page."""
+
+    title: str
+    pictures: tuple[str, ...] = ()
+    """SVG."""
+    lines: tuple[str, ...] = ()
+    legend: tuple[tuple[str, str], ...] = ()
+    """Class of the style sheet and words."""
+    folded: bool = False
+    """Whether it opens on a click."""
+
+
+def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
+    """Return the page.
+
+    Args:
+        verdict: `schemas/verdict.schema.json`.
+        found: Readings beside the model.
+    """
+    presses = telling(found)
+    parts = [
+        _presses(verdict, found, presses), _loops(verdict, presses), _shares(verdict), _where(verdict, found),
+        _path(verdict), _rivals(verdict), Part("What to record next", lines=tuple(verdict["next"])),
+        Part("Of these recordings", lines=tuple(verdict["remarks"])), *_folded(verdict),
+    ]  # fmt: skip
+    shown = [part for part in parts if part.pictures or part.lines]
+    return _template().render(verdict=verdict, parts=shown, tiles=_tiles(verdict))
+
+
+def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return figures in large print, each a value and what it is."""
+    data, sealed = verdict["data"], verdict["sealed"]
+    tiles = [(str(data["episodes"]), "presses"), (str(data["channels"]), "channels")]
+    for e in verdict["effects"]:
+        if e["status"] == "named" and e["confidence"] is not None:
+            tiles.append((f"{100 * e['confidence']:.0f} %", f"sure of {e['mechanism']}"))
+    if sealed["episodes"] and verdict["effects"]:
+        words = f"residual of {sealed['episodes']} sealed presses, mean square over the noise (1 is noise alone)"
+        tiles.append((f"{sealed['before']:.3g} → {sealed['after']:.3g}", words))
+        if sealed["certain"]:
+            low, high = sealed["interval"]
+            spread = f"of their gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
+            tiles.append((f"{100 * sealed['closed']:.0f} %", spread))
+    return tiles
+
+
+def _presses(verdict: dict[str, Any], found: Residuals, presses: list[ToldPress]) -> Part:
+    added = bool(verdict["effects"])
+    pictures: list[str] = []
+    for p in presses:
+        level = float(np.nanmedian(p.measured[:5]))
+        lines = [("measured", p.measured - level), ("before", p.before - level)]
+        left = [("before", p.measured - p.before)]
+        if added:
+            lines.append(("after", p.after - level))
+            left.append(("after", p.measured - p.after))
+        pictures.append(charts.curves(f"{p.name}, {p.stream}", p.time, lines, ("time [s]", "reading above idle")))
+        pictures.append(charts.curves("residual; grey: noise", p.time, left, ("time [s]", "residual"), 2 * p.noise))
+    kind = "Sealed presses that tell most" if found.sealed else "Presses that tell most"
+    return Part(kind, tuple(pictures), legend=_legend(added))
+
+
+def _legend(added: bool) -> tuple[tuple[str, str], ...]:
+    last = (("after", "model with the effects"),) if added else ()
+    return (("measured", "measured"), ("before", "model as it was"), *last)
+
+
+def _loops(verdict: dict[str, Any], presses: list[ToldPress]) -> Part:
+    if not any(e.get("family") in LOOPS for e in verdict["effects"]):
+        return Part("")
+    pictures = []
+    for p in presses:
+        level = float(np.nanmedian(p.measured[:5]))
+        lines = [("measured", p.measured - level), ("before", p.before - level), ("after", p.after - level)]
+        pictures.append(charts.curves(f"{p.name}, {p.stream}", p.depth, lines, ("depth [mm]", "reading above idle")))
+    return Part("Loops over depth", tuple(pictures), legend=_legend(True))
+
+
+def _shares(verdict: dict[str, Any]) -> Part:
+    """Return the sealed gap as one bar: each name, the remainder."""
+    sealed = verdict["sealed"]
+    if not sealed["episodes"] or not verdict["effects"] or not sealed["certain"] or sealed["closed"] <= 0:
+        return Part("")
+    named = [(name, share) for name, share in sealed["shares"].items() if share > 0]
+    rest = max(1 - sealed["closed"], 0.0)
+    kinds = [(f"share{k % 4}", load(name).called, share) for k, (name, share) in enumerate(named)]
+    every = [*kinds, ("rest", REST, rest)]
+    legend = tuple((kind, f"{name} {100 * share:.0f} %") for kind, name, share in every)
+    return Part("The gap on sealed presses", (charts.shares_bar(every),), legend=legend)
+
+
+def _where(verdict: dict[str, Any], found: Residuals) -> Part:
+    made = heat_map(found)
+    pictures = [charts.map_of("before, mean square over the noise", made.rows, made.columns, made.before)]
+    if verdict["effects"]:
+        pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after))
+    rest = [f"without a name yet: {words}" for words in verdict.get("located_after", ())]
+    return Part("Where the gap lives", tuple(pictures), (*verdict["located"], *rest))
+
+
+def _path(verdict: dict[str, Any]) -> Part:
+    lines = []
+    for step in verdict["path"]:
+        title, share = load(step["effect"]).title, step["share"]
+        told = "dropped, or replaced by another form" if share is None else f"buys {100 * share:.0f} %"
+        lines.append(f"{title}: {told}")
+    return Part("In which order effects were added, and what each buys", lines=tuple(lines))
+
+
+def _rivals(verdict: dict[str, Any]) -> Part:
+    """Return one line a rival: why it is not the name, or why it may be."""
+    lines = []
+    for e in verdict["effects"]:
+        beside = e.get("beside_remainder") or {}
+        margins = beside.get("margins") or e["margins"]
+        near, least = set(e["alternatives"]), {}
+        for name, by in sorted(margins.items(), key=lambda item: item[1]):
+            least.setdefault(load(name).called, by)
+        for called, by in list(least.items())[:MOST_RIVALS]:
+            if called in near:
+                lines.append(f"{called} may stand in for {e['mechanism']}: {_apart(by)}")
+            else:
+                lines.append(f"not {called}: {_apart(by)} than {e['mechanism']}")
+    return Part("Why not the others", lines=tuple(dict.fromkeys(lines)))
+
+
+def _apart(by: float) -> str:
+    if by > 0:
+        return f"it explains the presses worse by {by:.1f} standard errors"
+    return f"it explains the presses better by {-by:.1f} standard errors" if by < 0 else "it explains them as well"
+
+
+def _folded(verdict: dict[str, Any]) -> list[Part]:
+    """Return what cannot be judged, by reason, and what is known and not modelled."""
+    reasons: dict[str, list[str]] = {}
+    for name, reason in verdict["unjudgeable"].items():
+        reasons.setdefault(reason, []).append(name)
+    lines = [f"{reason}: {', '.join(sorted(names))}" for reason, names in reasons.items()]
+    untested = "; ".join(words.split(": ", 1)[-1] for words in verdict["untested"])
+    return [
+        Part("What cannot be judged here, by reason", lines=tuple(lines), folded=True),
+        Part("Known, and not modelled", lines=(untested,) if untested else (), folded=True),
+    ]
+
+
+@cache
+def _template() -> Any:
+    from jinja2 import Environment, PackageLoader
+
+    return Environment(loader=PackageLoader("tacdata.discrepancy.page", "."), autoescape=True).get_template(
+        "verdict.html.j2"
+    )

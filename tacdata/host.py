@@ -1,0 +1,87 @@
+"""What a process takes from its computer: time, threads, the disk and signals; a simulated world gives its own."""
+
+from __future__ import annotations
+
+import os
+import queue
+import signal
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+
+class Host:
+    """The computer that this process runs on.
+
+    Whatever drives devices or records them asks its clock's host (`tacdata.clock.Clock.host`). It does not use `time`,
+    `threading` or `signal` itself. So a test can run it in a world of its own, with drawn faults and faster than real
+    time.
+
+    Example:
+        >>> from tacdata.host import COMPUTER
+        >>> COMPUTER.sleep(0.001)
+    """
+
+    def monotonic(self) -> float:
+        """Return a time that never steps [s, real time]."""
+        return time.monotonic()
+
+    def monotonic_ns(self) -> int:
+        """Return the same [ns]."""
+        return time.monotonic_ns()
+
+    def time_ns(self) -> int:
+        """Return Unix time [ns since 1970]."""
+        return time.time_ns()
+
+    def sleep(self, seconds: float) -> None:
+        """Wait [s, real time]."""
+        time.sleep(seconds)
+
+    def thread(self, target: Callable[..., None], name: str, args: tuple[Any, ...] = ()) -> threading.Thread:
+        """Return a thread that is not started yet and does not keep the process alive."""
+        return threading.Thread(target=target, args=args, name=name, daemon=True)
+
+    def event(self) -> threading.Event:
+        """Return a flag that threads can wait for."""
+        return threading.Event()
+
+    def condition(self) -> threading.Condition:
+        """Return a condition with a reentrant lock of its own."""
+        return threading.Condition()
+
+    def lock(self) -> Any:
+        """Return a reentrant lock."""
+        return threading.RLock()
+
+    def queue(self) -> queue.SimpleQueue[Any]:
+        """Return a queue between threads."""
+        return queue.SimpleQueue()
+
+    def create(self, path: Path) -> BinaryIO:
+        """Open a new file for writing.
+
+        Raises:
+            FileExistsError: If it exists.
+            OSError: If the disk refuses it.
+        """
+        return path.open("xb")
+
+    def sync(self, stream: BinaryIO) -> None:
+        """Write what the stream holds to the disk.
+
+        Raises:
+            OSError: If the disk refuses it.
+        """
+        stream.flush()
+        os.fsync(stream.fileno())
+
+    def signal(self, number: int, handler: Any) -> Any:
+        """Set a signal's handler and return the one before; for the main thread."""
+        return signal.signal(number, handler)
+
+
+COMPUTER = Host()
+"""This computer."""

@@ -1,0 +1,55 @@
+"""Zarr stores, versions 2 and 3, such as those of Open-X-Tactile (FTP-1): a folder of arrays that share their rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.importing.formats.npz import rows_of
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+
+ENDS = "meta/episode_ends"
+"""Array with the row after each episode's last."""
+WIDEST = 4096
+"""Values a row above which an array holds images, and no channels."""
+
+
+class Zarr(SourceFormat):
+    """Arrays by name, without ``data/``; a column ``episode`` counts from 0 where the store says where episodes end.
+
+    Rows are time: the first axis of an array. What lies in the other axes becomes a table.
+    """
+
+    endings = (".zarr",)
+
+    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+        """Read the arrays; images are left out and named. See the base class."""
+        import zarr
+
+        arrays: dict[str, np.ndarray] = {}
+        notes: list[str] = []
+        for folder in _arrays(path):
+            name = folder.relative_to(path).as_posix()
+            found = zarr.open_array(str(folder), mode="r")
+            if int(np.prod(found.shape[1:])) > WIDEST:
+                shape = " x ".join(map(str, found.shape[1:]))
+                notes.append(f"{path.name}: {name} of {shape} values a row is left out")
+                continue
+            values = np.asarray(found[:])
+            arrays[name] = np.char.strip(values) if values.dtype.kind == "U" else values
+        ends = arrays.pop(ENDS, None)
+        columns = {name.removeprefix("data/"): values for name, values in arrays.items()
+                   if not name.startswith("meta/")}  # fmt: skip
+        if ends is not None and len(ends):
+            columns["episode"] = np.searchsorted(ends, np.arange(int(ends[-1])), side="right")
+        table = rows_of(path, columns, options)
+        return SourceTable(path, table.columns, table.units, (*notes, *table.notes))
+
+
+def _arrays(path: Path) -> list[Path]:
+    """Return the folders of arrays; groups may lack a description of their own, so they are not asked."""
+    second = {described.parent for described in path.rglob(".zarray")}
+    third = {found.parent for found in path.rglob("zarr.json") if '"array"' in found.read_text()}
+    return sorted(second | third)

@@ -1,0 +1,89 @@
+"""The page of a verdict holds all of itself, and says what the document and the text say."""
+
+import re
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from pressing import course
+
+from tacdata import documents
+from tacdata.discrepancy.judge import judge
+from tacdata.discrepancy.model.spec import read_spec
+from tacdata.discrepancy.page import charts
+from tacdata.discrepancy.page.heat_map import heat_map
+from tacdata.discrepancy.page.telling import telling
+from tacdata.discrepancy.page.verdict_page import verdict_page
+from tacdata.discrepancy.verdict.before_and_after import beside_model
+from tacdata.discrepancy.verdict.sealed import chosen
+from tacdata.discrepancy.verdict.text import in_text
+from tacdata.effects import library
+
+FEW = ("latency", "relaxation", "backlash")
+
+
+@pytest.fixture(scope="module", params=[{"delay": 0.05}, {}], ids=["delay", "nothing"])
+def judged(request):
+    """A verdict and the readings beside its model."""
+    made = course(episodes=24, **request.param)
+    others = tuple(e.called for e in library() if e.name not in FEW)
+    done = judge(made, read_spec(None), without=others)
+    return done.document, beside_model(made, done.found, chosen(made))
+
+
+class Outside(HTMLParser):
+    """Collects what a page would load from elsewhere."""
+
+    def __init__(self):
+        super().__init__()
+        self.loaded = []
+
+    def handle_starttag(self, tag, attrs):
+        self.loaded += [value for name, value in attrs if name in ("src", "href")]
+
+
+def test_a_page_holds_all_of_itself_and_its_pictures_are_sound(judged):
+    page = verdict_page(*judged)
+    reader = Outside()
+    reader.feed(page)
+    assert not reader.loaded
+    pictures = re.findall(r"<svg.*?</svg>", page, re.S)
+    assert len(pictures) >= 5
+    for picture in pictures:
+        ElementTree.fromstring(picture)
+
+
+def test_the_page_the_document_and_the_text_are_of_one_mind(judged):
+    verdict, residuals = judged
+    documents.check(verdict, "verdict", "verdict")
+    page, text = verdict_page(verdict, residuals), in_text(verdict)
+    assert f'class="badge">{verdict["status"]}<' in page and text.startswith(verdict["status"].upper())
+    for e in verdict["effects"]:
+        assert e["mechanism"] in page and e["mechanism"] in text
+    sealed = verdict["sealed"]
+    shown = f"{sealed['before']:.3g} → {sealed['after']:.3g}"
+    assert (shown in page) == bool(verdict["effects"])
+    words = "of the gap closed" in text
+    assert words == ("of their gap closed" in page) == bool(verdict["effects"] and sealed["certain"])
+
+
+def test_telling_presses_are_sealed_ones(judged):
+    verdict, residuals = judged
+    presses = telling(residuals)
+    assert {p.name for p in presses} <= set(verdict["data"]["sealed"]) and presses
+
+
+def test_the_map_is_the_mean_square_over_the_noise(judged):
+    _, residuals = judged
+    made = heat_map(residuals)
+    assert made.before.shape == (len(made.rows), len(made.columns)) == made.after.shape
+    known = np.isfinite(made.before)
+    assert known.sum() >= 9
+    whole = np.nanmean(np.square(residuals.standardized(residuals.before))[residuals.phase > 0])
+    assert made.before[known].min() <= whole <= made.before[known].max()
+
+
+def test_a_bar_of_shares_is_as_long_as_they_are():
+    bar = ElementTree.fromstring(charts.shares_bar([("share0", "a <b>", 0.6), ("rest", "no name yet", 0.3)]))
+    assert [float(r.get("width")) for r in bar] == pytest.approx([480, 240])

@@ -1,0 +1,54 @@
+"""Hum, jumps, wandering gains and swapped channels are told of, and ordinary recordings are left alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pressing import course
+
+from tacdata.discrepancy.data.idle_lines import idle_lines
+from tacdata.discrepancy.data.single_channels import odd_channels
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+
+IDLE = np.full(3, 5000.0)
+
+
+def with_readings(made, change):
+    """Return a course whose readings above idle were changed: time, episode and rises in, rises out."""
+    return replace(made, readings=IDLE + change(made.time[:, None], made.episode[:, None], made.readings - IDLE))
+
+
+def watched(made):
+    return [*idle_lines(made), *odd_channels(made, FittedResponse(made))]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("truth", [{}, {"relaxed": 0.15, "hold": 4.0}, {"delay": 0.05}, {"play": 0.05}])
+def test_ordinary_presses_are_left_alone(seed, truth):
+    assert watched(course(seed=seed, **truth)) == []
+
+
+def test_hum_is_told_of_with_its_frequency():
+    """2 % of full scale at 9 Hz."""
+    [words] = idle_lines(with_readings(course(), lambda t, e, r: r + 16 * np.sin(2 * np.pi * 9 * t)))
+    hertz = float(words.split(" Hz")[0].split()[-1])
+    assert hertz == pytest.approx(9, abs=1.1), "as fine as short stretches in the air allow"
+
+
+def test_a_channel_that_drops_by_a_quarter_and_heals_is_told_of():
+    fallen = with_readings(course(), lambda t, e, r: r * np.where((e >= 8) & (e < 14), [1, 0.75, 1], 1.0))
+    [words] = odd_channels(fallen, FittedResponse(fallen))
+    assert words.startswith("channel 1: reads 2") and "press 8 to press 13 and comes back" in words
+
+
+def test_a_gain_that_wanders_is_told_of():
+    moved = with_readings(course(noise=0.5), lambda t, e, r: r * (1 + np.array([0, 0, 0.08]) * np.sin(e / 4)))
+    [words] = odd_channels(moved, FittedResponse(moved))
+    assert words.startswith("channel 2: its gain wanders by")
+
+
+def test_channels_that_change_places_are_told_of():
+    made = course()
+    swapped = with_readings(made, lambda t, e, r: np.where(e >= 17, r[:, [2, 1, 0]], r))
+    words = odd_channels(swapped, FittedResponse(made))
+    assert any("channel 0 and channel 2 read as one another from press 17" in said for said in words)

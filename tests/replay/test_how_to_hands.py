@@ -1,0 +1,120 @@
+"""The commands of the pages on hands and robots run as they stand: what needs a rig in the long part, the rest here."""
+
+import importlib.util
+import re
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from running.in_process import tacdata
+from tracked_hand import tracks
+
+from tacdata.demonstrations.recording.session import open_demo_session
+from tacdata.virtual_rig.world.hand import draw_hand
+from viewers.pictures import replay_film
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests" / "demonstrations"))
+PAGES = [ROOT / "docs" / "how_to" / name for name in ("hands.md", "own_robot.md")]
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+FILES, RIG = ("export", "replay", "view"), ("virtual-rig", "record", "track", "live")
+ELSEWHERE = {"calibrate-world": "demonstrations/test_hand_eye.py"}
+"""Verb -> the test that types it."""
+FASTER = {"replay": ["--seeds", "2", "--preliminary", "2"], "view": ["--save", "shown.rrd"], "live": ["--seconds", "3"]}
+FASTER["grasp-study"] = ["--repeats", "1", "--epochs", "1"]
+"""Verb -> what is added: less to wait for, and files instead of windows."""
+
+
+def commands(page):
+    """Return a page's commands as words, without "tacdata"."""
+    text = page.read_text().replace("DEMOS", "demos").replace("--network RUN", "--network network")
+    lines = [line for kind, body in BLOCK.findall(text) if kind == "sh" for line in body.splitlines()]
+    return [shlex.split(line, comments=True)[1:] for line in lines if line.startswith("tacdata ")]
+
+
+ALL = [words for page in PAGES for words in commands(page)]
+
+
+def needs_rig(words):
+    """Say whether a command needs devices or real recordings."""
+    return words[0] in RIG or "open_x_tactile" in words
+
+
+def typed(words, folder):
+    """Type a command of a page; return what it said."""
+    (folder / "shown.rrd").unlink(missing_ok=True)
+    words = ["live.rrd" if word == "window" else word for word in words]
+    done = tacdata(*words, *FASTER.get(words[0], []), folder=folder)
+    assert done.returncode == 0, f"tacdata {shlex.join(words)}: {done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def test_every_command_is_typed_somewhere():
+    assert {words[0] for words in ALL} == {*FILES, *RIG, *ELSEWHERE, "grasp-study"}
+    for verb, place in ELSEWHERE.items():
+        assert verb in (ROOT / "tests" / place).read_text(), f"{place} does not type {verb}"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Two demonstrations that were tracked, and the robot of the page."""
+    from demo_examples import rig
+
+    open_demo_session(tmp_path / "demos", rig(), "grasp", resume=False)
+    for number in range(2):
+        (tmp_path / "demos" / f"episode-{number:06d}.mcap").write_bytes(b"stand-in")
+        tracks(tmp_path / "demos", draw_hand(number + 1), "grasp", f"{number}" * 64, number)
+    monkeypatch.chdir(tmp_path)
+    (block,) = (body for kind, body in BLOCK.findall(PAGES[1].read_text()) if kind == "python")
+    exec(compile(block, "own_robot.md", "exec"), {})
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_what_needs_tracks_alone_runs(page, folder, monkeypatch):
+    monkeypatch.setitem(replay_film.MOST, ".mp4", 4)
+    for words in commands(page):
+        if words[0] in FILES and not needs_rig(words):
+            said = typed(words, folder)
+            if words[0] == "replay":
+                kinds = dict(re.findall(r"^(\w+) +held (\d+) of", said, re.MULTILINE))
+                assert kinds["direct"] == "0" and int(kinds.get("chosen", 4)) >= 2, said
+    assert (folder / "joints").is_dir() and (folder / "targets").is_dir()
+
+
+@pytest.mark.long("tacdata/commands", "tacdata/virtual_rig", "tacdata/live", reason="a hand, in its own time")
+@pytest.mark.timeout(900)
+def test_what_needs_a_rig_runs(tmp_path):
+    from training.settings import TrainingSettings
+    from training.train import train
+
+    made = importlib.util.spec_from_file_location("training_frames", ROOT / "tests" / "training" / "conftest.py")
+    assert made and made.loader
+    frames = importlib.util.module_from_spec(made)
+    made.loader.exec_module(frames)
+    settings = TrainingSettings(arguments={"hidden": 16, "channels": 4}, epochs=1)
+    train(frames.build_frames(), settings, tmp_path / "network", device="cpu", threads=1)
+    wanted = [words for words in commands(PAGES[0]) if needs_rig(words)]
+    assert wanted[0][0] == "virtual-rig"
+    rig = subprocess.Popen([sys.executable, "-m", "tacdata.cli", *wanted[0]], cwd=tmp_path)
+    try:
+        end = time.monotonic() + 120
+        while not (tmp_path / "rig" / "demo_rig.yaml").is_file() and time.monotonic() < end:
+            time.sleep(0.2)
+        said = {shlex.join(words): typed(words, tmp_path) for words in wanted[1:]}
+    finally:
+        rig.terminate()
+        rig.wait(60)
+    assert len(list((tmp_path / "demos").glob("episode-*.mcap"))) == 2
+    assert any("predicted depth up to" in words for words in said.values())
+
+
+@pytest.mark.long("tacdata/commands", "tacdata/grasping", "training", reason="a network is trained, and oranges lifted")
+@pytest.mark.timeout(1800)
+def test_the_study_of_grasps_runs(tmp_path):
+    (study,) = (words for words in commands(PAGES[0]) if words[0] == "grasp-study")
+    typed(study, tmp_path)
+    assert (tmp_path / "study").is_dir()

@@ -1,0 +1,308 @@
+"""Faults that a seed draws: what goes wrong, when, and from when on the recorder can see it."""
+
+import random
+import signal
+import sys
+
+import numpy as np
+from schedule import SECOND
+
+LIVED = 3.0
+"""Time after which the recorder has seen readings that live [s]."""
+COURSE = 19.0
+"""About how long a run without faults takes [s]."""
+
+
+class Faults:
+    """The faults of one run; `names` says which."""
+
+    def __init__(self, world, seed, only=()):
+        """Draw and plan them; ``only`` names kinds to draw from."""
+        self.world, self.random = world, random.Random(f"faults {seed}")
+        self.names, self.visible, self.over = [], [], False
+        """(time [ns] from which the recorder can see it, its name)."""
+        self.deaf = False
+        """Whether the controller may hear nothing, so that nobody can stop it."""
+        self.moved_otherwise = False
+        """Whether a line to the controller was changed, so that it may do something else."""
+        kinds = only or tuple(KINDS)
+        number = self.random.choices((0, 1, 2, 3), (1, 10, 6, 3))[0] if not only else 1
+        for _ in range(number):
+            name = self.random.choice(kinds)
+            self.names.append(name)
+            self.at(self.random.uniform(0.0, COURSE), lambda act=KINDS[name]: act(self))
+        if self.random.random() < 0.3:
+            world.computer.lateness = ((0.02, self.random.choice((0.02, 0.1, 0.4))),)
+            self.names.append(f"busy computer {world.computer.lateness}")
+        world.computer.preempt = self.random.choice((0.0, 0.05, 0.3))
+
+    def at(self, seconds, action):
+        """Do something at a time of the world [s]."""
+        self.world.schedule.at(round(seconds * SECOND), lambda: self.over or action())
+
+    def after(self, seconds, action):
+        """Do something so much later [s]."""
+        self.at(self.world.schedule.now + seconds, action)
+
+    def end(self):
+        """Let nothing go wrong any more."""
+        self.over = True
+        for watcher in list(WATCHERS):
+            watcher.stop()
+
+    def see(self, name, seconds=0.0):
+        """Note that the recorder can see it from now on, or so much later [s]."""
+        self.visible.append((self.world.schedule.now_ns + round(seconds * SECOND), name))
+
+    def seen(self):
+        """Return when the recorder could first see one of them [s], or None."""
+        found = list(self.visible)
+        if self.world.computer.disk.refused_ns is not None:
+            found.append((self.world.computer.disk.refused_ns, "full disk"))
+        if not found:
+            return None
+        first = min(found)[0]
+        for begin, end in sorted(self.world.computer.stalls):
+            if begin - SECOND // 2 <= first < end:
+                first = end
+        for begin, end in sorted(self.world.computer.disk.slow):
+            if begin - SECOND // 2 <= first < end:
+                first = end
+        return first / SECOND
+
+
+WATCHERS = []
+"""Who counts lines."""
+TOOL = 3
+"""The number by which Python knows them."""
+
+
+class AtALine:
+    """Delivers a signal when the main thread has run so many lines of the project."""
+
+
+    def __init__(self, faults, number, lines):
+        """Begin to count."""
+        self.faults, self.number, self.left = faults, number, lines
+        if not WATCHERS:
+            sys.monitoring.use_tool_id(TOOL, "simulation")
+            sys.monitoring.register_callback(TOOL, sys.monitoring.events.LINE, self.look)
+            sys.monitoring.set_events(TOOL, sys.monitoring.events.LINE)
+        WATCHERS.append(self)
+
+    @staticmethod
+    def look(code, _line):
+        """Count a line."""
+        if "/tacdata/" not in code.co_filename:
+            return sys.monitoring.DISABLE
+        for watcher in list(WATCHERS):
+            computer = watcher.faults.world.computer
+            if watcher.faults.over:
+                watcher.stop()
+            elif computer.schedule.task is computer.main and not computer.killed:
+                watcher.left -= 1
+                if not watcher.left:
+                    watcher.stop()
+                    watcher.faults.see("signal")
+                    computer.handlers.get(watcher.number, signal.default_int_handler)(watcher.number, None)
+        return None
+
+    def stop(self):
+        """Count no more."""
+        WATCHERS.remove(self)
+        if not WATCHERS:
+            sys.monitoring.set_events(TOOL, 0)
+            sys.monitoring.register_callback(TOOL, sys.monitoring.events.LINE, None)
+            sys.monitoring.free_tool_id(TOOL)
+
+
+def _damage(faults, way, text):
+    """Change one byte of one of the next writes."""
+    draw = faults.random
+    kind = draw.choice(("lost", "doubled", "flipped", "digit"))
+    left = [draw.randrange(1, 3)]
+
+    def change(data):
+        if not left or draw.random() < 0.3:
+            return data
+        left[0] -= 1
+        if not left[0]:
+            left.clear()
+        data, at = bytearray(data), draw.randrange(len(data))
+        digits = [k for k, byte in enumerate(data) if 0x30 <= byte <= 0x39]
+        if kind == "digit" and digits and text:
+            data[draw.choice(digits)] = 0x30 + draw.randrange(10)
+        elif kind == "lost":
+            del data[at]
+        elif kind == "doubled":
+            data.insert(at, data[at])
+        else:
+            data[at] ^= 1 << draw.randrange(8)
+        return bytes(data)
+
+    way.change = change
+
+
+def _lose(faults, way):
+    """Lose the whole of the next write that is no report."""
+    left = [1]
+
+    def change(data):
+        if left and not data.startswith((b"<", b"?")):
+            left.clear()
+            return b""
+        return data
+
+    way.change = change
+
+
+def _late(faults, *ways, most=7.0):
+    until = faults.world.schedule.now_ns + round(faults.random.choice((0.05, 0.3, 1.0, most)) * SECOND)
+    for way in ways:
+        way.held_until = until
+
+
+def damaged_answer(faults):
+    _damage(faults, faults.world.cnc_line.to_host, True)
+
+
+def damaged_command(faults):
+    faults.moved_otherwise = True
+    _damage(faults, faults.world.cnc_line.to_device, True)
+
+
+def lost_answer(faults):
+    _lose(faults, faults.world.cnc_line.to_host)
+
+
+def lost_command(faults):
+    _lose(faults, faults.world.cnc_line.to_device)
+
+
+def late_answers(faults):
+    _late(faults, faults.world.cnc_line.to_host)
+
+
+def controller_stalls(faults):
+    faults.deaf = True
+    _late(faults, faults.world.cnc_line.to_host, faults.world.cnc_line.to_device)
+
+
+def damaged_frame(faults):
+    _damage(faults, faults.world.board_line.to_host, False)
+
+
+def board_stalls(faults):
+    _late(faults, faults.world.board_line.to_host)
+
+
+def board_freezes(faults):
+    last = []
+
+    def same(counts):
+        last.append(counts)
+        return last[0]
+
+    faults.world.board.inject_readings(same)
+    if faults.world.schedule.now > LIVED:  # one that never changed may be a board that rests
+        faults.see("board freezes", 2.0)
+
+
+def board_unplugged(faults):
+    faults.world.board_line.close()
+    faults.see("board unplugged")
+
+
+def controller_unplugged(faults):
+    faults.deaf = True
+    faults.world.cnc_line.close()
+
+
+def controller_mute(faults):
+    faults.deaf = True
+    faults.world.controller.inject_wire(to_host=lambda text: None)
+
+
+def alarm(faults):
+    faults.world.controller.inject_alarm(faults.random.choice((1, 2, 3)))
+
+
+def brown_out(faults):
+    faults.world.controller.inject_brown_out()
+
+
+def foreign_hold(faults):
+    faults.world.controller.inject_byte(0x21)
+
+
+def foreign_door(faults):
+    faults.world.controller.inject_byte(0x84)
+
+
+def door(faults):
+    faults.world.controller.inject_door(True)
+    if faults.random.random() < 0.5:
+        faults.after(faults.random.uniform(0.05, 3.0), lambda: faults.world.controller.inject_door(False))
+
+
+def pendant(faults):
+    faults.deaf = True
+    faults.world.controller.inject_pendant()
+
+
+def computer_stalls(faults):
+    schedule = faults.world.schedule
+    seconds = faults.random.choice((0.1, 0.5, 2.0, 2.9, 3.1, 6.0, 20.0))
+    faults.world.computer.stalls.append((schedule.now_ns, schedule.now_ns + round(seconds * SECOND)))
+
+
+def disk_full(faults):
+    faults.world.computer.disk.room = faults.random.randrange(0, 3000)
+
+
+def disk_slow(faults):
+    now = faults.world.schedule.now_ns
+    seconds = faults.random.choice((0.3, 2.0, 9.0))
+    faults.world.computer.disk.slow.append((now, now + round(seconds * SECOND)))
+
+
+def interrupted(faults):
+    number = faults.random.choice((signal.SIGINT, signal.SIGTERM))
+
+    def deliver():
+        if number in faults.world.computer.handlers:
+            faults.see("signal")
+        faults.world.computer.send_signal(number)
+
+    deliver()
+    for _ in range(faults.random.choice((0, 0, 1, 2))):
+        faults.after(faults.random.uniform(0.02, 2.0), lambda: faults.world.computer.send_signal(number))
+
+
+def interrupted_at_a_line(faults):
+    """Deliver one or two signals before any line of the project that the main thread is about to run."""
+    number, draw = signal.SIGINT, faults.random
+    for _ in range(draw.choice((1, 2))):
+        AtALine(faults, number, draw.randrange(1, draw.choice((20, 300, 3000))))
+
+
+def board_saturates(faults):
+    faults.world.board.inject_readings(lambda counts: np.full_like(counts, 65535.0))
+    faults.see("board saturates", 2.0)
+
+
+def killed(faults):
+    faults.deaf = True
+    faults.world.computer.kill()
+
+
+KINDS = {
+    act.__name__: act
+    for act in (
+        damaged_answer, damaged_command, lost_answer, lost_command, late_answers, controller_stalls, damaged_frame,
+        board_stalls, board_freezes, board_saturates, board_unplugged, controller_unplugged, controller_mute, alarm,
+        brown_out, foreign_hold, foreign_door, door, pendant, computer_stalls, disk_full, disk_slow, interrupted,
+        interrupted_at_a_line, killed,
+    )
+}  # fmt: skip
+"""Name -> what happens."""

@@ -1,0 +1,179 @@
+"""A rig in a simulated world: the emulated controller, a board, and what truly happened."""
+
+from dataclasses import replace
+
+import numpy as np
+from schedule import SECOND, Schedule
+from simulated_disk import SimulatedDisk
+from simulated_host import EPOCH, START, SimulatedHost
+from simulated_line import LINES, SimulatedLine
+
+from tacdata.clock import Clock
+from tacdata.plans import Plan
+from tacdata.recording.live.interruption import Interruption
+from tacdata.recording.recorder import Recorder
+from tacdata.rig.rig import from_document
+from tacdata.sensor import default_sensor
+from tacdata.virtual_rig.board import Timing, VirtualBoard
+from tacdata.virtual_rig.firmware.controller import Controller
+from tacdata.wire import default_format
+
+SENSOR = default_sensor()
+ORIGIN, PARKED = (-96.0, -61.5, -38.0), 12.0
+CLEARANCE = 3.0
+ENVELOPE = {"min": [-106.0, -76.5, -41.0], "max": [-86.0, -46.5, -20.0]}
+SITES = [(1.0, 0.5), (-2.0, 1.5), (3.0, -2.0), (0.0, 0.0)]
+WATCHED = 0.01
+"""How often the true position is noted [s]."""
+LIMIT = 180.0
+"""Time after which a run counts as hung [s]; one without faults takes about 25 s."""
+
+
+def plan(presses, **entries):
+    """Return a plan of some seconds a press, with further entries."""
+    return Plan.from_document(
+        {
+            "version": "1.0", "name": "simulated", "indenters": {"ball": {"shape": "sphere", "radius": 3.0}},
+            "motion": {
+                "clearance": CLEARANCE, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0,
+                "press_speed": 0.5, "hold": 2.0, "rest": 1.0,
+            },
+            "presses": [
+                {"indenter": "ball", "x": x, "y": y, "depth": 0.8 + 0.1 * k}
+                for k, (x, y) in enumerate((SITES * presses)[:presses])
+            ],
+            **entries,
+        },
+        "simulated",
+    )  # fmt: skip
+
+
+class Calm:
+    """No fault, as the judge of a run sees it."""
+
+    deaf, names, moved_otherwise = False, (), False
+
+    def seen(self):
+        """Return that there is nothing to see."""
+
+
+class World:
+    """One computer, one controller, one board and their lines, driven by one seed."""
+
+    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, **entries):
+        """Switch everything on."""
+        self.seed, self.folder, self.plan = seed, folder, plan(presses, **entries)
+        self.schedule = Schedule(seed, LIMIT)
+        self.bench = SimulatedHost(self.schedule)
+        self.clock = Clock(EPOCH + START, START, 1.0, self.bench)
+        self.computer = self._boot()
+        names = [f"sim://{seed}/{device}" for device in ("cnc", "board")]
+        self.cnc_line = SimulatedLine(names[0], self.computer, self.bench, 115200)
+        self.board_line = SimulatedLine(names[1], self.computer, self.bench, 115200)
+        parked = (ORIGIN[0], ORIGIN[1], ORIGIN[2] + PARKED)
+        self.controller = Controller(
+            self.clock, seed, parked, settings=settings, firmware=firmware, port=self.cnc_line
+        )
+        timing = Timing(self.clock.now_ns(), 1 / 30, 20.0, 0.0003, 600.0, 0.001, 0.016)
+        self.board = VirtualBoard(self.clock, default_format(), timing, self._read, 115200, seed, self.board_line)
+        self._noise = np.random.default_rng([seed, 1])
+        self.path = []
+        """(time [s], true position [mm] as x, y, z, whether it moves, whether its position is truly lost)."""
+        self.asked, self.answer, self.said = [], lambda question: False, []
+        self.controller.start()
+        self.board.start()
+        self.bench.thread(self._watch, "watch").start()
+
+    def _boot(self):
+        host = SimulatedHost(self.schedule)
+        host.disk = SimulatedDisk(host)
+        return host
+
+    def reboot(self, seconds=LIMIT):
+        """Start the computer's process anew, after it ended or was killed."""
+        self.computer.kill()
+        before, self.computer = self.computer, self._boot()
+        self.computer.preempt, self.computer.lateness = before.preempt, before.lateness
+        for line in (self.cnc_line, self.board_line):
+            line.attach(self.computer)
+        self.schedule.extend(seconds)
+
+    def record(self, resume=False, sync_tap=False, **controller):
+        """Run the recorder, with settings of the controller; return the session, or raise what it raises."""
+        rig = self.rig(**controller)
+
+        def work():
+            with Interruption(self.computer) as interruption:
+                recorder = Recorder(
+                    rig, SENSOR, self.plan, self.folder, resume, interruption=interruption, ask=self._asked,
+                    say=self.said.append, sync_tap=sync_tap,
+                )
+                return recorder.run(lambda summary: True)
+
+        return self.computer.run(work)
+
+    def rig(self, **controller):
+        """Return the rig as its file describes it, on this computer's clock."""
+        document = {
+            "version": "1.0", "name": "simulated",
+            "cnc": {"driver": "grbl", "port": self.cnc_line.path, **controller},
+            "board": {"driver": "capacitive_board", "port": self.board_line.path},
+            "registration": {"origin": [*ORIGIN], "yaw": 5.0, "method": "by hand", "date": "2026-01-01"},
+            "envelope": ENVELOPE,
+        }  # fmt: skip
+        clock = Clock(EPOCH + START, START, 1.0, self.computer)
+        return replace(from_document(document, "simulated"), clock=clock)
+
+    def repair(self, lost):
+        """Do what a person does: plug in, close the door, make room; and switch the controller off and on if its
+        position is ``lost`` or it does not answer. Return that nothing is wrong any more.
+        """
+        for line in (self.cnc_line, self.board_line):
+            line.plug_in()
+        self.controller.inject_wire(lambda line: line, lambda text: text)
+        self.controller.inject_door(False)
+        if lost:
+            self.controller.inject_brown_out()
+        self.mend_board()
+        self.schedule.run_for(3.0, self.bench)
+        return Calm()
+
+    def mend_board(self):
+        """Let the board read what is there again."""
+        self.board.inject_readings(lambda counts: self._read(self.clock.now_ns()))
+
+    def home(self):
+        """Find the position again, as homing or a touch-off does."""
+        machine = self.controller.machine
+        machine.error, machine.alarm = np.zeros(3), None
+
+    def end(self):
+        """End everything."""
+        for host in (self.computer, self.bench):
+            host.kill()
+        for line in (self.cnc_line, self.board_line):
+            LINES.pop(line.path)
+
+    @property
+    def lost(self):
+        """Whether the controller counts from elsewhere than where it stands."""
+        return bool(np.abs(self.controller.machine.error).max() > 0.05)
+
+    def position(self):
+        """Return where the tip truly is [mm], shape (3,)."""
+        return self.controller.position_at(self.clock.now_ns())
+
+    def _asked(self, question):
+        self.asked.append(question)
+        return self.answer(question)
+
+    def _read(self, sampled_ns):
+        depth = max(ORIGIN[2] - self.controller.position_at(sampled_ns)[2], 0.0)
+        return np.round(9000 + 800 * depth + self._noise.normal(0, 5, 24))
+
+    def _watch(self):
+        while True:
+            now = self.clock.now_ns()
+            x, y, z = self.controller.position_at(now).tolist()
+            self.path.append((self.schedule.now_ns / SECOND, x, y, z, self.controller.planner.moving(now), self.lost))
+            self.bench.sleep(WATCHED)

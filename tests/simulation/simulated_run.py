@@ -1,0 +1,242 @@
+"""One seed: a recording with faults, what must hold of it, then the person repairs the rig and resumes."""
+
+import random
+import re
+import sys
+import tempfile
+import time
+import traceback
+from pathlib import Path
+
+import numpy as np
+from drawn_faults import Faults
+from schedule import Hung
+from simulated_host import EPOCH
+from simulated_rig import CLEARANCE, ENVELOPE, ORIGIN, World
+
+from tacdata.errors import TacdataError
+from tacdata.recording.files import file_names
+from tacdata.recording.files.reader import read_recording
+
+NEAR = 0.02
+"""Difference of two positions that are the same [mm]: reports have three decimals."""
+STOPPED = 0.5
+"""Time from when a fault can be seen until the motion has stopped [s], beside the braking."""
+BRAKING = 0.2
+"""Longest braking [s]: 30 mm/s at 150 mm/s^2."""
+OUTSIDE = 1.0
+"""Time that the tip may be outside the envelope [s]: the interval of two reports, their way, the hold, the braking."""
+
+
+class Run:
+    """One attempt to record."""
+
+    def __init__(self, world, resume=False):
+        """Record until it ends by itself, or is killed."""
+        self.world, self.begin = world, world.schedule.now
+        self.before = set(world.folder.glob("*.mcap")) if world.folder.exists() else set()
+        self.session, self.error, self.hung = None, None, ""
+        try:
+            self.session = world.record(resume)
+        except Hung as error:
+            self.hung = str(error)
+        except (Exception, KeyboardInterrupt) as error:  # judged below
+            self.error = error
+        self.end = world.schedule.now
+        self.killed = world.computer.killed
+        self.words = "\n".join([str(self.error or ""), *getattr(self.error, "__notes__", ())])
+        self.here = world.position()
+        self.moves_at_the_end = world.controller.planner.moving(world.clock.now_ns())
+
+    @property
+    def path(self):
+        """Times [s], true positions [mm], and whether it moves, while this ran."""
+        rows = [row for row in self.world.path if self.begin <= row[0] <= self.end]
+        table = np.array(rows, float).reshape(-1, 6)
+        return table[:, 0], table[:, 1:4], table[:, 4] > 0
+
+
+def broken(run, faults):
+    """Yield what does not hold of a run, a sentence each."""
+    if run.hung:
+        yield f"hangs: {run.hung}"
+        return
+    known = run.error is None or isinstance(run.error, (TacdataError, KeyboardInterrupt))
+    if not known:
+        yield f"not an error for a person: {_traced(run.error)}"
+    yield from _threads(run)
+    yield from _motion(run, faults)
+    if not run.killed:
+        yield from _words(run, faults)
+    yield from _files(run, faults)
+
+
+def _traced(error):
+    return "".join(traceback.format_exception(error))[-1500:]
+
+
+def _threads(run):
+    for task in run.world.schedule.tasks:
+        if task.error is not None and task.name != "main":
+            yield f"the thread {task.name} died: {_traced(task.error)}"
+    left = [task.name for task in run.world.computer.tasks if not task.ended]
+    if left and not run.killed and not isinstance(run.error, KeyboardInterrupt):  # a second one ends all waiting
+        yield f"threads that go on after the end: {left}"
+
+
+def _motion(run, faults):
+    times, places, _ = run.path
+    if not len(times):
+        return
+    outside = np.any((places < np.array(ENVELOPE["min"]) - NEAR) | (places > np.array(ENVELOPE["max"]) + NEAR), axis=1)
+    moving = outside & np.concatenate([[False], np.any(np.diff(places, axis=0) != 0, axis=1)])
+    if moving.sum() * 0.01 > OUTSIDE and not faults.deaf:
+        yield f"moved outside the envelope for {moving.sum() * 0.01:.2f} s, to {places[outside].min(axis=0)}"
+    sideways = np.linalg.norm(np.diff(places[:, :2], axis=0), axis=1)
+    down = -np.diff(places[:, 2])
+    low = places[:-1, 2] < ORIGIN[2] + CLEARANCE - NEAR
+    begun = np.flatnonzero(~low)
+    first = begun[0] if len(begun) else len(low)
+    if np.any(sideways[:first] > 1e-6) or np.any(down[:first] > 1e-6):
+        yield "the first move was not straight up"
+    seen = faults.seen()  # in the sense of `Faults.see`
+    if seen is not None and not faults.deaf:
+        late = times[:-1] > seen + STOPPED + BRAKING
+        goes = np.flatnonzero(late & ((sideways > NEAR / 10) | (down > NEAR / 10)))
+        if len(goes):
+            yield f"a fault could be seen at {seen:.2f} s; it still went on at {times[goes[0]]:.2f} s"
+
+
+def _words(run, faults):
+    world, words = run.world, run.words
+    if run.moves_at_the_end and "NOT KNOWN" not in words and not re.search("broke|closed", words):
+        yield f"it moves after the end, and the words are:\n{words}"
+    if run.error is None:
+        return
+    done, stated = len(file_names.finished(world.folder)) if world.folder.exists() else 0, None
+    if match := re.search(r"data:   (\d+) of \d+ presses are complete", words):
+        stated = int(match[1])
+    if "data:   nothing was written" in words:
+        stated = 0
+    if stated != done:
+        yield f"{done} presses are on disk, and the words are:\n{words}"
+    skin = run.here[2] < ORIGIN[2] - NEAR
+    if world.lost:
+        return
+    lifted = re.search(r"straight up from (\S+) to (\S+) mm", words)
+    if lifted and abs(float(lifted[2]) - run.here[2]) > NEAR and not faults.deaf:
+        yield f"the tip is at {run.here}, and the words are:\n{words}"
+    if skin and "not lifted" not in words:
+        yield f"the tip is in the skin, at {run.here}, and the words are:\n{words}"
+    if match := re.search(r"motion: (?:stopped|at rest) at \((\S+), (\S+), (\S+)\)", words):
+        stated = np.array([float(value) for value in match.groups()])
+        off = np.abs(stated - run.here)[: 2 if lifted else 3]
+        if off.max() > NEAR and not faults.deaf:
+            yield f"the tip is at {run.here}, and the words are:\n{words}"
+    if "nothing was moved" in words and world.controller.planner.rest_ns is not None and run.begin == 0:
+        yield f"something moved, and the words are:\n{words}"
+
+
+def _files(run, faults):
+    folder = run.world.folder
+    if not folder.exists():
+        if run.error is None and not run.killed:
+            yield "there is no session"
+        return
+    presses = len(run.world.plan.presses)
+    finished = file_names.finished(folder)
+    if run.error is None and not run.killed and len(finished) < presses:
+        yield f"it ended well with {len(finished)} of {presses} presses"
+    partial = list(folder.glob(f"*{file_names.PARTIAL}"))
+    hurried = isinstance(run.error, KeyboardInterrupt)  # a second one ends the closing, too; --resume renames the file
+    if partial and not (run.killed or hurried) and run.world.computer.disk.refused_ns is None:
+        yield f"left half written: {[path.name for path in partial]}"
+    for path in [*finished.values(), *file_names.unfinished(folder)]:
+        # What the run before left half written is renamed by --resume: it was judged with that run's faults.
+        left = path.with_name(path.name.split(".")[0] + file_names.PARTIAL)
+        earlier = path in run.before or (path not in finished.values() and left in run.before)
+        if path.stat().st_size == 0 or earlier:
+            continue
+        if path in finished.values() or run.world.computer.disk.refused_ns is None:
+            yield from _frames(run, faults, path)
+
+
+def _frames(run, faults, path):
+    try:
+        recording = read_recording(path)
+    except TacdataError as error:
+        if not run.killed:
+            yield f"{path.name} cannot be read: {error}"
+        return
+    episode = recording.episode
+    is_final = bool(file_names.EPISODE.fullmatch(path.name))
+    if is_final != episode.complete:
+        yield f"{path.name} says complete: {episode.complete}"
+    counter = episode.taxels.counter
+    touched = {"damaged_frame", "board_stalls", "board_unplugged"} & set(faults.names)
+    if not touched and len(counter) and np.any(np.diff(counter) != 1):
+        yield f"{path.name} lacks frames: {np.flatnonzero(np.diff(counter) != 1)}"
+    if run.killed and path.name.endswith(file_names.PARTIAL) and not touched and not run.world.computer.stalls:
+        last = (episode.taxels.arrival_ns[-1] - EPOCH) * 1e-9 if len(counter) else run.begin
+        if run.end - last > 1.2 and len(counter) and not run.world.computer.disk.slow:
+            yield f"{path.name} ends {run.end - last:.2f} s before the kill"
+
+
+def play(seed, only=()):
+    """Play one seed; return (names of its faults, what did not hold, simulated seconds)."""
+    with tempfile.TemporaryDirectory() as folder:
+        draw = random.Random(f"rig {seed}")
+        firmware = draw.choice(("Grbl", "Grbl", "grblHAL"))
+        settings = draw.choice((None, None, {"$20": "0", "$22": "0"}))
+        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings)
+        faults = Faults(world, seed, only)
+        try:
+            found = list(_play(world, faults))
+        finally:
+            faults.end()
+            world.end()
+        return [firmware, *(["no homing"] if settings else []), *faults.names], found, world.schedule.now
+
+
+def _play(world, faults):
+    run = Run(world)
+    faults.end()
+    yield from (f"first run: {words}" for words in broken(run, faults))
+    if run.hung or (run.error is None and not run.killed):
+        return
+    lost = world.lost or world.controller.machine.alarm is not None
+    world.reboot()
+    calm = world.repair(lost)
+    resume = world.folder.exists()
+    before = world.path[-1][1:4] if world.path else None
+    if lost:
+        run = Run(world, resume)
+        yield from (f"without an answer: {words}" for words in broken(run, calm))
+        if resume and (run.error is None or np.abs(np.array(world.path[-1][1:4]) - before).max() > NEAR):
+            yield f"it moved from a lost place without an answer; its words:\n{run.words}"
+        world.reboot()
+        world.home()
+    world.answer = lambda question: True
+    run = Run(world, world.folder.exists())
+    yield from (f"resumed: {words}" for words in broken(run, calm))
+    if run.error is not None:
+        yield f"does not resume: {run.words}"
+
+
+def main(first, last):
+    """Play seeds from ``first`` up to ``last`` and print those that fail; return how many did."""
+    failed, seconds, begin = 0, 0.0, time.process_time()
+    for seed in range(first, last):
+        names, found, simulated = play(seed)
+        seconds += simulated
+        if found:
+            failed += 1
+            print(f"seed {seed} ({', '.join(names)}):", *found, sep="\n  ", flush=True)
+    used = time.process_time() - begin
+    print(f"{failed} of {last - first} seeds failed; {seconds:.0f} simulated s took {used:.0f} s of a core")
+    return failed
+
+
+if __name__ == "__main__":
+    sys.path.append(str(Path(__file__).parents[1]))  # pyserial imports the lines by this folder's name
+    sys.exit(bool(main(int(sys.argv[1]), int(sys.argv[2]))))

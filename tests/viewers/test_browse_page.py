@@ -1,0 +1,156 @@
+"""The page of episodes as a person uses it, in headless Chromium; a page that grabs the keyboard stands for Rerun's."""
+
+import json
+import shutil
+import socketserver
+import threading
+from http.server import BaseHTTPRequestHandler
+
+import pytest
+
+from tacdata.dataset.flags import read_flags, read_history
+from viewers.browse.episode_list import Entry, EpisodeList
+from viewers.browse.server import Pages, serving
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+sync_api = pytest.importorskip("playwright.sync_api")
+pytestmark = pytest.mark.skipif(not CHROMIUM, reason="no Chromium: apt-get install chromium")
+COUNT = 30
+GRABBING = b"""<!doctype html><canvas tabindex="0" id="c" style="width:100%;height:100%"></canvas><script>
+const c = document.getElementById("c"); c.focus(); setTimeout(() => c.focus(), 100);
+onkeydown = () => { document.title = "pressed"; };
+</script>"""
+
+
+class Grabber(BaseHTTPRequestHandler):
+    def do_GET(self):
+        self.send_response(200)
+        self.send_header("Content-Type", "text/html")
+        self.end_headers()
+        self.wfile.write(GRABBING)
+
+    def log_message(self, *_):
+        pass
+
+
+class Quick(Pages):
+    """Draws nothing."""
+
+    def episode(self, number):
+        self.listed.numbered(number)
+        return self._folder / "empty.rrd"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def served(tmp_path):
+    entries = []
+    for k in range(COUNT):
+        name = f"episode-{k:06d}.mcap"
+        (tmp_path / name).write_text(name)
+        entries.append(Entry(k, name, "ball" if k % 2 else "pin", "sphere", 0.1 * k, 0.0, 0.4 + 0.05 * k, 1.0, 0.95,
+                             "complete", "test", 0.01 * k))  # fmt: skip
+    (tmp_path / "empty.rrd").write_bytes(b"")
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Grabber) as viewer:
+        threading.Thread(target=viewer.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{viewer.server_address[1]}"
+        pages = Quick(EpisodeList(tmp_path, "session", tuple(entries)), None, None, tmp_path, address)
+        with serving(pages, 0):
+            yield pages
+        viewer.shutdown()
+
+
+@pytest.fixture
+def page(browser, served):
+    context = browser.new_context(viewport={"width": 1400, "height": 800})
+    opened = context.new_page()
+    faults = []
+    opened.on("pageerror", lambda error: faults.append(str(error)))
+    opened.goto(served.address + "/")
+    opened.wait_for_function(f"document.querySelectorAll('tbody tr').length === {COUNT}")
+    yield opened
+    context.close()
+    assert not faults
+
+
+def opened(page):
+    return int(page.inner_text("tr.open td:first-child"))
+
+
+def test_arrow_keys_work_although_the_viewer_grabs_the_keyboard(page):
+    for wanted in (1, 2, 3):
+        page.wait_for_timeout(400)  # the viewer has loaded and taken the focus, twice
+        page.keyboard.press("ArrowDown")
+        page.wait_for_function(f"document.querySelector('tr.open td').textContent === '{wanted}'")
+    page.mouse.move(1000, 400)  # over the viewer the keys are the viewer's
+    page.mouse.click(1000, 400)
+    page.keyboard.press("ArrowDown")
+    page.wait_for_timeout(200)
+    assert opened(page) == 3
+    page.mouse.move(200, 500)
+    page.keyboard.press("ArrowUp")
+    page.wait_for_function("document.querySelector('tr.open td').textContent === '2'")
+
+
+@pytest.mark.parametrize(
+    ("typed", "words"),
+    [("depht>1", "no column depht: there are number, flag, error"), ("depth>deep", "depth is a number"),
+     ("indenter>ball", "indenter is a text"), ("depth>0.5 eror<1", "no column eror")],
+)  # fmt: skip
+def test_a_typo_in_a_filter_is_named_and_hides_nothing(page, typed, words):
+    page.fill("#filter", typed)
+    assert words in page.inner_text("#wrong")
+    assert page.locator("tbody tr").count() == (COUNT if "depth>0.5" not in typed else COUNT - 3)
+    page.fill("#filter", "depth>0.8 indenter=ball")
+    assert not page.is_visible("#wrong") and page.locator("tbody tr").count() == 11
+
+
+def test_the_flag_is_seen_at_1400_px_and_columns_are_chosen(page, tmp_path):
+    page.fill("#reason", "the tool slipped")
+    page.click("#flag")
+    page.wait_for_selector("td.flag:has-text('slipped')")
+    box = page.locator("tr.open td.flag").bounding_box()
+    side = page.locator("#side").bounding_box()
+    assert box["x"] + box["width"] <= side["x"] + side["width"], "inside the list without scrolling"
+    page.click("#side > #tools > details:first-of-type > summary")
+    page.uncheck("#show-indenter")
+    heads = page.locator("th").all_inner_texts()
+    assert not any("indenter" in head for head in heads) and heads[:2] == ["number", "flag"]
+    page.reload()
+    page.wait_for_selector("tbody tr")
+    assert not any("indenter" in head for head in page.locator("th").all_inner_texts()), "remembered"
+
+
+def test_several_rows_are_flagged_at_once_and_the_history_tells_who(page, served):
+    page.click("tbody tr:nth-child(3)")
+    page.click("tbody tr:nth-child(6)", modifiers=["Shift"])
+    page.click("tbody tr:nth-child(9)", modifiers=["Control"])
+    page.fill("#reason", "rig was moved")
+    page.click("#flag")
+    page.wait_for_function("document.querySelectorAll('tr.flagged').length === 5")
+    flags = read_flags(served.listed.root)
+    assert sorted(flag.file[8:14] for flag in flags.values()) == ["000002", "000003", "000004", "000005", "000008"]
+    page.click("tbody tr:nth-child(3)")
+    page.click("#unflag")
+    page.wait_for_function("document.querySelectorAll('tr.flagged').length === 4")
+    page.click("#past > summary")
+    page.wait_for_function("document.querySelector('#history').textContent.includes('taken back')")
+    told = page.inner_text("#history").splitlines()
+    assert len(told) == 6 and "episode-000002.mcap taken back" in told[0] and "@" in told[0]
+    history = read_history(served.listed.root)
+    assert [change.reason for change in history] == ["rig was moved"] * 5 + [""]
+
+
+def test_a_link_opens_an_episode(page, browser, served):
+    page.goto("about:blank")
+    page.goto(served.address + "/#episode=17")
+    page.wait_for_function("document.querySelector('tr.open td') !== null")
+    assert opened(page) == 17
+    assert json.loads(page.evaluate("JSON.stringify(location.hash)")) == "#episode=17"
