@@ -43,7 +43,7 @@ class SkinModel:
     >>> from tacdata.skin.press import PressRequest
     >>> model = SkinModel(default_sensor())
     >>> len(model.mesh.nodes), model.remarks
-    (13696, ())
+    (10196, ())
     >>> press = PressRequest(Sphere(3.0), x=1.0, y=0.0, yaw=0.0, depths=(0.4, 0.8))
     >>> solution = model.solve(press)  # doctest: +SKIP
     >>> solution.surface.shape, solution.force.shape  # doctest: +SKIP

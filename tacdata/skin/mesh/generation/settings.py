@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class MeshSettings:
     """Target edge lengths [mm].
 
-    The default ones give some 13,700 nodes. Solutions then differ from independent ones by 1 % in force, and by 5 % of
-    the largest in each protrusion's force (`tests/skin/test_skin_reference.py`, decision 0014).
+    The default ones give some 10,200 nodes. Solutions then differ from independent ones by 1 % in force, and by 5 % of
+    the largest in each protrusion's force (`tests/skin/test_skin_reference.py`, decision 0019).
 
     Example:
         >>> from tacdata.skin.mesh.generation.settings import MeshSettings
@@ -25,7 +25,7 @@ class MeshSettings:
     """In the middle of the slab [mm]."""
     protrusion: float = 1.2
     """At the protrusions [mm]."""
-    tip: float | None = 0.17
+    tip: float | None = 0.3
     """At the protrusions' tips [mm]; None: one ring of edges around the contact patch."""
     envelope: float = 1e-3
     """fTetWild's envelope over the bounding box's diagonal [1]."""
