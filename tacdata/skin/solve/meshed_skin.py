@@ -142,8 +142,9 @@ class MeshedSkin:
 
     @property
     def _solver(self) -> SolverSettings:
-        """The settings; where the skin sticks, with the steps that a jump takes."""
+        """The settings, with the forcing that the material needs and, where the skin sticks, the steps of a jump."""
         solver = self.settings.solver
+        solver = replace(solver, forcing=solver.forcing_for(self.sensor.material))
         if self.sensor.contact.adhesion is None:
             return solver
         limit, patience = (max(a, b) for a, b in zip((solver.newton_limit, solver.patience), _JUMP, strict=True))
