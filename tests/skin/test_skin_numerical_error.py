@@ -109,7 +109,11 @@ def test_the_model_without_estimate_is_another_version_and_says_so(boxes):
 
 
 def test_the_estimate_covers_the_true_error(boxes):
-    """Truth: edges of 0.33 mm; of 80 % of pixels, root mean square and force within a factor of 2."""
+    """Truth: edges of 0.33 mm; of 80 % of pixels, and the root mean square within a factor of 2.
+
+    The force's true error is small, scatters with where nodes lie and may cross zero. A difference of two meshes states
+    it too large (benchmarks/skin_error_ladder.py); it must not be stated too small.
+    """
     model, solution = boxes
     fine = SkinModel(
         model.sensor, replace(model.settings, error_estimate=False), mesh=box_mesh(model.sensor, 12, 12, 5)
@@ -123,7 +127,7 @@ def test_the_estimate_covers_the_true_error(boxes):
         print(f"depth {solution.depth[k]:g}: {within:.2f} of pixels, rms {ratio:.2f}, force {force:.2f} of the error")
         assert within >= 0.8
         assert 0.5 < ratio < 2.0
-        assert 0.5 < force < 2.0
+        assert force > 0.8 and solution.force_error[k] < 0.05 * truth.force[k - 1, 2]
 
 
 def test_a_coarser_mesh_is_chosen_by_what_the_mesher_made(monkeypatch):

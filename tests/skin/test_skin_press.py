@@ -97,9 +97,23 @@ def test_the_map_of_a_centred_sphere_is_symmetric(smooth):
 
 
 def test_the_map_is_as_deep_as_the_press_and_bulges_around_it(smooth):
-    assert smooth.surface[2][7, 7] == pytest.approx(0.5, abs=0.005)
+    """Gaps close in the mean: between the nodes of this coarse mesh the skin leaves the sphere by up to 10 um."""
+    assert smooth.surface[2][7, 7] == pytest.approx(0.5, abs=0.01)
     assert smooth.surface[2].max() < 0.51
     assert -0.05 < smooth.surface[2].min() < 0
+
+
+def test_between_nodes_the_skin_leaves_the_shape_to_both_sides_alike(slab):
+    """The mean over the inner contact, weighted by area, is below 0.3 % of the depth; the deviation is the mesh's."""
+    [(_, state)] = slab.states(press((0.5,)))
+    around = np.linspace(-0.55, 0.55, 45)
+    points = np.stack(np.meshgrid(around, around, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = points[np.hypot(*points.T) < 0.55]
+    place = np.c_[points, np.full(len(points), 2.0)] + slab.skin.face.displacement(points, state.displacement)
+    gap = np.linalg.norm(place - [0.0, 0.0, 2.0 - 0.5 + SPHERE.radius], axis=1) - SPHERE.radius
+    print(f"mean {1e3 * gap.mean():.2f} um, deviation {1e3 * gap.std():.2f} um")
+    assert abs(gap.mean()) < 0.003 * 0.5
+    assert 0 < gap.std() < 0.02 * 0.5
 
 
 def test_without_friction_the_force_of_a_centred_press_is_upright(smooth):

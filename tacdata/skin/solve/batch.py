@@ -38,6 +38,9 @@ _ANY = 1e3
 _SLOW = 1.0
 """Share of the residual that a step by friction's tangent may leave at most [1]; else the secant takes over."""
 
+_NEARER = 0.1
+"""Share of the residual where the tangent failed from which on it is tried again [1]."""
+
 _AWAY = 1e3
 """Height at which the shapes of an idle column wait [mm]."""
 
@@ -111,7 +114,7 @@ class Batch:
         unknowns = self._at.unknowns
         self._base, self._accepted, self._rate = unknowns, unknowns.zeros(), unknowns.zeros()
         self._loading = LoadingStates(unknowns)
-        self._majorant = torch.zeros(capacity, dtype=torch.bool, device=device)
+        self._failed_at = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
         self._presses: list[PlacedPress | None] = [None] * capacity
         self._before = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
         self.cg = 0
@@ -320,8 +323,10 @@ class Batch:
         at = self._at
         # By the tangent, nodes may flip between opposite slips for ever; by the secant, a majorant, they do not.
         flipping = (at.friction_tangent > 0) & (now.relative > _SLOW * self._before)
-        self._majorant = (self._majorant & (at.near == 0)) | flipping
-        at.friction_tangent = torch.where(self._majorant, 0.0, self._newton.friction_tangent(now))
+        self._failed_at = torch.where(at.near == 0, self._failed_at, torch.inf)
+        self._failed_at = torch.where(flipping, self._before.minimum(self._failed_at), self._failed_at)
+        may = now.relative < _NEARER * self._failed_at
+        at.friction_tangent = torch.where(may, self._newton.friction_tangent(now), 0.0)
         moved, changes, used = self._newton.step(at, now, busy)
         self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
         # The first step of a load step changes the active set: its residual says nothing.
@@ -360,7 +365,7 @@ class Batch:
         self._base, self._accepted, self._rate = (
             state.take(which) for state in (self._base, self._accepted, self._rate)
         )
-        self._before, self._majorant = self._before[which], self._majorant[which]
+        self._before, self._failed_at = self._before[which], self._failed_at[which]
         self._loading.keep(which)
         self._presses = [self._presses[column] for column in columns]
 

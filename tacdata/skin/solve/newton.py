@@ -26,7 +26,7 @@ from tacdata.skin.solve.settings import SolverSettings
 _LEAST_VOLUME = 0.1
 """Volume ratio det F below which a Newton step is shortened [1]."""
 
-_NEAR = 0.02
+_NEAR = 0.05
 """Relative residual below which the tangent of friction replaces its secant [1]."""
 
 _STRAGGLERS, _LONG = 0.3, 8

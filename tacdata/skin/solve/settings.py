@@ -54,7 +54,7 @@ class ModelSettings:
     """Weight of a gap against a pressure in the active set, over Young's modulus [1/mm]."""
     stick: float = 30.0
     """Tangential stiffness of sticking nodes over Young's modulus [1/mm]."""
-    step: float = 0.5
+    step: float = 0.25
     """Longest load step [mm]."""
     averaged_from: float = 0.0
     """Poisson's ratio from which on volume changes are averaged at the corners [1]: 0 always, 0.5 never.

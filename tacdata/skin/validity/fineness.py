@@ -9,8 +9,8 @@ from tacdata.skin.contact.first_touch import reach
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
 
-_SPACING = 1 / 3
-"""Distance of the contact's quadrature points over the edge of their triangle [1]."""
+_SPACING = 1 / 2
+"""Distance of the nodes, whose hats close a gap in the mean, over the edge of their triangle [1]."""
 
 
 def edge_under(mesh: SkinMesh, sensor: Sensor, request: PressRequest) -> float:
@@ -37,7 +37,7 @@ def _edge_remark(edge: float, request: PressRequest) -> str:
     if sharpest >= _SPACING * edge:
         return ""
     return (
-        f"{request.indenter.shape}: its sharpest radius is {sharpest:.2g} mm, and contact is seen at points "
+        f"{request.indenter.shape}: its sharpest radius is {sharpest:.2g} mm, and contact is seen at nodes "
         f"{_SPACING * edge:.2g} mm apart (triangles of {edge:.2g} mm): force and map near that edge may be off beyond "
         f"the numerical error; triangles of {sharpest / _SPACING:.2g} mm would see it"
     )
@@ -53,7 +53,7 @@ def _adhesion_remark(edge: float, sensor: Sensor) -> str:
     if width >= _SPACING * edge:
         return ""
     return (
-        f"adhesion: traction falls over {width:.2g} mm at the contact's edge, and is seen at points "
+        f"adhesion: traction falls over {width:.2g} mm at the contact's edge, and is seen at nodes "
         f"{_SPACING * edge:.2g} mm apart (triangles of {edge:.2g} mm): the skin lets go too late, at too large a "
         f"force; triangles of {width / _SPACING:.2g} mm, or a range of "
         f"{np.sqrt(_SPACING * edge * adhesion.work * 1e-3 / plane):.2g} mm, would do"
