@@ -22,7 +22,7 @@ from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
 from tacdata.recording.live.lost_position import Ask, require_found, require_free, why_lost
 from tacdata.recording.live.reading_health import BadReadings
-from tacdata.recording.live.rig_devices import RigDevices
+from tacdata.recording.live.rig_devices import RigDevices, require_channels
 from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion import sync_tap as tap_motion
 from tacdata.recording.motion.preflight import Preflight, preflight, safe_height
@@ -111,7 +111,8 @@ class Recorder:
             The session as it stands on disk.
 
         Raises:
-            UsageError: If the folder exists (or, resuming, does not), or the summary was refused.
+            UsageError: If the folder exists (or, resuming, does not), the summary was refused, or the board sends
+                another number of channels than the sensor has taxels.
             FormatError: If a press would leave the envelope or the skin.
             DeviceError: On a fault. The motion is stopped and the recording closed; --resume continues.
             KeyboardInterrupt: On Ctrl-C, after the same.
@@ -122,6 +123,7 @@ class Recorder:
         wanted = session.remaining if session else tuple(press.index for press in self.plan.presses)
         if session and not wanted:
             return session
+        require_channels(self.devices.board, self.sensor)
         try:
             return self._open_and_record(session, wanted, confirm)
         except BaseException as error:
