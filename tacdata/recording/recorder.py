@@ -117,13 +117,13 @@ class Recorder:
             DeviceError: On a fault. The motion is stopped and the recording closed; --resume continues.
             KeyboardInterrupt: On Ctrl-C, after the same.
         """
+        require_channels(self.devices.board, self.sensor)  # before the plan: its sites are off another skin too
         self.plan.check_against(self.sensor)
         session = self._existing_session()
         self._latencies = latencies(session) if session else {}
         wanted = session.remaining if session else tuple(press.index for press in self.plan.presses)
         if session and not wanted:
             return session
-        require_channels(self.devices.board, self.sensor)
         try:
             return self._open_and_record(session, wanted, confirm)
         except BaseException as error:
