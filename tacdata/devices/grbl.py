@@ -213,6 +213,8 @@ class Grbl(MotionController):
         """
         link = self._opened()
         self._target, self._ends_ns = None, 0
+        if link.halted and link.fault:
+            raise StandsStill(link.fault.given, link.fault.allowed, link.fault.remedy)
         status = self._rest(link)
         stands = "stands at (" + ", ".join(f"{value:.2f}" for value in status.position) + ") mm"
         if link.pendant:

@@ -133,7 +133,7 @@ class Recorder:
             with suppress(TacdataError):  # the fault itself must be reported first
                 if lost and self.out.exists():
                     lose_position(read_session(self.out), lost)
-            error.add_note(self._ending(lost))
+            error.add_note(self._ending(lost, error))
             raise
 
     def _paused(self, error: BadReadings) -> bool:
@@ -180,9 +180,9 @@ class Recorder:
             session = refresh(session)
         return session
 
-    def _ending(self, lost: str) -> str:
+    def _ending(self, lost: str, error: BaseException) -> str:
         again = "the same command" + (" with --resume" if self.out.exists() else "")
-        return ending(self._motion, lost, on_disk(self.out, len(self.plan.presses)), again)
+        return ending(self._motion, lost, on_disk(self.out, len(self.plan.presses)), again, error)
 
     def _existing_session(self) -> Session | None:
         if self.resume:

@@ -24,6 +24,8 @@ STOPPED = 0.5
 """Time from when a fault can be seen until the motion has stopped [s], beside the braking."""
 BRAKING = 0.2
 """Longest braking [s]: 30 mm/s at 150 mm/s^2."""
+HALTING = {"alarm", "brown_out"}
+"""Faults after which a controller moves nothing, and says so."""
 OUTSIDE = 1.0
 """Time that the tip may be outside the envelope [s]: the interval of two reports, their way, the hold, the braking."""
 
@@ -113,6 +115,8 @@ def _words(run, faults):
         yield f"it moves after the end, and the words are:\n{words}"
     if run.error is None:
         return
+    if "NOT KNOWN" in words and set(faults.names) & HALTING and set(faults.names) <= HALTING:
+        yield f"the controller has stopped by itself, and the words are:\n{words}"
     done, stated = len(file_names.finished(world.folder)) if world.folder.exists() else 0, None
     if match := re.search(r"data:   (\d+) of \d+ presses are complete", words):
         stated = int(match[1])

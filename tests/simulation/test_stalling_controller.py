@@ -34,7 +34,7 @@ def test_the_sync_tap_is_tried_once_more(tmp_path, lost, done):
     else:
         with pytest.raises(OwesAnswer, match="stands idle and still owes an answer") as error:
             world.record(sync_tap=True)
-        assert "the indenter was lifted off the skin" in "".join(error.value.__notes__)
+        assert "the indenter stands clear of the skin" in "".join(error.value.__notes__)
     world.end()
     assert sum("the sync tap is tried once more" in words for words in world.said) == 1
     assert world.position()[2] > ORIGIN[2]

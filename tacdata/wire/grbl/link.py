@@ -60,6 +60,8 @@ class GrblLink:
         self.fault: DeviceError | None = None
         self.lost = ""
         """Why the position is not known any more, in words; empty while it is."""
+        self.halted = False
+        """Whether the controller itself has ended all motion: an alarm, a restart, motors switched off."""
         self.pendant = False
         """Whether a pendant has control, as far as a report has said."""
         self.interruption: DeviceError | None = None
@@ -353,10 +355,13 @@ class GrblLink:
                 self._take_response(line)
             elif alarm := ALARM.match(line):
                 kept = alarm[1] and int(alarm[1]) in codes.POSITION_KEPT
+                self.halted = True
                 self._fail(
                     f"the controller stopped with {codes.alarm_in_words(int(alarm[1])) if alarm[1] else line}",
                     "motion without an alarm",
-                    "free the machine by hand if need be, then home it and start again",
+                    "unlock it ($X) in a terminal, which keeps the position, then start again"
+                    if kept
+                    else "free the machine by hand if need be, then home it and start again",
                     lost=not kept,
                 )
             elif WELCOME.search(line):
@@ -384,6 +389,7 @@ class GrblLink:
             self._unanswered.popleft().answer = "reset"
         if not self._welcome_expected:
             given, allowed, remedy = WELCOME_IN_MID_STREAM
+            self.halted = True
             self._fail(given.format(line), allowed, remedy, lost=True)
 
     def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
@@ -394,6 +400,7 @@ class GrblLink:
         if self.polled and not self._welcome_expected:
             wrong, for_good = what_is_wrong(report, self._held, self.homing)
             if wrong and for_good:
+                self.halted = True
                 known = self.fault is not None  # an alarm whose own line came first has said what is lost
                 self._fail(*wrong, lost=not known)
             elif wrong and self.interruption is None:
