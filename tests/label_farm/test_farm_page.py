@@ -82,6 +82,13 @@ def test_a_person_submits_watches_and_cancels(page, service):
     page.wait_for_selector("#failures pre:has-text('Traceback')")
     row = page.inner_text("#workers tbody tr").split("\t")
     assert row[1] == "cpu" and int(row[2]) >= 5 and float(row[4]) > 10
+    page.wait_for_selector("#workers tbody td:nth-child(7):has-text('MB')")
+    assert page.inner_text("#workers tbody td:nth-child(6)").endswith("%")
+    page.wait_for_selector("#throughput-words:has-text('5 presses solved and 1 failed')")
+    assert page.locator("#throughput rect.solved").count() >= 1
+    page.wait_for_selector("#failures img.press[src^=blob]")
+    page.wait_for_timeout(500)
+    assert page.eval_on_selector("#failures img.press", "image => image.naturalWidth") > 900
     if folder := os.environ.get("TACDATA_SCREENSHOTS"):
         page.screenshot(path=f"{folder}/farm.png", full_page=True)
 
