@@ -95,6 +95,14 @@ def test_the_spread_of_a_size_is_what_its_parts_differ_by():
     assert spread(parts(np.array([0.3, -0.3])), 2) == pytest.approx(0.3, rel=0.1)
 
 
+def test_a_part_that_holds_little_of_an_effect_counts_like_the_others():
+    """What fits fast presses alone is found by the slow ones."""
+    gram = parts(np.array([0.0, 0.5]))
+    gram[:, 2] *= 0.2
+    gram[:, :, 2] *= 0.2
+    assert spread(gram, 2) == pytest.approx(2.5 / np.sqrt(2), rel=0.1)
+
+
 def test_chance_is_no_spread():
     assert spread(parts(np.array([0.0, 0.0]), noise=5.0), 2) < 0.05
 

@@ -25,8 +25,8 @@ WIDE = 1.25
 """A condition is one where its largest part's value is so many times its smallest's [1]."""
 STANDS = 0.02
 """A tip that is slower stands [fastest]."""
-LITTLE = 0.03
-"""A part in which an effect has a smaller share of its information says nothing of its size [1]."""
+UNSURE = 0.25
+"""A part whose size is not known within so much says nothing of it [share of the size]."""
 
 
 def constancies(found: Findings) -> tuple[dict[str, float], ...]:
@@ -44,25 +44,28 @@ def constancies(found: Findings) -> tuple[dict[str, float], ...]:
 def spread(gram: np.ndarray, parts: int) -> float:
     """Return the spread of a column's coefficient over its parts, that of chance taken off [1].
 
+    All parts count alike, however little of the effect is in them: one that fits fast presses alone is found by the
+    slow ones, which hold little of it.
+
     Args:
         gram: Residual first, then each part's column, other columns eliminated, shape (episodes, 1 + parts, 1 + parts).
         parts: How many there are.
     """
-    index = np.arange(1, parts + 1)
     total = gram.sum(axis=0)
-    information = total[np.ix_(index, index)]
-    weight = np.diag(information) / max(float(np.trace(information)), 1e-300)
-    kept = np.flatnonzero(weight >= LITTLE)
-    if len(kept) < 2:
+    index = np.flatnonzero(np.diag(total)[1:] > 0) + 1
+    if len(index) < 2:
         return 0.0
-    own, weight = index[kept], weight[kept] / weight[kept].sum()
-    inverse = np.linalg.inv(total[np.ix_(own, own)] + 1e-6 * float(np.mean(np.diag(total)[own])) * np.eye(len(own)))
-    off = inverse @ total[own, 0]
-    scores = gram[:, own, 0] - np.einsum("eij,j->ei", gram[:, own][:, :, own], off)
-    covariance = inverse @ (scores.T @ scores) @ inverse
-    apart = np.eye(len(own)) - weight[None, :]
-    square = float(weight @ np.square(apart @ off))
-    return float(np.sqrt(max(square - float(weight @ np.diag(apart @ covariance @ apart.T)), 0.0)))
+    information = total[np.ix_(index, index)]
+    root = np.sqrt(np.diag(information))  # parts of very different size: solved at one scale
+    scaled = information / np.outer(root, root) + 1e-9 * np.eye(len(index))
+    inverse = np.linalg.inv(scaled) / np.outer(root, root)
+    off = inverse @ total[index, 0]
+    scores = gram[:, index, 0] - np.einsum("eij,j->ei", gram[:, index][:, :, index], off)
+    chance = np.diag(inverse @ (scores.T @ scores) @ inverse)
+    told = np.sqrt(chance) <= UNSURE
+    if np.count_nonzero(told) < 2:
+        return 0.0
+    return float(np.sqrt(max(float(np.mean(np.square(off[told]) - chance[told])), 0.0)))
 
 
 def _of(final: Problem, at: int, conditions: dict[str, np.ndarray]) -> dict[str, float]:
