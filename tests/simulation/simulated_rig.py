@@ -60,7 +60,7 @@ class Calm:
 class World:
     """One computer, one controller, one board and their lines, driven by one seed."""
 
-    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, **entries):
+    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, echo=False, **entries):
         """Switch everything on."""
         self.seed, self.folder, self.plan = seed, folder, plan(presses, **entries)
         self.schedule = Schedule(seed, LIMIT)
@@ -72,7 +72,7 @@ class World:
         self.board_line = SimulatedLine(names[1], self.computer, self.bench, 115200)
         parked = (ORIGIN[0], ORIGIN[1], ORIGIN[2] + PARKED)
         self.controller = Controller(
-            self.clock, seed, parked, settings=settings, firmware=firmware, port=self.cnc_line
+            self.clock, seed, parked, settings=settings, firmware=firmware, port=self.cnc_line, echo=echo
         )
         timing = Timing(self.clock.now_ns(), 1 / 30, 20.0, 0.0003, 600.0, 0.001, 0.016)
         self.board = VirtualBoard(self.clock, default_format(), timing, self._read, 115200, seed, self.board_line)

@@ -192,14 +192,16 @@ def play(seed, only=()):
         draw = random.Random(f"rig {seed}")
         firmware = draw.choice(("Grbl", "Grbl", "grblHAL"))
         settings = draw.choice((None, None, {"$20": "0", "$22": "0"}))
-        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings)
+        echo = draw.random() < 0.3
+        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings, echo=echo)
         faults = Faults(world, seed, only)
         try:
             found = list(_play(world, faults))
         finally:
             faults.end()
             world.end()
-        return [firmware, *(["no homing"] if settings else []), *faults.names], found, world.schedule.now
+        kind = [firmware, *(["no homing"] if settings else []), *(["echo"] if echo else [])]
+        return [*kind, *faults.names], found, world.schedule.now
 
 
 def _play(world, faults):
