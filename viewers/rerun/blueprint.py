@@ -38,8 +38,9 @@ def episode_blueprint(scene: Scene, follows: bool = False) -> rrb.Blueprint:
         shares.append(5.0)
     rows.append(_curves(scene))
     shares.append(5.0)
-    if scene.phases:
-        rows.append(rrb.StateTimelineView(origin="phase", name="Phases"))
+    if scene.phases or scene.notes:
+        name = " and ".join(word for word, own in (("Phases", scene.phases), ("notes", scene.notes)) if own)
+        rows.append(rrb.StateTimelineView(origin="/", contents=["phase", "notes"], name=name))
         shares.append(2.2)
     main = rrb.Vertical(*rows, row_shares=shares)
     return rrb.Blueprint(
