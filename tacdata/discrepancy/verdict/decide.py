@@ -122,7 +122,7 @@ def decide(
     status, reason = _status(found, answer)
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
     levels = [finest(f) for f in answer]
-    if reason is Reason.LEFTOVERS:
+    if reason is Reason.LEFTOVERS and (shown is None or not len(shown.names) or shown.shrinks):
         levels = [beside_much(found, f, own.get(f.placed.effect.name)) for f in answer]
         if any(levels):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
