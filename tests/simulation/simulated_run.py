@@ -180,6 +180,9 @@ def _frames(run, faults, path):
     touched = {"damaged_frame", "board_stalls", "board_unplugged"} & set(faults.names)
     if not touched and len(counter) and np.any(np.diff(counter) != 1):
         yield f"{path.name} lacks frames: {np.flatnonzero(np.diff(counter) != 1)}"
+    for view in recording.cameras.values():
+        if not {"camera_hangs", "camera_unplugged"} & set(faults.names) and np.any(np.diff(view.sequence) != 1):
+            yield f"{path.name} lacks images: {np.flatnonzero(np.diff(view.sequence) != 1)}"
     if run.killed and path.name.endswith(file_names.PARTIAL) and not touched and not run.world.computer.stalls:
         last = (episode.taxels.arrival_ns[-1] - EPOCH) * 1e-9 if len(counter) else run.begin
         if run.end - last > 1.2 and len(counter) and not run.world.computer.disk.slow:
@@ -192,15 +195,16 @@ def play(seed, only=()):
         draw = random.Random(f"rig {seed}")
         firmware = draw.choice(("Grbl", "Grbl", "grblHAL"))
         settings = draw.choice((None, None, {"$20": "0", "$22": "0"}))
-        echo = draw.random() < 0.3
-        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings, echo=echo)
+        echo, camera = draw.random() < 0.3, draw.random() < 0.3
+        more = {"echo": echo, "camera": camera}
+        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings, **more)
         faults = Faults(world, seed, only)
         try:
             found = list(_play(world, faults))
         finally:
             faults.end()
             world.end()
-        kind = [firmware, *(["no homing"] if settings else []), *(["echo"] if echo else [])]
+        kind = [firmware, *(["no homing"] if settings else []), *(name for name, on in more.items() if on)]
         return [*kind, *faults.names], found, world.schedule.now
 
 
