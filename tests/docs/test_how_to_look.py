@@ -120,7 +120,11 @@ def looked_at(monkeypatch):
     found = {}
 
     def look():
-        address = re.search(r"open (\S+)/\n", sys.stdout.getvalue())[1]
+        said = sys.stdout.getvalue()
+        if "catalogue " in said:
+            found["catalogue"] = datasets(re.search(r"catalogue rerun\+(\S+)\n", said)[1])
+            return
+        address = re.search(r"open (\S+)/\n", said)[1]
         for path in ("/", "/list", "/episode/7.rrd"):
             with urllib.request.urlopen(address + path, timeout=60) as answer:
                 found[path] = answer.read()
@@ -128,6 +132,16 @@ def looked_at(monkeypatch):
     monkeypatch.setattr(window, "has_display", lambda: False)
     monkeypatch.setattr(window, "until_interrupted", look)
     return found
+
+
+def datasets(address):
+    """Ask a catalogue for its entries, by gRPC over HTTP; names stand in the answer as plain text."""
+    request = urllib.request.Request(
+        f"{address}/rerun.cloud.v1alpha1.RerunCloudService/FindEntries", data=b"\0\0\0\0\0", method="POST",
+        headers={"Content-Type": "application/grpc-web+proto", "X-Grpc-Web": "1"},
+    )  # fmt: skip
+    with urllib.request.urlopen(request, timeout=60) as answer:
+        return answer.read().decode("latin-1")
 
 
 def edited(root):
@@ -149,4 +163,5 @@ def test_every_command_of_the_page_runs(folder, looked_at):
         assert done.returncode == 0, f"tacdata {shlex.join(words)}: {done.stdout}{done.stderr}"
         assert not opens or shown.stat().st_size > 5_000, shlex.join(words)
         said[shlex.join(words)] = done.stdout
-    assert len(said) == 23 and looked_at["/episode/7.rrd"][:4] == b"RRF2" and b"<title>" in looked_at["/"]
+    assert "session" in looked_at["catalogue"], "what Rerun's server holds, by its own answer"
+    assert len(said) == 24 and looked_at["/episode/7.rrd"][:4] == b"RRF2" and b"<title>" in looked_at["/"]
