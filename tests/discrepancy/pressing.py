@@ -15,8 +15,8 @@ def course(
     """Return presses of three channels at two places; sizes in s, s, share, mm.
 
     A tool that pulls sticks to the skin; readings grow by a power of load. Friction is a share of load, carried by
-    elements that slip beyond loads of their own and come to rest when the tool is off. While the tip leaves, readings are
-    late by ``recovery``, as by ``delay`` unless given.
+    elements that slip beyond loads of their own and come to rest when the tool is off. While the tip leaves, readings
+    are late by ``recovery``, as by ``delay`` unless given.
     """
     slips = np.array([0.03, 0.08, 0.2])
     rng = np.random.default_rng(seed)
