@@ -125,3 +125,25 @@ def test_a_recording_says_whether_its_lines_were_checked(tmp_path):
         world.end()
         attached = read_records(session.episodes[0]).attachments["controller.json"].data
         assert json.loads(attached)["settings"].get("line_check") == ("echo" if echo else None)
+
+
+HALF = b"G53G90G94G21G1X-96.0000Y-61.5000Z-45.0000F600.000"
+"""A line of motion, 7 mm into the skin, without its end."""
+
+
+@pytest.mark.parametrize("firmware", ["Grbl", "grblHAL"])
+@pytest.mark.parametrize(("way", "left"), [("to_device", HALF), ("to_host", b"ok\r\n")])
+def test_what_an_earlier_program_left_is_neither_carried_out_nor_taken_for_an_answer(tmp_path, firmware, way, left):
+    world, added = World(4, tmp_path / "session", presses=1, firmware=firmware), []
+
+    def change(data):
+        if not added and (data.startswith(b"$") or b"[VER" in data):
+            added.append(data)
+            return left + data
+        return data
+
+    getattr(world.cnc_line, way).change = change
+    session = world.record()
+    world.end()
+    assert added and len(session.done) == 1
+    assert min(row[3] for row in world.path) > ORIGIN[2] - 0.81, "only the press went into the skin"
