@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
 from tacdata.dataset.notes import Note, add_note, read_notes, remove_note
 from tacdata.errors import UsageError
 from viewers.browse.episode_list import EpisodeList
 from viewers.browse.flagging import recording_of
-from viewers.scene.scene import Span
 
 
 def notes_of(listed: EpisodeList, number: int) -> list[Note]:
@@ -49,9 +44,3 @@ def unnote_stretch(listed: EpisodeList, number: int, place: int) -> str:
         raise UsageError(f"note {place} of episode {number}", f"one of its {len(notes)}", "look at the list again")
     remove_note(listed.root, notes[place])
     return notes[place].text
-
-
-def spans_of(notes: Sequence[Note], time_ns: np.ndarray) -> tuple[Span, ...]:
-    """Return notes as stretches of a scene whose readings were taken at these times [ns]."""
-    first = int(time_ns[0])
-    return tuple(Span(note.text, first + round(1e9 * note.begin), first + round(1e9 * note.end)) for note in notes)

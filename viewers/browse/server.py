@@ -7,7 +7,7 @@ import socket
 import tempfile
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from http import HTTPStatus
 from importlib.resources import files
 from pathlib import Path
@@ -26,7 +26,7 @@ from tacdata.dataset.notes import Note, read_notes
 from tacdata.errors import TacdataError
 from viewers.browse.episode_list import UNITS, Entry, EpisodeList, with_flags, with_notes
 from viewers.browse.flagging import flag_episode, unflag_episode
-from viewers.browse.noting import note_stretch, notes_of, spans_of, unnote_stretch
+from viewers.browse.noting import note_stretch, notes_of, unnote_stretch
 from viewers.rerun.shield import LOOPBACK, shielded
 from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
 
@@ -106,8 +106,7 @@ class Pages:
         file = self._folder / f"{number}.rrd"
         with self._drawing:
             if not file.is_file():
-                scene = scene_at(self.listed.root, self._labels, self._predictions, number)
-                RerunBackend(file).draw(replace(scene, notes=spans_of(self.notes(number), scene.taxels.time_ns)))
+                RerunBackend(file).draw(scene_at(self.listed.root, self._labels, self._predictions, number))
         return file
 
     def flag(self, number: int, reason: str) -> str:
