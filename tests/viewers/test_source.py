@@ -64,7 +64,7 @@ def test_a_session_shows_its_first_episode_or_the_one_asked_for(session):
     assert caught.value.allowed == "3"
 
 
-def test_notes_on_stretches_of_a_recording_stand_below_its_phases(session, recorded, tmp_path):
+def test_notes_on_stretches_of_a_recording_stand_beside_its_phases(session, recorded, tmp_path):
     add_note(session, recording_hash(recorded), recorded.path.name, 1.0, 1.5, "the tool slips")
     add_note(session, "b" * 64, "another.mcap", 0.0, 1.0, "not this one")
     try:

@@ -42,7 +42,7 @@ def episode_blueprint(scene: Scene, follows: bool = False, stands: bool = False)
     if scene.phases or scene.notes:
         name = " and ".join(word for word, own in (("Phases", scene.phases), ("notes", scene.notes)) if own)
         rows.append(rrb.StateTimelineView(origin="/", contents=["phase", "notes"], name=name))
-        shares.append(2.2)
+        shares.append(3.8 if scene.phases and scene.notes else 2.2)
     main = rrb.Vertical(*rows, row_shares=shares)
     return rrb.Blueprint(
         rrb.Horizontal(main, _side(scene), column_shares=[3, 1]),
