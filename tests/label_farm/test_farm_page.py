@@ -1,14 +1,12 @@
 """The page in a real browser: Debian's Chromium, without a head."""
 
 import os
-import shutil
 
 import pytest
 from chaos import Service, record
+from running.chromium import needs_chromium
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-sync_api = pytest.importorskip("playwright.sync_api")
-pytestmark = pytest.mark.skipif(not CHROMIUM, reason="no Chromium: apt-get install chromium")
+pytestmark = needs_chromium
 TOKEN = "0123456789abcdef0123"
 
 
@@ -20,14 +18,6 @@ def service(tmp_path_factory):
     options = ("--token", TOKEN)
     with Service(folder, workers=1, seconds=0.3, options=options, FAST_MODEL_FAILS="-5.95") as service:
         yield service
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture

@@ -2,21 +2,19 @@
 
 import json
 import os
-import shutil
 import socketserver
 import threading
 from http.server import BaseHTTPRequestHandler
 
 import pytest
+from running.chromium import needs_chromium
 
 from tacdata.dataset.flags import read_flags, read_history
 from tacdata.dataset.notes import read_notes
 from viewers.browse.episode_list import Entry, EpisodeList
 from viewers.browse.server import Pages, serving
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-sync_api = pytest.importorskip("playwright.sync_api")
-pytestmark = pytest.mark.skipif(not CHROMIUM, reason="no Chromium: apt-get install chromium")
+pytestmark = needs_chromium
 COUNT = 30
 GRABBING = b"""<!doctype html><canvas tabindex="0" id="c" style="width:100%;height:100%"></canvas><script>
 const c = document.getElementById("c"); c.focus(); setTimeout(() => c.focus(), 100);
@@ -41,14 +39,6 @@ class Quick(Pages):
     def episode(self, number):
         self.listed.numbered(number)
         return self._folder / "empty.rrd"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture
