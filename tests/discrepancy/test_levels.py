@@ -11,7 +11,7 @@ from tacdata.discrepancy.levels.constancy import spread
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.remainder import _size
 from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.verdict.decide import beside_much, finest, stands_in
+from tacdata.discrepancy.verdict.decide import beside_much, finest, stands, stands_in
 from tacdata.effects import Placed, load
 
 MARGINS = {"creep": 9.0, "backlash": 9.0}
@@ -72,6 +72,14 @@ def test_a_form_that_what_is_left_may_lend_names_a_family():
     assert beside_much(leaving(30.0, *tried), lag, beside) is Level.FAMILY
     both = replace(lag, margins={"latency": 4.0, "servo_lag": 5.0})
     assert beside_much(leaving(30.0, *tried), both, beside) is Level.MECHANISM
+
+
+def test_one_that_looks_like_another_family_is_there_without_a_name():
+    """One rate does not tell it from play: it stands, and is named at no level."""
+    beside = BesideRemainder(0.0, {}, {"depth": 0.05})
+    alike = replace(ONE, rivals=("backlash",), bought=100.0)
+    assert stands(leaving(30.0), alike, beside) and beside_much(leaving(30.0), alike, beside) is None
+    assert not stands(leaving(30.0), replace(alike, at_bound=("f",)), beside)
 
 
 def leaving(gain, *names):
