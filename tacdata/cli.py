@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import functools
 import inspect
+import re
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext, redirect_stdout
@@ -15,7 +16,7 @@ import typer
 
 from tacdata import progress, registry, stages
 from tacdata.commands.command import Result
-from tacdata.errors import DeviceError, Exit, TacdataError
+from tacdata.errors import DeviceError, Exit, TacdataError, UsageError
 from tacdata.extras import missing_package
 
 ROOM, BASE = "tacdata.commands", "command"
@@ -153,11 +154,49 @@ def _end(result: Result, as_json: bool) -> None:
         raise typer.Exit(result.ends)
 
 
+MISTYPED: Any = typer.BadParameter.__mro__[1]
+"""What typer raises for a line that does not fit a verb."""
+
+
+def in_words(error: Any) -> UsageError:
+    """Return what is wrong with a line that was typed, in our words: what was given, what is allowed, what is next."""
+    context, kind = error.ctx, type(error).__name__
+    path = context.command_path if context else "tacdata"
+    allowed = context.get_usage().removeprefix("Usage: ") if context else "tacdata VERB"
+    remedy = f"{path} --help explains each"
+    parameter = getattr(error, "param", None)
+    if kind == "MissingParameter" and parameter is not None:
+        name = parameter.name if parameter.param_type_name == "argument" else parameter.opts[0]
+        return UsageError(f"{path} without {name}", allowed, f"name it; {remedy}")
+    if kind == "BadOptionUsage":
+        return UsageError(f"{error.option_name} without a value", "a value behind it", f"name it; {remedy}")
+    if kind == "NoSuchOption":
+        known = [option for one in context.command.get_params(context) for option in one.opts if option[:2] == "--"]
+        return UsageError(f"{path} with {error.option_name}", ", ".join(sorted(known)), remedy)
+    if kind == "NoSuchCommand" or "No such command" in error.message:
+        known = ", ".join(context.command.list_commands(context))
+        given = error.message.rstrip(".").replace("No such command", f"{path} has no verb")
+        return UsageError(given, known, remedy)
+    if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)", error.message):
+        return UsageError(f"{path} with {extra[1]}, which it has no place for", allowed, f"leave it out; {remedy}")
+    return UsageError(f"{path}: {error.format_message().rstrip('.')}", allowed, remedy)
+
+
 def main() -> None:
     """Run the command line; an error meant for a person ends in words and a non-zero exit, never a traceback."""
     stages.follow()
     try:
-        application()(prog_name="tacdata")
+        ended = application()(prog_name="tacdata", standalone_mode=False)
+        if type(ended) is int and ended:
+            raise SystemExit(ended)
+    except MISTYPED as error:
+        if type(error).__name__ == "NoArgsIsHelpError":
+            error.show()
+            raise SystemExit(int(Exit.USAGE)) from None
+        print(f"error: {in_words(error)}", file=sys.stderr)
+        raise SystemExit(int(Exit.USAGE)) from None
+    except typer.Abort:
+        raise SystemExit(int(Exit.INTERRUPTED)) from None
     except TacdataError as error:
         print("\n".join([f"error: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
         raise SystemExit(int(error.exit_code)) from None

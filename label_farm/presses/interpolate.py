@@ -47,9 +47,7 @@ class Branch:
         if not inner:
             return np.repeat(np.abs(self.values[-1:] - self.values[:1]), len(self.depth), axis=0)
         without = [Branch(np.delete(self.depth, k), np.delete(self.values, k, axis=0)) for k in inner]
-        missed = [
-            np.abs(rest.at(self.depth[k]) - self.values[k]) for k, rest in zip(inner, without, strict=True)
-        ]
+        missed = [np.abs(rest.at(self.depth[k]) - self.values[k]) for k, rest in zip(inner, without, strict=True)]
         return np.stack([np.max(missed[:2], axis=0), *missed, np.max(missed[-2:], axis=0)])
 
     def left_out_beside(self, depth: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import asdict
 from urllib.error import URLError
@@ -12,6 +13,7 @@ from label_farm.remote.client import Client
 from label_farm.store import solution_file
 from label_farm.store.failure import Failure
 from label_farm.store.solution_check import check_solution
+from label_farm.workers.usage import usage_of
 from tacdata.errors import DeviceError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
@@ -93,7 +95,8 @@ class RemoteDesk:
     def beat(self) -> None:
         """Give a sign of life, by which claims stay valid."""
         try:
-            self._client.post("/api/work/beat", self._me())
+            usage = usage_of(os.getpid())
+            self._client.post("/api/work/beat", self._me(**(asdict(usage) if usage else {})))
         except DeviceError as error:
             raise URLError(str(error)) from None
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from label_farm.ledger.ledger import Ledger
 from label_farm.service.foreman import Foreman
+from label_farm.service.gauges import SHOWN as MINUTES
 from label_farm.service.guard import Guard
 from label_farm.service.metrics import add_metrics
 from label_farm.service.receiving import add_receiving
@@ -96,6 +97,11 @@ def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
         """Everything that the page shows."""
         return {"submissions": _listing(foreman), **_farm(foreman)}
 
+    @api.get("/api/throughput")
+    def throughput() -> list[dict[str, Any]]:
+        """Presses settled in each minute since the service began, a day at most."""
+        return foreman.gauges.throughput()
+
     @api.post("/api/submissions", status_code=201)
     def submit(wish: SubmissionRequest) -> dict[str, Any]:
         """Ask for a session's labels."""
@@ -142,12 +148,14 @@ def _farm(foreman: Foreman) -> dict[str, Any]:
     workers = [asdict(row) for row in foreman.workers()]
     for row in workers:
         row["rate"] = (row["done"] + row["failed"]) / row["busy"] if row["busy"] > 0 else 0.0
+        row |= foreman.gauges.usage(row["owner"])
     rate = sum(row["rate"] for row in workers if not row["note"])
     left = waiting + leased
     return {
         "presses": {"waiting": waiting, "in_work": leased, "solved": done, "failed": failed},
         "workers": workers,
         "rate": rate,
+        "throughput": foreman.gauges.throughput(MINUTES),
         "seconds_left": left / rate if rate and left else (0.0 if not left else None),
         "paused": foreman.paused,
         "damaged": foreman.submissions.damaged,

@@ -16,6 +16,7 @@ from label_farm.labels.session_labels import SessionLabels
 from label_farm.ledger.ledger import Ledger
 from label_farm.ledger.roster import Roster, WorkerRow
 from label_farm.presses.model import Version
+from label_farm.service.gauges import Gauges
 from label_farm.service.run import RECENT, Run
 from label_farm.service.submission import OPEN, Submission, Submissions
 from label_farm.settings import FarmSettings
@@ -27,6 +28,8 @@ ROUND_SECONDS = 0.1
 PAUSE_SECONDS = 5.0
 MOST_SHOWN = 100
 """Most failures that are shown of a submission."""
+SAMPLE_SECONDS = 2.0
+"""How often throughput and workers are looked at [s]."""
 KEPT_RUNS = 200
 """How many finished submissions keep their list of failures in memory."""
 
@@ -48,6 +51,7 @@ class Foreman:
         self.root, self.store, self._settings = root, store, settings
         self._lock_file = _lock(store.folder)
         self.submissions = Submissions(store.folder)
+        self.gauges, self._sampled = Gauges(), -SAMPLE_SECONDS
         self._pauses = {"plan": "", "work": ""}
         self._versions: dict[str, Version] = {}
         self._guard = threading.RLock()
@@ -279,7 +283,16 @@ class Foreman:
                     if state.state not in OPEN:
                         run.close()
         pool.tend(ledger.unsettled(self._settings.workers), settled > 0)
+        self._sample(ledger)
         self._forget_old()
+
+    def _sample(self, ledger: Ledger) -> None:
+        if time.monotonic() - self._sampled < SAMPLE_SECONDS:
+            return
+        self._sampled = time.monotonic()
+        _, _, solved, failed = ledger.counts().values()
+        self.gauges.count(solved, failed)
+        self.gauges.measure(row.owner for row in Roster(ledger).listing())
 
     def _forget_old(self) -> None:
         with self._guard:

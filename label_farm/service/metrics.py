@@ -48,6 +48,13 @@ def exposition(farm: Mapping[str, Any], states: Iterable[str]) -> str:
     for key, meaning in (("done", "solved"), ("failed", "failed")):
         named = (({"worker": row["owner"], "device": row["device"]}, row[key]) for row in workers)
         tell(f"worker_{key}_total", "counter", f"Presses that a worker {meaning}.", named)
+    for key, kind, name, meaning in (
+        ("processor_seconds", "counter", "processor_seconds_total", "Processor time of a worker [s]."),
+        ("memory", "gauge", "memory_bytes", "Memory that a worker holds [bytes]."),
+    ):
+        seen = (row for row in workers if row[key] is not None)
+        named = (({"worker": row["owner"], "device": row["device"]}, row[key]) for row in seen)
+        tell(f"worker_{name}", kind, meaning, named)
     busy = (({"worker": row["owner"], "device": row["device"]}, row["busy"]) for row in workers)
     tell("worker_busy_seconds_total", "counter", "Time that a worker spent solving [s].", busy)
     return "\n".join(lines) + "\n"

@@ -11,6 +11,7 @@ from label_farm.labels.session_labels import SessionLabels
 from label_farm.service.foreman import Foreman
 from tacdata import documents
 from tacdata.errors import UsageError
+from tacdata.recording.files import file_names
 
 
 def add_results(api: FastAPI, foreman: Foreman) -> None:
@@ -44,6 +45,16 @@ def add_results(api: FastAPI, foreman: Foreman) -> None:
 
         content, depth = picture(_labels(foreman, number).path(episode))
         return Response(content, media_type="image/png", headers={"X-Depth": f"{depth:.4f}"})
+
+    @api.get("/api/submissions/{number}/failures/{episode}.png")
+    def failed(number: str, episode: int) -> Response:
+        """A press that has no label as a picture: place, depth over time, reason."""
+        from label_farm.service.failed_press import failed_press
+
+        labels = _labels(foreman, number)
+        reason = documents.read(labels.failure_path(episode), "label_failure")["reason"]
+        recording = file_names.episode(foreman.session(number), episode)
+        return Response(failed_press(recording, reason), media_type="image/png")
 
     @api.get("/api/submissions/{number}/failures/{episode}")
     def failure(number: str, episode: int) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from label_farm.ledger.roster import Roster
 from label_farm.service.foreman import Foreman
 from label_farm.store import solution_file
 from label_farm.store.failure import Failure
+from label_farm.workers.usage import Usage
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import Sensor
 
@@ -35,6 +36,13 @@ class ClaimRequest(RemoteWorker):
 
     version: str = Field(pattern="^[0-9a-f]{64}$")
     count: int = Field(1, ge=1, le=MOST_JOBS)
+
+
+class SignOfLife(RemoteWorker):
+    """That it lives, and what it takes of its computer."""
+
+    processor: float | None = Field(None, ge=0, le=1e12)
+    memory: int | None = Field(None, ge=0, le=2**60)
 
 
 class FailedJob(RemoteWorker):
@@ -109,12 +117,14 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
             return {"counted": ledger.fail(key, owner, why.reason, why.seconds)}
 
     @api.post("/api/work/beat")
-    def beat(hands: RemoteWorker) -> dict[str, Any]:
+    def beat(hands: SignOfLife) -> dict[str, Any]:
         """Give a sign of life, by which claims stay valid; with a note, say why the worker does not work."""
         with opened() as ledger:
             ledger.heartbeat(remote(hands.owner))
             if hands.note:
                 Roster(ledger).note(remote(hands.owner), hands.note)
+        if hands.processor is not None and hands.memory is not None:
+            foreman.gauges.tell(remote(hands.owner), Usage(hands.processor, hands.memory))
         return {}
 
     @api.post("/api/work/leave")

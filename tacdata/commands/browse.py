@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import PIPELINE, Result
-from tacdata.progress import suggest
+from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from viewers.browse.episode_list import EpisodeList
@@ -35,6 +35,9 @@ def run(
     web: Annotated[
         bool, typer.Option("--web", help="A page on this machine: list, viewer, step from worst to next.")
     ] = False,
+    catalogue: Annotated[
+        bool, typer.Option("--catalogue", help="Draw all episodes and serve them as a dataset of Rerun's catalogue.")
+    ] = False,
 ) -> Result:
     """List, filter and sort episodes; flag bad ones, which training then leaves out; step through them in a browser."""
     from viewers.browse.flagging import flag_episode, unflag_episode
@@ -51,6 +54,9 @@ def run(
     for condition in where or ():
         chosen = chosen.where(condition)
     chosen = chosen.by(sort)
+    if catalogue:
+        _catalogue(chosen, labels, predictions, most)
+        return Result(None)
     if web:
         _serve(chosen, labels, predictions)
         return Result(None)
@@ -74,6 +80,26 @@ def serve(path: Path, labels: Path | None, predictions: Path | None) -> None:
     from viewers.browse.list_sources import episodes_at
 
     _serve(episodes_at(path, labels, predictions).by("error" if predictions else "number"), labels, predictions)
+
+
+def _catalogue(chosen: EpisodeList, labels: Path | None, predictions: Path | None, most: int) -> None:
+    from viewers.browse.catalogue import catalogue_server
+    from viewers.rerun import window
+
+    def drawn(count: int, whole: int) -> None:
+        say(f"  {count} of {whole} episodes drawn")
+
+    with catalogue_server(chosen, labels, predictions, drawn) as served:
+        print(f"open {served.whole}\ncatalogue {served.address}")
+        if served.dataset:
+            for entry in chosen.entries[:most]:
+                print(f"episode {entry.number} at its deepest: {served.at_deepest(entry.number)}")
+        else:
+            say("Rerun lays them out itself; `pip install 'rerun-sdk[catalog]'` brings our layout and links to moments")
+        print("Ctrl-C ends it", flush=True)
+        if window.has_display():
+            typer.launch(served.whole)
+        window.until_interrupted()
 
 
 def _serve(chosen: EpisodeList, labels: Path | None, predictions: Path | None) -> None:

@@ -29,6 +29,7 @@ def run(
     """Write the recordings and their labels as a LeRobot v3 dataset."""
     from tacdata.dataset.flags import carry_flags
     from tacdata.dataset.format.features import asked_for
+    from tacdata.dataset.notes import carry_notes
     from tacdata.dataset.pack import LabelFiles, pack, refuse_existing
     from tacdata.labels import file_names
     from tacdata.recording.files.reader import read_episode
@@ -55,6 +56,8 @@ def run(
         print(f"  {path.name}  left out: the recording was broken off")
     for flag in carry_flags(session, out):
         print(f"  {flag.file}  set aside, training leaves it out: {flag.reason}")
+    if carried := carry_notes(session, out):
+        print(f"  {carried} notes on stretches carried along")
     print(f"{packed.episodes} episodes, {packed.frames} frames in {out}")
     suggest("train", out)
     return Result(packed)

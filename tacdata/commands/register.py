@@ -113,7 +113,7 @@ def _measure(
             return _touch(rig, sensor, settings, specimen, yes, devices, motion, interruption)
         except BaseException as error:
             data = ("nothing was written",)
-            error.add_note(ending(motion, devices.cnc.position_lost, data, "the same command"))
+            error.add_note(ending(motion, devices.cnc.position_lost, data, "the same command", error))
             raise
 
 

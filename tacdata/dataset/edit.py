@@ -15,6 +15,7 @@ from typing import Any
 
 from tacdata.dataset.flags import carry_flags
 from tacdata.dataset.format import folder, metadata
+from tacdata.dataset.notes import carry_notes
 from tacdata.dataset.pack import refuse_existing
 from tacdata.dataset.restore import restore
 from tacdata.errors import FormatError, UsageError
@@ -159,6 +160,7 @@ def _write(
             lacking[part] = restore(made / part, sources)
             for source in sources:
                 carry_flags(source, made / part)
+                carry_notes(source, made / part)
         os.replace(made, out)
     return lacking
 

@@ -91,7 +91,7 @@ def set_flag(folder: Path, recording: str, file: str, reason: str) -> Flag:
     if not reason or len(reason) > LONGEST:
         given = "a flag without a reason" if not reason else f"a reason of {len(reason)} letters"
         raise UsageError(given, f"1 to {LONGEST} letters", "say in a sentence what is wrong with the episode")
-    flag = Flag(recording, file, reason, datetime.now(UTC).isoformat(timespec="seconds"), _who())
+    flag = Flag(recording, file, reason, datetime.now(UTC).isoformat(timespec="seconds"), who())
     change = FlagChange(recording, file, reason, flag.flagged_by, flag.flagged_at)
     _write(folder, read_flags(folder) | {recording: flag}, [change])
     return flag
@@ -102,7 +102,7 @@ def clear_flag(folder: Path, recording: str) -> None:
     flags = read_flags(folder)
     if (flag := flags.pop(recording, None)) is not None:
         at = datetime.now(UTC).isoformat(timespec="seconds")
-        _write(folder, flags, [FlagChange(recording, flag.file, "", _who(), at)])
+        _write(folder, flags, [FlagChange(recording, flag.file, "", who(), at)])
 
 
 def read_history(folder: Path) -> list[FlagChange]:
@@ -160,7 +160,7 @@ def _write(folder: Path, flags: dict[str, Flag], changes: Sequence[FlagChange]) 
     documents.write(path_of(folder), document, "flags")
 
 
-def _who() -> str:
+def who() -> str:
     """Return who works here: user@computer; the user is left out where the system knows none."""
     with suppress(OSError, KeyError):
         return f"{getpass.getuser()}@{socket.gethostname()}"

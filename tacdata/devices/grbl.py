@@ -115,8 +115,10 @@ class Grbl(MotionController):
         self._lost = link.lost or self._lost
 
     def settings(self) -> dict[str, str]:
-        """Return ``banner``, the ``$n`` settings, and ``$G``, ``$#``, ``$I`` by their tags."""
-        return {**self._found, **self._answers.answers}
+        """Return ``banner``, the ``$n`` settings, ``$G``, ``$#``, ``$I`` by their tags, and how lines are checked."""
+        echoes = self._link is not None and self._link.echoes
+        check = {"line_check": "echo"} if echoes else {}
+        return {**self._found, **self._answers.answers, **check}
 
     @property
     def cautions(self) -> tuple[str, ...]:
@@ -213,6 +215,8 @@ class Grbl(MotionController):
         """
         link = self._opened()
         self._target, self._ends_ns = None, 0
+        if link.halted and link.fault:
+            raise StandsStill(link.fault.given, link.fault.allowed, link.fault.remedy)
         status = self._rest(link)
         stands = "stands at (" + ", ".join(f"{value:.2f}" for value in status.position) + ") mm"
         if link.pendant:

@@ -14,6 +14,7 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from schemas import tacdata_pb2 as pb
 from tacdata.importing.streams import Stream
 from tacdata.plans import Press
+from tacdata.recording.clocks.stream_pairs import stream_pairs
 from tacdata.recording.episode import Phase
 from tacdata.recording.files import file_names, topics
 from tacdata.recording.files.chunked_file import ChunkedFile
@@ -94,6 +95,7 @@ def write(path: Path, imported: ImportedPress) -> None:
         "notes": imported.record["notes"],
     }
     file.describe("stream_counts/taxels", {key: json.dumps(value) for key, value in counts.items()})
+    file.describe("sync", {pair.name: pair.words for pair in stream_pairs({"taxels": None})})
     file.describe("episode", {"complete": "true", "reason": ""})
     file.close()
     file.path.rename(path)

@@ -22,7 +22,7 @@ from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
 from tacdata.recording.live.lost_position import Ask, require_found, require_free, why_lost
 from tacdata.recording.live.reading_health import BadReadings
-from tacdata.recording.live.rig_devices import RigDevices
+from tacdata.recording.live.rig_devices import RigDevices, require_channels
 from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion import sync_tap as tap_motion
 from tacdata.recording.motion.preflight import Preflight, preflight, safe_height
@@ -111,11 +111,13 @@ class Recorder:
             The session as it stands on disk.
 
         Raises:
-            UsageError: If the folder exists (or, resuming, does not), or the summary was refused.
+            UsageError: If the folder exists (or, resuming, does not), the summary was refused, or the board sends
+                another number of channels than the sensor has taxels.
             FormatError: If a press would leave the envelope or the skin.
             DeviceError: On a fault. The motion is stopped and the recording closed; --resume continues.
             KeyboardInterrupt: On Ctrl-C, after the same.
         """
+        require_channels(self.devices.board, self.sensor)  # before the plan: its sites are off another skin too
         self.plan.check_against(self.sensor)
         session = self._existing_session()
         self._latencies = latencies(session) if session else {}
@@ -131,7 +133,7 @@ class Recorder:
             with suppress(TacdataError):  # the fault itself must be reported first
                 if lost and self.out.exists():
                     lose_position(read_session(self.out), lost)
-            error.add_note(self._ending(lost))
+            error.add_note(self._ending(lost, error))
             raise
 
     def _paused(self, error: BadReadings) -> bool:
@@ -178,9 +180,9 @@ class Recorder:
             session = refresh(session)
         return session
 
-    def _ending(self, lost: str) -> str:
+    def _ending(self, lost: str, error: BaseException) -> str:
         again = "the same command" + (" with --resume" if self.out.exists() else "")
-        return ending(self._motion, lost, on_disk(self.out, len(self.plan.presses)), again)
+        return ending(self._motion, lost, on_disk(self.out, len(self.plan.presses)), again, error)
 
     def _existing_session(self) -> Session | None:
         if self.resume:

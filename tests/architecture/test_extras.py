@@ -34,6 +34,7 @@ ROOMS = {
     "tacdata.grasping.pin_presses": "fem",
     "tacdata.dataset.windows": "fem",
     "training": "learn",
+    "viewers.browse.catalogue": "view",
     "viewers.browse.server": "view",
     "viewers.rerun": "view",
     "label_farm.service": "farm",

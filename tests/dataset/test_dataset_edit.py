@@ -11,6 +11,7 @@ from tacdata.commands.dataset.command import numbers
 from tacdata.dataset import edit, pack, read_dataset, restore
 from tacdata.dataset.flags import flagged_episodes, set_flag
 from tacdata.dataset.format import features, metadata
+from tacdata.dataset.notes import add_note, carry_notes, notes_path, read_notes
 from tacdata.errors import FormatError, UsageError
 
 FRAMES = 12
@@ -45,6 +46,17 @@ def test_delete_split_and_merge_keep_what_lerobot_drops(packed: Path, tmp_path: 
     assert flagged_episodes(read_dataset(tmp_path / "merged")) == {0: "the finger slipped"}
     assert recorded(packed) == [0, 1, 2, 3], "the source stays as it is"
     assert not list(tmp_path.glob(".*")), "nothing unfinished is left"
+
+
+def test_notes_on_stretches_go_where_their_recording_goes(packed: Path, tmp_path: Path) -> None:
+    for number in (1, 2):
+        record = read_dataset(packed).episodes[number].record
+        add_note(packed, record.recording, record.recording_file, 0.1, 0.2, f"of {number}")
+    edit.delete(packed, [1], tmp_path / "fewer")
+    assert [note.text for note in read_notes(tmp_path / "fewer")] == ["of 2"]
+    assert notes_path(tmp_path / "fewer") == tmp_path / "fewer" / "meta" / "tacdata_notes.json"
+    assert carry_notes(packed, tmp_path / "fewer") == 0, "never twice"
+    notes_path(packed).unlink()
 
 
 @pytest.mark.parametrize(

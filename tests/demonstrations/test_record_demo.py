@@ -18,6 +18,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.recording.check.report import check
 from tacdata.tags import look
 from tacdata.virtual_rig.demo import FINGERS, VirtualDemo
+from tacdata.wire import default_format
 
 
 class Now:
@@ -195,3 +196,13 @@ def test_a_virtual_demonstration_is_refused_what_it_cannot_do(tmp_path, capsys):
         VirtualDemo(tmp_path, nub=0.0)
     with pytest.raises(UsageError, match="3 cameras"):
         VirtualDemo(tmp_path, cameras=3)
+
+
+def test_a_board_that_is_not_the_fingers_is_refused_by_name(tmp_path):
+    formats = default_format().document
+    bench = rig()
+    bench.boards["index"]["format"] = {**formats, "channels": {**formats["channels"], "count": 16}}
+    session = open_demo_session(tmp_path / "demos", bench, "grasp", resume=False)
+    with pytest.raises(UsageError, match="the board of index sends 16 channels") as caught:
+        DemoRecorder(session, bench, Now()).__enter__()
+    assert "sensors in the demo rig" in caught.value.remedy

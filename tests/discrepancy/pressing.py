@@ -10,12 +10,13 @@ FINE = 200
 
 def course(
     seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5, pulls=True,
-    power=1.0, friction=0.0,
+    power=1.0, friction=0.0, recovery=None,
 ):  # fmt: skip
     """Return presses of three channels at two places; sizes in s, s, share, mm.
 
     A tool that pulls sticks to the skin; readings grow by a power of load. Friction is a share of load, carried by
-    elements that slip beyond loads of their own and come to rest when the tool is off.
+    elements that slip beyond loads of their own and come to rest when the tool is off. While the tip leaves, readings
+    are late by ``recovery``, as by ``delay`` unless given.
     """
     slips = np.array([0.03, 0.08, 0.2])
     rng = np.random.default_rng(seed)
@@ -42,7 +43,8 @@ def course(
             late = late + (now - late) / (FINE * lag) if lag > 0 else now
             read[i] = 5000 + 800 * (late if power == 1.0 else np.maximum(late, 0.0) ** power)
         pick = np.arange(rng.integers(6), len(time), 6)
-        before = np.maximum(pick - round(delay * FINE), 0)
+        by = np.where(time[pick] < at[3], delay, delay if recovery is None else recovery)
+        before = np.maximum(pick - np.round(by * FINE).astype(int), 0)
         values = np.round(read[before] + noise * rng.normal(size=(len(pick), 3)))
         parts.append((clock, rows_of(time[pick], values, at, np.column_stack([0 * at + k % 2, 0 * at, path]))))
         clock += at[-1] + 1.0

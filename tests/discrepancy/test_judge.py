@@ -67,6 +67,14 @@ def test_a_delay_is_named_and_measured():
     assert answer.found.effects[0].placed.values["L"] == pytest.approx(0.05, abs=0.006)
 
 
+def test_a_delay_that_is_longer_on_the_way_out_is_named_and_both_times_are_measured():
+    answer = judged(effects=(*FEW, "latency_either_way"), delay=0.04, recovery=0.2)
+    assert answer.decision.status == "named"
+    assert answer.names == {"latency"}
+    values = answer.found.effects[0].placed.values
+    assert (values["L_in"], values["L_out"]) == pytest.approx((0.04, 0.2), abs=0.01)
+
+
 def test_relaxation_is_named_and_measured():
     answer = judged(relaxed=0.15, hold=4.0)
     assert answer.names == {"relaxation"}

@@ -7,10 +7,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from tacdata.discrepancy.levels.constancy import spread
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.remainder import _size
 from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.verdict.decide import finest, stands_in
+from tacdata.discrepancy.verdict.decide import beside_much, finest, stands, stands_in
 from tacdata.effects import Placed, load
 
 MARGINS = {"creep": 9.0, "backlash": 9.0}
@@ -41,27 +42,77 @@ def test_noise_alone_leaves_no_remainder():
     assert np.median(sizes) < 0.01
 
 
-@pytest.mark.parametrize(
-    ("margins", "level"),
-    [
-        ({"creep": 4.0, "backlash": 4.0}, Level.FORM),
-        ({"creep": 1.0, "backlash": 4.0}, Level.FAMILY),
-        ({"creep": 4.0, "backlash": 1.0}, None),
-    ],
-)
-def test_a_level_holds_where_no_rival_of_it_is_near_beside_the_remainder(margins, level):
-    assert finest(NOTHING, ONE, BesideRemainder(5.0, margins)) is level
+@pytest.mark.parametrize(("rivals", "level"), [((), Level.FORM), (("creep",), Level.FAMILY), (("backlash",), None)])
+def test_a_level_holds_where_no_rival_of_it_is_near(rivals, level):
+    assert finest(replace(ONE, rivals=rivals)) is level
 
 
 def test_a_form_between_two_is_named_as_a_mechanism():
-    between = replace(ONE, forms={"power_creep": 1.0})
-    assert finest(NOTHING, between, BesideRemainder(5.0, {})) is Level.MECHANISM
+    assert finest(replace(ONE, forms={"power_creep": 1.0})) is Level.MECHANISM
 
 
-def test_an_effect_that_the_remainder_could_be_is_not_named():
-    assert finest(NOTHING, ONE, BesideRemainder(1.0, {"backlash": 9.0})) is None
-    assert finest(NOTHING, replace(ONE, at_bound=("f",)), BesideRemainder(9.0, {})) is None
-    assert finest(NOTHING, replace(ONE, necessity=3.0, corrected_p=0.02), BesideRemainder(9.0, {})) is None
+def test_an_effect_that_is_not_surely_there_is_not_named():
+    assert finest(replace(ONE, at_bound=("f",))) is None
+    assert finest(replace(ONE, necessity=3.0, corrected_p=0.02)) is None
+
+
+@pytest.mark.parametrize(
+    ("spread", "bought", "level"),
+    [(0.05, 100, Level.MECHANISM), (0.15, 100, Level.FAMILY), (0.4, 100, None), (0.05, 20, None)],
+)
+def test_beside_much_without_a_name_an_effect_stands_by_its_size_in_all_conditions(spread, bought, level):
+    beside = BesideRemainder(0.0, {}, {"rate": spread, "depth": 0.0})
+    assert beside_much(leaving(30.0), replace(ONE, bought=bought), beside) is level
+
+
+def test_a_form_that_what_is_left_may_lend_names_a_family():
+    """A filter and a delay look alike but for their form: where the delay was not tried, neither is named."""
+    tried, beside = ("latency", "low_pass_filter", "servo_lag"), BesideRemainder(0.0, {}, {"rate": 0.01})
+    lag = replace(ONE, placed=Placed(load("low_pass_filter"), {}), bought=100.0, margins={"latency": 4.0})
+    assert beside_much(leaving(30.0, *tried), lag, beside) is Level.FAMILY
+    both = replace(lag, margins={"latency": 4.0, "servo_lag": 5.0})
+    assert beside_much(leaving(30.0, *tried), both, beside) is Level.MECHANISM
+
+
+def test_one_that_looks_like_another_family_is_there_without_a_name():
+    """One rate does not tell it from play: it stands, and is named at no level."""
+    beside = BesideRemainder(0.0, {}, {"depth": 0.05})
+    alike = replace(ONE, rivals=("backlash",), bought=100.0)
+    assert stands(leaving(30.0), alike, beside) and beside_much(leaving(30.0), alike, beside) is None
+    assert not stands(leaving(30.0), replace(alike, at_bound=("f",)), beside)
+
+
+def leaving(gain, *names):
+    """Findings that leave much, of a search that tried some effects."""
+    problem = SimpleNamespace(candidates=[SimpleNamespace(effect=load(name)) for name in names])
+    return cast(Any, SimpleNamespace(left=SimpleNamespace(gain=gain), problem=problem))
+
+
+def parts(sizes, episodes=30, noise=1.0):
+    """Grams of a residual that holds one column in two parts, each episode in one of them."""
+    rng, gram = np.random.default_rng(7), np.zeros((episodes, 3, 3))
+    for e in range(episodes):
+        columns = np.zeros((400, 3))
+        columns[:, 1 + e % 2] = rng.normal(size=400)
+        columns[:, 0] = columns[:, 1:] @ sizes + noise * rng.normal(size=400)
+        gram[e] = columns.T @ columns
+    return gram
+
+
+def test_the_spread_of_a_size_is_what_its_parts_differ_by():
+    assert spread(parts(np.array([0.3, -0.3])), 2) == pytest.approx(0.3, rel=0.1)
+
+
+def test_a_part_that_holds_little_of_an_effect_counts_like_the_others():
+    """What fits fast presses alone is found by the slow ones."""
+    gram = parts(np.array([0.0, 0.5]))
+    gram[:, 2] *= 0.2
+    gram[:, :, 2] *= 0.2
+    assert spread(gram, 2) == pytest.approx(2.5 / np.sqrt(2), rel=0.1)
+
+
+def test_chance_is_no_spread():
+    assert spread(parts(np.array([0.0, 0.0]), noise=5.0), 2) < 0.05
 
 
 @pytest.mark.parametrize(

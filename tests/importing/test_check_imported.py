@@ -1,14 +1,16 @@
 """What `tacdata check` says of recordings that were imported: in their own unit, by their own times."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 from foreign import mapping, press_data, wide_csv
+from matplotlib.figure import Figure
 
 from tacdata import documents
 from tacdata.importing.imported_session import import_session
 from tacdata.recording.check.report import check
-from viewers.pictures.check import draw
+from viewers.pictures.check import _responses, draw
 
 
 def several(presses, begin=2.0, seed=0, spread=0.05):
@@ -56,3 +58,12 @@ def test_between_presses_is_one_where_they_begin_in_contact(tmp_path):
 def test_one_press_is_judged_by_its_rest_as_before(tmp_path):
     report = told(tmp_path, press_data())
     assert "no idle stretch" not in report.text and "(0 %)" in report.text
+
+
+def test_channels_and_recordings_are_counted_in_whole_numbers():
+    axes = Figure().subplots()
+    entries = [SimpleNamespace(document={"taxels": {"response": [1.0, 2.0, 3.0]}})] * 2
+    _responses(axes, SimpleNamespace(episodes=entries), "counts")
+    for axis, low, high in ((axes.xaxis, -0.5, 2.5), (axes.yaxis, -0.5, 1.5)):
+        shown = [tick for tick in axis.get_ticklocs() if low <= tick <= high]
+        assert len(shown) >= 2 and all(tick == round(tick) for tick in shown)

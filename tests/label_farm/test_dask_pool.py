@@ -93,7 +93,9 @@ class LostResult:
 
 def test_a_result_that_went_with_its_worker_is_asked_for_again(tmp_path, monkeypatch):
     model = "a" * 64
-    pool = DaskPool(Store(tmp_path / "store"), "fast_model:FastModel", {model: default_sensor()}, 0, 60.0, (), "tcp://h:1")
+    pool = DaskPool(
+        Store(tmp_path / "store"), "fast_model:FastModel", {model: default_sensor()}, 0, 60.0, (), "tcp://h:1"
+    )
     try:
         monkeypatch.setattr(pool, "_connected", lambda: None)
         monkeypatch.setattr(pool, "_give_out", lambda client: None)

@@ -1,14 +1,12 @@
 """The page in a real browser: Debian's Chromium, without a head."""
 
 import os
-import shutil
 
 import pytest
 from chaos import Service, record
+from running.chromium import needs_chromium
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-sync_api = pytest.importorskip("playwright.sync_api")
-pytestmark = pytest.mark.skipif(not CHROMIUM, reason="no Chromium: apt-get install chromium")
+pytestmark = needs_chromium
 TOKEN = "0123456789abcdef0123"
 
 
@@ -20,14 +18,6 @@ def service(tmp_path_factory):
     options = ("--token", TOKEN)
     with Service(folder, workers=1, seconds=0.3, options=options, FAST_MODEL_FAILS="-5.95") as service:
         yield service
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture
@@ -82,6 +72,13 @@ def test_a_person_submits_watches_and_cancels(page, service):
     page.wait_for_selector("#failures pre:has-text('Traceback')")
     row = page.inner_text("#workers tbody tr").split("\t")
     assert row[1] == "cpu" and int(row[2]) >= 5 and float(row[4]) > 10
+    page.wait_for_selector("#workers tbody td:nth-child(7):has-text('MB')")
+    assert page.inner_text("#workers tbody td:nth-child(6)").endswith("%")
+    page.wait_for_selector("#throughput-words:has-text('5 presses solved and 1 failed')")
+    assert page.locator("#throughput rect.solved").count() >= 1
+    page.wait_for_selector("#failures img.press[src^=blob]")
+    page.wait_for_timeout(500)
+    assert page.eval_on_selector("#failures img.press", "image => image.naturalWidth") > 900
     if folder := os.environ.get("TACDATA_SCREENSHOTS"):
         page.screenshot(path=f"{folder}/farm.png", full_page=True)
 

@@ -273,13 +273,22 @@ def test_model_survives_its_document():
 
 def test_every_pair_of_streams_says_its_offset_or_that_it_was_not_measured():
     known = {"taxels": StreamLatency(6_100_000, 300_000), "camera a": StreamLatency(40_000_000, 400_000)}
-    pairs = stream_pairs({**known, "camera b": None})
+    pairs = {pair.name: pair.words for pair in stream_pairs({**known, "camera b": None})}
     assert pairs["taxels - motion"] == "+6.10 +- 0.30 ms, taken off"
     assert pairs["camera a - taxels"] == "+33.90 +- 0.50 ms, taken off"
-    assert pairs["camera b - taxels"] == pairs["camera b - motion"] == "not measured (record --sync-tap)"
+    assert pairs["camera b - taxels"] == pairs["camera b - motion"] == "not measured"
     assert len(pairs) == 6
+    assert len(stream_pairs({"taxels left": None, "camera a": None}, motion=False)) == 1
 
 
 def test_the_pairs_stand_in_the_file(tmp_path):
     metadata = read_records(Press().write(tmp_path / "episode-000000.mcap")).metadata
-    assert metadata["sync"] == {"taxels - motion": "not measured (record --sync-tap)"}
+    assert metadata["sync"] == {"taxels - motion": "not measured"}
+
+
+def test_a_board_without_a_clock_and_a_camera_stand_in_the_pairs_too(tmp_path):
+    press = Press(camera=True)
+    press.counter[:] = -1
+    metadata = read_records(press.write(tmp_path / "episode-000000.mcap")).metadata
+    names = ["camera side - taxels", "camera side - motion", "taxels - motion"]
+    assert metadata["sync"] == dict.fromkeys(names, "not measured")

@@ -21,7 +21,8 @@ HEIGHT = -18.0
 def bench():
     clock = Clock.start(10.0)
     cnc = Controller(clock, AT)
-    return SimpleNamespace(cnc=cnc, motion=GuardedMotion(cnc, clock), streams=SimpleNamespace(fault=None))
+    streams = SimpleNamespace(fault=None, position=None)
+    return SimpleNamespace(cnc=cnc, motion=GuardedMotion(cnc, clock), streams=streams)
 
 
 def fail(bench, seconds):

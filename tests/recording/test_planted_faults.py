@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recording_examples import SENSOR, T0, Press, header, plan_document, rig_document
+from recording_examples import SENSOR, T0, Press, header, plan_document, rig, rig_document
 
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts
@@ -128,6 +128,12 @@ def host_stalls(p):
     p.arrival[stalled] = p.arrival[50] + 600 * MS
 
 
+@fault(WARN, "taxels", "the host read nothing for 2.. ms, then what had waited")
+def host_stalls_for_a_moment(p):
+    stalled = (p.arrival >= p.arrival[50]) & (p.arrival < p.arrival[50] + 290 * MS)
+    p.arrival[stalled] = p.arrival[50] + 290 * MS
+
+
 @fault(WARN, "taxels", "7 damaged frames")
 def corrupt_frames(p):
     p.driver.corrupt = 7
@@ -209,6 +215,11 @@ def gain_step_in_the_hold(p):
     p.counts[p.while_still("hold") :, 10] *= 1.5
 
 
+@fault(BAD, "taxels", r"channel \d+ jumps by [+](9\d|1[01]\d) counts at .* while nothing moves")
+def small_step_of_the_channel_that_answers_most(p):
+    p.counts[p.while_still("hold") :, int(np.argmax(p.counts[p.while_still("hold")]))] += 100
+
+
 @fault(BAD, "taxels", "24 channels jump")
 def supply_steps(p):
     p.counts[p.while_still("rest") :] -= 700
@@ -250,6 +261,11 @@ def readings_late(p):
 @fault(BAD, "taxels", r"they end \d{4} ms before the press does")
 def readings_end_early(p):
     p.drop(int(np.searchsorted(p.sample, p.end - 4000 * MS)), len(p.sample))
+
+
+@fault(WARN, "taxels", r"they end 3\d\d ms before the controller's reports: the press is whole")
+def readings_end_after_the_press(p):
+    p.drop(int(np.searchsorted(p.sample, p.end - 450 * MS)), len(p.sample))
 
 
 @fault(BAD, "label", r"the guide went to x 1.00, y 0.50, depth 0.80 mm, and the label says x 3.00, y 0.50")
@@ -387,16 +403,19 @@ def test_clocks_are_shown_for_every_stream(tmp_path):
 SITES = np.round(np.random.default_rng(8).uniform([-4.7, -3.7], [4.7, 3.7], (24, 2)), 2).tolist()
 
 
-def session_of(folder, change):
-    """Record 24 presses at random sites; ``change(number, counts)`` returns what the board says instead."""
+GAIN = np.random.default_rng(3).normal(1, 0.08, 24)
+
+
+def session_of(folder, change, sites=SITES):
+    """Record presses at sites; ``change(number, press)`` changes what is recorded of each."""
     document = plan_document(1)
-    document["presses"] = [{"indenter": "ball", "x": x, "y": y, "depth": 0.8} for x, y in SITES]
+    document["presses"] = [{"indenter": "ball", "x": x, "y": y, "depth": 0.8} for x, y in sites]
     plan = Plan.from_document(document, "many")
     made = create_session(folder, plan, SENSOR, rig_document())
-    gain = np.random.default_rng(3).normal(1, 0.08, 24)
-    for number in range(24):
+    for number in range(len(sites)):
         press = Press(0, seed=number, of=replace(header(0), press=plan.presses[number]))
-        press.counts = change(number, np.round(9000 + gain * (press.counts - 9000)))
+        press.counts = np.round(9000 + GAIN * (press.counts - 9000))
+        change(number, press)
         press.write(folder / f"episode-{number:06d}.mcap")
     return check(refresh(made).folder)
 
@@ -404,30 +423,66 @@ def session_of(folder, change):
 def exchanged(a, b):
     order = np.arange(24)
     order[[a, b]] = b, a
-    return lambda number, counts: counts[:, order]
+    return reordered(order)
 
 
-def weaker(number, counts):
-    counts[:, 14] = 9000 + (counts[:, 14] - 9000) * (0.4 if number >= 12 else 1.0)
-    return counts
+def reordered(order):
+    def change(number, press):
+        press.counts = press.counts[:, order]
+
+    return change
 
 
-def offset(number, counts):
-    counts[:, 7] += 1500 * (number >= 10)
-    return counts
+def weaker(number, press):
+    press.counts[:, 14] = 9000 + (press.counts[:, 14] - 9000) * (0.4 if number >= 12 else 1.0)
 
 
-def louder(number, counts):
-    return counts + (number == 5) * np.round(np.random.default_rng(1).normal(0, 40, counts.shape))
+def all_stronger(number, press):
+    press.counts = np.round(9000 + (press.counts - 9000) * (1.3 if number >= 12 else 1.0))
 
 
-def mute(number, counts):
-    counts[:, 9] = np.round(9000 + np.random.default_rng(number).normal(0, 5, len(counts)))
-    return counts
+def tool_up(by, since=12):
+    def change(number, press):
+        if number >= since:
+            tip = rig().registration.to_sensor(press.position(press.sample)) - np.array([0.0, 0.0, by])
+            press.counts = np.round(9000 + GAIN * (press._counts(tip) - 9000))
+
+    return change
 
 
-def no_contact(number, counts):
-    return np.round(9000 + np.random.default_rng(number).normal(0, 5, counts.shape))
+def one_press_not_felt(number, press):
+    if number == 7:
+        press.counts = np.round(9000 + press.rng.normal(0, 5, press.counts.shape))
+
+
+def one_clock_off(number, press):
+    if number == 7:
+        press.arrival = T0 + np.round((press.arrival - T0) * (1 + 400e-6)).astype(np.int64)
+
+
+def offset(number, press):
+    press.counts[:, 7] += 1500 * (number >= 10)
+
+
+def louder(number, press):
+    press.counts = press.counts + (number == 5) * np.round(np.random.default_rng(1).normal(0, 40, press.counts.shape))
+
+
+def mute(number, press):
+    press.counts[:, 9] = np.round(9000 + np.random.default_rng(number).normal(0, 5, len(press.counts)))
+
+
+def no_contact(number, press):
+    press.counts = np.round(9000 + np.random.default_rng(number).normal(0, 5, press.counts.shape))
+
+
+def late(number, press):
+    if number == 5:
+        press.counts = np.roll(press.counts, 3, axis=0)
+
+
+def nothing(number, press):
+    pass
 
 
 SESSION_FAULTS = {
@@ -437,18 +492,30 @@ SESSION_FAULTS = {
     "neighbours swapped": (exchanged(8, 9), [
         (BAD, "channel 8 answers like taxel 9"), (BAD, "channel 9 answers like taxel 8"),
     ]),
-    "plug turned": (lambda number, counts: counts[:, ::-1], [(BAD, "as if the array were turned by 180 deg")]),
+    "plug turned": (reordered(np.arange(24)[::-1]), [(BAD, "as if the array were turned by 180 deg")]),
     "gain step": (weaker, [(BAD, "channel 14 answers 0.4. times as strongly from about")]),
+    "all gains": (all_stronger, [(BAD, r"all channels answer 1.[23]\d times as strongly from episode-000012")]),
+    "tool slips up": (tool_up(0.3), [(BAD, r"the skin is felt about 0.(2[5-9]|3[0-5]) mm deeper from episode-000012")]),
+    "tool slips up a little": (tool_up(0.12), [
+        (WARN, r"the skin is felt about 0.1\d mm deeper from episode-000012"),
+    ]),
+    "tool slips down": (tool_up(-0.3), [
+        (BAD, r"the skin is felt about 0.(2[5-9]|3[0-5]) mm higher from episode-000012"),
+    ]),
+    "press not felt": (one_press_not_felt, [(BAD, "no channel answers to this press: the tip did not reach the skin")]),
+    "clock of one recording": (one_clock_off, [
+        (WARN, r"its clock runs \+[345]\d\d ppm otherwise than in the session's other recordings"),
+    ]),
     "offset step": (offset, [(WARN, r"idle reading of channel 7 steps by \+1[45]\d\d counts before episode-000010")]),
     "mute channel": (mute, [(BAD, "channel 9 did not answer")]),
     "no contact": (no_contact, [(BAD, "no channel answered to any press")]),
-    "one recording late": (lambda number, counts: np.roll(counts, 3, axis=0) if number == 5 else counts, [
+    "one recording late": (late, [
         (WARN, r"they come \+100 ms later against the motion than in other recordings: 0.10 mm of depth"),
     ]),
     "louder": (louder, [
         (WARN, r"its noise is \d+ times that of the session's quiet recordings"),
     ]),
-    "nothing": (lambda number, counts: counts, []),
+    "nothing": (nothing, []),
 }  # fmt: skip
 
 
@@ -460,3 +527,36 @@ def test_a_fault_that_only_a_session_shows_is_named(tmp_path, name):
     assert len(found) == len(expected), found
     for severity, words in expected:
         assert any(f[0] == severity and re.search(words, f[2]) for f in found), (words, found)
+    fits = name not in ("no contact", "plug turned")
+    assert not fits or report.not_assessed == ("whether the gain of channel 22, 23 steps: too few presses near it",)
+
+
+def test_repeats_of_one_place_show_a_slip_as_well(tmp_path):
+    report = session_of(tmp_path / "session", tool_up(0.3, since=9), [(0.5, 0.5)] * 16)
+    assert any("mm deeper from episode-000009" in f[2] for f in judged(report)), judged(report)
+    assert any("too few presses near it" in text for text in report.not_assessed), "no press was near most channels"
+
+
+def test_a_session_with_few_presses_says_what_they_cannot_tell(tmp_path):
+    report = session_of(tmp_path / "session", tool_up(0.3, since=3), SITES[:6])
+    assert judged(report) == []
+    words = "whether gains, wiring or the tool changed: 6 presses, at least 16 are needed"
+    assert report.not_assessed == (words,)
+    assert f"NOT ASSESSED  {words}" in report.text
+    assert report.document["not_assessed"] == [words]
+
+
+def test_the_first_lines_say_what_is_known_of_the_time_between_streams(tmp_path):
+    press = Whole()
+    path = press.write(tmp_path / "episode-000000.mcap")
+    line = check(path).text.splitlines()[1]
+    expected = "not measured: camera side - taxels, camera side - motion, taxels - motion (record --sync-tap)"
+    assert line == f"  sync    {expected}"
+    writer = EpisodeWriter(tmp_path / "episode-000001.mcap", press.header, Clock(T0, 0, 1.0), ("side",))
+    press.feed(writer)
+    model = envelope_fit.fit(press.arrival, press.counter).with_latency(StreamLatency(6_100_000, 300_000))
+    report = check(writer.close(True, "", {"taxels": model}))
+    assert report.text.splitlines()[1] == "  sync    taxels - motion +6.10 +- 0.30 ms, taken off"
+    assert report.text.splitlines()[2].startswith("  sync    not measured: camera side - taxels, camera side - motion")
+    pair = {"first": "taxels", "second": "motion", "offset": 6.1, "uncertainty": 0.3}
+    assert pair in report.document["episodes"][0]["sync"]

@@ -281,3 +281,11 @@ def test_streams_end_with_the_session(bench):
     before = threading.active_count()
     bench.run()
     assert threading.active_count() <= before
+
+
+def test_a_board_of_another_skin_is_refused_before_anything_is_opened(bench):
+    bench.board.describe = lambda: {"channels": 16, "rate": {"nominal": 30.0, "unit": "Hz"}}
+    with pytest.raises(UsageError, match=r"the board sends 16 channels, and the sensor .* has 24 taxels") as caught:
+        bench.run()
+    assert "--sensor" in caught.value.remedy
+    assert not bench.cnc.calls and not bench.folder.exists()

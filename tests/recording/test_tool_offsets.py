@@ -56,9 +56,9 @@ def test_a_longer_tool_is_driven_higher_and_its_tip_recorded_where_it_is(plan, t
     np.testing.assert_allclose(apart, -np.array(OFFSET), atol=1e-5)
     assert moves[:, 2].max() == pytest.approx(-25.0)
     with pytest.raises(UsageError, match="tool offsets"):
-        Recorder(rig(), SENSOR, plan, tmp_path / "session", resume=True, devices=RigDevices(cnc, None)).run(
-            lambda _: True
-        )
+        Recorder(
+            rig(), SENSOR, plan, tmp_path / "session", resume=True, devices=RigDevices(cnc, Board(clock, cnc))
+        ).run(lambda _: True)
 
 
 def test_the_summary_names_offsets_and_those_that_are_missing(plan):

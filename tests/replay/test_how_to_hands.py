@@ -1,6 +1,5 @@
 """The commands of the pages on hands and robots run as they stand: what needs a rig in the long part, the rest here."""
 
-import importlib.util
 import re
 import shlex
 import subprocess
@@ -10,6 +9,8 @@ from pathlib import Path
 
 import pytest
 from running.in_process import tacdata
+from running.typed_pages import HOW_TO, blocks
+from running.typed_pages import commands as shown
 from tracked_hand import tracks
 
 from tacdata.demonstrations.recording.session import open_demo_session
@@ -18,8 +19,9 @@ from viewers.pictures import replay_film
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tests" / "demonstrations"))
-PAGES = [ROOT / "docs" / "how_to" / name for name in ("hands.md", "own_robot.md")]
-BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+PAGES = [HOW_TO / name for name in ("hands.md", "own_robot.md")]
+NAMES = {"DEMOS": "demos", "RUN": "network"}
+"""What a page writes for a path of the reader's -> ours."""
 FILES, RIG = ("export", "replay", "view"), ("virtual-rig", "record", "track", "live")
 ELSEWHERE = {"calibrate-world": "demonstrations/test_hand_eye.py"}
 """Verb -> the test that types it."""
@@ -29,10 +31,8 @@ FASTER["grasp-study"] = ["--repeats", "1", "--epochs", "1"]
 
 
 def commands(page):
-    """Return a page's commands as words, without "tacdata"."""
-    text = page.read_text().replace("DEMOS", "demos").replace("--network RUN", "--network network")
-    lines = [line for kind, body in BLOCK.findall(text) if kind == "sh" for line in body.splitlines()]
-    return [shlex.split(line, comments=True)[1:] for line in lines if line.startswith("tacdata ")]
+    """Return a page's commands as words, with our paths."""
+    return [[NAMES.get(word, word).replace("DEMOS/", "demos/") for word in words] for words in shown(page)]
 
 
 ALL = [words for page in PAGES for words in commands(page)]
@@ -68,7 +68,7 @@ def folder(tmp_path, monkeypatch):
         (tmp_path / "demos" / f"episode-{number:06d}.mcap").write_bytes(b"stand-in")
         tracks(tmp_path / "demos", draw_hand(number + 1), "grasp", f"{number}" * 64, number)
     monkeypatch.chdir(tmp_path)
-    (block,) = (body for kind, body in BLOCK.findall(PAGES[1].read_text()) if kind == "python")
+    (block,) = blocks(PAGES[1], "python")
     exec(compile(block, "own_robot.md", "exec"), {})
     return tmp_path
 
@@ -91,12 +91,11 @@ def test_what_needs_a_rig_runs(tmp_path):
     from training.settings import TrainingSettings
     from training.train import train
 
-    made = importlib.util.spec_from_file_location("training_frames", ROOT / "tests" / "training" / "conftest.py")
-    assert made and made.loader
-    frames = importlib.util.module_from_spec(made)
-    made.loader.exec_module(frames)
+    sys.path.append(str(ROOT / "tests" / "training"))
+    from training_frames import build_frames
+
     settings = TrainingSettings(arguments={"hidden": 16, "channels": 4}, epochs=1)
-    train(frames.build_frames(), settings, tmp_path / "network", device="cpu", threads=1)
+    train(build_frames(), settings, tmp_path / "network", device="cpu", threads=1)
     wanted = [words for words in commands(PAGES[0]) if needs_rig(words)]
     assert wanted[0][0] == "virtual-rig"
     rig = subprocess.Popen([sys.executable, "-m", "tacdata.cli", *wanted[0]], cwd=tmp_path)

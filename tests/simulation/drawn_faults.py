@@ -1,5 +1,6 @@
 """Faults that a seed draws: what goes wrong, when, and from when on the recorder can see it."""
 
+import linecache
 import random
 import signal
 import sys
@@ -9,6 +10,8 @@ from schedule import SECOND
 
 LIVED = 3.0
 """Time after which the recorder has seen readings that live [s]."""
+SILENT = 3.0
+"""Time after which a silent camera is a fault [s]."""
 COURSE = 19.0
 """About how long a run without faults takes [s]."""
 
@@ -23,6 +26,7 @@ class Faults:
         """(time [ns] from which the recorder can see it, its name)."""
         self.deaf = False
         """Whether the controller may hear nothing, so that nobody can stop it."""
+        self.frozen = False
         self.moved_otherwise = False
         """Whether a line to the controller was changed, so that it may do something else."""
         kinds = only or tuple(KINDS)
@@ -30,7 +34,12 @@ class Faults:
         for _ in range(number):
             name = self.random.choice(kinds)
             self.names.append(name)
-            self.at(self.random.uniform(0.0, COURSE), lambda act=KINDS[name]: act(self))
+            self.at(self.random.uniform(0.0, COURSE), lambda act={**KINDS, **MORE}[name]: act(self))
+        later = random.Random(f"more faults {seed}")  # of its own, so that seeds keep what they drew before
+        if not only and later.random() < 0.25:
+            name = later.choice(tuple(MORE))
+            self.names.append(name)
+            self.at(later.uniform(0.0, COURSE), lambda: MORE[name](self))
         if self.random.random() < 0.3:
             world.computer.lateness = ((0.02, self.random.choice((0.02, 0.1, 0.4))),)
             self.names.append(f"busy computer {world.computer.lateness}")
@@ -78,8 +87,11 @@ TOOL = 3
 
 
 class AtALine:
-    """Delivers a signal when the main thread has run so many lines of the project."""
+    """Delivers a signal when the main thread has run so many lines of the project.
 
+    Not at the line of a ``with``: it comes again when the block is left, before its end runs. CPython looks for signals
+    after calls and jumps back, and never delivers one there. A lock would stay held (seed 5281).
+    """
 
     def __init__(self, faults, number, lines):
         """Begin to count."""
@@ -91,7 +103,7 @@ class AtALine:
         WATCHERS.append(self)
 
     @staticmethod
-    def look(code, _line):
+    def look(code, line):
         """Count a line."""
         if "/tacdata/" not in code.co_filename:
             return sys.monitoring.DISABLE
@@ -101,10 +113,12 @@ class AtALine:
                 watcher.stop()
             elif computer.schedule.task is computer.main and not computer.killed:
                 watcher.left -= 1
-                if not watcher.left:
+                if not watcher.left and linecache.getline(code.co_filename, line).lstrip().startswith("with "):
+                    watcher.left = 1
+                elif not watcher.left:
                     watcher.stop()
                     watcher.faults.see("signal")
-                    computer.handlers.get(watcher.number, signal.default_int_handler)(watcher.number, None)
+                    (computer.handlers.get(watcher.number) or signal.default_int_handler)(watcher.number, None)
         return None
 
     def stop(self):
@@ -197,7 +211,9 @@ def board_stalls(faults):
 
 
 def board_freezes(faults):
-    last = []
+    if faults.frozen:
+        return  # frozen anew, it would show another reading once
+    last, faults.frozen = [], True
 
     def same(counts):
         last.append(counts)
@@ -306,3 +322,40 @@ KINDS = {
     )
 }  # fmt: skip
 """Name -> what happens."""
+
+
+def camera_hangs(faults):
+    """Let no image come for a while; a camera that is silent for 3 s is a fault."""
+    if faults.world.camera:
+        schedule, seconds = faults.world.schedule, faults.random.choice((0.5, 2.0, 2.8, 20.0))
+        faults.world.camera.hangs_until_ns = faults.world.clock.now_ns() + round(seconds * SECOND)
+        if seconds > SILENT + 1.0 and schedule.now > LIVED:
+            faults.see("camera hangs", SILENT + 0.3)
+
+
+def camera_unplugged(faults):
+    if faults.world.camera:
+        faults.world.camera.unplugged = True
+        faults.see("camera unplugged")
+
+
+def controller_garbage(faults):
+    faults.world.controller.inject_bytes(faults.random.randbytes(faults.random.choice((1, 5, 40))))
+
+
+def foreign_override(faults):
+    faults.world.controller.inject_byte(faults.random.choice((0x91, 0x92)))
+
+
+def pendant_for_a_moment(faults):
+    """Let a pendant take control and give it back."""
+    pendant(faults)
+    clear = lambda: faults.world.controller.inject_wire(lambda line: line, lambda text: text)  # noqa: E731
+    faults.after(faults.random.uniform(0.1, 4.0), clear)
+
+
+MORE = {
+    act.__name__: act
+    for act in (camera_hangs, camera_unplugged, controller_garbage, foreign_override, pendant_for_a_moment)
+}
+"""Kinds that came later: a seed draws one of them beside those that it has drawn."""

@@ -54,7 +54,7 @@ class SimulatedHost(Host):
 
     def send_signal(self, number):
         """Deliver a signal to the main thread."""
-        if number in self.handlers and self.main and not self.main.ended:
+        if self.handlers.get(number) and self.main and not self.main.ended:
             self.main.signals.append((self.handlers[number], number))
             self.schedule.wake(self.main)
 

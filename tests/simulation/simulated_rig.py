@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from schedule import SECOND, Schedule
+from simulated_camera import CameraDevice, SimulatedCamera
 from simulated_disk import SimulatedDisk
 from simulated_host import EPOCH, START, SimulatedHost
 from simulated_line import LINES, SimulatedLine
@@ -11,6 +12,7 @@ from simulated_line import LINES, SimulatedLine
 from tacdata.clock import Clock
 from tacdata.plans import Plan
 from tacdata.recording.live.interruption import Interruption
+from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
 from tacdata.rig.rig import from_document
 from tacdata.sensor import default_sensor
@@ -60,7 +62,8 @@ class Calm:
 class World:
     """One computer, one controller, one board and their lines, driven by one seed."""
 
-    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, **entries):
+    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, echo=False, camera=False,
+                 **entries):  # fmt: skip
         """Switch everything on."""
         self.seed, self.folder, self.plan = seed, folder, plan(presses, **entries)
         self.schedule = Schedule(seed, LIMIT)
@@ -72,13 +75,14 @@ class World:
         self.board_line = SimulatedLine(names[1], self.computer, self.bench, 115200)
         parked = (ORIGIN[0], ORIGIN[1], ORIGIN[2] + PARKED)
         self.controller = Controller(
-            self.clock, seed, parked, settings=settings, firmware=firmware, port=self.cnc_line
+            self.clock, seed, parked, settings=settings, firmware=firmware, port=self.cnc_line, echo=echo
         )
         timing = Timing(self.clock.now_ns(), 1 / 30, 20.0, 0.0003, 600.0, 0.001, 0.016)
         self.board = VirtualBoard(self.clock, default_format(), timing, self._read, 115200, seed, self.board_line)
         self._noise = np.random.default_rng([seed, 1])
         self.path = []
         """(time [s], true position [mm] as x, y, z, whether it moves, whether its position is truly lost)."""
+        self.camera = CameraDevice() if camera else None
         self.asked, self.answer, self.said = [], lambda question: False, []
         self.controller.start()
         self.board.start()
@@ -101,11 +105,14 @@ class World:
     def record(self, resume=False, sync_tap=False, **controller):
         """Run the recorder, with settings of the controller; return the session, or raise what it raises."""
         rig = self.rig(**controller)
+        devices = RigDevices.of(rig)
+        if self.camera:
+            devices = replace(devices, cameras={"side": SimulatedCamera(rig.clock, self.camera)})
 
         def work():
             with Interruption(self.computer) as interruption:
                 recorder = Recorder(
-                    rig, SENSOR, self.plan, self.folder, resume, interruption=interruption, ask=self._asked,
+                    rig, SENSOR, self.plan, self.folder, resume, devices, interruption=interruption, ask=self._asked,
                     say=self.said.append, sync_tap=sync_tap,
                 )
                 return recorder.run(lambda summary: True)
@@ -135,6 +142,8 @@ class World:
         if lost:
             self.controller.inject_brown_out()
         self.mend_board()
+        if self.camera:
+            self.camera.repair()
         self.schedule.run_for(3.0, self.bench)
         return Calm()
 

@@ -24,6 +24,8 @@ STOPPED = 0.5
 """Time from when a fault can be seen until the motion has stopped [s], beside the braking."""
 BRAKING = 0.2
 """Longest braking [s]: 30 mm/s at 150 mm/s^2."""
+HALTING = {"alarm", "brown_out"}
+"""Faults after which a controller moves nothing, and says so."""
 OUTSIDE = 1.0
 """Time that the tip may be outside the envelope [s]: the interval of two reports, their way, the hold, the braking."""
 
@@ -113,6 +115,8 @@ def _words(run, faults):
         yield f"it moves after the end, and the words are:\n{words}"
     if run.error is None:
         return
+    if "NOT KNOWN" in words and set(faults.names) & HALTING and set(faults.names) <= HALTING:
+        yield f"the controller has stopped by itself, and the words are:\n{words}"
     done, stated = len(file_names.finished(world.folder)) if world.folder.exists() else 0, None
     if match := re.search(r"data:   (\d+) of \d+ presses are complete", words):
         stated = int(match[1])
@@ -176,6 +180,9 @@ def _frames(run, faults, path):
     touched = {"damaged_frame", "board_stalls", "board_unplugged"} & set(faults.names)
     if not touched and len(counter) and np.any(np.diff(counter) != 1):
         yield f"{path.name} lacks frames: {np.flatnonzero(np.diff(counter) != 1)}"
+    for view in recording.cameras.values():
+        if not {"camera_hangs", "camera_unplugged"} & set(faults.names) and np.any(np.diff(view.sequence) != 1):
+            yield f"{path.name} lacks images: {np.flatnonzero(np.diff(view.sequence) != 1)}"
     if run.killed and path.name.endswith(file_names.PARTIAL) and not touched and not run.world.computer.stalls:
         last = (episode.taxels.arrival_ns[-1] - EPOCH) * 1e-9 if len(counter) else run.begin
         if run.end - last > 1.2 and len(counter) and not run.world.computer.disk.slow:
@@ -188,14 +195,17 @@ def play(seed, only=()):
         draw = random.Random(f"rig {seed}")
         firmware = draw.choice(("Grbl", "Grbl", "grblHAL"))
         settings = draw.choice((None, None, {"$20": "0", "$22": "0"}))
-        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings)
+        echo, camera = draw.random() < 0.3, draw.random() < 0.3
+        more = {"echo": echo, "camera": camera}
+        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings, **more)
         faults = Faults(world, seed, only)
         try:
             found = list(_play(world, faults))
         finally:
             faults.end()
             world.end()
-        return [firmware, *(["no homing"] if settings else []), *faults.names], found, world.schedule.now
+        kind = [firmware, *(["no homing"] if settings else []), *(name for name, on in more.items() if on)]
+        return [*kind, *faults.names], found, world.schedule.now
 
 
 def _play(world, faults):

@@ -116,6 +116,10 @@ def test_what_must_hold_of_every_run_holds(seed):
         (221, ()),  # the door opened during the lift: "stopped at" the place where the lift had begun
         (2, ("interrupted",)),  # the same after a second Ctrl-C during the lift
         (3, ("interrupted",)),  # ... that had ended at the top: "not lifted"
+        (5381, ()),  # half a line was left in the controller's buffer: --resume was refused
+        (5766, ()),  # the same, with echoes of lines
+        (5968, ()),  # the same after a hold from outside, on a busy computer
+        (5582, ()),  # a board that freezes twice shows another reading once: no fault of the recorder
     ],
 )
 def test_seeds_that_once_failed(seed, kinds):

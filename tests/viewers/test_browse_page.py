@@ -1,20 +1,20 @@
 """The page of episodes as a person uses it, in headless Chromium; a page that grabs the keyboard stands for Rerun's."""
 
 import json
-import shutil
+import os
 import socketserver
 import threading
 from http.server import BaseHTTPRequestHandler
 
 import pytest
+from running.chromium import needs_chromium
 
 from tacdata.dataset.flags import read_flags, read_history
+from tacdata.dataset.notes import read_notes
 from viewers.browse.episode_list import Entry, EpisodeList
 from viewers.browse.server import Pages, serving
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-sync_api = pytest.importorskip("playwright.sync_api")
-pytestmark = pytest.mark.skipif(not CHROMIUM, reason="no Chromium: apt-get install chromium")
+pytestmark = needs_chromium
 COUNT = 30
 GRABBING = b"""<!doctype html><canvas tabindex="0" id="c" style="width:100%;height:100%"></canvas><script>
 const c = document.getElementById("c"); c.focus(); setTimeout(() => c.focus(), 100);
@@ -39,14 +39,6 @@ class Quick(Pages):
     def episode(self, number):
         self.listed.numbered(number)
         return self._folder / "empty.rrd"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture
@@ -146,6 +138,30 @@ def test_several_rows_are_flagged_at_once_and_the_history_tells_who(page, served
     assert len(told) == 6 and "episode-000002.mcap taken back" in told[0] and "@" in told[0]
     history = read_history(served.listed.root)
     assert [change.reason for change in history] == ["rig was moved"] * 5 + [""]
+
+
+def test_a_stretch_is_noted_and_the_note_taken_away(page, served):
+    page.click("tbody tr:nth-child(4)")
+    page.click("#marks > summary")
+    page.click("#write")
+    assert "from when to when" in page.inner_text("#said")
+    for begin, end, text in (("2", "1", "wrong way"), ("1.5", "2.25", "the tool <b>slips")):
+        page.fill("#begin", begin)
+        page.fill("#end", end)
+        page.fill("#note", text)
+        page.click("#write")
+        answer = "2 to 1 s" if begin == "2" else "noted: episode-000003"
+        page.wait_for_selector(f"#said:has-text('{answer}')")
+    assert page.inner_text("#notes span") == "1.5 to 2.25 s: the tool <b>slips", "words of others are shown as words"
+    assert "@" in page.get_attribute("#notes span", "title")
+    assert page.inner_text("tr.open td:nth-child(4)") == "1" and "notes" in page.locator("th").nth(3).inner_text()
+    [note] = read_notes(served.listed.root)
+    assert (note.file, note.begin, note.end) == ("episode-000003.mcap", 1.5, 2.25)
+    if folder := os.environ.get("TACDATA_SCREENSHOTS"):
+        page.screenshot(path=f"{folder}/browse.png")
+    page.click("#notes button")
+    page.wait_for_selector("#said:has-text('taken away')")
+    assert not read_notes(served.listed.root) and not page.locator("#notes span").count()
 
 
 def test_a_link_opens_an_episode(page, browser, served):

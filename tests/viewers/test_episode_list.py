@@ -13,6 +13,7 @@ from tacdata.errors import UsageError
 from viewers.browse.episode_list import Entry, EpisodeList, errors_of
 from viewers.browse.flagging import flag_episode, unflag_episode
 from viewers.browse.list_table import list_table
+from viewers.browse.noting import note_stretch, notes_of, unnote_stretch
 from viewers.browse.server import Pages, serving
 
 ENTRIES = (
@@ -74,9 +75,33 @@ def test_a_flag_follows_the_recordings_bytes(listed):
 
 def test_errors_are_of_the_frames_that_both_hold():
     label, predicted = np.zeros((3, 2, 2), np.float32), np.full((2, 2, 2), 0.3, np.float32)
-    assert errors_of(label, np.array([1, 2, 3]), predicted, np.array([2, 9])) == pytest.approx(0.3)
+    assert errors_of(label, np.array([1, 2, 3]), predicted, np.array([2, 9])).error == pytest.approx(0.3)
     assert errors_of(label, np.array([1, 2, 3]), predicted, np.array([8, 9])) is None
     assert errors_of(label, np.array([1, 2, 3]), predicted[:, :1], np.array([2, 9])) is None
+
+
+def test_place_and_region_of_the_contact_are_means_of_the_frames_that_have_them():
+    label, predicted = np.zeros((3, 8, 6), np.float32), np.zeros((3, 8, 6), np.float32)
+    label[1:, 2:4, 2:4] = 1.0
+    predicted[1, 2:4, 2:4] = 0.8  # the right place
+    predicted[2, 3:5, 2:4] = 1.0  # a pixel aside: a third of the union is shared
+    found = errors_of(label, np.arange(3), predicted, np.arange(3))
+    assert found.centroid == pytest.approx(0.5) and found.iou == pytest.approx((1 + 1 / 3) / 2)
+    assert errors_of(label[:1], np.arange(1), predicted[:1], np.arange(1)).iou is None, "nothing was touched"
+
+
+def test_notes_on_stretches_are_kept_beside_the_data(listed):
+    note_stretch(listed, 1, 2.0, 2.5, "the tool  slips")
+    note_stretch(listed, 1, 0.5, 1, "a knock")
+    first, second = notes_of(listed, 1)
+    assert (first.text, second.begin, second.text) == ("a knock", 2.0, "the tool slips") and "@" in first.by
+    assert documents.read(listed.root / "notes.json", "notes")["notes"][0]["file"] == "episode-000001.mcap"
+    for begin, end, text, words in ((2, 1, "x", "2 to 1 s"), (-1, 1, "x", "-1 to 1"), (0, 1, " ", "without a text")):
+        with pytest.raises(UsageError, match=words):
+            note_stretch(listed, 1, begin, end, text)
+    assert unnote_stretch(listed, 1, 0) == "a knock" and notes_of(listed, 1) == [second] and not notes_of(listed, 0)
+    with pytest.raises(UsageError, match="note 5 of episode 1"):
+        unnote_stretch(listed, 1, 5)
 
 
 @pytest.fixture

@@ -255,6 +255,38 @@ def test_the_layout_for_foxglove_names_only_what_the_recording_has(episode, imag
         write_foxglove_layout(recording, tmp_path / "layout.json")
 
 
+def test_images_and_poses_are_of_foxglove_s_own_schemas_field_by_field(episode, images, tmp_path):
+    """What the file says of a message type is what Foxglove publishes of it, for that type and all that it holds."""
+    from foxglove_schemas_protobuf import CompressedImage_pb2, PoseInFrame_pb2
+    from google.protobuf import descriptor_pool
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+    from mcap.reader import make_reader
+    from recorded_press import write_recording
+
+    def fields(kind, seen=()):
+        own = {
+            f.name: (f.number, f.type, f.is_repeated, f.message_type and f.message_type.full_name) for f in kind.fields
+        }
+        inner = [f.message_type for f in kind.fields if f.message_type and f.message_type.full_name not in seen]
+        below = [fields(each, (*seen, each.full_name)) for each in inner]
+        return {kind.full_name: own, **{name: told for each in below for name, told in each.items()}}
+
+    with write_recording(tmp_path / "episode-000003.mcap", episode, images).open("rb") as stream:
+        schemas_there = {schema.name: schema.data for schema in make_reader(stream).get_summary().schemas.values()}
+    published = {
+        "foxglove.CompressedImage": CompressedImage_pb2.CompressedImage,
+        "foxglove.PoseInFrame": PoseInFrame_pb2.PoseInFrame,
+    }
+    for name, kind in published.items():
+        pool = descriptor_pool.DescriptorPool()
+        for file in FileDescriptorSet.FromString(schemas_there[name]).file:
+            pool.Add(file)
+        assert fields(pool.FindMessageTypeByName(name)) == fields(kind.DESCRIPTOR)
+    assert len(fields(PoseInFrame_pb2.PoseInFrame.DESCRIPTOR)) == 5, (
+        "pose, vector, quaternion and time are compared too"
+    )
+
+
 def test_foxglove_reads_a_recording_by_the_schemas_that_it_carries(episode, images, tmp_path):
     """By descriptors from the file alone: names and fields are those that Foxglove documents."""
     from google.protobuf import descriptor_pool, message_factory

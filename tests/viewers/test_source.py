@@ -5,14 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from recorded_press import write_recording
+from rerun.chunk import RrdReader
 
 from tacdata import documents
 from tacdata.dataset.frames import recording_hash
+from tacdata.dataset.notes import add_note
 from tacdata.dataset.pack import pack
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import write_label
 from tacdata.recording.files.reader import read_episode
 from training.inference.prediction import write_prediction
+from viewers.rerun.backend import RerunBackend
 from viewers.source import scene_at
 
 
@@ -59,6 +62,21 @@ def test_a_session_shows_its_first_episode_or_the_one_asked_for(session):
     with pytest.raises(UsageError, match="--episode 4") as caught:
         scene_at(session, episode=4)
     assert caught.value.allowed == "3"
+
+
+def test_notes_on_stretches_of_a_recording_stand_beside_its_phases(session, recorded, tmp_path):
+    add_note(session, recording_hash(recorded), recorded.path.name, 1.0, 1.5, "the tool slips")
+    add_note(session, "b" * 64, "another.mcap", 0.0, 1.0, "not this one")
+    try:
+        scene = scene_at(session)
+    finally:
+        (session / "notes.json").unlink()
+    [note] = scene.notes
+    first = scene.taxels.time_ns[0]
+    assert (note.name, note.start_ns - first, note.end_ns - first) == ("the tool slips", 10**9, 1_500_000_000)
+    RerunBackend(tmp_path / "e.rrd").draw(scene)
+    assert "/notes" in {str(chunk.entity_path) for chunk in RrdReader(tmp_path / "e.rrd").stream()}
+    assert scene_at(session).notes == ()
 
 
 def test_labels_elsewhere(session, own_label, tmp_path):

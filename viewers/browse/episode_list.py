@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.dataset.flags import Flag
+from tacdata.dataset.notes import Note
 from tacdata.errors import UsageError
 from tacdata.plans import Press
 
@@ -42,13 +44,19 @@ class Entry:
     """What a network knew of it: train, validation, test."""
     error: float | None = None
     """Pixel root mean square error of a network over all frames [mm]."""
+    centroid: float | None = None
+    """Distance of the predicted contact's centroid from the label's, mean over the frames that have both [px]."""
+    iou: float | None = None
+    """Intersection over union of predicted and labelled contact, mean over the frames that have either [1]."""
     flag: str = ""
     """Why it is set aside; empty for one that is not."""
+    notes: int | None = None
+    """How many notes there are on stretches of it [count]."""
     recording: str = ""
     """SHA-256 of the recording's file, where it is known without reading it."""
 
 
-UNITS = {"x": "mm", "y": "mm", "depth": "mm", "rate": "mm/s", "error": "mm"}
+UNITS = {"x": "mm", "y": "mm", "depth": "mm", "rate": "mm/s", "error": "mm", "centroid": "px"}
 SHOWN = tuple(f.name for f in fields(Entry) if f.name != "recording")
 """What can be listed, filtered and sorted by."""
 OPERATORS: dict[str, Callable[[Any, Any], bool]] = {
@@ -129,8 +137,26 @@ def of_press(number: int, file: str, press: Press | None) -> Entry:
     return Entry(number, file, press.indenter_name, press.indenter.shape, press.x, press.y, press.depth, press.speed)
 
 
-def errors_of(depth: np.ndarray, time_ns: np.ndarray, predicted: np.ndarray, predicted_ns: np.ndarray) -> float | None:
-    """Return a prediction's pixel root mean square error over the frames that both hold [mm], or None.
+def with_notes(entries: tuple[Entry, ...], notes: Sequence[Note]) -> tuple[Entry, ...]:
+    """Return entries with how many notes each has, found as flags are."""
+    by_hash, by_file = Counter(note.recording for note in notes), Counter(note.file for note in notes)
+    return tuple(replace(e, notes=(by_hash[e.recording] if e.recording else by_file[e.file]) or None) for e in entries)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How far a prediction is from the label, over the frames that both hold."""
+
+    error: float
+    """Pixel root mean square error [mm]."""
+    centroid: float | None
+    """Mean distance of the centroids [px]; None where no frame has contact in both."""
+    iou: float | None
+    """Mean intersection over union [1]; None where no frame has contact in either."""
+
+
+def errors_of(depth: np.ndarray, time_ns: np.ndarray, predicted: np.ndarray, predicted_ns: np.ndarray) -> Errors | None:
+    """Return how far a prediction is off over the frames that both hold, or None where there are none.
 
     Args:
         depth: Labels [mm], shape (n, pixels_x, pixels_y).
@@ -138,10 +164,21 @@ def errors_of(depth: np.ndarray, time_ns: np.ndarray, predicted: np.ndarray, pre
         predicted: Predictions [mm], shape (m, pixels_x, pixels_y).
         predicted_ns: Their times [ns], shape (m,).
     """
+    from training.metrics.depth_maps import score_frames
+
     _, ours, theirs = np.intersect1d(time_ns, predicted_ns, return_indices=True)
     if not len(ours) or depth.shape[1:] != predicted.shape[1:]:
         return None
-    return float(np.sqrt(np.mean(np.square(predicted[theirs] - depth[ours], dtype=np.float64))))
+    scores = score_frames(predicted[theirs], depth[ours])
+    return Errors(
+        float(np.sqrt(np.mean(np.square(predicted[theirs] - depth[ours], dtype=np.float64)))),
+        _mean(scores.centroid_error), _mean(scores.iou),
+    )  # fmt: skip
+
+
+def _mean(values: np.ndarray) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else None
 
 
 def _parsed(condition: str) -> tuple[str, str, Any]:

@@ -15,7 +15,7 @@ def flag_episode(listed: EpisodeList, number: int, reason: str) -> str:
         DeviceError: If the disk refuses it.
     """
     entry = listed.numbered(number)
-    flag = set_flag(listed.root, _recording(listed, entry), entry.file, reason)
+    flag = set_flag(listed.root, recording_of(listed, entry), entry.file, reason)
     return f"{entry.file or number}: {flag.reason}"
 
 
@@ -26,11 +26,11 @@ def unflag_episode(listed: EpisodeList, number: int) -> str:
         UsageError: If there is no such episode.
     """
     entry = listed.numbered(number)
-    clear_flag(listed.root, _recording(listed, entry))
+    clear_flag(listed.root, recording_of(listed, entry))
     return entry.file or str(number)
 
 
-def _recording(listed: EpisodeList, entry: Entry) -> str:
+def recording_of(listed: EpisodeList, entry: Entry) -> str:
     """Return the recording's hash; an episode that lost its record has one made of its dataset and number."""
     if entry.recording:
         return entry.recording

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +13,13 @@ from tacdata import documents
 from tacdata.dataset import label_states
 from tacdata.dataset.flags import read_flags
 from tacdata.dataset.format import features, folder, metadata
+from tacdata.dataset.notes import read_notes
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.labels import file_names as label_names
 from tacdata.recording.files import file_names
 from tacdata.recording.session import read_session
 from training.inference.prediction import PredictedMaps, read_prediction
-from viewers.browse.episode_list import Entry, EpisodeList, errors_of, of_press, with_flags
+from viewers.browse.episode_list import Entry, EpisodeList, Errors, errors_of, of_press, with_flags, with_notes
 from viewers.parts.label import shown_label
 from viewers.parts.prediction_files import prediction_paths
 
@@ -50,7 +51,7 @@ def _session(root: Path, labels: Path, predictions: Path | None) -> EpisodeList:
     for number, path in file_names.finished(root).items():
         entry = of_press(number, path.name, presses.get(number))
         entries.append(replace(entry, label=_label_state(labels, path), quality=checked.get(path.name)))
-    found = with_flags(tuple(entries), read_flags(root))
+    found = with_notes(with_flags(tuple(entries), read_flags(root)), read_notes(root))
     if predictions is not None:
         found = _with_session_errors(found, labels, predictions)
     return EpisodeList(root, "session", found, tuple(remarks))
@@ -88,11 +89,16 @@ def _with_session_errors(entries: tuple[Entry, ...], labels: Path, predictions: 
         path = label_names.label(labels, Path(entry.file))
         label = shown_label(path) if entry.label == "complete" else None
         own = next((p for t, p in known.items() if label is not None and t in label.time_ns), None)
-        error = None
+        errors = None
         if label is not None and own is not None:
-            error = errors_of(np.maximum(label.signed, 0), label.time_ns, own.depth, own.time_ns)
-        result.append(replace(entry, error=error, part=own.part if own else ""))
+            errors = errors_of(np.maximum(label.signed, 0), label.time_ns, own.depth, own.time_ns)
+        result.append(_with_errors(entry, errors, own))
     return tuple(result)
+
+
+def _with_errors(entry: Entry, errors: Errors | None, own: PredictedMaps | None) -> Entry:
+    told = asdict(errors) if errors else dict.fromkeys(("error", "centroid", "iou"))
+    return replace(entry, **told, part=own.part if own else "")
 
 
 def _dataset(root: Path, predictions: Path | None) -> EpisodeList:
@@ -110,7 +116,7 @@ def _dataset(root: Path, predictions: Path | None) -> EpisodeList:
         model = record.label_provenance.get("parents", {}).get("model", "")
         label = "complete" if known["models"].get(record.sensor, model) == model else "stale"
         entries.append(replace(entry, quality=record.quality, label=label, recording=record.recording))
-    found = with_flags(tuple(entries), read_flags(root))
+    found = with_notes(with_flags(tuple(entries), read_flags(root)), read_notes(root))
     if predictions is not None:
         found = _with_dataset_errors(root, found, predictions)
     absent = sum(len(set(own["episodes"]) - set(own["packed"])) for own in known["sessions"].values())
@@ -147,6 +153,6 @@ def _with_dataset_errors(root: Path, entries: tuple[Entry, ...], predictions: Pa
         part = slice(place.start, place.stop)
         own_time = np.asarray(time[part])
         own = next((p for t, p in known.items() if own_time[0] <= t <= own_time[-1]), None)
-        error = errors_of(np.asarray(depth[part]), own_time, own.depth, own.time_ns) if own else None
-        result.append(replace(entry, error=error, part=own.part if own else ""))
+        errors = errors_of(np.asarray(depth[part]), own_time, own.depth, own.time_ns) if own else None
+        result.append(_with_errors(entry, errors, own))
     return tuple(result)

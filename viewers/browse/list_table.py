@@ -36,6 +36,8 @@ def said(entry: Entry, column: str) -> str:
         return "–"
     if column == "error":
         return f"{value:.4f}"
+    if column in ("centroid", "iou"):
+        return f"{value:.3f}"
     if column == "quality":
         return f"{100 * value:.0f} %"
     return f"{value:g}" if isinstance(value, float) else str(value)

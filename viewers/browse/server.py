@@ -21,10 +21,12 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from pydantic import BaseModel, Field
 
-from tacdata.dataset.flags import read_flags, read_history
+from tacdata.dataset.flags import Flag, read_flags, read_history
+from tacdata.dataset.notes import Note, read_notes
 from tacdata.errors import TacdataError
-from viewers.browse.episode_list import UNITS, EpisodeList, with_flags
+from viewers.browse.episode_list import UNITS, Entry, EpisodeList, with_flags, with_notes
 from viewers.browse.flagging import flag_episode, unflag_episode
+from viewers.browse.noting import note_stretch, notes_of, unnote_stretch
 from viewers.rerun.shield import LOOPBACK, shielded
 from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
 
@@ -83,7 +85,7 @@ class Pages:
         """Return the list, with the flags as they are now."""
         flags = read_flags(self.listed.root)
         by_file = {flag.file: flag for flag in flags.values()}
-        rows: list[dict[str, Any]] = [asdict(entry) for entry in with_flags(self.listed.entries, flags)]
+        rows: list[dict[str, Any]] = [asdict(entry) for entry in self._marked(flags)]
         for row in rows:
             if row["flag"] and (flag := flags.get(row["recording"]) or by_file.get(row["file"])):
                 row |= {"flagged_at": flag.flagged_at, "flagged_by": flag.flagged_by}
@@ -91,6 +93,9 @@ class Pages:
             "root": str(self.listed.root), "units": UNITS, "episodes": rows, "remarks": self.listed.remarks,
             "viewer": self.viewer + "/?hide_welcome_screen&url=" + quote(self.address + "/episode/", safe=""),
         }  # fmt: skip
+
+    def _marked(self, flags: dict[str, Flag]) -> tuple[Entry, ...]:
+        return with_notes(with_flags(self.listed.entries, flags), read_notes(self.listed.root))
 
     def episode(self, number: int) -> Path:
         """Return an episode's Rerun file, drawn when it is first asked for. Raises as `viewers.source.scene_at`."""
@@ -109,6 +114,33 @@ class Pages:
         if reason.strip():
             return f"set aside: {flag_episode(self.listed, number, reason)}"
         return f"taken back: {unflag_episode(self.listed, number)}"
+
+    def notes(self, number: int) -> list[Note]:
+        """Return what was noted of an episode, in the order of time."""
+        return notes_of(self.listed, number)
+
+    def note(self, asked: NoteRequest) -> str:
+        """Note something of a stretch of an episode; return what was done."""
+        with self._drawing:
+            said = note_stretch(self.listed, asked.number, asked.begin, asked.end, asked.text)
+            (self._folder / f"{asked.number}.rrd").unlink(missing_ok=True)
+        return f"noted: {said}"
+
+    def unnote(self, number: int, place: int) -> str:
+        """Take an episode's note away by its place among them; return what was done."""
+        with self._drawing:
+            said = unnote_stretch(self.listed, number, place)
+            (self._folder / f"{number}.rrd").unlink(missing_ok=True)
+        return f"taken away: {said}"
+
+
+class NoteRequest(BaseModel):
+    """What the page asks for when a person notes something of a stretch of an episode."""
+
+    number: int
+    begin: float
+    end: float
+    text: str = Field(max_length=LONGEST)
 
 
 class FlagRequest(BaseModel):
@@ -163,6 +195,18 @@ def application(pages: Pages) -> FastAPI:
     @routes.post("/flag")
     def flag(asked: FlagRequest) -> dict[str, str]:
         return {"said": pages.flag(asked.number, asked.reason)}
+
+    @routes.get("/notes/{number}")
+    def notes(number: int) -> list[dict[str, Any]]:
+        return [asdict(note) for note in pages.notes(number)]
+
+    @routes.post("/note")
+    def note(asked: NoteRequest) -> dict[str, str]:
+        return {"said": pages.note(asked)}
+
+    @routes.delete("/notes/{number}/{place}")
+    def unnote(number: int, place: int) -> dict[str, str]:
+        return {"said": pages.unnote(number, place)}
 
     api.include_router(routes)
     return api

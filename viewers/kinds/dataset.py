@@ -26,6 +26,7 @@ class DatasetKind(Kind):
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one episode, the first if none is named."""
         from tacdata.dataset.format import features
+        from viewers.parts.stretch_notes import with_stretch_notes
         from viewers.scenes.dataset import dataset_scene
         from viewers.scenes.recording import prediction_for
         from viewers.scenes.single_episode import read_single
@@ -41,7 +42,9 @@ class DatasetKind(Kind):
         if asked.predictions is not None and entry is not None:
             time = np.asarray(dataset[features.TIME][entry.start : entry.stop])
             prediction, remarks = prediction_for(asked.predictions, time, entry.sensor)
-        return dataset_scene(dataset, number, prediction, tuple(remarks), count)
+        scene = dataset_scene(dataset, number, prediction, tuple(remarks), count)
+        record = entry.record if entry is not None else None
+        return scene if record is None else with_stretch_notes(scene, path, lambda: record.recording)
 
 
 def _predicted(path: Path, predictions: Path) -> int:

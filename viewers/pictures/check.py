@@ -50,10 +50,14 @@ def _signals(axes, episode: Episode, unit: str) -> None:
 
 
 def _responses(axes, report: Report, unit: str) -> None:
+    from matplotlib.ticker import MaxNLocator
+
     table = np.array([_numbers(entry.document["taxels"]["response"]) for entry in report.episodes])
     image = axes.imshow(table, aspect="auto", interpolation="nearest", cmap="viridis")
     axes.figure.colorbar(image, ax=axes, label=f"rest to hold [{unit}]")
     axes.set(xlabel="channel", ylabel="recording", title="answer of each channel")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(integer=True))  # a channel and a half is none
 
 
 def _sites(axes, episodes: list[Episode]) -> None:

@@ -28,18 +28,18 @@ LAYOUTS = {
 class RerunBackend(Backend):
     """Writes each scene into a file (.rrd) that the stock Rerun viewer opens."""
 
-    def __init__(self, path: Path) -> None:
-        """Take the file to write.
+    def __init__(self, path: Path, recording: str | None = None) -> None:
+        """Take the file to write, and a name for what is in it, by which Rerun tells recordings apart.
 
         Raises:
             UsageError: If it exists or does not end in .rrd.
         """
-        self._path = new_file(path, RERUN)
+        self._path, self._recording = new_file(path, RERUN), recording
 
     def draw(self, scene: Scene) -> None:
         """Write the file; a crash leaves none rather than half of one."""
         with written_beside(self._path) as temporary:
-            recording = rr.RecordingStream(APPLICATION)
+            recording = rr.RecordingStream(APPLICATION, recording_id=self._recording)
             recording.save(temporary, default_blueprint=LAYOUTS[scene.kind](scene))
             recording.send_recording_name(scene.title)
             RerunParts(recording, scene).write()

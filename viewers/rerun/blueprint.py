@@ -21,12 +21,13 @@ EYE = (-10.0, -16.5, 14.0)
 """Where the skin is seen from [mm]."""
 
 
-def episode_blueprint(scene: Scene, follows: bool = False) -> rrb.Blueprint:
+def episode_blueprint(scene: Scene, follows: bool = False, stands: bool = False) -> rrb.Blueprint:
     """Return the layout for one episode: skin, maps and curves in rows, text and cameras beside them.
 
     Args:
         scene: What is laid out.
         follows: Whether time runs along with what arrives, for a recording in progress.
+        stands: Whether time stands where an address says.
     """
     skins = [skin_view(s.name, SKIN_TITLES[s.name], scene) for s in scene.surfaces]
     rows: list[rrb.ContainerLike] = [rrb.Horizontal(*skins)]
@@ -38,19 +39,22 @@ def episode_blueprint(scene: Scene, follows: bool = False) -> rrb.Blueprint:
         shares.append(5.0)
     rows.append(_curves(scene))
     shares.append(5.0)
-    if scene.phases:
-        rows.append(rrb.StateTimelineView(origin="phase", name="Phases"))
-        shares.append(2.2)
+    if scene.phases or scene.notes:
+        name = " and ".join(word for word, own in (("Phases", scene.phases), ("notes", scene.notes)) if own)
+        rows.append(rrb.StateTimelineView(origin="/", contents=["phase", "notes"], name=name))
+        shares.append(3.8 if scene.phases and scene.notes else 2.2)
     main = rrb.Vertical(*rows, row_shares=shares)
     return rrb.Blueprint(
         rrb.Horizontal(main, _side(scene), column_shares=[3, 1]),
-        _time_panel(follows),
+        _time_panel(follows, stands),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )
 
 
-def _time_panel(follows: bool) -> rrb.TimePanel:
+def _time_panel(follows: bool, stands: bool) -> rrb.TimePanel:
+    if stands:
+        return rrb.TimePanel(timeline=HOST, state="collapsed", play_state="paused")
     if follows:
         return rrb.TimePanel(timeline=HOST, state="collapsed", play_state="following")
     return rrb.TimePanel(timeline=HOST, state="collapsed", loop_mode="All")

@@ -7,7 +7,7 @@ counter).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import rerun as rr
@@ -24,6 +24,7 @@ from viewers.scene.scene import (
     MotionTrail,
     Scene,
     SkinSurface,
+    Span,
     TaxelArray,
 )
 from viewers.scene.shading import body_normals, cube_axes, normals
@@ -82,7 +83,8 @@ class RerunParts:
             self._bars(bars)
         for page in scene.pages:
             self._static(f"pages/{page.name}", rr.EncodedImage(contents=page.png, media_type="image/png"))
-        self._phases()
+        self._spans("phase", self._scene.phases)
+        self._spans("notes", self._scene.notes)
 
     def _static(self, path: str, *parts: rr.AsComponents) -> None:
         self._recording.log(path, *parts, static=True)
@@ -239,8 +241,7 @@ class RerunParts:
             columns = rr.Arrows3D.columns(origins=origins, vectors=vectors, colors=colors).partition(count)
             self._columns(path, camera.cube_ns, columns)
 
-    def _phases(self) -> None:
-        phases = self._scene.phases
+    def _spans(self, entity_path: str, phases: Sequence[Span]) -> None:
         if not phases:
             return
         # An empty state ends the phase before, where no other follows at once.
@@ -249,5 +250,5 @@ class RerunParts:
         columns = rr.StateChange.columns(state=[changes[t] for t in times.tolist()])
         names = list(dict.fromkeys(span.name for span in phases))
         colors = [(*HUES[k % len(HUES)], 255) for k in range(len(names))]
-        self._static("phase", rr.StateConfiguration(values=names, labels=names, colors=colors))
-        self._columns("phase", times, columns)
+        self._static(entity_path, rr.StateConfiguration(values=names, labels=names, colors=colors))
+        self._columns(entity_path, times, columns)

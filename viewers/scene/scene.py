@@ -194,6 +194,8 @@ class Scene:
     bodies: tuple[Body, ...] = ()
     cameras: tuple[CameraView, ...] = ()
     phases: tuple[Span, ...] = ()
+    notes: tuple[Span, ...] = ()
+    """Stretches of which a person said something."""
     trails: tuple[MotionTrail, ...] = ()
     clouds: tuple[Cloud, ...] = ()
     bars: tuple[Bars, ...] = ()

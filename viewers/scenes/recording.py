@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tacdata import documents
+from tacdata import documents, provenance
 from tacdata.errors import UsageError
 from tacdata.labels import file_names as label_names
 from tacdata.recording.files import file_names
 from training.inference.prediction import PredictedMaps
 from viewers.parts.label import ShownLabel, shown_label
+from viewers.parts.stretch_notes import with_stretch_notes
 from viewers.scene import thinning
 from viewers.scene.request import Asked
 from viewers.scene.scene import Scene
@@ -44,7 +45,8 @@ def recording_scene(path: Path, asked: Asked) -> Scene:
         label, remarks = label_read.result()
     if path.name.endswith(file_names.PARTIAL):
         remarks.append("still being written, or left by a crash: this is what had reached the disk")
-    return scene_of(recording, sampler, label, remarks, asked.predictions)
+    scene = scene_of(recording, sampler, label, remarks, asked.predictions)
+    return with_stretch_notes(scene, path.parent, lambda: provenance.file_hash(path))
 
 
 @contextmanager

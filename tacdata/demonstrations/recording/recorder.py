@@ -16,6 +16,7 @@ from tacdata.devices.device import Camera, TaxelBoard, create
 from tacdata.errors import DeviceError, UsageError
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.detection_process import Detect
+from tacdata.recording.live.rig_devices import require_channels
 
 FIRST_FRAME = 5.0
 """Time allowed for the streams to begin [s of real time]."""
@@ -70,8 +71,11 @@ class DemoRecorder:
         """Open boards and cameras and wait until all of them deliver.
 
         Raises:
+            UsageError: If a board sends another number of channels than its finger's sensor has taxels.
             DeviceError: If one of them is missing or silent, naming the finger or the camera.
         """
+        for name, board in self._boards.items():
+            require_channels(board, self.rig.sensors[name], f"the board of {name}", "sensors in the demo rig")
         try:
             for kind, devices in (("board of", self._boards), ("camera", self._cameras)):
                 for name, device in devices.items():

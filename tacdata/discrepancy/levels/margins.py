@@ -1,12 +1,13 @@
-"""Each effect of an answer against its rivals beside the remainder: which level of its name holds?"""
+"""Each effect of an answer beside a remainder: is its size the same in all conditions, and how far are its rivals?"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
 
+from tacdata.discrepancy.levels.constancy import constancies
 from tacdata.discrepancy.levels.remainder import Remainder, remainder
 from tacdata.discrepancy.search.findings import Findings, RivalModels
 from tacdata.discrepancy.search.j_test import ModelError, j_statistic
@@ -28,6 +29,8 @@ class BesideRemainder:
     """By how many standard errors over episodes the model is worse without it (J test) [1]."""
     margins: dict[str, float]
     """Rival effect -> by how many standard errors over episodes this one is better (J test)."""
+    spreads: dict[str, float] = field(default_factory=dict)
+    """Condition -> spread of its size over that condition's parts [share of its size]."""
 
 
 def beside_remainder(found: Findings) -> tuple[BesideRemainder, ...]:
@@ -37,14 +40,15 @@ def beside_remainder(found: Findings) -> tuple[BesideRemainder, ...]:
     """
     if not found.comparisons:
         return ()
-    left = remainder(found.final)
-    return tuple(_held_against(found, one, at, left) for at, one in enumerate(found.comparisons))
+    left, spreads = remainder(found.final), constancies(found)
+    each = zip(found.comparisons, spreads, strict=True)
+    return tuple(replace(_held_against(found, one, at, left), spreads=own) for at, (one, own) in enumerate(each))
 
 
 def _held_against(found: Findings, one: RivalModels, at: int, left: Remainder) -> BesideRemainder:
     null, setting = found.final.null, found.problem.setting
     course = setting.course.reduced
-    alone = ModelError(left.columns, course, null)
+    alone = ModelError(left.columns, course, null) if left.columns.shape[2] else None
     if one.without.placed:
         alone = _joined(ModelError.of(one.begin, one.without, null), left)
     need = j_statistic(one.current, one.without, one.pooled, alone)

@@ -136,10 +136,8 @@ def _rivals(verdict: dict[str, Any]) -> Part:
     """Return one line a rival: why it is not the name, or why it may be."""
     lines = []
     for e in verdict["effects"]:
-        beside = e.get("beside_remainder") or {}
-        margins = beside.get("margins") or e["margins"]
         near, least = set(e["alternatives"]), {}
-        for name, by in sorted(margins.items(), key=lambda item: item[1]):
+        for name, by in sorted(e["margins"].items(), key=lambda item: item[1]):
             least.setdefault(load(name).called, by)
         for called, by in list(least.items())[:MOST_RIVALS]:
             if called in near:

@@ -29,6 +29,9 @@ REFITS = 3
 MINOR = 0.3
 """Forward selection: a further effect must explain this share of the model error that resembles it [1]."""
 
+PHYSICAL = 0.5
+"""Forward selection: a set within physical bounds goes first if it explains this share of what the best does [1]."""
+
 Note = Callable[[str], None]
 
 
@@ -86,13 +89,33 @@ def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None
             first.append(candidate.placed(own, problem.setting.course.channels))
             at += len(candidate.columns)
         tried.append(refine(problem.setting, [*problem.placed, *first], problem.null))
-    tried.sort(key=lambda model: model.half_bic)
     if not tried:
         return None
+    tried = physical_first(tried, selection.model)
     for model in (without_minor(tried, selection.model), tried[0]):
         if necessity(problem.setting, model, selection.model, problem.null, selection.tests.pooled) >= NEEDED_Z:
             return model
     return None
+
+
+def physical_first(tried: list[Refined], current: Refined) -> list[Refined]:
+    """Return models, the best first, but those with a number at a physical bound behind those without.
+
+    A stand-in that would need an unphysical size is never named. What it stands in for may explain a little less.
+
+    Args:
+        tried: Models that add to the current one.
+        current: It.
+    """
+    ordered = sorted(tried, key=lambda model: model.half_bic)
+    worth = PHYSICAL * (current.half_bic - ordered[0].half_bic)
+    ahead = [m for m in ordered if not _at_bound(m, current) and current.half_bic - m.half_bic >= worth]
+    return [*ahead, *(m for m in ordered if m not in ahead)]
+
+
+def _at_bound(model: Refined, current: Refined) -> bool:
+    """Return whether a number of what a model adds is at a physical bound."""
+    return any(model.errors(k)[1] for k in range(len(current.placed), len(model.placed)))
 
 
 def _is_minor(selection: Selection, best: Refined) -> bool:

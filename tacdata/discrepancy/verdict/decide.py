@@ -13,8 +13,6 @@ from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.search.elimination import LARGEST_P
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gate import GATE
-from tacdata.discrepancy.search.j_test import NEEDED_Z
-from tacdata.discrepancy.search.rivals import required_margin
 from tacdata.discrepancy.search.shortlist import RIVAL_Z
 from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
 from tacdata.discrepancy.verdict.confidence import confidence, features
@@ -29,6 +27,10 @@ LEFT_T = 2.0
 """Leftovers: they count from so many standard errors over episodes on [1]."""
 GAP_T = 3.0
 """Leftovers: without any effect that helps, they are a gap from so many standard errors on [1]."""
+SAME_SIZE = 0.1
+"""Constancy: an effect whose size spreads by so little over all conditions is a mechanism, whatever is left [1]..."""
+ALIKE_SIZE = 0.2
+"""...and by so little it is surely of its family. Stand-ins spread by more, but for those that look the same [1]."""
 SETTLED_Z = 5.0
 """J test: a rival beaten by so many standard errors is out, whatever the answer leaves [1]."""
 LOUD = 2.0
@@ -119,7 +121,13 @@ def decide(
     answer = answer_of(found)
     status, reason = _status(found, answer)
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
-    levels = [finest(found, f, own.get(f.placed.effect.name)) for f in answer]
+    levels = [finest(f) for f in answer]
+    if reason is Reason.LEFTOVERS and (shown is None or not len(shown.names) or shown.shrinks):
+        levels = [beside_much(found, f, own.get(f.placed.effect.name)) for f in answer]
+        if any(levels):
+            status, reason = INCOMPLETE, Reason.INCOMPLETE
+        elif any(stands(found, f, own.get(f.placed.effect.name)) for f in answer):
+            status, reason = "ambiguous", Reason.RIVALS
     if status == "named" and any(stands_in(found, f) for f in answer):
         # One of several names may stand in for a part of what has none: only the others are sure.
         levels = [None if stands_in(found, f) else level for f, level in zip(answer, levels, strict=True)]
@@ -156,32 +164,54 @@ def refuted(found: Findings, answer: list[FoundEffect], shown: Gap | None) -> bo
     return not raced or found.explained / judged * len(shown.names) >= SHOULD_SHOW
 
 
-def finest(found: Findings, finding: FoundEffect, beside: BesideRemainder | None) -> Level | None:
-    """Return the finest level at which an effect may be named; None if none holds.
-
-    Beside a remainder where there is one: what separates two effects must lie beyond what else may be missing.
-    """
+def finest(finding: FoundEffect) -> Level | None:
+    """Return the finest level at which an effect may be named; None if none holds."""
     if not _needed(finding) or finding.at_bound:
         return None
-    if beside is not None and beside.necessity < NEEDED_Z:
+    mine = finding.placed.effect
+    if any(load(name).family is not mine.family for name in finding.rivals):
         return None
-    near, mine = _near(finding, beside), finding.placed.effect
-    if any(load(name).family is not mine.family for name in near):
-        return None
-    if near:
+    if finding.rivals:
         return Level.FAMILY
     return Level.MECHANISM if any(by < RIVAL_Z for by in finding.forms.values()) else Level.FORM
 
 
-def _near(finding: FoundEffect, beside: BesideRemainder | None) -> set[str]:
-    """Return the mechanisms that may stand in for an effect, beside a remainder where there is one."""
-    rivals = set(finding.rivals)
-    if beside is None:
-        return rivals
-    close = {n for n, by in beside.margins.items() if by < required_margin(finding.placed.effect, load(n))}
-    # One that is no better and has more numbers is out, whatever is left.
-    richer = {n for n in close if finding.margins[n] < required_margin(finding.placed.effect, load(n))}
-    return rivals | {load(n).called for n in close - richer}
+def stands(found: Findings, finding: FoundEffect, beside: BesideRemainder | None) -> bool:
+    """Return whether an effect, or one that looks the same, is there beside much that has no name.
+
+    It is needed and explains more than is left. Its size is the same in all conditions: what it stands beside has no
+    reason to follow it there.
+    """
+    if beside is None or not beside.spreads or not _needed(finding) or finding.at_bound:
+        return False
+    return finding.bought >= found.left.gain and max(beside.spreads.values()) <= ALIKE_SIZE
+
+
+def beside_much(found: Findings, finding: FoundEffect, beside: BesideRemainder | None) -> Level | None:
+    """Return the finest level of an effect beside much that has no name; None if none holds.
+
+    How exactly its size is the same in all conditions says how fine the name may be.
+    """
+    level = finest(finding)
+    if level is None or beside is None or not stands(found, finding, beside):
+        return None
+    same = max(beside.spreads.values()) <= SAME_SIZE
+    fine = level is not Level.FAMILY and same and not _untried_kin(found, finding)
+    return Level.MECHANISM if fine else Level.FAMILY
+
+
+def _untried_kin(found: Findings, finding: FoundEffect) -> set[str]:
+    """Return mechanisms of its group that do the same at rest, and were not held against it.
+
+    They look alike but for their exact form, and what is left may lend it.
+    """
+    mine, tried = finding.placed.effect, {load(name).called for name in finding.margins}
+    every = {c.effect.called: c.effect for c in found.problem.candidates}
+    kin = {
+        called for called, e in every.items()
+        if mine.at_rest is not None and (e.family, e.group, e.at_rest) == (mine.family, mine.group, mine.at_rest)
+    }  # fmt: skip
+    return kin - tried - {mine.called}
 
 
 def _needed(finding: FoundEffect) -> bool:
@@ -258,5 +288,7 @@ def _decided(
     if verdict == INCOMPLETE:
         return Decided(finding, "suspected" if level is None else "named", values, None, level, beside)
     status = "suspected" if verdict == "unknown" else settled(finding) if level is not None else "ambiguous"
+    if beside is not None and not stands(found, finding, beside):
+        status = "suspected"
     sure = confidence(values) if status == "named" else None
     return Decided(finding, status, values, sure, None if status == "suspected" else level, beside)

@@ -106,6 +106,7 @@ def _effect(decided: Decided) -> dict[str, Any]:
     if decided.beside is not None:
         written["beside_remainder"] = {
             "necessity": decided.beside.necessity, "margins": _bounded(decided.beside.margins),
+            "spreads": {name: round(by, 4) for name, by in decided.beside.spreads.items()},
         }  # fmt: skip
     return written
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
-from tacdata.discrepancy.verdict.decide import LEFT_T, Decision, Reason
+from tacdata.discrepancy.verdict.decide import LEFT_T, SHARE_LEFT_ALONE, Decided, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import worsened
 
@@ -41,9 +41,11 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             more = "" if found.left.t < LEFT_T else f"; {100 * found.share_left:.1f} % of it is another form"
             return f"{names}: nothing else explains the episodes as well{more}"
         case Reason.RIVALS:
-            return _undecided(decision)
+            closed = _closed(decision, shown)
+            either_way = f"; either way {closed} is closed" if closed else ""
+            return _undecided(decision) + either_way + _nameless(found, SHARE_LEFT_ALONE)
         case Reason.INCOMPLETE:
-            return _incomplete(decision, found.share_left, shown)
+            return _incomplete(decision, shown) + _nameless(found, 0.0)
         case Reason.SEALED:
             return f"{names} fits the presses that were judged; the sealed ones do not bear it out: not the name"
         case Reason.LEFTOVERS:
@@ -59,17 +61,37 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             return "something is missing that no modelled effect explains"
 
 
-def _incomplete(decision: Decision, share: float, shown: Gap | None) -> str:
-    """Return what has a name, how fine it is, what it closes, and how much has none."""
-    words = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is not None))
+def _incomplete(decision: Decision, shown: Gap | None) -> str:
+    """Return what has a name, how fine it is, and what it closes."""
+    sure = [e for e in decision.effects if e.level is not None]
+    words = list(dict.fromkeys(_called(e) for e in sure))
     open_ones = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is None))
-    said = f"{_listed(words, 'and')} {'is' if len(words) == 1 else 'are'} there"
+    said, closed = f"{_listed(words, 'and')} {'is' if len(words) == 1 else 'are'} there", _closed(decision, shown)
+    said += f" and {'closes' if len(words) == 1 else 'close'} {closed}" if closed else ""
+    return said + (f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else "")
+
+
+def _called(decided: Decided) -> str:
+    """Return an effect by the level at which it is named; a family with what fits best."""
+    effect = decided.finding.placed.effect
+    return f"{effect.family.value} ({effect.called} fits best)" if decided.level is Level.FAMILY else effect.called
+
+
+def _closed(decision: Decision, shown: Gap | None) -> str:
+    """Return what is closed of the gap on sealed episodes, by effects with a name if there are any; empty if unsure."""
     sealed = shown.document() if shown is not None and len(shown.before) else {}
-    if sealed.get("certain") and sealed["closed"] > 0:
-        closes = "closes" if len(words) == 1 else "close"
-        said += f" and {closes} {100 * sealed['closed']:.0f} % of the gap on sealed presses"
-    said += f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else ""
-    return f"{said}; {100 * share:.0f} % of what could be explained has no name yet"
+    if not sealed.get("certain"):
+        return ""
+    each, own = sealed["shares"], [e.finding.placed.effect.name for e in decision.effects if e.level is not None]
+    share = sum(each.get(name, 0.0) for name in own) if own and any(each.values()) else sealed["closed"]
+    return f"{100 * share:.0f} % of the gap on sealed presses" if share > 0 else ""
+
+
+def _nameless(found: Findings, least: float) -> str:
+    """Return how much has no name, from a least share on [1]."""
+    if found.left.t < LEFT_T or found.share_left < least:
+        return ""
+    return f"; {100 * found.share_left:.0f} % of what could be explained has no name yet"
 
 
 def _undecided(decision: Decision) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.recording.check.channel_order import Answers
 from tacdata.recording.check.figures import RecordingFigures
 from tacdata.recording.check.idle import idle_rows
 
@@ -14,12 +13,8 @@ CLEAR = 20.0
 """Answer from which its time can be told [times the noise]."""
 FEW = 10
 """Readings without contact that are needed [count]."""
-INSIDE = 0.5
-"""Distance of a press from the outermost taxels' centres, inwards, from which its centre of answer is used [mm]."""
-FEWEST = 4
-"""Presses on both sides of a slip, at least [count]."""
-SLIP = (0.7, 7.0)
-"""Slip that is reported: at least so far [mm], and so many times its own standard error [1]."""
+FELT = 0.25
+"""Share of a press's greatest answer at which its height is taken [1]: low, as a curved answer moves high shares."""
 
 
 def reading_lag(figures: RecordingFigures) -> float | None:
@@ -28,6 +23,25 @@ def reading_lag(figures: RecordingFigures) -> float | None:
     Taken where answer and depth cross half of their greatest value, going in and coming out. A curved answer moves
     both crossings in opposite ways, so the mean is the delay. What remains is the skin's own: its creep and hysteresis.
     """
+    felt, episode = _felt(figures, 0.5), figures.recording.episode
+    if felt is None:
+        return None
+    depth = np.maximum(episode.tip_at(episode.taxels.sample_ns)[:, 2], 0.0)
+    gone = _crossings(depth, float(depth.max()), 0.5, episode.taxels.sample_ns)
+    return None if gone is None else float(np.mean(felt - gone) / 1e6)
+
+
+def height_felt(figures: RecordingFigures) -> float | None:
+    """Return the depth at which `FELT` of the press's greatest answer is felt [mm]; None where it cannot be told.
+
+    The mean of going in and coming out, in which a delay cancels. A gain does not enter.
+    """
+    felt = _felt(figures, FELT)
+    return None if felt is None else float(figures.recording.episode.tip_at(felt)[:, 2].mean())
+
+
+def _felt(figures: RecordingFigures, share: float) -> np.ndarray | None:
+    """Return when the clearest channel first passes a share of its greatest answer, and when last [ns], shape (2,)."""
     episode = figures.recording.episode
     time_ns, idle = episode.taxels.sample_ns, idle_rows(episode)
     if idle.sum() < FEW or not len(episode.tip_ns) or episode.press.depth < CONTACT:
@@ -41,12 +55,7 @@ def reading_lag(figures: RecordingFigures) -> float | None:
     channel = int(np.argmax(greatest / noise))
     if greatest[channel] < CLEAR * noise[channel]:
         return None
-    depth = np.maximum(episode.tip_at(time_ns)[:, 2], 0.0)
-    felt = _crossings(np.abs(change[:, channel]), float(greatest[channel]), time_ns)
-    gone = _crossings(depth, float(depth.max()), time_ns)
-    if felt is None or gone is None:
-        return None
-    return float(np.mean(felt - gone) / 1e6)
+    return _crossings(np.abs(change[:, channel]), float(greatest[channel]), share, time_ns)
 
 
 def loading(figures: RecordingFigures) -> float:
@@ -55,15 +64,15 @@ def loading(figures: RecordingFigures) -> float:
     return 1e3 * press.deepest / press.speed
 
 
-def _crossings(values: np.ndarray, greatest: float, time_ns: np.ndarray) -> np.ndarray | None:
-    """Return when half of the greatest value is first passed upwards and last passed downwards [ns], shape (2,)."""
-    above = np.flatnonzero(values > greatest / 2)
+def _crossings(values: np.ndarray, greatest: float, share: float, time_ns: np.ndarray) -> np.ndarray | None:
+    """Return when a share of the greatest value is first passed upwards and last downwards [ns], shape (2,)."""
+    above = np.flatnonzero(values > share * greatest)
     if not len(above) or above[0] == 0 or above[-1] == len(values) - 1:
         return None
     times = []
     for before in (above[0] - 1, above[-1]):
-        share = (greatest / 2 - values[before]) / (values[before + 1] - values[before])
-        times.append(time_ns[before] + share * (time_ns[before + 1] - time_ns[before]))
+        part = (share * greatest - values[before]) / (values[before + 1] - values[before])
+        times.append(time_ns[before] + part * (time_ns[before + 1] - time_ns[before]))
     return np.array(times)
 
 
@@ -90,29 +99,9 @@ def missing_ends(figures: RecordingFigures) -> tuple[float, float]:
     return float(time_ns[0] - phases[0].start_ns) / 1e6, float(phases[-1].end_ns - time_ns[-1]) / 1e6
 
 
-def slip(found: Answers) -> tuple[int, np.ndarray] | None:
-    """Return the press from which the answers lie elsewhere, and by how much [mm], shape (2,); None if they do not."""
-    centers = found.taxels.centers
-    low, high = centers.min(axis=0) + INSIDE, centers.max(axis=0) - INSIDE
-    rows = np.flatnonzero(np.all((found.sites > low) & (found.sites < high), axis=1))
-    if len(rows) < 2 * FEWEST:
-        return None
-    weight = np.maximum(found.response[rows], 0.0) ** 2
-    total = weight.sum(axis=1)
-    if not total.all():
-        return None
-    sites = found.sites[rows]
-    off = (weight[:, :, None] * centers).sum(axis=1) / total[:, None] - sites
-    base = np.column_stack([np.ones(len(rows)), sites]).astype(float)
-    best: tuple[float, int, np.ndarray] | None = None
-    for at in range(FEWEST, len(rows) - FEWEST + 1):
-        design = np.column_stack([base, (np.arange(len(rows)) >= at).astype(float)])
-        solved, *_ = np.linalg.lstsq(design, off, rcond=None)
-        spread = ((off - design @ solved) ** 2).sum(axis=0) / max(len(rows) - design.shape[1], 1)
-        error = np.sqrt(spread * np.linalg.pinv(design.T @ design)[-1, -1])
-        sure = float((np.abs(solved[-1]) / np.maximum(error, 1e-9)).max())
-        if best is None or sure > best[0]:
-            best = sure, at, solved[-1]
-    if best is None or best[0] < SLIP[1] or np.abs(best[2]).max() < SLIP[0]:
-        return None
-    return int(rows[best[1]]), best[2]
+def ends_before_reports(figures: RecordingFigures) -> float:
+    """Return for how long the controller still reports after the last reading has arrived [ms]."""
+    episode = figures.recording.episode
+    if not len(episode.taxels.arrival_ns) or not len(episode.cnc.arrival_ns) or not episode.complete:
+        return 0.0
+    return float(episode.cnc.arrival_ns[-1] - episode.taxels.arrival_ns[-1]) / 1e6

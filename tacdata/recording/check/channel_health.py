@@ -16,10 +16,14 @@ LIVE = 0.3
 """Noise above which the channels of a board count as live [counts]."""
 EDGE = 2
 """Frames ignored at both ends of a still stretch, because its bounds are estimates [frames]."""
-JUMP = 12.0
+JUMP = 10.0
 """Minimum jump: change between neighbouring frames of a still stretch [times the noise]."""
 JUMP_SHARE = 0.05
 """Minimum jump as a share of the channel's answer to the press [1]; relaxation stays below it."""
+ALONE_SHARE = 0.02
+"""... and without what all channels do at that moment in the ratio of their answers, as relaxation does [1]."""
+ANSWERING, TOGETHER = 20.0, 4
+"""Answer from which a channel tells what all do [times the noise], and how many must [count]."""
 SPIKE, SPIKE_AROUND = 15.0, 5
 """Distance of a spike from the median around it [times the noise], and the frames of that median [count]."""
 LASTS = 3
@@ -136,19 +140,31 @@ def jumps(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jum
         noise: Noise of each channel [counts], shape (taxels,).
         response: Change of each channel from rest to hold [counts], shape (taxels,).
     """
-    threshold = np.maximum(JUMP * np.sqrt(2) * np.maximum(np.nan_to_num(noise, nan=np.inf), 0.5), 0.0)
-    threshold = np.maximum(threshold, JUMP_SHARE * np.abs(np.nan_to_num(response)))
+    usual, size_of = _usual(noise), np.abs(np.nan_to_num(response))
+    least = JUMP * np.sqrt(2) * usual
+    clear = np.flatnonzero(size_of > ANSWERING * usual)  # none where a reading is no number
     found: dict[int, Jump] = {}
     phase = episode.phase_at(episode.taxels.sample_ns)
     for name in ("rest", "hold"):
         rows = np.flatnonzero(phase == PHASES.index(name))[EDGE : -EDGE or None]
         if len(rows) < 2 * LASTS + 2:
             continue
-        for channel, place, size in _lasting(episode.taxels.counts[rows], threshold):
+        counts = episode.taxels.counts[rows]
+        sudden = _lasting(counts, np.maximum(least, JUMP_SHARE * size_of))
+        if len(clear) >= TOGETHER and np.isfinite(counts).all():
+            together = np.median((counts - counts[0])[:, clear] / response[clear], axis=1)
+            sudden += _lasting(counts - together[:, None] * response, np.maximum(least, ALONE_SHARE * size_of))
+        for channel, place, size in sudden:
             jump = Jump(channel, int(episode.taxels.sample_ns[rows[place]]), size)
             if channel not in found or abs(size) > abs(found[channel].size):
                 found[channel] = jump
     return [found[channel] for channel in sorted(found)]
+
+
+def _usual(noise: np.ndarray) -> np.ndarray:
+    """Return the noise to compare with [counts]: a second of rest may show too little of one channel's by chance."""
+    others = float(np.nanmedian(noise)) if np.isfinite(noise).any() else 0.0
+    return np.maximum(np.nan_to_num(noise, nan=np.inf), max(others / 2, 0.5))
 
 
 def spikes(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jump]:
@@ -159,7 +175,7 @@ def spikes(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Ju
         noise: Noise of each channel [counts], shape (taxels,).
         response: Change of each channel from rest to hold [counts], shape (taxels,).
     """
-    threshold = SPIKE * np.maximum(np.nan_to_num(noise, nan=np.inf), 0.5)
+    threshold = SPIKE * _usual(noise)
     threshold = np.maximum(threshold, JUMP_SHARE * np.abs(np.nan_to_num(response)))
     found: dict[int, Jump] = {}
     phase = episode.phase_at(episode.taxels.sample_ns)

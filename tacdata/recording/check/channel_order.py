@@ -27,13 +27,13 @@ ROUNDS = 4
 """Passes in which width, amplitudes and gains are fitted in turn [count]."""
 CLEAR = 8.0
 """Minimum gain in log-likelihood by which another place must explain a channel's answers [1]."""
-STEP = 0.5
+STEP = 0.25
 """Minimum gain step that is reported [1]."""
 SURE = 7.0
 """... and minimum ratio to its own standard error [1]."""
 NEAR = 0.15
 """Share of a press's strongest answer from which a channel counts as near it [1]."""
-SIDE = 3
+SIDE = 2
 """Presses that a channel must have answered on both sides of a step [count]."""
 SILENT = 6.0
 """Answer to a near press that a working channel exceeds [times its noise]."""
@@ -92,13 +92,15 @@ class AnswerFit:
     """Gain of each channel relative to the others [1], shape (taxels,)."""
     pattern: np.ndarray
     """Predicted answer of a channel of gain 1 at each place [counts], shape (presses, taxels)."""
+    amplitude: np.ndarray
+    """Predicted answer of a channel of gain 1 below the indenter [counts], shape (presses,)."""
 
 
 def fit_answers(found: Answers, place: np.ndarray | None = None) -> AnswerFit:
     """Fit the answers robustly, with channel k at place ``place[k]`` (default: its own)."""
     place = np.arange(found.response.shape[1]) if place is None else place
     response, squared = found.response, found.distance[:, place] ** 2
-    gain, pattern = np.ones(response.shape[1]), np.zeros_like(response)
+    gain, pattern, amplitude = np.ones(response.shape[1]), np.zeros_like(response), np.zeros(len(response))
     weight = np.ones_like(response)
     for _ in range(ROUNDS):
         for name in np.unique(found.indenters):
@@ -108,12 +110,12 @@ def fit_answers(found: Answers, place: np.ndarray | None = None) -> AnswerFit:
             ]
             best = int(np.argmin([misfit for _, misfit in fits]))
             shape = np.exp(-(found.distance[rows] ** 2) / (2 * WIDTHS[best] ** 2))
-            pattern[rows] = fits[best][0][:, None] * shape
+            amplitude[rows], pattern[rows] = fits[best][0], fits[best][0][:, None] * shape
         expected = pattern[:, place]
         weight = _trust(response - expected * gain, found.noise)
         raw = (weight * response * expected).sum(axis=0) / np.maximum((weight * expected**2).sum(axis=0), 1e-12)
         gain = np.clip(raw / max(float(np.median(raw)), 1e-12), 0.2, 5.0)
-    return AnswerFit(gain, pattern)
+    return AnswerFit(gain, pattern, amplitude)
 
 
 def _amplitudes(response: np.ndarray, shape: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, float]:
@@ -177,7 +179,7 @@ def gain_steps(found: Answers) -> dict[int, tuple[int, float]]:
     if len(found.response) < STEP_PRESSES:
         return {}
     pattern = fit_answers(found).pattern
-    near = (pattern > NEAR * pattern.max(axis=1, keepdims=True)) & (pattern > SILENT * found.noise)
+    near = _near(found, pattern)
     ratio = np.full(pattern.shape, np.nan)
     ratio[near] = np.log(np.clip(found.response[near] / pattern[near], 0.05, 20.0))
     ratio -= _common(found, ratio)
@@ -191,6 +193,17 @@ def gain_steps(found: Answers) -> dict[int, tuple[int, float]]:
         if step is not None:
             steps[channel] = (int(rows[step[0]]), float(np.exp(step[1])))
     return steps
+
+
+def _near(found: Answers, pattern: np.ndarray) -> np.ndarray:
+    """Return which presses are near which channels, shape (presses, taxels), bool."""
+    return (pattern > NEAR * pattern.max(axis=1, keepdims=True)) & (pattern > SILENT * found.noise)
+
+
+def unknown_gains(found: Answers) -> list[int]:
+    """Return the channels with too few presses near them for telling a step of their gain."""
+    near = _near(found, fit_answers(found).pattern).sum(axis=0)
+    return np.flatnonzero(near < 2 * SIDE).tolist()
 
 
 def _common(found: Answers, ratio: np.ndarray) -> np.ndarray:

@@ -77,12 +77,10 @@ def clock_words(clock: dict[str, Any] | None) -> str:
     if not clock["steady"]:
         return "too unsteady to be followed, so sample times are arrival times"
     drift = "" if clock["drift"] is None else f"drift {clock['drift']:+.0f} +- {clock['drift_uncertainty']:.0f} ppm, "
-    tap = (
-        "constant delay not measured (record --sync-tap)"
-        if clock["latency"] is None
-        else f"constant delay {clock['latency']:.1f} +- {clock['latency_uncertainty']:.1f} ms taken off"
-    )
-    return f"clock: {drift}delay {clock['delay']:.1f} ms beyond the least, jitter {clock['jitter']:.1f} ms; {tap}"
+    words = f"clock: {drift}delay {clock['delay']:.1f} ms beyond the least, jitter {clock['jitter']:.1f} ms"
+    if clock["latency"] is None:
+        return words
+    return f"{words}; constant delay {clock['latency']:.1f} +- {clock['latency_uncertainty']:.1f} ms taken off"
 
 
 def _rounded(value: float, digits: int = 3) -> float:

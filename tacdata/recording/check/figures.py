@@ -18,6 +18,7 @@ from tacdata.recording.check.channel_health import (
     undefined_channels,
 )
 from tacdata.recording.check.clocks import clock_figures, round_trip
+from tacdata.recording.clocks.stream_pairs import StreamPair, stream_pairs
 from tacdata.recording.episode import Episode
 from tacdata.recording.files.reader import Recording
 
@@ -46,9 +47,25 @@ def figures(recording: Recording) -> RecordingFigures:
         "complete": episode.complete,
         "taxels": _taxels(recording, lag),
         "cnc": _cnc(recording),
+        "sync": [
+            {
+                "first": pair.first,
+                "second": pair.second,
+                "offset": None if pair.offset is None else _rounded(pair.offset),
+                "uncertainty": None if pair.uncertainty is None else _rounded(pair.uncertainty),
+            }
+            for pair in recording_pairs(recording)
+        ],
         "cameras": {name: camera_figures(recording, name) for name in recording.images},
     }
     return RecordingFigures(recording, document, lag)
+
+
+def recording_pairs(recording: Recording) -> tuple[StreamPair, ...]:
+    """Return every pair of a recording's streams, and what is known of the time between them."""
+    streams = ["taxels", *(f"camera {name}" for name in recording.images)]
+    clocks = {name: recording.clocks.get(name) for name in streams}
+    return stream_pairs({name: clock.latency if clock else None for name, clock in clocks.items()})
 
 
 def _taxels(recording: Recording, lag: np.ndarray) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.recording.check.alignment import loading, missing_ends, other_place, reading_lag
+from tacdata.recording.check.alignment import ends_before_reports, loading, missing_ends, other_place, reading_lag
 from tacdata.recording.check.camera_findings import camera_warnings
 from tacdata.recording.check.channel_health import held_frames, spikes
 from tacdata.recording.check.clocks import clock_warnings
@@ -123,7 +123,17 @@ def _taxels(figures: RecordingFigures) -> list[Judgement]:
         found.append((WARNING, "taxels", text))
     if values["latency"] / _rate_of_clock(figures) > LATENCY_MS:
         found.append((WARNING, "taxels", f"the host was up to {values['latency']:.0f} ms late in reading"))
+    elif (silent := _longest_silence(figures)) > LATENCY_MS * _rate_of_clock(figures):
+        found.append((WARNING, "taxels", f"the host read nothing for {silent:.0f} ms, then what had waited"))
     return found
+
+
+def _longest_silence(figures: RecordingFigures) -> float:
+    """Return the longest time in which nothing arrived though readings were taken [ms]."""
+    stream = figures.recording.episode.taxels
+    longest = int(np.argmax(np.diff(stream.arrival_ns)))
+    taken = stream.sample_ns[longest + 1] - stream.sample_ns[longest]
+    return float(stream.arrival_ns[longest + 1] - stream.arrival_ns[longest] - taken) / 1e6
 
 
 def _line(counts: dict) -> list[str]:
@@ -187,6 +197,9 @@ def _together(figures: RecordingFigures) -> list[Judgement]:
         found.append((UNUSABLE, "taxels", f"they begin {late:.0f} ms after the press does"))
     if short > allowed:
         found.append((UNUSABLE, "taxels", f"they end {short:.0f} ms before the press does"))
+    elif (early := ends_before_reports(figures)) > allowed:
+        text = f"they end {early:.0f} ms before the controller's reports: the press is whole, the board fell silent"
+        found.append((WARNING, "taxels", text))
     lag = reading_lag(figures)
     off = figures.document["cnc"]["hold_error"] or 0.0
     # Where the guide was not where it should be, nothing can be said of when it was.

@@ -102,8 +102,11 @@ def answer(figures: RecordingFigures) -> float | None:
     depth = episode.tip_at(episode.taxels.sample_ns)[:, 2]
     noise = np.array([np.nan if v is None else v for v in figures.document["taxels"]["idle_noise"]], float)
     away, inside = depth < 0, depth > max(0.8 * float(depth.max()), CONTACT)
-    if not away.any() or not inside.any() or not np.isfinite(noise).any():
+    if not away.any() or not inside.any():
         return None
     counts = episode.taxels.counts
-    change = np.abs(np.nanmedian(counts[inside], axis=0) - np.nanmedian(counts[away], axis=0))
-    return float(np.nanmax(change / np.maximum(noise, 1e-9)))
+    known = np.isfinite(noise) & np.isfinite(counts[inside]).any(axis=0) & np.isfinite(counts[away]).any(axis=0)
+    if not known.any():
+        return None
+    change = np.abs(np.nanmedian(counts[inside][:, known], axis=0) - np.nanmedian(counts[away][:, known], axis=0))
+    return float((change / np.maximum(noise[known], 1e-9)).max())

@@ -15,7 +15,7 @@ from tacdata.recording.check.figures import RecordingFigures, figures
 from tacdata.recording.check.findings import UNUSABLE, WARNING, Finding, findings
 from tacdata.recording.check.imported import imported_summary, is_imported
 from tacdata.recording.check.possible import ANSWER, CONTACT, answer
-from tacdata.recording.check.session import session_findings
+from tacdata.recording.check.session import session_findings, session_not_assessed
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.session import read_session
 
@@ -29,6 +29,8 @@ class Report:
     episodes: tuple[RecordingFigures, ...]
     """Figures of every recording that could be read."""
     findings: tuple[Finding, ...]
+    not_assessed: tuple[str, ...] = ()
+    """What the recordings cannot tell, and why, as sentences."""
 
     @property
     def usable(self) -> bool:
@@ -43,6 +45,7 @@ class Report:
             "source": self.source.name,
             "usable": self.usable,
             "findings": [asdict(finding) for finding in self.findings],
+            "not_assessed": list(self.not_assessed),
             "episodes": [entry.document for entry in self.episodes],
         }
 
@@ -52,8 +55,8 @@ class Report:
         lines = [f"{self.source}: {len(self.episodes)} recordings"]
         imported = bool(self.episodes) and is_imported(self.episodes[0].recording.episode)
         told = imported_summary(self.episodes) if imported else _summary([entry.document for entry in self.episodes])
-        lines += told
-        lines += _not_assessed(self.episodes)
+        lines += [*_sync_words(self.episodes), *told]
+        lines += [f"  NOT ASSESSED  {text}" for text in self.not_assessed]
         lines += _grouped(self.findings) or ["nothing to remark"]
         return "\n".join([*lines, "usable" if self.usable else "NOT usable as it is"])
 
@@ -80,7 +83,7 @@ def check(path: Path) -> Report:
     path = Path(path)
     if path.is_file():
         entry = figures(read_recording(path))
-        return Report(path, (entry,), tuple(findings(entry)))
+        return Report(path, (entry,), tuple(findings(entry)), tuple(_not_assessed([entry])))
     if not path.is_dir():
         raise UsageError(f"no file or folder {path}", "a recording or a session folder", "check the path")
     session = read_session(path)
@@ -91,7 +94,10 @@ def check(path: Path) -> Report:
             found += findings(entries[-1])
         except FormatError as error:
             found.append(Finding(UNUSABLE, "recording", file.name, error.given))
-    return Report(path, tuple(entries), (*found, *_of_session(session, entries)))
+    unknown = _not_assessed(entries)
+    if entries and not is_imported(entries[0].recording.episode):
+        unknown += session_not_assessed(entries)
+    return Report(path, tuple(entries), (*found, *_of_session(session, entries)), tuple(unknown))
 
 
 def _of_session(session: Any, entries: list[RecordingFigures]) -> list[Finding]:
@@ -115,12 +121,32 @@ def _unanswered(entries: list[RecordingFigures]) -> list[Finding]:
     return [Finding(UNUSABLE, "taxels", "", text)]
 
 
-def _not_assessed(entries: tuple[RecordingFigures, ...]) -> list[str]:
+def _not_assessed(entries: list[RecordingFigures]) -> list[str]:
     """Say what the recordings cannot tell."""
     pressed = [entry for entry in entries if entry.recording.episode.press.depth >= CONTACT]
     blind = sum(answer(entry) is None for entry in pressed)
     words = f"{blind} of {len(pressed)} presses have no rest, no contact or no noise to compare"
-    return [f"  NOT ASSESSED  whether the readings answer contact: {words}"] if blind else []
+    return [f"whether the readings answer contact: {words}"] if blind else []
+
+
+def _sync_words(entries: tuple[RecordingFigures, ...]) -> list[str]:
+    """Say how far every pair of streams may be off in time, or that it was not measured."""
+    pairs: dict[str, list[dict[str, Any]]] = {}
+    for entry in entries:
+        for pair in entry.document["sync"]:
+            pairs.setdefault(f"{pair['first']} - {pair['second']}", []).append(pair)
+    measured, unknown = [], []
+    for name, said in pairs.items():
+        known = [pair for pair in said if pair["offset"] is not None]
+        if len(known) < len(said):
+            unknown.append(name + (f" (in {len(said) - len(known)} of {len(said)})" if known else ""))
+        if known:
+            offset, off = _middle(pair["offset"] for pair in known), max(pair["uncertainty"] for pair in known)
+            measured.append(f"{name} {offset:+.2f} +- {off:.2f} ms, taken off")
+    lines = [f"  sync    {words}" for words in measured]
+    imported = bool(entries) and is_imported(entries[0].recording.episode)
+    why = "the source's times are taken as they are" if imported else "record --sync-tap"
+    return [*lines, f"  sync    not measured: {', '.join(unknown)} ({why})"] if unknown else lines
 
 
 def _summary(documents: list[dict[str, Any]]) -> list[str]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.stats import theilslopes
 
-from tacdata.recording.check.alignment import loading, reading_lag, slip
+from tacdata.recording.check.alignment import FELT, loading, reading_lag
 from tacdata.recording.check.channel_order import (
+    STEP_PRESSES,
     Answers,
     answers,
     counts_as_press,
@@ -14,9 +16,13 @@ from tacdata.recording.check.channel_order import (
     orders,
     silent,
     unanswered,
+    unknown_gains,
 )
+from tacdata.recording.check.clocks import DRIFT_PPM
 from tacdata.recording.check.figures import RecordingFigures
-from tacdata.recording.check.findings import UNUSABLE, WARNING, Finding
+from tacdata.recording.check.findings import DEPTH_MM, UNUSABLE, WARNING, Finding
+from tacdata.recording.check.possible import ANSWER, CONTACT, answer
+from tacdata.recording.check.session_steps import TELLING, height_step, slip, strength_step
 
 TURNED = ("turned by 180 deg", "mirrored along x", "mirrored along y")
 """Texts for the usual wrong orders of a plug (`channel_order.orders`)."""
@@ -34,13 +40,18 @@ LAG_DEPTH = 0.2
 """Error of the depth by that delay that makes a recording unusable [mm]."""
 FEWEST = 4
 """Recordings needed for comparing their delays or noise [count]."""
+PLAIN = 4.0
+"""How far beyond what counts as an answer the other presses' answers must lie [1]."""
+NOT_FELT = "the tip did not reach the skin, or the board does not see it"
+MIDDLE, LEANING = 0.8, 300
+"""Share of a drift that the middle of the latencies must show, too [1], and how many of them are looked at [count]."""
 LOUDER = 3.0
 """Warning threshold: noise of a recording over that of the session's quiet ones [1]."""
 
 
 def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
     """Return findings on the channels, from their answers to the session's presses."""
-    apart = [*_delays(entries), *_louder(entries)]
+    apart = [*_delays(entries), *_louder(entries), *_drifts(entries), *_not_felt(entries)]
     found = answers(entries)
     if found is None:
         return apart
@@ -56,11 +67,29 @@ def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
         text = f"channel {channel} answers {factor:.2f} times as strongly from about {names[press]} on"
         texts.append((UNUSABLE, text))
     texts += [(WARNING, text) for text in _offsets(entries, found)]
-    if not moved and (slipped := slip(found)):
-        at, (x, y) = slipped
-        words = "the tool or the skin slipped, or the registration changed"
-        texts.append((UNUSABLE, f"answers lie x {x:+.1f}, y {y:+.1f} mm elsewhere from {names[at]} on: {words}"))
+    if not moved:
+        texts += _steps(entries, found, names)
     return [*apart, *(Finding(severity, "taxels", "", text) for severity, text in texts)]
+
+
+def session_not_assessed(entries: list[RecordingFigures]) -> list[str]:
+    """Say which changes within the session its presses cannot tell, and why."""
+    found = answers(entries)
+    presses = 0 if found is None else len(found.response)
+    if found is None or presses < STEP_PRESSES:
+        return [f"whether gains, wiring or the tool changed: {presses} presses, at least {STEP_PRESSES} are needed"]
+    if unanswered(found):
+        return []
+    words = []
+    if few := unknown_gains(found):
+        words.append(f"whether the gain of channel {', '.join(map(str, few))} steps: too few presses near it")
+    unsure = {"strength of all answers": strength_step(entries, found), "height of the tool": height_step(entries)}
+    words += [
+        f"whether the {what} steps: depths, sites and indenters explain it as well, or answers scatter too much"
+        for (what, search), least in zip(unsure.items(), TELLING, strict=True)
+        if search.step is None and search.smallest > least
+    ]
+    return words
 
 
 def _delays(entries: list[RecordingFigures]) -> list[Finding]:
@@ -79,6 +108,78 @@ def _delays(entries: list[RecordingFigures]) -> list[Finding]:
             severity = UNUSABLE if depth > LAG_DEPTH else WARNING
             found.append(Finding(severity, "taxels", episode.path.name, f"{text}: {depth:.2f} mm of depth"))
     return found
+
+
+def _drifts(entries: list[RecordingFigures]) -> list[Finding]:
+    """Find the recordings in which the board's clock runs otherwise than in the session's others."""
+    clocks = [(entry, entry.document["taxels"]["clock"]) for entry in entries]
+    known = [(entry, clock) for entry, clock in clocks if clock and clock["steady"] and clock["drift"] is not None]
+    if len(known) < FEWEST:
+        return []
+    usual, found = float(np.median([clock["drift"] for _, clock in known])), []
+    for entry, clock in known:
+        off = clock["drift"] - usual
+        if abs(off) <= max(DRIFT_PPM, 3 * clock["drift_uncertainty"]):
+            continue
+        # What is far off its nominal rate is named in the recording itself.
+        named = abs(clock["drift"]) - 2 * clock["drift_uncertainty"] > DRIFT_PPM
+        if abs(off + _lean(entry)) > MIDDLE * DRIFT_PPM and not named:
+            text = f"its clock runs {off:+.0f} ppm otherwise than in the session's other recordings"
+            found.append(Finding(WARNING, "taxels", entry.recording.episode.path.name, text))
+    return found
+
+
+def _lean(entry: RecordingFigures) -> float:
+    """Return by how much the middle of the latencies leans against the clock's line, which lies below them [ppm].
+
+    In a recording of seconds a few early frames lead the line astray; they do not lead the middle.
+    """
+    every = max(len(entry.lag) // LEANING, 1)
+    time_ms = entry.recording.episode.taxels.sample_ns[::every] / 1e6
+    return 1e6 * float(np.asarray(theilslopes(entry.lag[::every], time_ms - time_ms[0]))[0])
+
+
+def _not_felt(entries: list[RecordingFigures]) -> list[Finding]:
+    """Find the presses that no channel answers, where the session's others of their depth are felt."""
+    known = [
+        (entry, press, felt)
+        for entry in entries
+        if (press := entry.recording.episode.press).depth >= CONTACT and (felt := answer(entry)) is not None
+    ]
+    usual = [felt for _, press, felt in known if felt >= PLAIN * ANSWER]
+    felt_from = min((press.depth for _, press, felt in known if felt >= PLAIN * ANSWER), default=np.inf)
+    if 2 * len(usual) < len(known):
+        return []
+    return [
+        Finding(UNUSABLE, "taxels", entry.recording.episode.path.name, f"no channel answers to this press: {NOT_FELT}")
+        for entry, press, felt in known
+        if felt < ANSWER and press.depth >= felt_from and _over_taxels(entry)
+    ]
+
+
+def _over_taxels(entry: RecordingFigures) -> bool:
+    press, taxels = entry.recording.episode.press, entry.recording.episode.sensor.taxels
+    apart = np.linalg.norm(taxels.centers - np.array([press.x, press.y]), axis=1)
+    return bool(apart.min() < 0.75 * max(taxels.pitch_x, taxels.pitch_y))
+
+
+def _steps(entries: list[RecordingFigures], found: Answers, names: list[str]) -> list[tuple[str, str]]:
+    """Describe a step of all answers: sideways, else in height, else in strength, as each changes what follows it."""
+    if slipped := slip(found):
+        x, y = slipped.size
+        words = "the tool or the skin slipped, or the registration changed"
+        return [(UNUSABLE, f"answers lie x {x:+.1f}, y {y:+.1f} mm elsewhere from {names[slipped.row]} on: {words}")]
+    if step := height_step(entries).step:
+        height = float(step.size[0]) / (1 - FELT)
+        way = "deeper" if height > 0 else "higher"
+        words = f"the skin is felt about {abs(height):.2f} mm {way} from {names[step.row]} on"
+        severity = UNUSABLE if abs(height) > DEPTH_MM[1] else WARNING
+        return [(severity, f"{words}: the tool or the skin slipped, or the registration changed")]
+    if step := strength_step(entries, found).step:
+        factor = float(np.exp(step.size[0]))
+        words = "the board's gain or supply changed, or the skin did"
+        return [(UNUSABLE, f"all channels answer {factor:.2f} times as strongly from {names[step.row]} on: {words}")]
+    return []
 
 
 def _louder(entries: list[RecordingFigures]) -> list[Finding]:

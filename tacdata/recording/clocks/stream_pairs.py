@@ -1,36 +1,60 @@
-"""How far two streams of a recording may be off in time, in words that stand in its file."""
+"""How far two streams of a recording may be off in time: offset and uncertainty of every pair, or "not measured"."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import combinations
 
 from tacdata.recording.clocks.clock_model import StreamLatency
 
 MOTION = "motion"
 """The stream that sync taps measure the others against."""
-NOT_MEASURED = "not measured (record --sync-tap)"
+NOT_MEASURED = "not measured"
 
 
-def stream_pairs(latencies: dict[str, StreamLatency | None]) -> dict[str, str]:
-    """Return offset and uncertainty of every pair of streams [ms], by "FIRST - SECOND"; the offsets are taken off.
-
-    Args:
-        latencies: Constant latency of each stream beside the motion, measured by a sync tap, or None.
+@dataclass(frozen=True)
+class StreamPair:
+    """Two streams, and what a sync tap measured of the constant delay between them.
 
     Example:
-        ``stream_pairs({"taxels": StreamLatency(6_100_000, 300_000)})["taxels - motion"]`` is
-        ``+6.10 +- 0.30 ms, taken off``.
+        ``stream_pairs({"taxels": StreamLatency(6_100_000, 300_000)})[0].words`` is ``+6.10 +- 0.30 ms, taken off``.
     """
-    found = {f"{name} - {MOTION}": _words(latency, StreamLatency(0, 0)) for name, latency in latencies.items()}
-    for first, second in combinations(sorted(latencies), 2):
-        found[f"{first} - {second}"] = _words(latencies[first], latencies[second])
-    return found
+
+    first: str
+    second: str
+    offset: float | None = None
+    """How much later the first stream comes [ms]; taken off its times. None if it was not measured."""
+    uncertainty: float | None = None
+    """Of the offset [ms], one standard deviation."""
+
+    @property
+    def name(self) -> str:
+        """``FIRST - SECOND``."""
+        return f"{self.first} - {self.second}"
+
+    @property
+    def words(self) -> str:
+        """Offset and uncertainty, or that they were not measured."""
+        if self.offset is None:
+            return NOT_MEASURED
+        return f"{self.offset:+.2f} +- {self.uncertainty:.2f} ms, taken off"
 
 
-def _words(first: StreamLatency | None, second: StreamLatency | None) -> str:
-    if first is None or second is None:
-        return NOT_MEASURED
-    offset = (first.latency_ns - second.latency_ns) / 1e6
-    uncertainty = math.hypot(first.uncertainty_ns, second.uncertainty_ns) / 1e6
-    return f"{offset:+.2f} +- {uncertainty:.2f} ms, taken off"
+def stream_pairs(latencies: dict[str, StreamLatency | None], motion: bool = True) -> tuple[StreamPair, ...]:
+    """Return every pair of streams.
+
+    Args:
+        latencies: Constant latency of each stream, or None.
+        motion: Whether the recording holds a motion, too; latencies are measured against it.
+    """
+    beside = {MOTION: StreamLatency(0, 0)} if motion else {}
+    ordered = {**dict(sorted(latencies.items())), **beside}
+    return tuple(_pair(first, second, ordered[first], ordered[second]) for first, second in combinations(ordered, 2))
+
+
+def _pair(first: str, second: str, one: StreamLatency | None, other: StreamLatency | None) -> StreamPair:
+    if one is None or other is None:
+        return StreamPair(first, second)
+    offset = (one.latency_ns - other.latency_ns) / 1e6
+    return StreamPair(first, second, offset, math.hypot(one.uncertainty_ns, other.uncertainty_ns) / 1e6)

@@ -122,6 +122,9 @@ class EpisodeWriter:
         if path.exists():
             raise UsageError(f"{path} exists", "a recording is never overwritten", "choose another session folder")
         self.path, self._clock = path, clock
+        taxels = [f"taxels {board}" for board in boards] or ["taxels"]
+        self._streams = [*taxels, *(f"camera {camera}" for camera in cameras)]
+        self._moves = "controller.json" in header.attachments
         self.begun_ns = clock.now_ns()
         """Host time of creation [ns]; what arrived before belongs to no recording or to the one before."""
         try:
@@ -277,7 +280,8 @@ class EpisodeWriter:
             for name, model in (clock_models or {}).items():
                 self._file.describe(f"clock_model/{name}", model.document)
             known = {k: m.latency for k, m in (clock_models or {}).items() if isinstance(m, ClockModel)}
-            self._file.describe("sync", stream_pairs(known))
+            pairs = stream_pairs({**dict.fromkeys(self._streams), **known}, self._moves)
+            self._file.describe("sync", {pair.name: pair.words for pair in pairs})
             for name, count in (counts or {}).items():
                 self._file.describe(f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()})
             self._file.describe("episode", {"complete": json.dumps(complete), "reason": reason})

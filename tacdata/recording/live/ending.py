@@ -4,23 +4,27 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tacdata.errors import TacdataError
 from tacdata.recording.files import file_names
 from tacdata.recording.live.guarded_motion import GuardedMotion
 
 
-def ending(motion: GuardedMotion, lost: str, data: tuple[str, ...], command: str) -> str:
-    """Return the lines.
+def ending(motion: GuardedMotion, lost: str, data: tuple[str, ...], command: str, error: BaseException) -> str:
+    """Return the lines; what the error itself says is not said again.
 
     Args:
         motion: What moved.
         lost: Why the position is not known, in words; empty if it is.
         data: What is on the disk, a line each.
         command: How to go on.
+        error: What broke the session off.
     """
+    said = error.given if isinstance(error, TacdataError) else ""
     first = "find its zero again (home it, or touch off), then " if lost else ""
-    position = (f"zero:   LOST: {lost}",) if lost else ()
+    position = ("zero:   LOST" + (f": {lost}" if lost != said else ""),) if lost else ()
     lines = (*motion.ending, *position, *(f"data:   {line}" for line in data), f"then:   {first}{command}")
-    return "\n".join(f"  {line}" for line in lines)
+    known = f" ({said})" if said else ""
+    return "\n".join(f"  {line.replace(known, '') if known else line}" for line in lines)
 
 
 def on_disk(folder: Path, presses: int) -> tuple[str, ...]:

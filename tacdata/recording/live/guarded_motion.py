@@ -27,6 +27,8 @@ LETTING_GO = 10.0
 REASON = 1.0
 """How long a stream that stopped the motion may take to give its reason [s of real time]."""
 BY_HAND = "; free it by hand"
+LATER = "; leave it, the next start lifts it straight up"
+"""Where a machine at rest keeps its position: a tip that is freed by hand loses it."""
 STALL = 3.0
 """Time that this computer may stand still while the guide moves [s of real time]: suspended, or a closed lid."""
 
@@ -42,7 +44,8 @@ class GuardedMotion:
         self._why = "nothing was stopped"
         self._path: AllowedPath | None = None
         self._at: Position | None = None  # where the last path ended
-        self._lifted, self._still = "", False
+        self._lifted, self._clear, self._still = "", False, False
+        self._reported: Position | None = None  # latest position reported when the last stop was over
         self._rising: float | None = None  # machine height to which a lift is under way, or was when it broke off
 
     def off_path(self, status: CncStatus) -> DeviceError | None:
@@ -92,7 +95,10 @@ class GuardedMotion:
                 raise streams.fault or failure[0]
         except BaseException:
             self.stop()
-            self._let_go(work)
+            try:
+                self._let_go(work)
+            finally:
+                self._reported = streams.position
             raise
         self._at = next((step.target for step in reversed(path) if step.target), start)
         return self._at
@@ -109,7 +115,7 @@ class GuardedMotion:
         """After a stop: wait until the motion's thread sends nothing more, then empty the controller's queue."""
         self._rest, self._why, self._lifted = None, "interrupted while it was being stopped", ""
         self._rising = None
-        self._still = False
+        self._clear = self._still = False
         work.join(LETTING_GO)
         if work.is_alive():
             self._why = "the motion's thread does not end"
@@ -154,26 +160,32 @@ class GuardedMotion:
 
     def lift(self, height: float, speed: float) -> str:
         """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; return the result as a sentence."""
-        self._lifted = f"the indenter was not lifted (interrupted){BY_HAND}"
+        self._lifted = f"the indenter was not lifted (interrupted){self._advice}"
         self._lifted = self._lift(height, speed)
         return self._lifted
 
     def _lift(self, height: float, speed: float) -> str:
         if self._rest is None:
-            return f"the indenter was not lifted ({self._why}){BY_HAND}"
+            return f"the indenter was not lifted ({self._why}){self._advice}"
         x, y, z = self._rest
         try:
             if z < height:
                 self._rising = height
-                self._lifted = f"the indenter was not lifted all the way (interrupted){BY_HAND}"
+                self._lifted = f"the indenter was not lifted all the way (interrupted){self._advice}"
                 self._allowed.move((x, y, height), speed, self._clock.now_ns())
                 self._cnc.move((x, y, height), speed)
                 self._cnc.wait_idle(MARGIN + (height - z) / speed)
                 self._rising = None
         except TacdataError as error:
-            return f"the indenter was not lifted all the way: {error.given}{BY_HAND}"
-        self._at = x, y, max(z, height)
-        return f"the indenter was lifted off the skin, straight up from {z:.3f} to {max(z, height):.3f} mm"
+            return f"the indenter was not lifted all the way: {error.given}{self._advice}"
+        self._at, self._clear = (x, y, max(z, height)), True
+        if z >= height:
+            return f"the indenter stands clear of the skin, at machine height {z:.3f} mm"
+        return f"the indenter was lifted off the skin, straight up from {z:.3f} to {height:.3f} mm"
+
+    @property
+    def _advice(self) -> str:
+        return BY_HAND if self._cnc.position_lost else LATER
 
     def go_on(self) -> Position:
         """After a stop and a lift: accept steps again, and return where the guide stands [mm].
@@ -190,7 +202,7 @@ class GuardedMotion:
     @property
     def lifted(self) -> bool:
         """Whether the tip was lifted after the last stop."""
-        return self._rest is not None and self._rising is None and self._lifted.startswith("the indenter was lifted")
+        return self._rest is not None and self._rising is None and self._clear
 
     @property
     def ending(self) -> tuple[str, ...]:
@@ -201,17 +213,22 @@ class GuardedMotion:
             lost = self._cnc.position_lost
             return (f"motion: the machine moved while homing{f', and {lost}: its position is lost' if lost else ''}",)
         if self._lifted or self._halted.is_set():
-            tip = self._lifted or f"the indenter was not lifted{BY_HAND}"
+            tip = (self._lifted or f"the indenter was not lifted{self._advice}").replace(f" ({self._why})", "")
             if self._still:
-                return f"motion: stopped ({self._why})", f"tip:    {tip}"
+                stands = "" if "stands at" in self._why else self._last_seen
+                return f"motion: stopped ({self._why}){stands}", f"tip:    {tip}"
             if self._rest is None:
-                return (f"motion: NOT KNOWN to have stopped ({self._why}); if it moves, press the emergency stop",
-                        f"tip:    {tip}")  # fmt: skip
+                words = f"motion: NOT KNOWN to have stopped ({self._why}){self._last_seen}"
+                return f"{words}; if it moves, press the emergency stop", f"tip:    {tip}"
             if self._rising is not None:
                 up = f"motion: on its way straight up from {_text(self._rest)} to z {self._rising:.2f} mm when it ended"
                 return f"{up}; it stands somewhere on it", f"tip:    {tip}"
             return f"motion: stopped at {_text(self._rest)} mm", f"tip:    {tip}"
         return (f"motion: at rest at {_text(self._at)} mm" if self._at else "motion: NOT KNOWN to have stopped",)
+
+    @property
+    def _last_seen(self) -> str:
+        return f"; it last reported {_text(self._reported)} mm" if self._reported else ""
 
 
 def _look_again(looked: float, now: float) -> float:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from tacdata.devices.device import Camera, MotionController, TaxelBoard, create
 from tacdata.errors import UsageError
 from tacdata.rig import Rig
+from tacdata.sensor import Sensor
 
 
 @dataclass(frozen=True)
@@ -47,3 +48,18 @@ class RigDevices:
                 stack.enter_context(camera)
             stack.enter_context(self.cnc)
             yield self
+
+
+def require_channels(board: TaxelBoard, sensor: Sensor, what: str = "the board", remedy: str = "--sensor") -> None:
+    """Hold a board against the skin that is said to lie on it.
+
+    Raises:
+        UsageError: If it sends another number of channels than the sensor has taxels.
+    """
+    sent, wanted = board.describe().get("channels"), sensor.taxels.count
+    if sent is not None and sent != wanted:
+        raise UsageError(
+            f"{what} sends {sent} channels, and the sensor {sensor.name} has {wanted} taxels",
+            "a channel for each taxel",
+            f"name the skin's own file with {remedy}, or correct the board's format in the rig file",
+        )

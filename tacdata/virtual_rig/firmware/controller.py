@@ -33,12 +33,12 @@ class Controller:
         self, clock: Clock, seed: int = 0, position: tuple[float, float, float] = (-1.0, -1.0, -1.0),
         homed: bool = True, settings: dict[str, str] | None = None,
         offset: tuple[float, float, float] = (0.0, 0.0, 0.0), firmware: str = "Grbl", fresh: bool = False,
-        port: VirtualPort | None = None,
+        port: VirtualPort | None = None, echo: bool = False,
     ) -> None:  # fmt: skip
         """Switch on a machine at ``position`` [mm, machine]; ``offset`` is its G54 [mm].
 
         ``firmware`` is Grbl or grblHAL; a ``fresh`` one has empty memory. ``port`` is the line to the host, by
-        default a pseudo-terminal.
+        default a pseudo-terminal. With ``echo`` received lines are sent back, as FluidNC's ``$GCode/Echo=on`` does.
         """
         self.clock = clock
         self.port = port or VirtualPort(115200, seed)
@@ -50,7 +50,7 @@ class Controller:
         )
         self.heard: list[tuple[int, int]] = []
         """Real-time bytes other than ``?`` and when they came [ns]."""
-        self._fresh, self._muted = fresh, False
+        self._fresh, self._muted, self._echo = fresh, False, echo
         self._to_controller: Wire = lambda line: line
         self._to_host: Wire = lambda line: line
         self._lines: deque[tuple[int, str]] = deque()
@@ -195,6 +195,8 @@ class Controller:
             if not self.machine.admits(line, now):
                 return
             self._lines.popleft()
+            if self._echo:
+                self._say(now, f"[echo: {line}]")
             self.machine.execute(line, now)
 
     def _serve_output(self, now: int) -> None:

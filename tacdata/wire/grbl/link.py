@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,7 @@ from tacdata.clock import Clock
 from tacdata.errors import DeviceError
 from tacdata.wire.delivered import CncStatus
 from tacdata.wire.grbl import codes
+from tacdata.wire.grbl.answers import ECHO, changed_on_its_way, refusal
 from tacdata.wire.grbl.lines import ALARM, RESPONSE, WELCOME, StatusReport, parse_status
 from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.statuses import Statuses
@@ -60,6 +62,10 @@ class GrblLink:
         self.fault: DeviceError | None = None
         self.lost = ""
         """Why the position is not known any more, in words; empty while it is."""
+        self.echoes = False
+        """Whether the controller sends received lines back, so that they can be compared."""
+        self.halted = False
+        """Whether the controller itself has ended all motion: an alarm, a restart, motors switched off."""
         self.pendant = False
         """Whether a pendant has control, as far as a report has said."""
         self.interruption: DeviceError | None = None
@@ -69,8 +75,7 @@ class GrblLink:
         self.homing = False
         self._held = False
         self._unanswered: deque[_Line] = deque()
-        # It is looked at once a poll.
-        step = max(0.25, 2.0 / (poll_rate * clock.rate))
+        step = max(0.25, 2.0 / (poll_rate * clock.rate))  # it is looked at once a poll
         self._silence = Patience(SILENCE, clock.rate, SILENCE, step, clock.host)
         self._unread = ""  # the latest report that could not be read, since one that could
         self._commanded_ns = clock.now_ns()
@@ -177,7 +182,8 @@ class GrblLink:
         heard = () if line.startswith("$") else entry.pushed
         self.wait(lambda: entry.answer is not None, Owed(f"an answer to {line!r}", limit, motion, heard, True))
         answered_ns = self.clock.now_ns()
-        self._raise_if_refused(entry)
+        if wrong := refusal(line, entry.answer or ""):
+            raise wrong
         return entry.pushed, sent_ns, answered_ns
 
     def wait(self, reached: Callable[[], bool], owed: Owed, through_hold: bool = False) -> None:
@@ -247,24 +253,6 @@ class GrblLink:
 
     def _room(self) -> int:
         return self.rx_bytes - sum(len(line.text) + 1 for line in self._unanswered)
-
-    def _raise_if_refused(self, entry: _Line) -> None:
-        answer = entry.answer or ""
-        if answer == "ok":
-            return
-        accepted = "a line that it accepts in its present state"
-        if not (code := RESPONSE.match(answer)):
-            lost = f"the line {entry.text!r} was dropped by a reset"
-            raise DeviceError(lost, accepted, "send it again when the machine is idle")
-        why = codes.error_in_words(int(code[1])) if code[1] else answer
-        damaged = code[1] and int(code[1]) in codes.DAMAGED_LINE
-        raise DeviceError(
-            f"the controller refused {entry.text!r}: {why}",
-            accepted,
-            "it was well formed: bytes of it were lost or changed on their way, so check cable, ground and baud rate"
-            if damaged and not entry.text.startswith("$")
-            else "correct the controller's settings",
-        )
 
     def _begin(self, work: Callable[[], None], name: str) -> None:
         thread = self.clock.host.thread(work, name)
@@ -341,6 +329,7 @@ class GrblLink:
             del buffer[: max(0, len(buffer) - 4096)]
 
     def _take(self, line: str, arrival_ns: int) -> None:
+        changed = None
         with self._changed:
             if line.startswith("<"):
                 report = parse_status(line)
@@ -353,20 +342,30 @@ class GrblLink:
                 self._take_response(line)
             elif alarm := ALARM.match(line):
                 kept = alarm[1] and int(alarm[1]) in codes.POSITION_KEPT
+                self.halted = True
                 self._fail(
                     f"the controller stopped with {codes.alarm_in_words(int(alarm[1])) if alarm[1] else line}",
                     "motion without an alarm",
-                    "free the machine by hand if need be, then home it and start again",
+                    "unlock it ($X) in a terminal, which keeps the position, then start again"
+                    if kept
+                    else "free the machine by hand if need be, then home it and start again",
                     lost=not kept,
                 )
             elif WELCOME.search(line):
                 self._take_welcome(line)
+            elif self._unanswered and (echo := ECHO.match(line)):
+                changed = changed_on_its_way(self._unanswered[0].text, echo[1])
+                self.echoes = True
+                self.interruption = self.interruption or changed
             elif self._unanswered:
                 self._unanswered[0].pushed.append(line)
             else:
                 self.notes.append(line)
             del self.notes[:-200]
             self._changed.notify_all()
+        if changed:
+            with suppress(DeviceError):  # a broken line is known already
+                self.hold()
 
     def _take_response(self, line: str) -> None:
         if not self._unanswered:
@@ -384,6 +383,7 @@ class GrblLink:
             self._unanswered.popleft().answer = "reset"
         if not self._welcome_expected:
             given, allowed, remedy = WELCOME_IN_MID_STREAM
+            self.halted = True
             self._fail(given.format(line), allowed, remedy, lost=True)
 
     def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
@@ -394,7 +394,7 @@ class GrblLink:
         if self.polled and not self._welcome_expected:
             wrong, for_good = what_is_wrong(report, self._held, self.homing)
             if wrong and for_good:
-                known = self.fault is not None  # an alarm whose own line came first has said what is lost
-                self._fail(*wrong, lost=not known)
+                self.halted = True
+                self._fail(*wrong, lost=self.fault is None)  # an alarm's own line, if it came first, said what is lost
             elif wrong and self.interruption is None:
                 self.interruption = DeviceError(*wrong)

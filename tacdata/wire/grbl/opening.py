@@ -15,6 +15,8 @@ FIRST_QUERY = 0.25
 """Interval between queries while nothing is received [s, real time]."""
 ANSWER = 10.0
 """Timeout for the answer to a ``$`` command or a reset [s of the clock]; an alarm alone takes Grbl 0.5 s."""
+ATTEMPTS, SETTLE = 3, 0.5
+"""Questions for the version [count], and the pause after one in which late answers come [s, real time]."""
 TALKS = ("Idle", "Alarm")
 """States in which ``$`` commands are answered."""
 FULL_SPEED = (b"\x90", b"\x95")
@@ -103,9 +105,29 @@ def clear(link: GrblLink) -> str:
             "Idle",
             REMEDIES.get(state.split(":")[0], "bring it to Idle, then try again"),
         )
+    attune(link)
     for override in FULL_SPEED:
         link.realtime(override)
     return found
+
+
+def attune(link: GrblLink) -> None:
+    """Ask for the version until question and answer belong together.
+
+    A program that ended may have left half a line in the controller's buffer, or answers that are still to come. The
+    question makes half a line of motion invalid; ending that line otherwise might carry it out.
+
+    Raises:
+        DeviceError: If the question is refused each time.
+    """
+    for attempt in range(1, ATTEMPTS + 1):
+        try:
+            if any(line.startswith("[VER:") for line in link.command("$I", ANSWER)[0]):
+                return
+        except DeviceError:
+            if attempt == ATTEMPTS or link.fault:
+                raise
+        link.clock.host.sleep(SETTLE)
 
 
 def locked(link: GrblLink, settings: GrblSettings) -> DeviceError:

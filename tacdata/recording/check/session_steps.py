@@ -1,0 +1,136 @@
+"""Do all answers step within a session, in place, in strength or in height? Each press is held against all others.
+
+A regression explains what differs between presses by their depth, site, speed and indenter, and by a steady drift.
+A step from one press on is a further column (the Chow test with an unknown break). Strength is the amplitude of the
+answers. Height is the depth at which a share of a press's greatest answer is felt: it does not depend on gains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.plans import Press
+from tacdata.recording.check.alignment import height_felt
+from tacdata.recording.check.channel_order import Answers, counts_as_press, fit_answers
+from tacdata.recording.check.figures import RecordingFigures
+
+FEWEST = 4
+"""Presses on both sides of a step, at least [count]."""
+FREEDOM = 6
+"""Presses beyond the columns of the regression that its residual spread needs [count]."""
+SURE = 7.0
+"""Minimum ratio of a step to its own standard error [1]; at most 4 in 300 sessions without one."""
+SLIP = 0.5
+"""Slip sideways that is reported [mm]."""
+STRONGER = 0.18
+"""Step of the logarithm of all answers that is reported [1]: a factor of 1.2."""
+HIGHER = 0.06
+"""Step of the height that is reported [mm]."""
+INSIDE = 0.5
+"""Distance of a press from the outermost taxels' centres, inwards, from which its centre of answer is used [mm]."""
+TELLING = (0.7, 0.4)
+"""Step of the logarithm of all answers [1], and of the height [mm], that a session should be able to tell."""
+
+
+@dataclass(frozen=True)
+class AnswerStep:
+    """A step of all answers."""
+
+    row: int
+    """Which of the answers comes first after it, from 0."""
+    size: np.ndarray
+    """By how much [unit of what steps], shape (quantities,)."""
+
+
+@dataclass(frozen=True)
+class StepSearch:
+    """What a search for a step came to."""
+
+    step: AnswerStep | None
+    """The step, if there is a sure one."""
+    smallest: float
+    """Smallest step half-way through the session that would be sure; infinite if none would be."""
+
+
+def find_step(explained: np.ndarray, values: np.ndarray, least: float) -> StepSearch:
+    """Search for a step.
+
+    Args:
+        explained: Columns that explain the values otherwise, shape (presses, columns).
+        values: What was measured, shape (presses, quantities).
+        least: Smallest step that is reported [unit of the values].
+    """
+    count, best, middle = len(values), None, np.inf
+    for at in range(FEWEST, count - FEWEST + 1):
+        step = (np.arange(count) >= at).astype(float)
+        own = step - explained @ np.linalg.lstsq(explained, step, rcond=None)[0]
+        design = np.column_stack([explained, step])
+        freedom = count - int(np.linalg.matrix_rank(design))
+        if freedom < FREEDOM or own @ own < 1e-6 * count:
+            continue
+        solved = np.linalg.lstsq(design, values, rcond=None)[0]
+        spread = ((values - design @ solved) ** 2).sum(axis=0) / freedom
+        error = np.maximum(np.sqrt(spread / (own @ own)), 1e-9)
+        sure = float((np.abs(solved[-1]) / error).max())
+        if best is None or sure > best[0]:
+            best = sure, at, solved[-1]
+        middle = min(middle, SURE * float(error.max())) if abs(at - count / 2) <= 1 else middle
+    if best is None or best[0] < SURE or np.abs(best[2]).max() < least:
+        return StepSearch(None, middle)
+    return StepSearch(AnswerStep(best[1], best[2]), middle)
+
+
+def slip(found: Answers) -> AnswerStep | None:
+    """Return from which press on the answers lie elsewhere, and where [mm, sensor frame]; None if they do not."""
+    centers = found.taxels.centers
+    low, high = centers.min(axis=0) + INSIDE, centers.max(axis=0) - INSIDE
+    rows = np.flatnonzero(np.all((found.sites > low) & (found.sites < high), axis=1))
+    weight = np.maximum(found.response[rows], 0.0) ** 2
+    total = weight.sum(axis=1)
+    if len(rows) < 2 * FEWEST or not total.all():
+        return None
+    sites = found.sites[rows]
+    off = (weight[:, :, None] * centers).sum(axis=1) / total[:, None] - sites
+    step = find_step(np.column_stack([np.ones(len(rows)), sites]), off, SLIP).step
+    return None if step is None else AnswerStep(int(rows[step.row]), step.size)
+
+
+def strength_step(entries: list[RecordingFigures], found: Answers) -> StepSearch:
+    """Search for a step of the logarithm of all answers."""
+    presses = [entry.recording.episode.press for entry in entries if counts_as_press(entry)]
+    amplitude = fit_answers(found).amplitude
+    known = np.flatnonzero(amplitude > 0)
+    depth = np.log([presses[k].depth for k in known])
+    explained = np.column_stack([_explained([presses[k] for k in known]), depth, depth**2])
+    return _back(find_step(explained, np.log(amplitude[known])[:, None], STRONGER), known)
+
+
+def height_step(entries: list[RecordingFigures]) -> StepSearch:
+    """Search for a step of the height at which the skin is felt [mm], positive if it is felt deeper."""
+    pressed = [entry for entry in entries if counts_as_press(entry)]
+    heights = [height_felt(entry) for entry in pressed]
+    known = np.array([k for k, height in enumerate(heights) if height is not None], int)
+    if not len(known):
+        return StepSearch(None, np.inf)
+    presses = [pressed[k].recording.episode.press for k in known]
+    depth = np.array([press.deepest for press in presses])
+    values = np.array([heights[k] for k in known], float)
+    return _back(find_step(np.column_stack([_explained(presses), depth]), values[:, None], HIGHER), known)
+
+
+def _back(search: StepSearch, known: np.ndarray) -> StepSearch:
+    """Count presses among all that were used, not among those in which the quantity is known."""
+    if search.step is None:
+        return search
+    return StepSearch(AnswerStep(int(known[search.step.row]), search.step.size), search.smallest)
+
+
+def _explained(presses: list[Press]) -> np.ndarray:
+    """Return the columns for site, time, speed and kind of press, scaled to about 1, shape (presses, columns)."""
+    kinds = [(p.mounting, p.approach_from, p.overshoot > 0) for p in presses]
+    table = np.array([(p.x, p.y, np.log(p.speed), p.overshoot) for p in presses], float)
+    table = (table - table.mean(axis=0)) / np.maximum(table.std(axis=0), 1e-9)
+    each = [[float(kind == known) for known in sorted(set(kinds))] for kind in kinds]
+    return np.column_stack([each, table, table[:, :2] ** 2, np.linspace(-1.0, 1.0, len(presses))])

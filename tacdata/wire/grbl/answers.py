@@ -1,0 +1,49 @@
+"""What comes back for a line: was it refused, and did it arrive as it was sent?
+
+No released Grbl 1.1, grblHAL or FluidNC takes a checksum on a line: a changed one is carried out if it can be read.
+Each can send a received line back before carrying it out: FluidNC with ``$GCode/Echo=on``, Grbl and grblHAL built with
+``REPORT_ECHO_LINE_RECEIVED``. Such an echo is compared with what was sent. Without it, a changed line is noticed at the
+next status report, as soon as the machine leaves the path that was sent (`tacdata.recording.motion.allowed_path`).
+"""
+
+from __future__ import annotations
+
+import re
+
+from tacdata.errors import DeviceError
+from tacdata.wire.grbl import codes
+from tacdata.wire.grbl.lines import RESPONSE
+
+ECHO = re.compile(r"^\[(?:MSG:\w+:? ?)?echo: ?(.*?)\]?$")
+"""A received line sent back (Grbl's `report_echo_line_received`); FluidNC leaves the last bracket away."""
+
+
+def refusal(line: str, answer: str) -> DeviceError | None:
+    """Return why a line was not carried out, by its answer; None if it was."""
+    if answer == "ok":
+        return None
+    accepted = "a line that it accepts in its present state"
+    if not (code := RESPONSE.match(answer)):
+        return DeviceError(
+            f"the line {line!r} was dropped by a reset", accepted, "send it again when the machine is idle"
+        )
+    why = codes.error_in_words(int(code[1])) if code[1] else answer
+    damaged = code[1] and int(code[1]) in codes.DAMAGED_LINE
+    return DeviceError(
+        f"the controller refused {line!r}: {why}",
+        accepted,
+        "it was well formed: bytes of it were lost or changed on their way, so check cable, ground and baud rate"
+        if damaged and not line.startswith("$")
+        else "correct the controller's settings",
+    )
+
+
+def changed_on_its_way(sent: str, echo: str) -> DeviceError | None:
+    """Return what is wrong with a line of motion that was sent back; None if it arrived as it was sent."""
+    if sent.startswith("$") or "".join(echo.split()).upper() == sent.upper():
+        return None
+    return DeviceError(
+        f"the line {sent!r} came back as {echo!r}: it was changed on its way, there or back",
+        "an echo that is equal to what was sent",
+        "check cable, ground and baud rate, then start again; a session goes on with --resume",
+    )

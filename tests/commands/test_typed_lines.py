@@ -1,0 +1,34 @@
+"""A line that does not fit a verb is answered as any error: what was given, what is allowed, what is next."""
+
+import pytest
+from running.in_process import tacdata
+
+LINES = {
+    "check": ("tacdata check without path", "tacdata check [OPTIONS]", "name it; tacdata check --help explains each"),
+    "check a b c": ("tacdata check with b c, which it has no place for", "tacdata check [OPTIONS]", "leave it out"),
+    "check --nope a": ("tacdata check with --nope", "--help, --json, --out, --quiet", "tacdata check --help"),
+    "chek a": ("tacdata has no verb 'chek'", "register, record, import, check", "tacdata --help explains each"),
+    "farm nope": ("tacdata farm has no verb 'nope'", "up, send, submit", "tacdata farm --help explains each"),
+    "record --rig": ("--rig without a value", "a value behind it", "name it"),
+    "record --plan p": ("tacdata record without --", "tacdata record [OPTIONS]", "name it; tacdata record --help"),
+    "label --workers x y": ("tacdata label: Invalid value for '--workers'", "tacdata label [OPTIONS]", "--help"),
+}
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_line_that_does_not_fit_says_what_is_allowed_and_what_is_next(line, tmp_path):
+    given, allowed, remedy = LINES[line]
+    done = tacdata(*line.split(), folder=tmp_path)
+    assert done.returncode == 2
+    first, second, third = done.stderr.splitlines()
+    assert first.startswith(f"error: {given}")
+    assert second.startswith("  allowed: ") and allowed in second
+    assert third.startswith("  next:    ") and remedy in third
+    assert done.stdout == ""
+
+
+@pytest.mark.parametrize(("line", "code"), [("--version", 0), ("check --help", 0), ("", 2), ("farm", 2)])
+def test_help_and_version_end_as_before(line, code):
+    done = tacdata(*line.split())
+    assert done.returncode == code
+    assert "tacdata" in done.stdout + done.stderr

@@ -1,0 +1,125 @@
+"""The last lines on the screen, read as the person at the rig: what moved, where the tip is, what is kept, what comes.
+
+Each ending is played in the simulated world, and its words are held against where the tip truly is.
+"""
+
+import re
+import signal
+
+import numpy as np
+import pytest
+from simulated_rig import World
+from simulated_run import Run
+
+MS = 1_000_000
+PRESSING, TRAVELLING = 5.2, 0.6
+"""Times at which the tip is in the skin, and high above it on its way [s]."""
+HERE = r"\(-\d+\.\d\d, -\d+\.\d\d, -38\.80\) mm"
+LIFTED = r"the indenter was lifted off the skin, straight up from -38\.800 to -35\.000 mm"
+LEFT = "the indenter was not lifted; leave it, the next start lifts it straight up"
+BY_HAND = "the indenter was not lifted; free it by hand"
+AGAIN = "the same command with --resume"
+FOUND = f"find its zero again (home it, or touch off), then {AGAIN}"
+
+
+def interrupt(*after_ms):
+    """Press Ctrl-C now, and so much later."""
+
+    def act(world):
+        now = world.schedule.now_ns
+        world.computer.send_signal(signal.SIGINT)
+        for ms in after_ms:
+            world.schedule.at(now + ms * MS, lambda: world.computer.send_signal(signal.SIGINT))
+
+    return act
+
+
+def stall(world):
+    now = world.schedule.now_ns
+    world.computer.stalls.append((now, now + 6000 * MS))
+
+
+ENDINGS = {
+    # what happens: (the error's first words, motion, tip, zero, then)
+    "hard limit": (lambda w: w.controller.inject_alarm(1), r"the controller stopped with ALARM:1",
+                   f"stopped; it last reported {HERE}", BY_HAND, "LOST", FOUND),
+    "soft limit": (lambda w: w.controller.inject_alarm(2), r"the controller stopped with ALARM:2",
+                   f"stopped; it last reported {HERE}", LEFT, None, AGAIN),
+    "brown-out": (lambda w: w.controller.inject_brown_out(), "the controller was reset in mid-stream",
+                  f"stopped; it last reported {HERE}", BY_HAND, "LOST", FOUND),
+    "cable": (lambda w: w.cnc_line.close(), "the line to the controller on .* broke",
+              f"NOT KNOWN to have stopped; it last reported {HERE}; if it moves, press the emergency stop",
+              BY_HAND, "LOST", FOUND),
+    "mute controller": (lambda w: w.controller.inject_wire(to_host=lambda text: None), "motion controller: nothing",
+                        rf"NOT KNOWN to have stopped \(.* is silent: .*\); it last reported {HERE}; if it moves, .*",
+                        BY_HAND, r"LOST: .* is silent: .*", FOUND),
+    "door": (lambda w: w.controller.inject_door(True), "the safety door was opened",
+             rf"stopped \(the safety door is open; the machine stands at {HERE}\)", LEFT, None, AGAIN),
+    "pendant": (lambda w: w.controller.inject_pendant(), "a pendant has taken control",
+                rf"stopped \(a pendant has control of the machine, which stands at {HERE}\)", LEFT, None, AGAIN),
+    "foreign hold": (lambda w: w.controller.inject_byte(0x21), "someone held the motion",
+                     f"stopped at {HERE}", LIFTED, None, AGAIN),
+    "board unplugged": (lambda w: w.board_line.close(), "the line to the taxel board",
+                        f"stopped at {HERE}", LIFTED, None, AGAIN),
+    "saturated board": (lambda w: w.board.inject_readings(lambda counts: np.full_like(counts, 65535.0)),
+                        "taxels: all 24 channels have read 65535", f"stopped at {HERE}", LIFTED, None, AGAIN),
+    "full disk": (lambda w: setattr(w.computer.disk, "room", 100), "writing failed: .*No space left",
+                  f"stopped at {HERE}", LIFTED, None, AGAIN),
+    "closed lid": (stall, "this computer stood still for 6.0 s", f"stopped at {HERE}", LIFTED, None, AGAIN),
+    "Ctrl-C": (interrupt(), "", f"stopped at {HERE}", LIFTED, None, AGAIN),
+    "three Ctrl-C": (interrupt(50, 100), "",
+                     rf"NOT KNOWN to have stopped \(interrupted while it was being stopped\); it last reported {HERE}; "
+                     "if it moves, press the emergency stop", LEFT, None, AGAIN),
+}  # fmt: skip
+
+
+def ended(folder, act, at, **world):
+    """Play a run in which something happens at a time [s]; return the run, and its last lines by their tags."""
+    made = World(3, folder / "session", **world)
+    made.schedule.at(round(at * 1000) * MS, lambda: act(made))
+    try:
+        run = Run(made)
+    finally:
+        made.end()
+    lines = {}
+    for note in getattr(run.error, "__notes__", ()):
+        for line in note.splitlines():
+            tag, _, words = line.strip().partition(":")
+            lines.setdefault(tag, []).append(words.strip())
+    return run, lines
+
+
+@pytest.mark.parametrize("name", ENDINGS)
+def test_the_last_lines_are_true_and_say_what_comes_next(tmp_path, name):
+    act, error, motion, tip, zero, then = ENDINGS[name]
+    run, lines = ended(tmp_path, act, PRESSING)
+    assert re.match(error, str(run.error)), run.error
+    assert re.fullmatch(motion, lines["motion"][0]), lines
+    assert re.fullmatch(tip, lines["tip"][0]), lines
+    assert ("zero" in lines) == (zero is not None)
+    assert zero is None or re.fullmatch(zero, lines["zero"][0]), lines
+    assert lines["then"] == [then]
+    assert list(lines) == [tag for tag in ("motion", "tip", "zero", "data", "then") if tag in lines], "in this order"
+    assert lines["data"][0].startswith("0 of 2 presses are complete in")
+    assert re.fullmatch(r"broken off, readable: episode-000000\.(interrupted-0|partial)\.mcap", lines["data"][1])
+    assert (run.here[2] > -35.02) == (tip == LIFTED), "the tip is where the words say"
+    assert not run.moves_at_the_end
+    reason = getattr(run.error, "given", "no reason")
+    assert not any(reason in line for said in lines.values() for line in said), "nothing is said twice"
+
+
+def test_a_tip_high_above_the_skin_is_not_said_to_have_been_lifted(tmp_path):
+    run, lines = ended(tmp_path, interrupt(), TRAVELLING)
+    assert lines["motion"][0].startswith("stopped at")
+    stands = re.fullmatch(r"the indenter stands clear of the skin, at machine height (\S+) mm", lines["tip"][0])
+    assert stands, lines
+    assert float(stands[1]) == pytest.approx(run.here[2], abs=0.002)
+
+
+def test_before_the_first_move_nothing_was_moved_or_written(tmp_path):
+    run, lines = ended(tmp_path, interrupt(), 0.05)
+    assert isinstance(run.error, KeyboardInterrupt)
+    assert lines["motion"] == ["nothing was moved"]
+    assert lines["data"] == ["nothing was written"]
+    assert lines["then"] == ["the same command"]
+    assert "tip" not in lines

@@ -1,0 +1,30 @@
+"""What people noted of stretches of a recording, as stretches of its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from tacdata.dataset.notes import read_notes
+from viewers.scene.scene import Scene, Span
+
+
+def with_stretch_notes(scene: Scene, root: Path, recording: Callable[[], str]) -> Scene:
+    """Return a scene with the notes of its recording.
+
+    Args:
+        scene: What is shown; its first reading is the notes' zero.
+        root: The session or dataset.
+        recording: Returns the hash of the recording's file; asked only where there are notes.
+
+    Raises:
+        FormatError: If the file of notes is damaged.
+    """
+    notes = read_notes(root)
+    if not notes or not len(scene.taxels.time_ns):
+        return scene
+    digest, first = recording(), int(scene.taxels.time_ns[0])
+    own = sorted((note for note in notes if note.recording == digest), key=lambda note: note.begin)
+    spans = [Span(note.text, first + round(1e9 * note.begin), first + round(1e9 * note.end)) for note in own]
+    return replace(scene, notes=tuple(spans))
