@@ -27,7 +27,7 @@ class SkinMesh:
     >>> from tacdata.skin.mesh.build import MeshSettings, build_mesh
     >>> mesh = build_mesh(default_sensor(), MeshSettings())  # ships with the package
     >>> mesh.nodes.shape, mesh.tets.shape
-    ((10196, 3), (, 10))
+    ((10196, 3), (5561, 10))
     >>> bool((mesh.volumes() > 0).all())
     True
     """
