@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import cached_property
-from itertools import groupby
 
 import numpy as np
 
@@ -104,7 +103,7 @@ class SkinModel:
     def states_many(
         self, requests: Iterable[PressRequest], capacity: int = 1, with_displacement: bool = True
     ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
-        """Solve presses of one shape of indenter, many at a time.
+        """Solve presses, many at a time.
 
         Args:
             requests: What to press.
@@ -123,9 +122,9 @@ class SkinModel:
                 yield number, 0.0, error
         if not possible:
             return
-        batch = self.skin.batch(possible[0][1], min(capacity, len(possible)))
-        if self.device != "cpu":  # A GPU pays for columns that fall idle at the end: the longest paths come first.
-            possible.sort(key=lambda one: -one[1].steps(self.settings.step))
+        batch = self.skin.batch([request for _, request in possible], min(capacity, len(possible)))
+        # Columns that fall idle at the end cost, above all on a GPU: the longest paths come first.
+        possible.sort(key=lambda one: -one[1].steps(self.settings.step))
         presses = (self.skin.placed(number, request) for number, request in possible)
         yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement))
         self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
@@ -163,19 +162,14 @@ class SkinModel:
         Returns:
             One for each request; None where no error is estimated or there is no companion.
         """
-        found: list[CoarsePress | None] = [None] * len(requests)
         if not (self.settings.error_estimate and self.companion):
-            return found
-        for numbers in _by_shape(requests):
-            coarse = press_coarsely(self.companion, [requests[number] for number in numbers], capacity)
-            for number, press in zip(numbers, coarse, strict=True):
-                found[number] = press
-        return found
+            return [None] * len(requests)
+        return list(press_coarsely(self.companion, requests, capacity))
 
     def solve_many(
         self, requests: list[PressRequest], capacity: int = 1, coarse: Sequence[CoarsePress | None] | None = None
     ) -> Iterator[tuple[int, PathSolution | SolveError]]:
-        """Solve presses, many at a time; those of one shape of indenter share a batch.
+        """Solve presses, many at a time.
 
         Args:
             requests: What to press.
@@ -185,21 +179,18 @@ class SkinModel:
         Yields:
             The press's index and its solution, as they are finished; or why it was given up.
         """
-        for numbers in _by_shape(requests):
-            chosen = [requests[number] for number in numbers]
-            rows: dict[int, list[Equilibrium]] = {number: [] for number in numbers}
-            began = time.perf_counter()
-            beside = [coarse[k] for k in numbers] if coarse else self.solve_coarsely(chosen, capacity)
-            for index, _, state in self.states_many(chosen, capacity):
-                number = numbers[index]
-                if isinstance(state, SolveError):
-                    del rows[number]
-                    yield number, state
-                    continue
-                rows[number].append(state)
-                if len(rows[number]) == len(requests[number].depths):
-                    seconds, began = time.perf_counter() - began, time.perf_counter()
-                    yield number, self._answer(requests[number], rows.pop(number), beside[index], seconds)
+        rows: dict[int, list[Equilibrium]] = {number: [] for number in range(len(requests))}
+        began = time.perf_counter()
+        beside = coarse or self.solve_coarsely(requests, capacity)
+        for number, _, state in self.states_many(requests, capacity):
+            if isinstance(state, SolveError):
+                del rows[number]
+                yield number, state
+                continue
+            rows[number].append(state)
+            if len(rows[number]) == len(requests[number].depths):
+                seconds, began = time.perf_counter() - began, time.perf_counter()
+                yield number, self._answer(requests[number], rows.pop(number), beside[number], seconds)
 
     def figures(self, depths: Sequence[float], states: list[Equilibrium]) -> Figures:
         """Return what states (with displacements) at depths [mm] say."""
@@ -272,9 +263,3 @@ class SkinModel:
             penetration=np.array([state.penetration for state in states]),
             provenance=provenance.stamp("tacdata.skin", self.identity, parameters),
         )
-
-
-def _by_shape(requests: Sequence[PressRequest]) -> list[list[int]]:
-    """Return the numbers of requests, those of one shape of indenter together."""
-    order = sorted(range(len(requests)), key=lambda k: requests[k].indenter.shape)
-    return [list(group) for _, group in groupby(order, key=lambda k: requests[k].indenter.shape)]

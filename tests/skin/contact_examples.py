@@ -22,7 +22,7 @@ class PressedSlab:
         """Press; ``places`` are those of the spheres' lowest points [mm], ``moduli`` Young's moduli [MPa]."""
         nodes, faces = torch.as_tensor(body.mesh.nodes), torch.as_tensor(body.mesh.outer)
         held = torch.as_tensor(body.mesh.bottom)
-        self.surface = ContactSurface(nodes, faces, held, SPHERE.distance_function(), friction > 0, 10.0, 30.0)
+        self.surface = ContactSurface(nodes, faces, held, {0.0: SPHERE.distance_function()}, friction > 0, 10.0, 30.0)
         self.conditions = joined(*(conditions(replace(MATERIAL, youngs_modulus=e), friction, SPHERE) for e in moduli))
         count = len(places)
         turn = torch.eye(3, dtype=torch.float64)[:, :, None].repeat(1, 1, count)

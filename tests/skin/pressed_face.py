@@ -35,7 +35,7 @@ class Pressed:
         function, modulus = distance or Sphere(2.0).distance_function(), MATERIAL.youngs_modulus
         held = torch.zeros(len(nodes), dtype=torch.bool) if held is None else torch.as_tensor(held)
         flat = function is board_distance
-        self.surface = ContactSurface(nodes, faces, held, function, rough, ACTIVATION, STICK / modulus, flat)
+        self.surface = ContactSurface(nodes, faces, held, {0.0: function}, rough, ACTIVATION, STICK / modulus, flat)
         self.conditions, self.mesh = joined(*members), mesh
         self.start, self.tangent, self.near = self.surface.start, 0.0, 0.0
 

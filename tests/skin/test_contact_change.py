@@ -31,7 +31,7 @@ class Dent:
         self.held = HeldSlab()
         nodes, faces = torch.as_tensor(self.held.mesh.nodes), torch.as_tensor(self.held.mesh.outer)
         clamped = torch.as_tensor(self.held.mesh.bottom)
-        self.surface = ContactSurface(nodes, faces, clamped, EGG.distance_function(), True, 10.0, 3.0)
+        self.surface = ContactSurface(nodes, faces, clamped, {0.0: EGG.distance_function()}, True, 10.0, 3.0)
         self.conditions = conditions(slab_sensor().material, 0.3, EGG)
         angles = (torch.tensor([angle], dtype=torch.float64) for angle in (0.3, 0.05, -0.04))
         self.pose = Pose(torch.tensor([[0.11], [-0.17], [1.7]], dtype=torch.float64), turned(*angles))

@@ -81,8 +81,8 @@ def test_what_the_indenter_does_is_kept_as_energy():
     """No dissipation: the work along a path is the change of strain energy and of the attraction's potential."""
     skin = model(sticky(Adhesion("exponential", 5.0, 0.1)), cells=6, layers=2, residual=1e-5)
     request = PressRequest(Sphere(2.0), 0.0, 0.0, 0.0, tuple(np.linspace(0.0, 0.2, 9)))
-    batch = skin.skin.batch(request, 1)
-    assert isinstance(skin.skin.surfaces(request)[0], AdhesiveSurface)
+    batch = skin.skin.batch([request], 1)
+    assert isinstance(skin.skin.surfaces([request])[0], AdhesiveSurface)
     kept, force = [], []
     press = skin.skin.placed(0, request)
     for _, _, found in batch.run([press], lambda found: [found]):

@@ -52,7 +52,7 @@ def solved(model, requests, capacity):
 
 def walked(model, presses, request=PRESSES[0]):
     """States of presses that no `PressRequest` can express, in the presses' order; ``request`` says the shape."""
-    batch = model.skin.batch(request, len(presses))
+    batch = model.skin.batch([request], len(presses))
     states = {press.number: [] for press in presses}
     for number, _, state in batch.run(presses, model.skin.reader.states):
         states[number].append(state)
@@ -122,7 +122,7 @@ def test_a_batch_that_shrinks_keeps_everything_of_those_that_go_on(model):
 def test_an_observer_is_told_every_equilibrium_from_the_touch_on(model):
     """With the history that it was found with; depths between those wanted are told, too."""
     told, placed = [], [model.skin.placed(k, PressRequest(Sphere(1.5), 0.3 * k, 0.0, 0.0, (0.4,))) for k in range(2)]
-    batch = model.skin.batch(PRESSES[0], 2)
+    batch = model.skin.batch(PRESSES[:1], 2)
     found = list(batch.run(placed, lambda new: [new.u[..., k] for k in range(len(new.column))], told.append))
     touch, *others = told
     assert touch.u.shape[2] == 2 and not touch.u.any() and not touch.multipliers[0].any()
@@ -134,7 +134,7 @@ def test_an_observer_is_told_every_equilibrium_from_the_touch_on(model):
 
 def test_what_presses_share_does_not_change_while_they_are_solved(model):
     """Mesh, body, surfaces and tangent hold the same objects before and after."""
-    newton = model.skin.newton(PRESSES[0])
+    newton = model.skin.newton(PRESSES[:1])
     shared = [model.skin.mesh, model.skin.body, newton.tangent, *newton.surfaces, newton]
     before = [dict(vars(one)) for one in shared]
     batch = Batch(newton, model.skin.conditions.pressed_by(PRESSES[0].indenter), len(model.mesh.nodes), 1, 0.0)
@@ -333,3 +333,17 @@ def test_more_presses_than_a_card_holds_are_refused_in_words(model, monkeypatch)
     with pytest.raises(SolveError, match="presses at a time on a mesh of") as refusal:
         list(model.states_many(PRESSES[:2], 2))
     assert "fewer at a time" in refusal.value.remedy
+
+
+def test_shapes_share_a_batch_and_none_sees_the_others(model):
+    """Three shapes at once say what each says alone, with room for two, so that a column changes its shape."""
+    shapes = (Sphere(1.5), FlatPunch(0.9, 0.4), Ellipsoid(2.0, 1.4, 1.6))
+    requests = [PressRequest(shape, 0.2, -0.1, 30.0, (0.2, 0.35)) for shape in shapes]
+    together: dict[int, list[float]] = {}
+    for number, _, state in model.states_many(requests, 2):
+        together.setdefault(number, []).append(state.force[2])
+    for number, request in enumerate(requests):
+        alone = [state.force[2] for _, state in model.states(request)]
+        assert together[number] == pytest.approx(alone, rel=1e-3)
+    # Told apart by far more than that.
+    assert len({round(forces[-1], 2) for forces in together.values()}) == 3

@@ -60,7 +60,7 @@ def test_a_state_with_moved_faces_is_what_the_derivative_says():
 
 def _solved(skin, request, state, moved):
     """Force and map of the same press with its held faces moved beforehand; no derivative is used."""
-    press, newton = skin.skin.placed(0, request), skin.skin.newton(request)
+    press, newton = skin.skin.placed(0, request), skin.skin.newton([request])
     place = torch.as_tensor(press.touch - [0, 0, request.depths[0]])[:, None]
     pose, everyone = Pose(place, torch.eye(3, dtype=torch.float64)[..., None]), torch.ones(1, dtype=torch.bool)
     u, histories = torch.as_tensor(state.displacement)[..., None] + moved, (newton.surfaces[0].start(pose),)

@@ -80,7 +80,7 @@ def differences(skin, request, names):
     """Of [force, map, taxel forces, closures], by name at every state; all presses at once, each as if alone."""
     steps = [(name, sign * STEPS.get(name, 2e-6)) for name in names for sign in (1, -1)]
     presses = [moved(skin, request, *step, number) for number, step in enumerate(steps)]
-    batch = skin.skin.batch(request, len(presses))
+    batch = skin.skin.batch([request], len(presses))
     states = [[] for _ in presses]
     for number, _, state in batch.run(presses, skin.skin.reader.states):
         states[number].append((state.force, picture(skin, state), state.taxel_force, state.taxel_closure))

@@ -9,6 +9,7 @@ it is left out far from the solution, where the rest is a majorant. So Newton's 
 jump.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -57,11 +58,13 @@ def _pull(distance, law: str):
     @wp.kernel(module="unique", enable_backward=False)
     def pull(
         u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, adhesion: AdhesionData,
-        friction_tangent: wp.array(dtype=wp.float64), force: wp.array3d(dtype=wp.float64),
-        stiffness: wp.array4d(dtype=wp.float64), energy: wp.array(dtype=wp.float64),
+        chosen: wp.array(dtype=wp.int32), friction_tangent: wp.array(dtype=wp.float64),
+        force: wp.array3d(dtype=wp.float64), stiffness: wp.array4d(dtype=wp.float64),
+        energy: wp.array(dtype=wp.float64),
     ):
         """Attraction of one point, added to the nodes: gap, traction by the law, slope and normal for the stiffness."""
-        f, k, b = wp.tid()
+        f, k, c = wp.tid()
+        b = chosen[c]
         zero = wp.float64(0.0)
         for i in range(4):
             stiffness[f, k, i, b] = zero
@@ -119,16 +122,16 @@ class AdhesiveSurface(ContactSurface):
     """Contact of the outer face with a shape that it sticks to."""
 
     def __init__(
-        self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distance: wp.Function, rough: bool,
-        activation: float, stick: float, adhesion: Adhesion,
+        self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distances: Mapping[float, wp.Function],
+        rough: bool, activation: float, stick: float, adhesion: Adhesion,
     ) -> None:
-        """Bind faces of the mesh, a shape and a law; for the other arguments see `ContactSurface`.
+        """Bind faces of the mesh, shapes and a law; for the other arguments see `ContactSurface`.
 
         Raises:
             UsageError: If there is no such law.
         """
-        super().__init__(nodes, faces, held, distance, rough, activation, stick)
-        self._pull = _pull(distance, adhesion.law)
+        super().__init__(nodes, faces, held, distances, rough, activation, stick)
+        self._law = adhesion.law
         self._adhesion = filled(
             AdhesionData, strength=adhesion.work * _PER_MM / adhesion.range, length=adhesion.range,
             reach=load_adhesion_law(adhesion.law).reach,
@@ -146,11 +149,15 @@ class AdhesiveSurface(ContactSurface):
         nodal = torch.zeros_like(total)
         stiffness = torch.zeros(*self.weights.shape, 4, u.shape[2], dtype=torch.float64, device=u.device)
         energy = torch.zeros(u.shape[2], dtype=torch.float64, device=u.device)
-        wp.launch(
-            self._pull, dim=(*self.weights.shape, u.shape[2]),
-            inputs=[argument(u), self.data, member_data(conditions, pose), self._adhesion, argument(friction_tangent)],
-            outputs=[argument(nodal), argument(stiffness), argument(energy)], device=self.device,
-        )
+        members = member_data(conditions, pose)
+        for distance, chosen in self.by_shape(conditions):
+            wp.launch(
+                _pull(distance, self._law), dim=(*self.weights.shape, len(chosen)),
+                inputs=[
+                    argument(u), self.data, members, self._adhesion, argument(chosen), argument(friction_tangent),
+                ],
+                outputs=[argument(nodal), argument(stiffness), argument(energy)], device=self.device,
+            )
         total += nodal
         tangent = replace(contact.tangent, attraction=stiffness)
         return replace(contact, force=contact.force + nodal.sum(dim=0), tangent=tangent, energy=energy)

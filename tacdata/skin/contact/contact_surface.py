@@ -1,4 +1,4 @@
-"""Contact of faces of the skin with a rigid shape: multipliers at nodes, Coulomb friction.
+"""Contact of faces of the skin with rigid shapes: multipliers at nodes, Coulomb friction.
 
 The normal traction is a piecewise linear field on the four sub-triangles of every quadratic face. Its values at the
 nodes are unknowns (multipliers) beside the displacements. A node either carries pressure, or the mean gap under its hat
@@ -13,6 +13,8 @@ stiffness stays symmetric. Tractions are per undeformed area.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import torch
@@ -32,25 +34,26 @@ SUBDIVISIONS = 2
 
 
 class ContactSurface:
-    """Faces of the mesh against one rigid shape. It holds nothing that changes while presses are solved."""
+    """Faces of the mesh against rigid shapes, one a member. It holds nothing that changes while presses are solved."""
 
     def __init__(
-        self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distance: wp.Function, rough: bool,
-        activation: float, stick: float, flat: bool = False,
+        self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distances: Mapping[float, wp.Function],
+        rough: bool, activation: float, stick: float, flat: bool = False,
     ) -> None:
-        """Bind faces of the mesh and a shape.
+        """Bind faces of the mesh and shapes.
 
         Args:
             nodes: Undeformed positions [mm], shape (n, 3).
             faces: Quadratic triangles, shape (f, 6), int32.
             held: Nodes that cannot move, shape (n,), bool; they carry no multiplier.
-            distance: Signed distance of the shape (`tacdata.indenters.indenter`).
+            distances: Signed distances of the shapes (`tacdata.indenters.indenter`), by their numbers
+                (`tacdata.skin.member.conditions.shape_number`); of a single one the number is not asked for.
             rough: Whether there is friction (its coefficient is each member's own).
             activation: c over Young's modulus: weight of a gap against a pressure in the active set [1/mm].
             stick: Tangential stiffness of sticking nodes over Young's modulus [1/mm].
             flat: Whether the shape's normal is the z axis everywhere.
         """
-        self.faces, self.distance, self.device = faces, distance, str(nodes.device)
+        self.faces, self.distances, self.device = faces, dict(distances), str(nodes.device)
         self.rough, self.activation, self.flat = rough, activation, flat
         self.weights, self.shapes = face_quadrature(nodes, faces, SUBDIVISIONS)
         at_points = hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
@@ -86,6 +89,22 @@ class ContactSurface:
         """Number of contact nodes."""
         return len(self.area)
 
+    @property
+    def only(self) -> wp.Function:
+        """The distance function of a surface that has a single one."""
+        [distance] = self.distances.values()
+        return distance
+
+    def by_shape(self, conditions: Conditions) -> Iterator[tuple[wp.Function, torch.Tensor]]:
+        """Yield each shape's distance function and its members, by index, shape (k,), int32."""
+        everyone = torch.arange(len(conditions.shape), dtype=torch.int32, device=conditions.shape.device)
+        if len(self.distances) == 1:
+            yield self.only, everyone
+            return
+        for number, distance in self.distances.items():
+            if len(chosen := everyone[conditions.shape == number]):
+                yield distance, chosen
+
     def start(self, pose: Pose) -> ContactHistory:
         """Return the history of members without contact, the shape at ``pose``."""
         place = pose.place.clone()
@@ -115,22 +134,24 @@ class ContactSurface:
         """
         count, b = self.count, u.shape[2]
         members = kernels.member_data(conditions, pose)
-        gap = self._zeros(u)
-        wp.launch(
-            kernels.gap_kernel(self.distance), dim=(len(self.faces), b), inputs=[argument(u), self.data, members],
-            outputs=[argument(gap)], device=self.device,
-        )
+        gap, pressed = self._zeros(u), list(self.by_shape(conditions))
+        for distance, chosen in pressed:
+            wp.launch(
+                kernels.gap_kernel(distance), dim=(len(self.faces), len(chosen)),
+                inputs=[argument(u), self.data, members, argument(chosen)], outputs=[argument(gap)], device=self.device,
+            )
         c = self.activation * conditions.modulus
         active = (multiplier - c * (gap - near) > 0) & self.able[:, None]
         pressure = torch.where(active, multiplier, 0.0)
         nodal, normal = torch.zeros_like(total), self._zeros(u, 3)
         points = (0, 0) if self.flat else tuple(self.weights.shape)
         turn = torch.zeros(*points, 6, b, dtype=torch.float32, device=u.device)
-        wp.launch(
-            kernels.pressure_kernel(self.distance), dim=(len(self.faces), b),
-            inputs=[argument(u), self.data, members, argument(pressure), argument(active)],
-            outputs=[argument(nodal), argument(normal), int(not self.flat), argument(turn)], device=self.device,
-        )
+        for distance, chosen in pressed:
+            wp.launch(
+                kernels.pressure_kernel(distance), dim=(len(self.faces), len(chosen)),
+                inputs=[argument(u), self.data, members, argument(chosen), argument(pressure), argument(active)],
+                outputs=[argument(nodal), argument(normal), int(not self.flat), argument(turn)], device=self.device,
+            )
         normal = normal / torch.linalg.vector_norm(normal, dim=1, keepdim=True).clamp_min(1e-12)
         place = self.mortar.means(u) + self._mean_nodes + self._mean_rise * (conditions.thickness - 1)
         local, shear, force, stiffness = (self._zeros(u, size) for size in (3, 3, 3, 6))

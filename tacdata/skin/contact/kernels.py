@@ -201,10 +201,12 @@ def gap_kernel(distance: wp.Function) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def gaps(
-        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, gap: wp.array2d(dtype=wp.float64),
+        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData,
+        chosen: wp.array(dtype=wp.int32), gap: wp.array2d(dtype=wp.float64),
     ):
-        """Add the share of one face to the mean gaps of its nodes."""
-        f, b = wp.tid()
+        """Add the share of one face to the mean gaps of its nodes, for one of the chosen members."""
+        f, c = wp.tid()
+        b = chosen[c]
         q = parameters_of(members.indenter, b)
         R = rotation_of(members.turn, b)
         tip = of_member(members.place, b)
@@ -228,19 +230,20 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def pressures(
-        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData,
+        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, chosen: wp.array(dtype=wp.int32),
         pressure: wp.array2d(dtype=wp.float64), active: wp.array2d(dtype=wp.bool),
         force: wp.array3d(dtype=wp.float64), mean_normal: wp.array3d(dtype=wp.float64), curved: int,
         turn: wp.array4d(dtype=wp.float32),
     ):
-        """Add the normal forces of one face to its nodes, and its share to the mean normals.
+        """Add the normal forces of one face to its nodes, and its share to the mean normals, for a chosen member.
 
         1. Place of each point in the shape's frame, and the shape's normal there.
         2. Pressure: that of the active nodes, by their hats.
         3. Forces on the face's nodes; the normal's share in the means under the hats.
         4. If the shape is curved, how the force turns with the normal, symmetric: xx, yy, zz, xy, yz, xz.
         """
-        f, b = wp.tid()
+        f, c = wp.tid()
+        b = chosen[c]
         some = 0
         values = Six()
         for a in range(6):

@@ -105,7 +105,7 @@ def contact_change(
     carried = argument(now.pressure), argument(pressure), argument(active)
     force, gap, mean, d_mean = torch.zeros_like(moved), zeros(), zeros(3), zeros(3)
     wp.launch(
-        normal_change_kernel(surface.distance), dim=(len(surface.faces), c),
+        normal_change_kernel(surface.only), dim=(len(surface.faces), c),
         inputs=[argument(u), argument(moved), surface.data, members, d_members, *carried, int(whole)],
         outputs=[argument(value) for value in (gap, force, mean, d_mean)], device=surface.device,
     )

@@ -84,7 +84,7 @@ def directions(
     def zeros(*shape: int) -> torch.Tensor:
         return torch.zeros(*shape, count, dtype=torch.float64, device=device)
 
-    conditions = Conditions(zeros(8), zeros(), zeros(), zeros(), zeros(8))
+    conditions = Conditions(zeros(8), zeros(), zeros(), zeros(), zeros(8), zeros())
     change = ConditionsChange(conditions, Pose(zeros(3), zeros(3, 3)))
     for column, name in enumerate(parameters):
         if name in ("x", "y", "z"):

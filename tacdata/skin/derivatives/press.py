@@ -78,13 +78,13 @@ def sensitivities(
             "sample whole presses (tacdata.skin.derivatives.uncertainty.sampled_spread)",
         )
     skin = model.skin
-    press, batch = skin.placed(0, request), skin.batch(request, 1)
+    press, batch = skin.placed(0, request), skin.batch([request], 1)
     recorder, reader = PathRecorder(), _Reader(model, request, names)
     touch = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
     along = directions(model.sensor, request.indenter, names, press.conditions, touch)
     at_touch = _without_depth(names, along)
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
-    derivatives = PathDerivatives(skin.newton(request), skin.free, label, tolerance, _slack(model, names))
+    derivatives = PathDerivatives(skin.newton([request]), skin.free, label, tolerance, _slack(model, names))
     for _, depth, state in batch.run([press], skin.reader.states, recorder):
         if isinstance(state, SolveError):
             raise state

@@ -122,7 +122,7 @@ def sampled_spread(
         return [(depth, _joined(one, other)) for (depth, one), other in zip(drawn, beside, strict=True)]
     moves = np.random.default_rng(seed).normal(size=(samples, len(spreads))) * list(spreads.values())
     presses = (_moved(model, request, k, dict(zip(spreads, values, strict=True))) for k, values in enumerate(moves))
-    batch = model.skin.batch(request, min(capacity, samples))
+    batch = model.skin.batch([request], min(capacity, samples))
     found: list[list[Equilibrium]] = [[] for _ in range(samples)]
     for number, _, state in batch.run(presses, model.skin.reader.states):
         if isinstance(state, SolveError):

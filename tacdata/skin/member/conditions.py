@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -27,6 +28,8 @@ class Conditions(Columns):
     """Coulomb's coefficient between indenter and skin [1], shape (b,)."""
     indenter: torch.Tensor
     """Parameters of the indenter's distance function [mm, rad], shape (8, b)."""
+    shape: torch.Tensor
+    """Number of that function (`shape_number`) [1], shape (b,)."""
 
     def to(self, dtype: torch.dtype) -> Conditions:
         """Return the same in another precision; itself if it has that one."""
@@ -37,7 +40,13 @@ class Conditions(Columns):
     def pressed_by(self, indenter: Indenter) -> Conditions:
         """Return the same under a shape."""
         device = str(self.law.device)
-        return replace(self, indenter=_column(indenter.device_parameters(device), device))
+        own, number = indenter.device_parameters(device), shape_number(indenter)
+        return replace(self, indenter=_column(own, device), shape=_scalar(number, device))
+
+
+def shape_number(indenter: Indenter) -> float:
+    """Return the number that a shape's distance function goes by: a checksum of the shape's name [1]."""
+    return float(zlib.crc32(indenter.shape.encode()))
 
 
 def conditions(
@@ -48,6 +57,7 @@ def conditions(
         _column(load_law(material.law).parameters(material), device),
         _scalar(material.youngs_modulus, device), _scalar(thickness, device), _scalar(friction, device),
         _column(indenter.device_parameters(device) if indenter else (), device),
+        _scalar(shape_number(indenter) if indenter else 0.0, device),
     )
 
 

@@ -87,7 +87,7 @@ Observe = Callable[[Configuration], None]
 
 
 class Batch:
-    """A fixed number of columns on one mesh, one shape of indenter."""
+    """A fixed number of columns on one mesh; each has its own indenter."""
 
     def __init__(self, newton: Newton, idle: Conditions, nodes: int, capacity: int, floor: float) -> None:
         """Make an idle batch.

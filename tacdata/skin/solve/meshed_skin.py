@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -23,7 +24,7 @@ from tacdata.skin.elasticity.body import Elasticity
 from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
 from tacdata.skin.linear.rest_stiffness import RestSolver, rest_solver
 from tacdata.skin.materials import load_law
-from tacdata.skin.member.conditions import Conditions, conditions
+from tacdata.skin.member.conditions import Conditions, conditions, shape_number
 from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.build import build_mesh
 from tacdata.skin.mesh.skin_mesh import SkinMesh
@@ -108,32 +109,35 @@ class MeshedSkin:
         origin, own = touch(self.sensor, self.face, request), self.conditions.pressed_by(request.indenter)
         return PlacedPress(number, path, origin, rotation(request), own)
 
-    def surfaces(self, request: PressRequest) -> tuple[ContactSurface, ...]:
-        """Return the contact surfaces of presses by the shape of ``request``: the outer face's, then the board's."""
+    def surfaces(self, requests: Sequence[PressRequest]) -> tuple[ContactSurface, ...]:
+        """Return the contact surfaces of presses by the shapes of ``requests``: the outer face's, then the board's."""
         outer = torch.as_tensor(self.mesh.outer, device=self.device)
-        distance, contact = request.indenter.distance_function(), self.sensor.contact
-        given = self._nodes, outer, self._held, distance, contact.friction > 0, self.settings.activation
+        shapes = {shape_number(request.indenter): request.indenter for request in requests}
+        distances, contact = {n: shape.distance_function() for n, shape in shapes.items()}, self.sensor.contact
+        given = self._nodes, outer, self._held, distances, contact.friction > 0, self.settings.activation
         if contact.adhesion:
             pressed = AdhesiveSurface(*given, self.settings.stick, contact.adhesion)
         else:
             pressed = ContactSurface(*given, self.settings.stick)
         return (pressed, self.board) if self.board else (pressed,)
 
-    def newton(self, request: PressRequest) -> Newton:
-        """Return what solves presses by the shape of ``request``; its preconditioner is for one batch at a time."""
-        surfaces = self.surfaces(request)
+    def newton(self, requests: Sequence[PressRequest]) -> Newton:
+        """Return what solves presses by the shapes of ``requests``; its preconditioner is for one batch at a time."""
+        surfaces = self.surfaces(requests)
         preconditioner = ConstraintPreconditioner(self.rest, surfaces, self.sensor.material.youngs_modulus)
         return Newton(self.body, surfaces, self._held, preconditioner, self._solver)
 
-    def batch(self, request: PressRequest, capacity: int) -> Batch:
-        """Return an idle batch for presses by the shape of ``request``, so many at a time."""
-        idle, floor = self.conditions.pressed_by(request.indenter), -self.sensor.skin.protrusion_tip
-        return Batch(self.newton(request), idle, len(self.mesh.nodes), capacity, floor)
+    def batch(self, requests: Sequence[PressRequest], capacity: int) -> Batch:
+        """Return an idle batch for presses by the shapes of ``requests``, so many at a time."""
+        idle, floor = self.conditions.pressed_by(requests[0].indenter), -self.sensor.skin.protrusion_tip
+        return Batch(self.newton(requests), idle, len(self.mesh.nodes), capacity, floor)
 
     def _board(self) -> ContactSurface:
         bumps = torch.as_tensor(self.mesh.protrusions, device=self.device)
         flat: Any = board_distance  # a Warp function, though its decorator's type does not say so
-        return ContactSurface(self._nodes, bumps, self._held, flat, False, self.settings.activation, 0.0, flat=True)
+        return ContactSurface(
+            self._nodes, bumps, self._held, {0.0: flat}, False, self.settings.activation, 0.0, flat=True
+        )
 
     def _mortar(self, faces: np.ndarray) -> Mortar:
         weights, shapes = face_quadrature(self._nodes, torch.as_tensor(faces, device=self.device), SUBDIVISIONS)

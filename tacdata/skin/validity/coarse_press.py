@@ -49,7 +49,7 @@ def loading(request: PressRequest) -> PressRequest:
 
 
 def press_coarsely(model: PressSolver, requests: list[PressRequest], capacity: int = 1) -> list[CoarsePress]:
-    """Solve the loading branches of presses of one shape of indenter on the coarser mesh.
+    """Solve the loading branches of presses on the coarser mesh.
 
     Args:
         model: Of the coarser mesh.
