@@ -1,6 +1,6 @@
 """The same mesh and the same law in another code: how far its answer lies from ours.
 
-    python benchmarks/same_mesh.py CASE [--peer getfem | calculix] [--out FOLDER] [--set multiplier_degree=1 ...]
+    python benchmarks/same_mesh.py CASE [--peer getfem | calculix] [--out FOLDER] [--set step=0.1 ...]
 
 CASE is a case file as for ``tacdata solve``. Prints a table; ``--set`` changes a setting of the other code
 (`benchmarks/solvers/getfem.py`, `calculix.py`). Times are of one core; they are no fair race on a loaded machine.

@@ -6,6 +6,7 @@ import json
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from solvers import gwfl
@@ -18,6 +19,11 @@ from tacdata.skin.surface.outer_face import OuterFace
 
 PYTHON = "/usr/bin/python3"
 
+HATS = "FEM_STRUCTURED_COMPOSITE(FEM_PK(3,1),2)"
+"""Finite element whose trace on a face is piecewise linear on its four sub-triangles."""
+ON_HATS = "IM_STRUCTURED_COMPOSITE(IM_TETRAHEDRON(5),2)"
+"""Quadrature on the same sub-triangles, 7 points of degree 5 on each."""
+
 
 @dataclass(frozen=True)
 class GetFEM(Peer):
@@ -25,19 +31,17 @@ class GetFEM(Peer):
 
     name = "GetFEM"
     contact: str = "lagrangian"
-    """"lagrangian", or "penalty" (without friction): the traction is ``augmentation`` times the penetration."""
-    multiplier_degree: int = 2
-    """Degree of the multipliers' polynomials on the contact faces [1]."""
+    """"lagrangian". Or, without friction, "active set": multipliers at nodes that close mean gaps or are 0."""
+    multiplier: str = "FEM_PK(3,2)"
+    """Finite element of the multipliers; their traces on the contact faces are what counts."""
     augmentation: float = 10.0
-    """Augmentation of the Lagrangian, or the penalty, over Young's modulus [1/mm]."""
+    """Augmentation of the Lagrangian over Young's modulus [1/mm]."""
     volume_rule: str = "IM_TETRAHEDRON(2)"
     """Quadrature of the body, 4 points of degree 2; IM_TETRAHEDRON(5) has 15 points and takes 1.4 times as long."""
     surface_rule: str = "IM_TETRAHEDRON(5)"
     """Quadrature of the contact: on the faces, 7 points of degree 5."""
-    board_rule: str = "IM_STRUCTURED_COMPOSITE(IM_TETRAHEDRON(5),2)"
+    board_rule: str = ON_HATS
     """Quadrature of the contact with the board: the same on 4 sub-triangles."""
-    penalty_rules: tuple[str, str] = ("IM_TRIANGLE(4)", "IM_STRUCTURED_COMPOSITE(IM_TRIANGLE(4),2)")
-    """Quadrature with "penalty", outer face and board: the 6 points of degree 4, and those on 4 sub-triangles."""
     step: float = 0.25
     """Longest load step [mm]."""
     hydro: str = ""
@@ -96,9 +100,8 @@ class GetFEM(Peer):
             what = f"law {sensor.material.law}" if law is None else f"shape {request.indenter.shape}"
             raise PeerError(f"{what} is not written in GWFL (benchmarks/solvers/gwfl.py)")
         modulus = sensor.material.youngs_modulus
-        if self.contact == "penalty" and sensor.contact.friction:
-            raise PeerError("the penalty is written without friction: contact=lagrangian has it")
-        rules = self.penalty_rules if self.contact == "penalty" else (self.surface_rule, self.board_rule)
+        if self.contact != "lagrangian" and sensor.contact.friction:
+            raise PeerError(f"{self.contact} is written without friction: contact=lagrangian has it")
         numbers = {
             "r": self.augmentation * modulus,
             "r_t": self.augmentation * modulus,
@@ -118,9 +121,14 @@ class GetFEM(Peer):
             "board": -sensor.skin.protrusion_tip if sensor.contact.board else None,
             "contact": self.contact,
             "volume_rule": self.volume_rule,
-            "surface_rule": rules[0],
-            "board_rule": rules[1],
-            "multiplier_degree": self.multiplier_degree,
+            "surface_rule": self.surface_rule,
+            "board_rule": self.board_rule,
+            "multiplier": self.multiplier,
             "residual": self.residual,
             "max_newton": 60,
         }
+
+
+def with_nodal_contact(**settings: Any) -> GetFEM:
+    """Return GetFEM with contact discretized as ours: the same hats, mean gaps and active set."""
+    return GetFEM(contact="active set", multiplier=HATS, surface_rule=ON_HATS, **settings)

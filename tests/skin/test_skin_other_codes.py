@@ -1,7 +1,7 @@
 """The same mesh and the same law in another code (`benchmarks/same_mesh.py`), skipped where it is not installed.
 
-With the same contact law, a stiff penalty at the same points of the faces, GetFEM must give the same answer. With its
-own, an augmented Lagrangian with quadratic multipliers, forces and the field must agree; but at the edge of contact,
+With the same contact, multipliers on the same hats, GetFEM must give the same answer: what is left are tolerances.
+With its own, an augmented Lagrangian with quadratic multipliers, forces and the field must agree; but at the edge of contact,
 where an element is touched in part, either discretization is 2 to 4 % of the depth from the answer on a mesh twice as
 fine, and the two may differ by as much: there the bar on the largest difference is wider.
 """
@@ -24,13 +24,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 from same_mesh import compare
 from solvers.alone import ours_press
 from solvers.calculix import CalculiX
-from solvers.getfem import GetFEM
+from solvers.getfem import GetFEM, with_nodal_contact
 from solvers.ours import Ours
 
 SLAB = {"outer": 0.8, "interior": 1.2}
 BUMPS = {"outer": 0.9, "interior": 1.5, "protrusion": 1.0}
-# Ten times our penalty: ours is not all of our contact, as multipliers take up the penetration that it leaves.
-SAME_CONTACT = GetFEM(contact="penalty", augmentation=30000.0)
+SAME_CONTACT = with_nodal_contact()
 needs_getfem = pytest.mark.skipif(SAME_CONTACT.missing() is not None, reason=str(SAME_CONTACT.missing()))
 needs_calculix = pytest.mark.skipif(CalculiX().missing() is not None, reason=str(CalculiX().missing()))
 pytestmark = pytest.mark.long(
@@ -66,7 +65,7 @@ def rows(folder, peer, sensor, mesh, depths, radius=4.0, indenter=None, yaw=0.0,
     return found
 
 
-def assert_bar(found, force=0.3, largest=1.0):
+def assert_bar(found, force=0.1, largest=0.3):
     """Forces within ``force`` [%], the map within ``largest`` [% of the depth] anywhere."""
     assert max(abs(row["force"]) for row in found) < force
     assert max(row["largest"] for row in found) < largest
@@ -97,8 +96,7 @@ SHAPES = [
 @pytest.mark.parametrize("indenter", SHAPES, ids=[s["shape"] for s in SHAPES])
 def test_every_shape_is_pressed_alike(indenter, tmp_path):
     """Shapes written anew, as formulas of their own, turned by 25 degrees about the normal."""
-    # As stiff as in the other tests, edges would need four steps as small.
-    peer = replace(SAME_CONTACT, augmentation=6000.0, step=0.125)
+    peer = replace(SAME_CONTACT, step=0.125)
     assert_bar(rows(tmp_path, peer, slab_sensor(), SLAB, (0.25,), indenter=indenter, yaw=25.0))
 
 
@@ -114,7 +112,7 @@ def test_protrusions_stand_on_the_board_alike(tmp_path):
     sensor = replace(bumps_sensor(), contact=ContactProperties(0.0, ("sides",), True))
     found = rows(tmp_path, SAME_CONTACT, sensor, BUMPS, (0.25,))
     assert_bar(found)
-    assert max(row["protrusion"] for row in found) < 1.0
+    assert max(row["protrusion"] for row in found) < 0.1
 
 
 @needs_getfem
@@ -122,7 +120,7 @@ def test_friction_by_augmented_lagrangian(tmp_path):
     """Elements of 0.6 mm under a sphere of 10 mm radius: the contact is three to five elements wide."""
     sensor, mesh = slab_sensor(size=8.0, thickness=2.5, friction=0.2), {"outer": 0.6, "interior": 1.8}
     found = rows(tmp_path, GetFEM(), sensor, mesh, (0.25, 0.5), radius=10.0)
-    assert_bar(found, largest=3.0)
+    assert_bar(found, force=0.3, largest=3.0)
     assert max(row["top"] for row in found) < 0.3
     assert max(row["contact"] for row in found) < 0.5
 
@@ -148,8 +146,12 @@ def test_what_friction_takes_is_lost_alike_when_the_indenter_rises(tmp_path):
 
 @needs_calculix
 def test_calculix_agrees_too(tmp_path):
-    """Its contact is a softer penalty (200 MPa/mm) against a faceted sphere."""
-    found = rows(tmp_path, CalculiX(), slab_sensor(), SLAB, (0.25, 0.5))
+    """Its contact is a softer penalty (200 MPa/mm) against a faceted sphere.
+
+    Contact differs at its edge, where an element is touched in part: on elements of 0.8, 0.6 and 0.45 mm the largest
+    difference is 4.8, 3.9 and 1.8 % of the depth.
+    """
+    found = rows(tmp_path, CalculiX(), slab_sensor(), {"outer": 0.45, "interior": 1.2}, (0.25, 0.5))
     assert_bar(found, force=0.5, largest=3.0)
     assert max(row["top"] for row in found) < 0.4
     assert max(row["contact"] for row in found) < 0.5

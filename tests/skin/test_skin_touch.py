@@ -29,10 +29,10 @@ from tacdata.skin.surface.outer_face import OuterFace
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
-from solvers.getfem import GetFEM
+from solvers.getfem import with_nodal_contact
 
 PUNCH = FlatPunch(1.2, 0.5)
-PEER = GetFEM(contact="penalty", augmentation=30000.0, residual=1e-8)
+PEER = with_nodal_contact(residual=1e-8)
 CURVED = replace(slab_sensor(size=8.0), skin=Skin(8.0, 8.0, 2.0, 0.0, curvature_radius_x=10.0, underside="flat"))
 
 

@@ -9,8 +9,8 @@ cpu_seconds (d,), dofs, setup_cpu_seconds.
 
 Displacements are isoparametric FEM_PK(3,2). Contact is unilateral with Coulomb friction by the augmented Lagrangian
 of Alart and Curnier (1991): a field of multipliers on the contact faces, found with the displacements by Newton's
-method. Or it is a penalty without friction, integrated over meshes of the faces alone, so that any rule of triangles
-can be had.
+method. Or, without friction, an active set of multipliers at the nodes: each closes the mean gap under its hat, or is
+0.
 """
 
 import json
@@ -21,6 +21,10 @@ import getfem
 import numpy as np
 
 OUTER, BUMPS, FIRST_TAXEL = 1, 2, 100
+AT_NODES = "IM_STRUCTURED_COMPOSITE(IM_NC(3,1),2)"
+"""Quadrature whose points are the nodes of the hats: it weighs each by itself."""
+LARGE = 1e6
+"""Weight that holds the multipliers of open nodes at -gap / LARGE [mm/MPa]: at 0, but for the sign of the gap."""
 EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
 
@@ -57,17 +61,6 @@ def read_mesh(arrays):
     return mesh, order
 
 
-def face_mesh(nodes, faces):
-    """Return a mesh of quadratic triangles in space."""
-    corners = np.vstack([np.zeros(2), np.eye(2)])
-    ours = np.vstack([corners, (corners + np.roll(corners, -1, axis=0)) / 2])
-    curved = getfem.GeoTrans("GT_PK(2,2)")
-    order = np.array([np.abs(ours - point).sum(axis=1).argmin() for point in curved.pts().T])
-    mesh = getfem.Mesh("empty", 3)
-    mesh.add_convex(curved, np.ascontiguousarray(nodes[faces[:, order]].transpose(2, 1, 0)))
-    return mesh
-
-
 def node_dofs(space, tets, order, count):
     """Return the displacement dofs of each of our nodes, shape (n, 3)."""
     dofs = np.empty((count, 3), dtype=int)
@@ -101,36 +94,30 @@ class Press:
             self.model.add_fem_variable("hydro", hydro)
         self.model.add_nonlinear_term(self.inside, press["law"])
         self.taxels = [] if press["board"] is None else sorted(np.unique(arrays["taxel"]).tolist())
-        self.penalty = press["contact"] == "penalty"
-        if self.penalty:
-            self._surfaces_of_their_own()
-        else:
-            self.surface, self.board_surface = (
-                getfem.MeshIm(self.mesh, getfem.Integ(press[rule])) for rule in ("surface_rule", "board_rule")
-            )
+        self.active_set = press["contact"] == "active set"
+        self.at_nodes, self.held_by = getfem.MeshIm(self.mesh, getfem.Integ(AT_NODES)), []
+        self.surface, self.board_surface = (
+            getfem.MeshIm(self.mesh, getfem.Integ(press[rule])) for rule in ("surface_rule", "board_rule")
+        )
         self._indenter()
         if press["board"] is not None:
             self._board()
 
-    def _surfaces_of_their_own(self):
-        """Mesh the contact faces alone; displacements reach them by interpolation at their own places."""
-        nodes, press = self.arrays["nodes"], self.press
-        outer = face_mesh(nodes, self.arrays["outer"])
-        self.surface = getfem.MeshIm(outer, getfem.Integ(press["surface_rule"]))
-        self.model.add_interpolate_transformation_from_expression("body", outer, self.mesh, "X")
-        if press["board"] is not None:
-            bumps = face_mesh(nodes, self.arrays["protrusions"])
-            for taxel in self.taxels:
-                own = np.flatnonzero(self.arrays["taxel"] == taxel)
-                bumps.set_region(FIRST_TAXEL + taxel, np.stack([own, np.full(len(own), -1)]))
-            self.board_surface = getfem.MeshIm(bumps, getfem.Integ(press["board_rule"]))
-            self.model.add_interpolate_transformation_from_expression("bump", bumps, self.mesh, "X")
-
     def _multiplier(self, name, region, components):
         space = getfem.MeshFem(self.mesh, components)
-        space.set_fem(getfem.Fem(f"FEM_PK(3,{self.press['multiplier_degree']})"))
+        space.set_fem(getfem.Fem(self.press["multiplier"]))
         self.model.add_filtered_fem_variable(name, space, region)
         return space
+
+    def _constrain(self, name, region, rule, term):
+        """Add multipliers at nodes, all open."""
+        self._multiplier(name, region, 1)
+        space = self.model.mesh_fem_of_variable(name)
+        self.model.add_initialized_fem_data(f"open_{name}", space, np.ones(space.nbdof()))
+        self.model.add_initialized_data(f"large_{name}", [LARGE])
+        self.model.add_nonlinear_term(rule, term, region)
+        self.model.add_linear_term(self.at_nodes, f"large_{name}*open_{name}*{name}*Test_{name}", region)
+        self.held_by.append(name)
 
     def _indenter(self):
         model, press = self.model, self.press
@@ -140,15 +127,14 @@ class Press:
         model.add_fem_data("u_before", self.space)
         # To the indenter's frame; the rotation from it, row by row, is its inverse column by column.
         model.add_initialized_data("turn", np.ravel(press["turn"]), [3, 3])
-        moved, test = ("Interpolate(u,body)", "Interpolate(Test_u,body)") if self.penalty else ("u", "Test_u")
-        model.add_macro("p", f"(turn*(X+{moved}-tip))")
+        model.add_macro("p", "(turn*(X+u-tip))")
         for name, text in press["shape"]:
             model.add_macro(name, text)
         model.add_macro("n", "(turn'*Normalized(core))")
         model.add_macro("gap", f"(Norm(core)-{press['edge']!r})")
-        if self.penalty:
-            model.add_macro("traction", "(pos_part(-r*gap)*n)")
-            model.add_nonlinear_term(self.surface, f"-traction.{test}")
+        if self.active_set:
+            model.add_macro("traction", "(pressure*n)")
+            self._constrain("pressure", OUTER, self.surface, "-traction.Test_u+gap*Test_pressure")
         elif press["friction"] == 0:
             self._multiplier("pressure", OUTER, 1)
             model.add_macro("traction", "(pressure*n)")
@@ -166,11 +152,10 @@ class Press:
 
     def _board(self):
         model, board = self.model, self.press["board"]
-        if self.penalty:
-            model.add_macro("lift", f"pos_part(-r*((X+Interpolate(u,bump))(3)-({board!r})))")
-            model.add_nonlinear_term(self.board_surface, "-lift*Interpolate(Test_u,bump)(3)")
-            return
         model.add_macro("board_gap", f"((X+u)(3)-({board!r}))")
+        if self.active_set:
+            self._constrain("lift", BUMPS, self.board_surface, "-lift*Test_u(3)+board_gap*Test_lift")
+            return
         self._multiplier("lift", BUMPS, 1)
         model.add_nonlinear_term(
             self.board_surface, "-lift*Test_u(3)+(1/r)*(lift-pos_part(lift-r*board_gap))*Test_lift", BUMPS
@@ -184,17 +169,17 @@ class Press:
         model.set_variable("moved", now - before)
         model.set_variable("u_before", model.variable("u"))
         model.set_variable("tip", now)
-        taken = self._stiffen(depth) if self.penalty else self._newton(depth, self.press["max_newton"])[0]
+        taken = self._settle(depth) if self.active_set else self._newton(depth)
         model.assembly("build_rhs")
         return taken, float(np.abs(model.rhs()).max())
 
-    def _newton(self, depth, limit, must=True):
-        """Return the steps of Newton's method and whether it found the equilibrium."""
+    def _newton(self, depth):
+        """Find the equilibrium; return the steps of Newton's method."""
         steps, converged = self.model.solve(
             "max_res",
             self.press["residual"],
             "max_iter",
-            limit,
+            self.press["max_newton"],
             "lsolver",
             "mumps",
             "lsearch",
@@ -203,29 +188,28 @@ class Press:
             0.3,
             *(["noisy"] if "--noisy" in sys.argv else []),
         )
-        if must and not converged:
+        if not converged:
             raise SystemExit(f"GetFEM found no equilibrium at {depth} mm in {steps} Newton steps")
-        return steps, converged
+        return steps
 
-    def _stiffen(self, depth):
-        """Come to the whole penalty from a hundredth of it, by the widest steps that Newton's method follows."""
-        whole, share, factor, taken = self.press["constants"]["r"], 0.001, 10.0, 0
-        while share < 1.0:
-            before, wanted = self.model.variable("u"), min(1.0, share * factor)
-            self.model.set_variable("r", wanted * whole)
-            steps, converged = self._newton(depth, 12, must=factor < 1.02)
-            taken += steps
-            if converged:
-                share = wanted
-            else:
-                self.model.set_variable("u", before)
-                factor = factor**0.5
-        return taken
+    def _settle(self, depth):
+        """Close open nodes whose mean gap is negative, open closed ones that pull, until nothing changes."""
+        taken = 0
+        for _ in range(40):
+            taken += self._newton(depth)
+            changed = 0
+            for name in self.held_by:
+                before, value = self.model.variable(f"open_{name}"), self.model.variable(name)
+                now = np.where(value > 0, 0.0, np.where(value < 0, 1.0, before))
+                changed += int((now != before).sum())
+                self.model.set_variable(f"open_{name}", now)
+            if not changed:
+                return taken
+        raise SystemExit(f"GetFEM's active set does not settle at {depth} mm")
 
     def forces(self):
         """Return the force on the indenter, shape (3,), and on each protrusion, shape (t,) [N]."""
-        where = -1 if self.penalty else OUTER
-        own = [getfem.asm_generic(self.surface, 0, f"traction({k})", where, self.model) for k in (1, 2, 3)]
+        own = [getfem.asm_generic(self.surface, 0, f"traction({k})", OUTER, self.model) for k in (1, 2, 3)]
         lift = [getfem.asm_generic(self.board_surface, 0, "lift", FIRST_TAXEL + t, self.model) for t in self.taxels]
         return -np.ravel(own), np.ravel(lift)
 
