@@ -1,9 +1,9 @@
 """The same mesh and the same law in another code (`benchmarks/same_mesh.py`), skipped where it is not installed.
 
 With the same contact, multipliers on the same hats, GetFEM must give the same answer: what is left are tolerances.
-With its own, an augmented Lagrangian with quadratic multipliers, forces and the field must agree; but at the edge of contact,
-where an element is touched in part, either discretization is 2 to 4 % of the depth from the answer on a mesh twice as
-fine, and the two may differ by as much: there the bar on the largest difference is wider.
+With its own, an augmented Lagrangian with quadratic multipliers, forces and the field must agree. But at the edge of
+contact, where an element is touched in part, either discretization is 2 to 4 % of the depth from the answer on a mesh
+twice as fine. The two may differ by as much: there the bar on the largest difference is wider.
 """
 
 import sys
