@@ -187,8 +187,8 @@ def main() -> None:
     stages.follow()
     try:
         ended = application()(prog_name="tacdata", standalone_mode=False)
-        if type(ended) is int and ended:
-            raise SystemExit(ended)
+        if isinstance(ended, int) and ended:  # a member of Exit, too
+            raise SystemExit(int(ended))
     except MISTYPED as error:
         if type(error).__name__ == "NoArgsIsHelpError":
             error.show()
