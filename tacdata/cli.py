@@ -187,8 +187,8 @@ def main() -> None:
     stages.follow()
     try:
         ended = application()(prog_name="tacdata", standalone_mode=False)
-        if isinstance(ended, int) and ended:  # a member of Exit, too
-            raise SystemExit(int(ended))
+        # A verb that ends with a code returns it, a member of Exit.
+        raise SystemExit(int(ended) if isinstance(ended, int) else 0)
     except MISTYPED as error:
         if type(error).__name__ == "NoArgsIsHelpError":
             error.show()

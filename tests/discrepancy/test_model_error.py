@@ -38,7 +38,7 @@ def test_columns_are_a_share_of_each_effect(pressed):
     made, response, late = pressed
     assert model_error_columns(made, response, []).shape[2] == 0
     one = model_error_columns(made, response, [late])
-    assert one.shape == (len(made.read), 3, 5 + 4), "modulations, and delays of other sizes"
+    assert one.shape == (len(made.read), 3, 5 + 4 + 2), "modulations, delays of other sizes, and one either way"
     twice = model_error_columns(made, response, [replace(late, values={"L": np.array(0.1)})])
     size = np.linalg.norm(twice, axis=(0, 1)) / np.linalg.norm(one, axis=(0, 1))
     assert np.all((size > 1.7) & (size < 2.1))

@@ -24,7 +24,7 @@ def test_a_batch_gives_each_press_its_own_answer():
         Job(sensor.content_hash, "a" * 64, {"shape": "sphere", "radius": 3.0}, x, 0.0, 0.0, (0.0, depth, 0.0), loose)
         for x, depth in ((0.0, 0.1), (60.0, 0.1), (1.5, 0.12))
     ]
-    assert model.batch == 4, "a processor reads its factor once for all of them"
+    assert model.batch == 8, "a processor reads its factor once for all of them"
     found = {job.x: outcome for job, outcome in solve_each(model, jobs)}
     assert isinstance(found[60.0], SolveError), "beside the skin: one bad press stops no other"
     for job in (jobs[0], jobs[2]):

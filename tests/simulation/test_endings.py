@@ -69,7 +69,8 @@ ENDINGS = {
     "Ctrl-C": (interrupt(), "", f"stopped at {HERE}", LIFTED, None, AGAIN),
     "three Ctrl-C": (interrupt(50, 100), "",
                      rf"NOT KNOWN to have stopped \(interrupted while it was being stopped\); it last reported {HERE}; "
-                     "if it moves, press the emergency stop", LEFT, None, AGAIN),
+                     "if it moves, press the emergency stop", LEFT,
+                     "LOST: the controller was reset in mid-stream.*its position is lost", FOUND),
 }  # fmt: skip
 
 

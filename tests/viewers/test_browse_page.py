@@ -98,7 +98,7 @@ def test_arrow_keys_work_although_the_viewer_grabs_the_keyboard(page):
 )  # fmt: skip
 def test_a_typo_in_a_filter_is_named_and_hides_nothing(page, typed, words):
     page.fill("#filter", typed)
-    assert words in page.inner_text("#wrong")
+    page.wait_for_function("words => document.querySelector('#wrong').innerText.includes(words)", arg=words)
     assert page.locator("tbody tr").count() == (COUNT if "depth>0.5" not in typed else COUNT - 3)
     page.fill("#filter", "depth>0.8 indenter=ball")
     assert not page.is_visible("#wrong") and page.locator("tbody tr").count() == 11

@@ -76,6 +76,7 @@ def check(path: Path) -> Report:
         True
         >>> print(report.text)
         session: 2 recordings
+          sync    not measured: taxels - motion (record --sync-tap)
           taxels  30.00 Hz, 340 frames, 0 lost, ...
         ...
         usable
