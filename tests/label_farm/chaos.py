@@ -30,12 +30,13 @@ FINISHED = ("done", "refused", "cancelled")
 class Service:
     """`tacdata farm up` with a stand-in model, as a process of its own."""
 
-    def __init__(self, folder, workers=2, seconds=0.05, port=0, options=(), **variables):
+    def __init__(self, folder, workers=2, seconds=0.05, port=0, options=(), gate=None, **variables):
         self.folder, self.workers, self.options, self.port = folder, workers, options, port
         path = os.pathsep.join([str(HERE), str(ROOT)])
         self.environment = {
             **os.environ, "PYTHONPATH": path, "FAST_MODEL_SECONDS": str(seconds),
-            "FAST_MODEL_LOG": str(folder / "solves.log"), "OMP_NUM_THREADS": "1", **variables,
+            "FAST_MODEL_LOG": str(folder / "solves.log"), "OMP_NUM_THREADS": "1",
+            **(gate.variables if gate else {}), **variables,
         }  # fmt: skip
         self.process = None
 

@@ -5,6 +5,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import gate
 import numpy as np
 
 from tacdata import provenance
@@ -13,7 +14,7 @@ from tacdata.labels import PathSolution
 
 
 class FastModel:
-    """The surface is a bump times the depth. ``FAST_MODEL_*`` variables make it slow, wrong or deadly."""
+    """The surface is a bump times the depth. ``FAST_MODEL_*`` variables make it wait, slow, wrong or deadly."""
 
     def __init__(self, sensor):
         self.sensor = sensor
@@ -28,6 +29,8 @@ class FastModel:
         if log:
             with open(log, "a") as stream:
                 stream.write(f"{os.getpid()} {job.x:g}\n")
+        if closed := os.environ.get(gate.VARIABLE):
+            gate.pass_gate(closed)
         time.sleep(float(os.environ.get("FAST_MODEL_SECONDS", "0")))
         if f"{job.x:g}" in os.environ.get("FAST_MODEL_FAILS", "").split():
             raise SolveError("no equilibrium at state 3", "convergence in 50 iterations", "reduce the depth")

@@ -5,6 +5,7 @@ import os
 import pytest
 from chaos import ROOT, Service, all_finished
 from farm_examples import HERE
+from gate import Gate
 from running.in_process import tacdata
 from session_examples import examples, session
 
@@ -53,13 +54,16 @@ def test_the_dataset_grows_while_others_are_computed_and_survives_kills(tmp_path
     names = ["a", "b"]
     for k, name in enumerate(names):
         session(tmp_path / name, 10, first=10 * k)
-    service = Service(tmp_path, workers=2, seconds=0.3).start()
+    gate = Gate(tmp_path / "gate")
+    service = Service(tmp_path, workers=2, seconds=0.0, gate=gate).start()
     for name in names:
         service.client().post("/api/submissions", {"session": name, "by": "ann", "dataset": "data"})
-    service.wait(lambda state: sum(entry["labelled"] for entry in state["submissions"]) >= 5)
+    gate.let(5)
+    service.wait(lambda state: sum(entry["labelled"] for entry in state["submissions"]) == 5)
     part = read_dataset(tmp_path / "data")
     assert 0 < len(part.episodes) < 20, "it can be read while it grows"
     service.kill()
+    gate.open()
     with service:
         service.wait(all_finished)
     whole = read_dataset(tmp_path / "data")

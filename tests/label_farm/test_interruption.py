@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from farm_examples import HERE, press_episode
+from gate import Gate
 from session_examples import session
 
 SCRIPT = """
@@ -79,19 +80,22 @@ def test_two_runs_on_one_store_share_the_work(tmp_path, solves, monkeypatch):
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_run_that_is_stopped_goes_on_where_it_stood(tmp_path, label_all, solves, monkeypatch, how):
     count = 16
-    monkeypatch.setenv("FAST_MODEL_SECONDS", "2")  # most are still to come, however busy the machine is
+    gate = Gate(tmp_path / "gate")
+    for name, value in gate.variables.items():
+        monkeypatch.setenv(name, value)
+    gate.let(3)
     run = start(tmp_path, count)
-    wait_for(lambda: labels_in(tmp_path))
+    wait_for(lambda: len(labels_in(tmp_path)) == 3 and len(solves()) == 5)
     workers = {int(process) for process, _ in solves()}
     run.send_signal(how)
-    _, errors = run.communicate(timeout=30)
+    _, errors = run.communicate(timeout=100)
     assert run.returncode == (130 if how == signal.SIGINT else -9), errors
     wait_for(lambda: not any(alive(worker) for worker in workers))
     kept = {p: p.read_bytes() for p in (tmp_path / "labels").glob("*.parquet")}
     results = len(list((tmp_path / "labels" / "store").rglob("*.npz")))
-    assert 0 < len(kept) <= results < count
+    assert len(kept) == results == 3
     begun = len(solves())
-    monkeypatch.setenv("FAST_MODEL_SECONDS", "0")
+    gate.open()
     summary = label_all(episodes(tmp_path, count))
     assert labels_in(tmp_path) == list(range(count)) and not summary.failed
     assert len(solves()) - begun == count - results, "only what was not finished is computed"
@@ -100,7 +104,8 @@ def test_a_run_that_is_stopped_goes_on_where_it_stood(tmp_path, label_all, solve
 
 def test_workers_end_with_whoever_runs_the_verb_as_a_stage(tmp_path, solves, monkeypatch):
     """As `tacdata demo` does: killed, it leaves nobody behind who goes on solving."""
-    monkeypatch.setenv("FAST_MODEL_SECONDS", "200")
+    for name, value in Gate(tmp_path / "gate").variables.items():
+        monkeypatch.setenv(name, value)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HERE), str(HERE.parent.parent)]))
     recorded = session(tmp_path / "session", 3)
     with subprocess.Popen([sys.executable, "-c", STAGE, str(recorded)], stdout=subprocess.DEVNULL) as parent:

@@ -10,6 +10,7 @@ import hosts
 import pytest
 from chaos import ROOT, compare, record, undisturbed
 from farm_examples import HERE
+from gate import Gate
 
 pytestmark = [
     pytest.mark.long("label_farm", reason="three hosts of one network: one dies, one is cut off and comes back"),
@@ -56,7 +57,7 @@ def test_a_host_dies_and_another_loses_its_network(tmp_path, engine):
     work, peace = tmp_path / "work", tmp_path / "peace"
     work.mkdir()
     peace.mkdir()
-    names = record(work, 1, PRESSES)
+    names, gate = record(work, 1, PRESSES), Gate(tmp_path / "gate")
     with hosts.Hosts("head", "one", "two") as network, (tmp_path / "log").open("w") as log:
         head, said = network.address["head"], {"stdout": log, "stderr": log, "cwd": ROOT}
         scheduler, url = f"tcp://{head}:8786", f"http://{head}:8765"
@@ -67,7 +68,8 @@ def test_a_host_dies_and_another_loses_its_network(tmp_path, engine):
             line = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", head, "--no-dashboard"]
             network.start("head", line, env=patience, **said)
             options, joined = ("--dask", scheduler), scheduler
-        slow = environment(FAST_MODEL_SECONDS="0.5", FAST_MODEL_LOG=str(work / "solves.log"))
+        log_of_solves = str(work / "solves.log")
+        slow = environment(FAST_MODEL_SECONDS="0.5", FAST_MODEL_LOG=log_of_solves, **gate.variables)
         up = tacdata("farm", "up", "--root", str(work), "--host", head, "--factory", "fast_model:FastModel", *options)
         network.start("head", up, env=environment(), **said)
 
@@ -83,17 +85,22 @@ def test_a_host_dies_and_another_loses_its_network(tmp_path, engine):
         def labelled():
             return ask(network, url, "/api/submissions/000001")["labelled"]
 
-        wait(lambda: labelled() >= 6)
-        seen = {row["owner"] for row in ask(network, url, "/api/state")["workers"] if row["done"]}
-        assert {host for host in ("one", "two") if any(f"{host}/" in owner for owner in seen)} == {"one", "two"}, seen
+        def both_worked():
+            gate.let(2)
+            rows = ask(network, url, "/api/state")["workers"]
+            return all(any(row["done"] and f"{host}/" in row["owner"] for row in rows) for host in workers)
+
+        wait(both_worked)
         network.kill(workers["one"])
         before = labelled()
+        gate.let(6)
         wait(lambda: labelled() >= before + 4)
         network.cut("two")
         time.sleep(5.0)
         stuck = labelled()
         assert stuck < PRESSES, "there is work left when all hosts are gone"
         join("one")
+        gate.open()
         wait(lambda: labelled() > stuck)
         network.mend("two")
         # Asking costs a process: seldom enough not to starve those that work.
