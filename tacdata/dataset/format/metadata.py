@@ -58,12 +58,16 @@ class EpisodeRecord:
     """What a person should know of it."""
     specimen: str = ""
     """Name of the sensor: of sensors of one design, whose descriptions are the same, each has its own."""
+    simulated: dict[str, Any] | None = None
+    """What drew the press and its specimen, where nothing was recorded (`tacdata simulate`); None of a recording."""
 
     @cached_property
     def document(self) -> dict[str, Any]:
         """The record as plain data (JSON types)."""
         values = asdict(self)
         values |= {"baseline": list(self.baseline), "notes": list(self.notes)}
+        if self.simulated is None:
+            del values["simulated"]
         return {"version": schemas.version("dataset_record"), **values}
 
     @cached_property

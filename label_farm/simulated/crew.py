@@ -1,0 +1,97 @@
+"""Processes that solve a simulation side by side: one a core, or one a GPU."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import IO
+
+from label_farm import environment
+from label_farm.simulated.simulation import Simulation
+from label_farm.simulated.solving import solve
+from tacdata.errors import SolveError, UsageError
+
+
+def chosen_devices(name: str) -> tuple[str, ...]:
+    """Return what to solve on: "auto" takes all GPUs of this machine, or its CPU where it has none.
+
+    Raises:
+        UsageError: If the device is not there.
+    """
+    if name != "auto":
+        return environment.devices((name,))
+    try:
+        return environment.devices(("cuda",))
+    except UsageError:
+        return ("cpu",)
+
+
+def solve_all(
+    simulation: Simulation, presses: int, devices: Sequence[str], workers: int, settled: Callable[[int, str], None]
+) -> None:
+    """Solve what is missing by ``workers`` processes; by this one if that is one.
+
+    Args:
+        simulation: What is drawn and solved.
+        presses: How many presses are wanted in all.
+        devices: What the workers solve on, one after the other.
+        workers: How many processes.
+        settled: Called with each press's number, and why it was given up or "".
+
+    Raises:
+        SolveError: If a specimen cannot be modelled, or a worker dies.
+    """
+    simulation.open()
+    if workers == 1:
+        solve(simulation, presses, devices[0], settled=settled)
+        return
+    crew = [_Hand(simulation.folder, presses, k, workers, devices[k % len(devices)], settled) for k in range(workers)]
+    try:
+        for hand in crew:
+            hand.join()
+    finally:
+        for hand in crew:
+            hand.stop()
+
+
+class _Hand:
+    """One process, and a thread that listens to it."""
+
+    def __init__(
+        self, folder: Path, presses: int, index: int, of: int, device: str, settled: Callable[[int, str], None]
+    ) -> None:
+        self._errors: IO[bytes] = tempfile.TemporaryFile()
+        self._process = subprocess.Popen(
+            [*environment.python("label_farm.simulated.worker"), str(folder), str(presses), str(index), str(of)],
+            env=environment.variables(device), stdout=subprocess.PIPE, stderr=self._errors, text=True, process_group=0,
+        )  # fmt: skip
+        self._thread = threading.Thread(target=self._listen, args=(settled,), daemon=True)
+        self._thread.start()
+
+    def _listen(self, settled: Callable[[int, str], None]) -> None:
+        for line in self._process.stdout or ():
+            number, _, reason = line.rstrip("\n").partition(" ")
+            settled(int(number), reason)
+
+    def join(self) -> None:
+        """Wait for its end.
+
+        Raises:
+            SolveError: If it did not end well.
+        """
+        self._thread.join()
+        if code := self._process.wait():
+            self._errors.seek(0)
+            words = self._errors.read().decode(errors="replace")[-2000:].strip()
+            raise SolveError(
+                f"a process that solves presses ended with {code}:\n{words}", "processes that end well",
+                "see the lines above; run again to go on: what was written is kept",
+            )
+
+    def stop(self) -> None:
+        """End it, if it still runs."""
+        self._process.terminate()
+        self._process.wait()

@@ -1,0 +1,117 @@
+"""Writes the solved presses of a simulation as a dataset, an episode a press, in the order of their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from label_farm.labels.make_label import make_label
+from label_farm.labels.request import LabelRequest
+from label_farm.simulated.readings import board_counts
+from label_farm.simulated.shard import read_shard, settled_numbers, shard_files
+from label_farm.simulated.simulation import Simulation
+from label_farm.simulated.specimen import differences
+from label_farm.simulated.timeline import timeline
+from tacdata import provenance
+from tacdata.dataset import DatasetWriter, frames
+from tacdata.dataset.format.metadata import EpisodeRecord
+from tacdata.errors import UsageError
+from tacdata.labels import Label, PathSolution
+from tacdata.recording.episode import Episode
+
+_STREAM = 43
+"""Tells the random numbers of readings from those of presses and specimens."""
+
+
+def simulated_episode(simulation: Simulation, number: int, solution: PathSolution) -> tuple[Episode, Label]:
+    """Return a solved press as a recording and its label.
+
+    The recording's sensor is the design, the label is the specimen's: its skin's map, its board's readings.
+    """
+    press, specimen = simulation.press(number), simulation.specimen(number)
+    rng = np.random.default_rng([simulation.seed, _STREAM, number])
+    episode = timeline(press, simulation.sensor, rng)
+    model = solution.provenance["parents"]["model"]
+    times = episode.taxels.sample_ns
+    request = LabelRequest(
+        number, recording_key(simulation, number), specimen, model, times, episode.tip_at(times),
+        int(episode.tip_ns[int(np.argmax(episode.tip[:, 2]))]), simulation.job(press, model),
+    )  # fmt: skip
+    label = make_label(request, solution)
+    ideal = np.asarray(label.taxel_counts, dtype=float)
+    limit = specimen.transduction.full_scale if specimen.transduction else None
+    counts = board_counts(ideal, times, simulation.plan.noise, limit, rng)
+    return replace(episode, taxels=replace(episode.taxels, counts=counts)), label
+
+
+def recording_key(simulation: Simulation, number: int) -> str:
+    """Return what stands in place of a recording's hash (hex, 64 characters): decided by what is drawn, not by when."""
+    return provenance.content_hash({"simulation": simulation.content_hash, "press": number})
+
+
+def write_dataset(
+    simulation: Simulation, presses: int, out: Path, extra: Sequence[str] = (),
+    done: Callable[[int], None] = lambda number: None,
+) -> tuple[int, int]:
+    """Append the solved presses that a dataset lacks; an interruption keeps what is finished.
+
+    Args:
+        simulation: What is drawn and solved.
+        presses: How many presses are wanted in all; those given up are left out.
+        out: Folder of the dataset, made if missing.
+        extra: Optional columns of the labels (`features.EXTRA`).
+        done: Called with each press's number.
+
+    Returns:
+        Episodes and frames that the dataset has now.
+
+    Raises:
+        UsageError: If it holds other recordings.
+    """
+    writer = (DatasetWriter.open if out.exists() else DatasetWriter.create)(out, simulation.sensor, extra)
+    where = {n: path for path in shard_files(simulation.folder) for n in settled_numbers(path) if n < presses}
+    _refuse_others(simulation, writer, where, out)
+    read = lru_cache(maxsize=2 * len(simulation.specimens))(read_shard)
+    for number in sorted(where):
+        if recording_key(simulation, number) not in writer.recordings:
+            solution = read(where[number]).solutions.get(number)
+            if solution is not None:
+                _append(writer, simulation, number, solution, extra)
+        done(number)
+    return writer.info["total_episodes"], writer.info["total_frames"]
+
+
+def _append(
+    writer: DatasetWriter, simulation: Simulation, number: int, solution: PathSolution, extra: Sequence[str]
+) -> None:
+    episode, label = simulated_episode(simulation, number, solution)
+    record = _record(simulation, episode, label)
+    task = f"press the skin with {episode.press.indenter_name}"
+    writer.append(frames.episode_columns(episode, label, extra), record, task)
+
+
+def _record(simulation: Simulation, episode: Episode, label: Label) -> EpisodeRecord:
+    number, specimen = episode.number, simulation.specimen(episode.number)
+    found = frames.episode_record(episode, label, recording_key(simulation, number), simulation.sensor)
+    # The specimen's transduction stands in `simulated`, once.
+    made = found.label_provenance["parameters"]
+    made = {**found.label_provenance, "parameters": {k: v for k, v in made.items() if k != "transduction"}}
+    drawn = {
+        "plan": simulation.plan.name, "seed": simulation.seed, "press": number,
+        "simulation": simulation.content_hash, "specimen": differences(specimen, simulation.sensor),
+    }  # fmt: skip
+    return replace(found, specimen=specimen.name, label_provenance=made, simulated=drawn)
+
+
+def _refuse_others(simulation: Simulation, writer: DatasetWriter, where: dict[int, Path], out: Path) -> None:
+    own = {recording_key(simulation, number) for number in where}
+    if others := writer.recordings - own:
+        raise UsageError(
+            f"{out} holds {len(others)} episodes that are not among these presses",
+            "a new folder, or a dataset of the same plan, sensor and seed with fewer presses",
+            "choose another --out",
+        )

@@ -1,0 +1,136 @@
+"""A folder of simulated presses: what it is drawn from, and which of its presses are solved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import schemas
+from label_farm.presses.job import Job
+from label_farm.presses.ladder import Ladder
+from label_farm.simulated.plan import SimulationPlan
+from label_farm.simulated.press_draw import draw_press
+from label_farm.simulated.shard import settled_numbers, shard_files
+from label_farm.simulated.specimen import draw_specimen
+from tacdata import documents, provenance
+from tacdata.errors import FormatError, UsageError
+from tacdata.plans import Press
+from tacdata.sensor import Sensor
+
+FILE = "simulation.json"
+_DECIDING = (
+    "tacdata.skin", "tacdata.indenters", "tacdata.surfaces", "label_farm.presses.ladder",
+    "label_farm.simulated.plan", "label_farm.simulated.press_draw", "label_farm.simulated.specimen",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Everything that decides the solved presses of a folder, but for how many there are."""
+
+    folder: Path
+    """Where they lie."""
+    plan: SimulationPlan
+    sensor: Sensor
+    """The design; specimens are drawn around it."""
+    seed: int
+    mesh_error: bool = False
+    """Whether a coarser mesh says how far off each map is."""
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The folder's `FILE`."""
+        return {
+            "version": schemas.version("simulation"), "plan": self.plan.document, "sensor": self.sensor.document,
+            "seed": self.seed, "mesh_error": self.mesh_error, "code": provenance.code_hash(*_DECIDING),
+        }  # fmt: skip
+
+    @cached_property
+    def content_hash(self) -> str:
+        """Hash of everything that decides a press."""
+        return provenance.content_hash({k: v for k, v in self.document.items() if k != "version"})
+
+    def check(self) -> None:
+        """Refuse a plan that this sensor cannot serve, before seconds go into a mesh.
+
+        Raises:
+            FormatError: If no press can be drawn, or no specimen.
+        """
+        self.press(0)
+        if not self.specimens:
+            raise FormatError(f"plan {self.plan.name}: no specimen", "1 or more", "correct specimens/count")
+
+    def open(self) -> None:
+        """Make the folder, or see that it is of the same simulation.
+
+        Raises:
+            UsageError: If it holds another one.
+        """
+        path = self.folder / FILE
+        if not path.is_file():
+            documents.write(path, self.document, "simulation")
+            return
+        held = documents.read(path, "simulation")
+        other = [k for k in ("plan", "sensor", "seed", "mesh_error", "code") if held[k] != self.document[k]]
+        if other:
+            raise UsageError(
+                f"{self.folder} holds presses of another {' and '.join(other)}",
+                "a new folder, or the same plan, sensor, seed and code",
+                f"name another folder, or remove {self.folder}",
+            )
+
+    @classmethod
+    def read(cls, folder: Path) -> Simulation:
+        """Read what a folder of presses is drawn from.
+
+        Raises:
+            UsageError: If there is no such folder.
+            FormatError: If its file is damaged.
+        """
+        held = documents.read(folder / FILE, "simulation")
+        plan = SimulationPlan.from_document(held["plan"], str(folder / FILE))
+        sensor = Sensor.from_document(held["sensor"], str(folder / FILE))
+        return cls(folder, plan, sensor, held["seed"], held["mesh_error"])
+
+    @cached_property
+    def specimens(self) -> tuple[Sensor, ...]:
+        """The specimens, by their numbers."""
+        spread = self.plan.specimens
+        return tuple(draw_specimen(self.sensor, spread, self.seed, n) for n in range(spread.count))
+
+    @property
+    def settled(self) -> set[int]:
+        """Numbers of the presses that are solved or given up."""
+        return {number for path in shard_files(self.folder) for number in settled_numbers(path)}
+
+    def press(self, number: int) -> Press:
+        """Return a press by its number."""
+        return draw_press(self.plan, self.sensor, self.seed, number)
+
+    def specimen(self, number: int) -> Sensor:
+        """Return the specimen that a press is on: presses are dealt out in turn."""
+        return self.specimens[number % len(self.specimens)]
+
+    def job(self, press: Press, model: str) -> Job:
+        """Return what is solved for a press, by a model of its specimen with this content hash."""
+        step = self.plan.load_step
+        ladder = Ladder(first_step=min(0.05, step), load_step=step, unload_step=step, tolerance=None)
+        return Job(
+            self.specimen(press.index).content_hash, model, press.indenter.document, press.x, press.y, press.yaw,
+            ladder.depths(press.depth), None, press.tilt_x, press.tilt_y,
+        )  # fmt: skip
+
+    def missing(self, presses: int, size: int) -> Iterator[tuple[int, list[int]]]:
+        """Yield (specimen, numbers of presses) to solve together, ``size`` at most.
+
+        The batches of a number of presses are always the same, but for what is settled already.
+        """
+        settled, count = self.settled, len(self.specimens)
+        for start in range(0, presses, count * size):
+            for specimen in range(count):
+                numbers = range(start + specimen, min(start + count * size, presses), count)
+                if wanted := [n for n in numbers if n not in settled]:
+                    yield specimen, wanted

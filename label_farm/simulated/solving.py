@@ -1,0 +1,99 @@
+"""Solves the presses of a simulation in batches, in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from label_farm.simulated.shard import Shard
+from label_farm.simulated.simulation import Simulation
+from label_farm.simulated.specimen import stretched
+from tacdata.errors import SolveError
+from tacdata.indenters import from_document
+from tacdata.labels import PathSolution
+
+if TYPE_CHECKING:
+    from tacdata.skin.model import SkinModel
+
+_AT_A_TIME = {"cpu": 8, "cuda": 512}
+"""How many presses a device solves at a time [count], as in `label_farm.presses.fem`."""
+_IN_A_FILE = {"cpu": 16, "cuda": 1024}
+"""How many presses are solved between two writes [count]; so many are solved again after a crash."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """A worker's share of the batches: every ``of``-th, from ``index`` on."""
+
+    index: int = 0
+    of: int = 1
+
+
+def solve(
+    simulation: Simulation, presses: int, device: str, share: Share | None = None,
+    settled: Callable[[int, str], None] = lambda number, reason: None,
+) -> None:
+    """Solve the presses that are missing, and write each batch when it is done.
+
+    Args:
+        simulation: What is drawn and solved.
+        presses: How many presses are wanted in all.
+        device: "cpu", or a GPU such as "cuda:0".
+        share: The part that this process solves.
+        settled: Called with each press's number, and why it was given up or "".
+
+    Raises:
+        SolveError: If a specimen's skin cannot be modelled.
+    """
+    kind, share = device.split(":")[0], share or Share()
+    batches = list(simulation.missing(presses, _IN_A_FILE[kind]))[share.index :: share.of]
+    # One specimen after the other: a GPU holds the inverse of one skin at a time.
+    for specimen in sorted({number for number, _ in batches}):
+        model = _model(simulation, specimen, device)
+        for number, numbers in batches:
+            if number == specimen:
+                _solve_batch(simulation, model, numbers, _AT_A_TIME[kind], settled).write(simulation.folder)
+        del model
+
+
+def _solve_batch(
+    simulation: Simulation, model: SkinModel, numbers: list[int], capacity: int, settled: Callable[[int, str], None]
+) -> Shard:
+    from tacdata.skin.press import PressRequest
+
+    version, requests = model.content_hash, []
+    for number in numbers:
+        job = simulation.job(simulation.press(number), version)
+        requests.append(
+            PressRequest(
+                from_document(job.indenter), job.x, job.y, job.yaw, job.depths, tilt_x=job.tilt_x, tilt_y=job.tilt_y
+            )
+        )
+    solutions: dict[int, PathSolution] = {}
+    failed: dict[int, str] = {}
+    for index, outcome in model.solve_many(requests, min(capacity, len(requests))):
+        number = numbers[index]
+        if isinstance(outcome, SolveError):
+            failed[number] = outcome.given
+        else:
+            solutions[number] = outcome
+        settled(number, failed.get(number, ""))
+    return Shard(solutions, failed, {**model.identity, "model": version})
+
+
+def _model(simulation: Simulation, specimen: int, device: str) -> SkinModel:
+    """Return a specimen's skin on the design's mesh, stretched to its thickness."""
+    from tacdata.skin.mesh.build import MeshSettings, build_mesh
+    from tacdata.skin.mesh.coarser import companion_mesh
+    from tacdata.skin.model import ModelSettings, SkinModel
+
+    design, own = simulation.sensor, simulation.specimens[specimen]
+    settings = ModelSettings(
+        mesh=MeshSettings(**simulation.plan.document.get("mesh", {})), error_estimate=simulation.mesh_error
+    )
+    mesh = build_mesh(design, settings.mesh)
+    coarse = companion_mesh(design, settings.mesh, mesh) if simulation.mesh_error else None
+    thick = design.skin.thickness, own.skin.thickness
+    meshes = [stretched(each, *thick) if each else None for each in (mesh, coarse)]
+    return SkinModel(own, replace(settings), device, *meshes)

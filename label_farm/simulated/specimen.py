@@ -1,0 +1,92 @@
+"""Draws the specimens of one design: their skins, and what their boards read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from label_farm.simulated.plan import SpecimenSpread
+from tacdata.errors import FormatError
+from tacdata.sensor import Sensor
+from tacdata.transduction import Transducer
+
+if TYPE_CHECKING:
+    from tacdata.skin.mesh.skin_mesh import SkinMesh
+
+_STREAM = 42
+"""Tells the random numbers of specimens from those of presses and noise."""
+_FARTHEST = 2.0
+"""Largest distance of a drawn value from its mean, over the standard deviation [1]."""
+_INCOMPRESSIBLE = 0.495
+"""Largest Poisson's ratio that is drawn [1]."""
+_SKIN = {
+    "thickness": ("skin", "thickness"),
+    "youngs_modulus": ("material", "youngs_modulus"),
+    "poisson_ratio": ("material", "poisson_ratio"),
+    "friction": ("contact", "friction"),
+}
+"""Spread in the sensor file -> the entry that it is of. The others are of registration and of indenters."""
+
+
+def draw_specimen(sensor: Sensor, spread: SpecimenSpread, seed: int, number: int) -> Sensor:
+    """Return specimen ``number`` of a design: a sensor with values of its own, and no spread any more.
+
+    A skin's thickness, modulus, Poisson's ratio and friction are drawn as the sensor file's uncertainty says.
+    Registration is not drawn: places are random already, and labels are of the place that was pressed.
+
+    Raises:
+        FormatError: If the sensor file has no transduction, or lacks a parameter that is to vary.
+    """
+    transducer = Transducer.of(sensor)
+    rng = np.random.default_rng([seed, _STREAM, number])
+    document = sensor.document
+    document.pop("uncertainty", None)
+    document["name"] = f"{sensor.name}-specimen-{number}"
+    for name, (part, entry) in _SKIN.items():
+        drawn = _normal(rng)  # drawn in any case, so that what varies decides nothing of the rest
+        if spread.skin and name in sensor.uncertainty:
+            document[part][entry] = _kept(name, document[part][entry] + sensor.uncertainty[name] * drawn)
+    told = document["transduction"]
+    count = sensor.taxels.count
+    shared = 1 + spread.shared_gain * _normal(rng)
+    told["gain"] = [round(v, 4) for v in (transducer.gain * shared * (1 + spread.gain * _normal(rng, count))).tolist()]
+    told["offset"] = [round(v, 2) for v in (transducer.offset + spread.offset * _normal(rng, count)).tolist()]
+    known = {**vars(transducer.principle), **told.get("parameters", {})}
+    for name, share in sorted(spread.parameters.items()):
+        if name not in known:
+            raise FormatError(
+                f"specimens/parameters: {name}", f"parameters of {told['principle']}: {', '.join(known)}",
+                "name one of these, or leave it out",
+            )
+        value = np.asarray(known[name], dtype=float) * (1 + share * _normal(rng))
+        told.setdefault("parameters", {})[name] = value.round(6).tolist()
+    return Sensor.from_document(document, document["name"])
+
+
+def stretched(mesh: SkinMesh, thickness: float, wanted: float) -> SkinMesh:
+    """Return the mesh of a slab as one of another thickness [mm]: heights above the protrusions are scaled.
+
+    A mesh made anew would differ at random, in more than the thickness.
+    """
+    nodes = mesh.nodes.copy()
+    slab = nodes[:, 2] > 0
+    nodes[slab, 2] *= wanted / thickness
+    return replace(mesh, nodes=nodes)
+
+
+def differences(specimen: Sensor, design: Sensor) -> dict[str, Any]:
+    """Return what a specimen has of its own, for its record."""
+    own, common = specimen.document, design.document
+    skin = {name: own[part][entry] for name, (part, entry) in _SKIN.items() if own[part][entry] != common[part][entry]}
+    return {"name": specimen.name, **skin, "transduction": own["transduction"]}
+
+
+def _normal(rng: np.random.Generator, count: int | None = None) -> Any:
+    return np.clip(rng.standard_normal(count), -_FARTHEST, _FARTHEST)
+
+
+def _kept(name: str, value: float) -> float:
+    value = max(value, 0.0) if name == "friction" else value
+    return round(float(min(value, _INCOMPRESSIBLE) if name == "poisson_ratio" else value), 5)

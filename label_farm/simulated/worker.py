@@ -1,0 +1,26 @@
+"""A process that solves a share of a simulation: ``python -m label_farm.simulated.worker FOLDER PRESSES INDEX OF``."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from label_farm import environment
+from label_farm.simulated.simulation import Simulation
+from label_farm.simulated.solving import Share, solve
+
+
+def main() -> None:
+    """Solve; a line with its number, and why it was given up, says that a press is settled."""
+    folder, presses, index, of = sys.argv[1:]
+    tell = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)  # what libraries print must not mix with it
+    solve(
+        Simulation.read(Path(folder)), int(presses), os.environ.get(environment.DEVICE, "cpu"),
+        Share(int(index), int(of)), lambda number, reason: print(number, reason.replace("\n", " "), file=tell),
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
