@@ -101,7 +101,7 @@ class FemModel:
                     yield job, solution
                     continue
                 if job.tolerance is None or round_ == _ROUNDS - 1 or not _far_apart(job.tolerance, solution):
-                    yield job, self._finished(job, request, solution)
+                    yield job, self._finished(job, request, solution, coarse[number])
                 else:
                     depths = job.tolerance.refined(solution.depth, solution.surface)
                     requests[number] = replace(request, depths=depths)
@@ -113,12 +113,14 @@ class FemModel:
     def _together(self, requests: Sequence[PressRequest]) -> int:
         return max(1, min(len(requests), self.batch))
 
-    def _finished(self, job: Job, request: PressRequest, solution: PathSolution) -> PathSolution | SolveError:
+    def _finished(
+        self, job: Job, request: PressRequest, solution: PathSolution, coarse: CoarsePress | None
+    ) -> PathSolution | SolveError:
         from tacdata.skin.derivatives.path_uncertainty import with_uncertainty
 
         try:
             # Spreads are smooth in depth: the states that were asked for are enough.
-            return with_uncertainty(self._model, _request(job), _with_ladder(job, request, solution))
+            return with_uncertainty(self._model, _request(job), _with_ladder(job, request, solution), coarse)
         except SolveError as error:
             return error
 

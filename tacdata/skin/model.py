@@ -21,6 +21,7 @@ from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.equilibrium import Equilibrium
 from tacdata.skin.solve.meshed_skin import MeshedSkin
+from tacdata.skin.solve.passage import PathRecorder
 from tacdata.skin.solve.settings import ModelSettings
 from tacdata.skin.validity import fineness
 from tacdata.skin.validity.coarse_press import CoarsePress, press_coarsely
@@ -101,7 +102,8 @@ class SkinModel:
         return provenance.content_hash(self.identity)
 
     def states_many(
-        self, requests: Iterable[PressRequest], capacity: int = 1, with_displacement: bool = True
+        self, requests: Iterable[PressRequest], capacity: int = 1, with_displacement: bool = True,
+        observe: PathRecorder | None = None,
     ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
         """Solve presses, many at a time.
 
@@ -109,6 +111,7 @@ class SkinModel:
             requests: What to press.
             capacity: How many presses are in work at a time.
             with_displacement: Whether states hold displacements.
+            observe: Is told of every equilibrium on the way, if given.
 
         Yields:
             The press's index, the depth [mm] and the state, as found; or, in its place, why the press was given up.
@@ -126,7 +129,7 @@ class SkinModel:
         # Columns that fall idle at the end cost, above all on a GPU: the longest paths come first.
         possible.sort(key=lambda one: -one[1].steps(self.settings.step))
         presses = (self.skin.placed(number, request) for number, request in possible)
-        yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement))
+        yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement), observe)
         self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
 
     def states(self, request: PressRequest) -> Iterator[tuple[float, Equilibrium]]:
@@ -160,11 +163,15 @@ class SkinModel:
             capacity: How many presses are in work at a time.
 
         Returns:
-            One for each request; None where no error is estimated or there is no companion.
+            One for each request; None where no error is estimated or there is no companion. They keep their passages if
+            the sensor file states spreads.
         """
+        return self._coarsely(requests, capacity, keep=bool(self.sensor.uncertainty))
+
+    def _coarsely(self, requests: list[PressRequest], capacity: int, keep: bool) -> list[CoarsePress | None]:
         if not (self.settings.error_estimate and self.companion):
             return [None] * len(requests)
-        return list(press_coarsely(self.companion, requests, capacity))
+        return list(press_coarsely(self.companion, requests, capacity, keep))
 
     def solve_many(
         self, requests: list[PressRequest], capacity: int = 1, coarse: Sequence[CoarsePress | None] | None = None
@@ -181,7 +188,7 @@ class SkinModel:
         """
         rows: dict[int, list[Equilibrium]] = {number: [] for number in range(len(requests))}
         began = time.perf_counter()
-        beside = coarse or self.solve_coarsely(requests, capacity)
+        beside = coarse or self._coarsely(requests, capacity, keep=False)
         for number, _, state in self.states_many(requests, capacity):
             if isinstance(state, SolveError):
                 del rows[number]

@@ -60,6 +60,26 @@ def test_all_states_get_the_companions_loading_branch(skin, solved):
     assert said["spreads"] == spreads and said["units"]["youngs_modulus"] == "MPa"
 
 
+def test_states_that_the_companion_solved_before_are_not_solved_again(skin, solved, monkeypatch):
+    apart = with_uncertainty(skin, PRESS, solved)
+    meshes = {"mesh": skin.mesh, "companion": skin.companion.mesh}
+    asking = SkinModel(skin.sensor, replace(skin.settings, error_estimate=True), **meshes)
+    beside = replace(PRESS, x=0.4, depths=(0.0, 0.2, 0.0))
+    coarse = asking.solve_coarsely([beside, PRESS], 2)[1]
+    assert [len(passage.reached) for passage in coarse.passages] == [2, 1], "the touch, then each state"
+    monkeypatch.setattr(asking.companion.skin, "batch", None)
+    shared = with_uncertainty(asking, PRESS, solved, coarse)
+    assert shared.uncertainty == pytest.approx(apart.uncertainty, abs=0.01 * apart.uncertainty.max())
+    assert shared.force_uncertainty == pytest.approx(apart.force_uncertainty, rel=0.01, abs=1e-6)
+    assert shared.provenance["uncertainty"] == apart.provenance["uncertainty"]
+    monkeypatch.undo()
+    broken = replace(coarse, passages=coarse.passages[:1])
+    again = with_uncertainty(asking, PRESS, solved, broken)
+    assert again.uncertainty == pytest.approx(apart.uncertainty, rel=1e-3), "half a path is solved anew"
+    silent = SkinModel(replace(skin.sensor, uncertainty={}), asking.settings, **meshes)
+    assert silent.solve_coarsely([PRESS])[0].passages == ()
+
+
 def test_the_companions_spread_is_nearly_the_meshs_own(skin, solved):
     known = with_uncertainty(skin, PRESS, solved)
     [(_, _, own)] = uncertainties(skin, replace(PRESS, depths=(0.4,)), spreads_of(skin.sensor, PRESS.indenter))

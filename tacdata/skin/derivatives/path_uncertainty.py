@@ -8,6 +8,7 @@ unloading differ from those of loading at the same depth by 1 %
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,11 +21,15 @@ from tacdata.skin.derivatives.parameters import UNITS, known
 from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.derivatives.uncertainty import Uncertainty, propagate, sampled_spread
 from tacdata.skin.press import PressRequest
-from tacdata.skin.validity.coarse_press import loading
+from tacdata.skin.solve.passage import Passage
+from tacdata.skin.validity.coarse_press import CoarsePress, loading
 
 if TYPE_CHECKING:
     from tacdata.indenters import Indenter
     from tacdata.skin.model import SkinModel
+
+_Found = list[tuple[float, Uncertainty]]
+"""Depths [mm] and the standard deviations there."""
 
 _INDENTER = "indenter/"
 
@@ -80,7 +85,9 @@ def check_spreads(sensor: Sensor, indenter: Indenter) -> None:
         )
 
 
-def with_uncertainty(model: SkinModel, request: PressRequest, solution: PathSolution) -> PathSolution:
+def with_uncertainty(
+    model: SkinModel, request: PressRequest, solution: PathSolution, coarse: CoarsePress | None = None
+) -> PathSolution:
     """Return a solution with the standard deviations that the sensor file's spreads give it.
 
     Three ways are tried in turn: to first order on the companion, to first order on the mesh itself, and sampled on the
@@ -90,33 +97,43 @@ def with_uncertainty(model: SkinModel, request: PressRequest, solution: PathSolu
     Args:
         model: That solved it; its companion is taken where there is one.
         request: The press.
-        solution: Its states, at the depths of ``request``.
+        solution: Its states, at the depths of ``request`` or more.
+        coarse: What the companion found of the press (`SkinModel.solve_coarsely`); its states are taken from there if
+            it kept them.
     """
     spreads = spreads_of(model.sensor, request.indenter)
     if not spreads or not loading(request).depths:
         return _noted(solution, {"spreads": spreads, "remark": "no spreads stated" if not spreads else "no contact"})
     remarks = []
     cheapest = model.companion or model
-    for way, on in ((_first_order, cheapest), (_first_order, model), (_sampled, cheapest)):
+    # A path that ends early is tried again by itself: then it says why.
+    passages = coarse.passages if coarse and len(coarse.passages) == len(loading(request).depths) else None
+    ways: list[tuple[str, SkinModel, Callable[..., _Found]]] = [
+        ("first_order", cheapest, lambda on, press, own: _first_order(on, press, own, passages)),
+        ("first_order", model, _first_order), ("sampled", cheapest, _sampled),
+    ]
+    for name, on, way in ways:
         try:
             found = way(on, loading(request), spreads)
         except SolveError as error:
-            remarks.append(f"{way.__name__[1:]} on {len(on.mesh.nodes)} nodes: {error.given}")
+            remarks.append(f"{name} on {len(on.mesh.nodes)} nodes: {error.given}")
             continue
-        how = {"mesh": on.mesh.content_hash, "method": way.__name__[1:], "remark": "; ".join(remarks)}
+        how = {"mesh": on.mesh.content_hash, "method": name, "remark": "; ".join(remarks)}
         return _noted(replace(solution, **_along(solution.depth, found)), {"spreads": spreads, **how})
     return _noted(solution, {"spreads": spreads, "remark": "not found: " + "; ".join(remarks)})
 
 
-def _first_order(model: SkinModel, request: PressRequest, spreads: dict[str, float]) -> list[tuple[float, Uncertainty]]:
-    """Return depths and standard deviations by derivatives.
+def _first_order(
+    model: SkinModel, request: PressRequest, spreads: dict[str, float], passages: tuple[Passage, ...] | None = None
+) -> _Found:
+    """Return depths and standard deviations by derivatives; ``passages`` as of `sensitivities`.
 
     Raises:
         SolveError: If they are not found, or are much steeper than the map. Where a sharp tip is about to slip on a
             coarse mesh, they hold for next to no change.
     """
     found = []
-    for depth, state, sensitivity in sensitivities(model, request, list(spreads), _TOLERANCE):
+    for depth, state, sensitivity in sensitivities(model, request, list(spreads), _TOLERANCE, passages):
         steep = _STEEPER * max(_slope(model, state.displacement), 0.5)
         limits = {"x": steep, "y": steep, "z": _STEEPER, "thickness": _STEEPER}
         for name, limit in limits.items():
@@ -143,12 +160,12 @@ def _slope(model: SkinModel, displacement: np.ndarray) -> float:
     return float(np.abs(along).max()) / (2 * _BESIDE)
 
 
-def _sampled(model: SkinModel, request: PressRequest, spreads: dict[str, float]) -> list[tuple[float, Uncertainty]]:
+def _sampled(model: SkinModel, request: PressRequest, spreads: dict[str, float]) -> _Found:
     """Return depths and standard deviations among whole presses."""
     return sampled_spread(model, request, spreads, _SAMPLES, capacity=4)
 
 
-def _along(depth: np.ndarray, found: list[tuple[float, Uncertainty]]) -> dict[str, np.ndarray]:
+def _along(depth: np.ndarray, found: _Found) -> dict[str, np.ndarray]:
     """Return the standard deviations at all states [mm or N], between those of loading linearly in depth, 0 at 0."""
     known_at = np.array([0.0, *(at for at, _ in found)])
     after = np.clip(np.searchsorted(known_at, depth - 1e-9), 1, len(known_at) - 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -14,10 +14,10 @@ from tacdata.skin.derivatives.bonding import Bonding
 from tacdata.skin.derivatives.contact import ConditionsChange
 from tacdata.skin.derivatives.equilibria import TOLERANCE, PathDerivatives, Slack
 from tacdata.skin.derivatives.parameters import check, directions, known
-from tacdata.skin.derivatives.recorder import PathRecorder
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.equilibrium import Equilibrium
+from tacdata.skin.solve.passage import Passage, PathRecorder
 from tacdata.skin.surface.depth_map import DepthRaster
 
 if TYPE_CHECKING:
@@ -53,7 +53,8 @@ class Sensitivity:
 
 
 def sensitivities(
-    model: SkinModel, request: PressRequest, parameters: Sequence[str], tolerance: float = TOLERANCE
+    model: SkinModel, request: PressRequest, parameters: Sequence[str], tolerance: float = TOLERANCE,
+    passages: Iterable[Passage] | None = None,
 ) -> Iterator[tuple[float, Equilibrium, Sensitivity]]:
     """Yield the requested states of a press with their derivatives, in the order of its depths.
 
@@ -65,6 +66,7 @@ def sensitivities(
         request: The press.
         parameters: Names of parameters (`tacdata.skin.derivatives.parameters.known`).
         tolerance: Error of the linear solves, over what they find [1].
+        passages: The states of the press, if the model has solved them before; solved here if not given.
 
     Raises:
         UsageError: If a parameter is not one of this press.
@@ -78,19 +80,30 @@ def sensitivities(
             "sample whole presses (tacdata.skin.derivatives.uncertainty.sampled_spread)",
         )
     skin = model.skin
-    press, batch = skin.placed(0, request), skin.batch([request], 1)
-    recorder, reader = PathRecorder(), _Reader(model, request, names)
+    press, reader = skin.placed(0, request), _Reader(model, request, names)
     touch = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
     along = directions(model.sensor, request.indenter, names, press.conditions, touch)
     at_touch = _without_depth(names, along)
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
     derivatives = PathDerivatives(skin.newton([request]), skin.free, label, tolerance, _slack(model, names))
-    for _, depth, state in batch.run([press], skin.reader.states, recorder):
+    for passage in _passed(model, request) if passages is None else passages:
+        for reached in passage.reached:
+            derivatives.advance(reached, along if derivatives.changes else at_touch)
+        yield passage.depth, passage.state, reader.read(passage.state, derivatives, along)
+
+
+def _passed(model: SkinModel, request: PressRequest) -> Iterator[Passage]:
+    """Solve a press; yield its states with all equilibria on the way.
+
+    Raises:
+        SolveError: If one is not found.
+    """
+    skin, recorder = model.skin, PathRecorder()
+    batch = skin.batch([request], 1)
+    for number, depth, state in batch.run([skin.placed(0, request)], skin.reader.states, recorder):
         if isinstance(state, SolveError):
             raise state
-        for reached in recorder.take():
-            derivatives.advance(reached, along if derivatives.changes else at_touch)
-        yield depth, state, reader.read(state, derivatives, along)
+        yield Passage(depth, state, recorder.take(number))
 
 
 def _slack(model: SkinModel, names: list[str]) -> Slack | None:

@@ -82,8 +82,9 @@ class Equilibria:
 Collect = Callable[[Equilibria], list[Any]]
 """Makes of every column's state what is to be kept of it."""
 
-Observe = Callable[[Configuration], None]
-"""Is told the columns that have just reached an equilibrium, wanted or not, before their history moves on."""
+Observe = Callable[[list[int], Configuration], None]
+"""Is told the numbers of presses that have just reached an equilibrium, wanted or not, and their columns, before the
+history moves on."""
 
 
 class Batch:
@@ -217,7 +218,7 @@ class Batch:
         which = self._tensor(self._mask(verdicts, "found"))
         at = self._at
         if observe:
-            observe(at.take(torch.as_tensor(found, device=at.u.device)))
+            observe(self._numbers(found), at.take(torch.as_tensor(found, device=at.u.device)))
         for history, contact, pose in zip(at.histories, now.contacts, at.poses, strict=True):
             history.accept(contact, pose, which)
         # What is not active carries nothing.
@@ -285,7 +286,7 @@ class Batch:
         here.histories = tuple(surface.start(pose) for surface, pose in zip(surfaces, here.poses, strict=True))
         contacts = self._newton.add_contact_forces(here, torch.zeros_like(here.u))
         if observe:
-            observe(here.copy())
+            observe(self._numbers(which.tolist()), here.copy())
         everyone = torch.ones_like(which, dtype=torch.bool)
         for history, contact, pose in zip(here.histories, contacts, here.poses, strict=True):
             history.accept(contact, pose, everyone)
@@ -374,6 +375,9 @@ class Batch:
         if press is None:
             raise IndexError(f"column {column} is idle")
         return press
+
+    def _numbers(self, columns: list[int]) -> list[int]:
+        return [self._press(column).number for column in columns]
 
     def _mask(self, verdicts: list[str], verdict: str) -> np.ndarray:
         return np.array([v == verdict for v in verdicts])

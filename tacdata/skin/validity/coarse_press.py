@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from tacdata.errors import SolveError
 from tacdata.skin.press import PressRequest
+from tacdata.skin.solve.passage import Passage, PathRecorder
 from tacdata.skin.validity.mesh_error import Figures
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ class PressSolver(Protocol):
     """What solves presses: `tacdata.skin.model.SkinModel`."""
 
     def states_many(
-        self, requests: list[PressRequest], capacity: int = 1
+        self, requests: list[PressRequest], capacity: int = 1, *, observe: PathRecorder | None = None
     ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
         """As `SkinModel.states_many`."""
         ...
@@ -36,6 +37,8 @@ class CoarsePress:
     """Of the states reached."""
     remark: str
     """What is missing, in words; empty if nothing."""
+    passages: tuple[Passage, ...] = ()
+    """The states with all equilibria on the way, if these were to be kept."""
 
 
 def loading(request: PressRequest) -> PressRequest:
@@ -48,13 +51,16 @@ def loading(request: PressRequest) -> PressRequest:
     return replace(request, depths=tuple(depths))
 
 
-def press_coarsely(model: PressSolver, requests: list[PressRequest], capacity: int = 1) -> list[CoarsePress]:
+def press_coarsely(
+    model: PressSolver, requests: list[PressRequest], capacity: int = 1, keep: bool = False
+) -> list[CoarsePress]:
     """Solve the loading branches of presses on the coarser mesh.
 
     Args:
         model: Of the coarser mesh.
         requests: The presses as asked of the finer one.
         capacity: How many presses are in work at a time.
+        keep: Whether to keep the passages, for derivatives.
 
     Returns:
         One for each request, as far as it was reached.
@@ -62,13 +68,21 @@ def press_coarsely(model: PressSolver, requests: list[PressRequest], capacity: i
     numbers = [k for k, request in enumerate(requests) if loading(request).depths]
     found = [[model.figures([], [])] for _ in requests]
     remarks = [""] * len(requests)
-    for index, depth, state in model.states_many([loading(requests[k]) for k in numbers], capacity):
+    passages: list[list[Passage]] = [[] for _ in requests]
+    recorder = PathRecorder() if keep else None
+    asked = [loading(requests[k]) for k in numbers]
+    for index, depth, state in model.states_many(asked, capacity, observe=recorder):
         number = numbers[index]
         if isinstance(state, SolveError):
             remarks[number] = f"the coarser mesh gave up: {state.given}"
             continue
+        if recorder:
+            passages[number].append(Passage(depth, state, recorder.take(index)))
         try:
             found[number].append(model.figures([depth], [state]))
         except SolveError as error:
             remarks[number] = f"the coarser mesh at {depth:g} mm: {error.given}"
-    return [CoarsePress(Figures.joined(parts), remark) for parts, remark in zip(found, remarks, strict=True)]
+    return [
+        CoarsePress(Figures.joined(parts), remark, tuple(passed))
+        for parts, remark, passed in zip(found, remarks, passages, strict=True)
+    ]
