@@ -25,8 +25,8 @@ EQUAL_VERSIONS: dict[str, tuple[Any, str]] = {
     "1977f9099c306f209979b6bbd5f0329011656853c4e2acb9abe8cbc672db5f61": (
         "9d52ea98c6b708e1f5a724d14c8fcaf86a092e55882c91fa91b57574e8fd2629", _ALIKE,
     ),
-    "f6723a6dbe97df24222276487e450eeb04b41b3d004819fbf700392d9d8f68c6": (
-        "e4c1d022f42d681255d4dc8438075601194e5828c16138807f71cbf19e06b149", _ALIKE,
+    "65b40bc2bdc5b0d813864cdb37cf5b8eb6c7e78bb328c3616f73e36a61b04e65": (
+        "e4c1d022f42d681255d4dc8438075601194e5828c16138807f71cbf19e06b149", f"{_ALIKE}; since then pair.py was added",
     ),
     # label_farm.presses: without spreads, with them
     "6a824e685eab6018c2b9362d1e76e5fcf2462d494270c0515279cf2d2f2c510a": (_FARM, _ALIKE),

@@ -72,7 +72,8 @@ def write_dataset(
     Raises:
         UsageError: If it holds other recordings.
     """
-    writer = (DatasetWriter.open if out.exists() else DatasetWriter.create)(out, simulation.sensor, extra)
+    begun = DatasetWriter.open if out.exists() else DatasetWriter.create
+    writer = begun(out, simulation.sensor, extra, simulated=True)
     where = {n: path for path in shard_files(simulation.folder) for n in settled_numbers(path) if n < presses}
     _refuse_others(simulation, writer, where, out)
     read = lru_cache(maxsize=2 * len(simulation.specimens))(read_shard)
@@ -90,7 +91,7 @@ def _append(
 ) -> None:
     episode, label = simulated_episode(simulation, number, solution)
     record = _record(simulation, episode, label)
-    task = f"press the skin with {episode.press.indenter_name}"
+    task = f"press the simulated skin with {episode.press.indenter_name}"
     writer.append(frames.episode_columns(episode, label, extra), record, task)
 
 

@@ -57,11 +57,15 @@ class Simulation:
         """Refuse a plan that this sensor cannot serve, before seconds go into a mesh.
 
         Raises:
-            FormatError: If no press can be drawn, or no specimen.
+            FormatError: If no press can be drawn, no specimen, or no taxel would feel anything.
         """
         self.press(0)
-        if not self.specimens:
-            raise FormatError(f"plan {self.plan.name}: no specimen", "1 or more", "correct specimens/count")
+        if not self.specimens[0].skin.protrusion_radius:
+            raise FormatError(
+                f"sensor {self.sensor.name}: a skin without protrusions, of whose taxels the model knows no load",
+                "a skin whose protrusions stand over its taxels",
+                "set skin/protrusion_radius and contact/board in the sensor file",
+            )
 
     def open(self) -> None:
         """Make the folder, or see that it is of the same simulation.
@@ -74,7 +78,10 @@ class Simulation:
             documents.write(path, self.document, "simulation")
             return
         held = documents.read(path, "simulation")
-        other = [k for k in ("plan", "sensor", "seed", "mesh_error", "code") if held[k] != self.document[k]]
+        asked = self.document
+        other = [k for k in ("sensor", "seed", "mesh_error", "code") if held[k] != asked[k]]
+        if _solved_by(held["plan"]) != _solved_by(asked["plan"]):
+            other.insert(0, "plan")
         if other:
             raise UsageError(
                 f"{self.folder} holds presses of another {' and '.join(other)}",
@@ -134,3 +141,8 @@ class Simulation:
                 numbers = range(start + specimen, min(start + count * size, presses), count)
                 if wanted := [n for n in numbers if n not in settled]:
                     yield specimen, wanted
+
+
+def _solved_by(plan: dict[str, Any]) -> dict[str, Any]:
+    """Return the part of a plan that decides solved presses: noise comes later."""
+    return {name: value for name, value in plan.items() if name not in ("version", "name", "purpose", "noise")}

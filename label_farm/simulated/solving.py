@@ -50,7 +50,7 @@ def solve(
     batches = list(simulation.missing(presses, _IN_A_FILE[kind]))[share.index :: share.of]
     # One specimen after the other: a GPU holds the inverse of one skin at a time.
     for specimen in sorted({number for number, _ in batches}):
-        model = _model(simulation, specimen, device)
+        model = specimen_model(simulation, specimen, device)
         for number, numbers in batches:
             if number == specimen:
                 _solve_batch(simulation, model, numbers, _AT_A_TIME[kind], settled).write(simulation.folder)
@@ -82,7 +82,7 @@ def _solve_batch(
     return Shard(solutions, failed, {**model.identity, "model": version})
 
 
-def _model(simulation: Simulation, specimen: int, device: str) -> SkinModel:
+def specimen_model(simulation: Simulation, specimen: int, device: str) -> SkinModel:
     """Return a specimen's skin on the design's mesh, stretched to its thickness."""
     from tacdata.skin.mesh.build import MeshSettings, build_mesh
     from tacdata.skin.mesh.coarser import companion_mesh

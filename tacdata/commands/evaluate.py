@@ -30,8 +30,9 @@ def run(
 
     On the dataset that it was trained on only the test episodes count; another dataset counts as a whole.
     """
+    from tacdata.dataset.reader import read_dataset
     from tacdata.errors import UsageError
-    from training.frames.data import read_frames
+    from training.frames.data import frames_of
     from training.inference import checkpoint
     from training.reports import report
     from training.reports.score_sheet import markdown
@@ -43,7 +44,8 @@ def run(
     recorded = Path(trained.document["dataset"]["path"])
     if dataset is None and not recorded.is_dir():
         raise UsageError(f"the dataset {recorded} of {network} is not there", "a dataset folder", "give --dataset")
-    frames = read_frames(dataset or recorded)
+    scored = read_dataset(dataset or recorded)
+    frames = frames_of(scored)
     with progress.bars(transient=True) as bar:
         task = bar.add_task("predict", total=None)
         evaluation = evaluate(
@@ -55,6 +57,8 @@ def run(
         )
         report.write(place, evaluation, frames)
     print(markdown(evaluation.document))
+    if scored.simulated:
+        print("simulated: the scores say how well the network knows the skin model; of a sensor they say nothing")
     print(f"scores      {place.scores / report.JSON}, {report.SHEET}, {report.PICTURE}")
     print(f"predictions {place.predictions}")
     return Result(evaluation.document)

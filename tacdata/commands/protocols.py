@@ -27,8 +27,9 @@ def run(
     "wearing trial" are scored by participant. Where no press of the dataset has a purpose, each counts as both.
     """
     from tacdata import documents
+    from tacdata.dataset.reader import read_dataset
     from tacdata.errors import UsageError
-    from training.frames.data import read_frames
+    from training.frames.data import frames_of
     from training.inference import checkpoint
     from training.reports.protocol_sheet import markdown
     from training.scoring.protocols import protocols
@@ -36,7 +37,9 @@ def run(
     if out and out.exists():
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
     trained = checkpoint.load(network) if network else None
-    document = protocols(read_frames(dataset), trained)
+    trials = read_dataset(dataset)
+    trials.check_measured("the paper's trials")
+    document = protocols(frames_of(trials), trained)
     documents.check(document, "protocols", str(dataset))
     print(markdown(document))
     if out:

@@ -32,8 +32,9 @@ def run(
     Runs of one network and recipe that differ in their seed are put together, mean ± SD.
     """
     from tacdata import documents
+    from tacdata.dataset.reader import read_dataset
     from tacdata.errors import UsageError
-    from training.frames.data import read_frames
+    from training.frames.data import frames_of, read_frames
     from training.frames.frames import Frames
     from training.inference import checkpoint
     from training.reports.protocol_sheet import markdown
@@ -43,6 +44,8 @@ def run(
 
     if out.exists():
         raise UsageError(f"{out} exists", "a new file; nothing is overwritten", "choose another --out")
+    if trials:
+        read_dataset(trials).check_measured("the paper's trials")
     trained = [checkpoint.load(folder) for folder in _folders(runs)]
     known: dict[Path, Frames] = {}
     scored = []
@@ -55,7 +58,7 @@ def run(
         frames = known.setdefault(place, read_frames(place)) if place not in known else known[place]
         scored.append(Scored(network.settings.title, evaluate(network, frames, device, threads), frames))
         say(f"scored {network.path.parent}")
-    sheet = markdown(protocols(read_frames(trials), trained[0])) if trials else ""
+    sheet = markdown(protocols(frames_of(read_dataset(trials)), trained[0])) if trials else ""
     documents.write_text(out, page(scored, sheet))
     print(f"report: {out}")
     return Result({"runs": [{"title": run.name, **run.evaluation.document} for run in scored], "report": out})

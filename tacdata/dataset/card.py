@@ -62,6 +62,7 @@ def card(dataset: Dataset) -> str:
         f"{len(dataset.episodes)} episodes, {len(dataset)} frames, {seconds / 60:.1f} min at "
         f"{dataset.sensor.taxels.rate:g} Hz; LeRobot v3.0; content `{dataset.content_hash[:12]}`.",
         "",
+        *_simulated(dataset, records),
         *_sensor(dataset, records),
         *_presses(presses),
         *_coverage(presses, dataset),
@@ -72,11 +73,28 @@ def card(dataset: Dataset) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _simulated(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
+    """Say first of all that nobody recorded it, and what it was drawn from."""
+    drawn = Counter(f"plan {r.simulated['plan']}, seed {r.simulated['seed']}" for r in records if r.simulated)
+    if not drawn:
+        return []
+    whole = dataset.simulated == len(dataset.episodes)
+    share = "Nobody recorded" if whole else f"{dataset.simulated} of {len(dataset.episodes)} episodes, not recorded, of"
+    return [
+        f"**Simulated.** {share} this dataset: the skin model solved drawn presses, the sensor file's transduction "
+        "read them.",
+        "",
+        f"- drawn from {_counted(drawn)}",
+        "",
+    ]
+
+
 def _sensor(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
     sensor = dataset.sensor
-    kinds = {r.virtual for r in records}
+    kinds = {r.virtual for r in records if r.simulated is None}
     rig = "virtual rigs" if kinds == {True} else "real rigs" if kinds == {False} else "real and virtual rigs"
     specimens = Counter(r.specimen or "not named" for r in records)
+    origin = f"recorded on {rig if kinds else 'rigs that nobody named'}" if dataset.simulated < len(records) else "rig"
     return [
         "## Sensor and rig",
         "",
@@ -84,7 +102,7 @@ def _sensor(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
         f"{sensor.skin.size_x:g} x {sensor.skin.size_y:g} x {sensor.skin.thickness:g} mm, map "
         f"{sensor.map.pixels_x} x {sensor.map.pixels_y} pixels of {sensor.map.pixel_pitch:g} mm",
         f"- specimens: {_counted(specimens)}",
-        f"- recorded on {rig if kinds else 'rigs that nobody named'}: {_counted(Counter(r.rig for r in records))}",
+        f"- {origin}: {_counted(Counter(r.rig for r in records))}",
         "",
     ]
 

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from tacdata.dataset import cache
 from tacdata.dataset.format import features, folder, metadata
 from tacdata.dataset.format.metadata import EpisodeRecord
-from tacdata.errors import FormatError
+from tacdata.errors import FormatError, UsageError
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
 
@@ -82,6 +82,27 @@ class Dataset:
     def units(self) -> dict[str, str]:
         """Unit of every column."""
         return {key: features.unit(key) for key in self.columns}
+
+    @cached_property
+    def simulated(self) -> int:
+        """Number of episodes that nobody recorded (`tacdata simulate`)."""
+        return sum(episode.record is not None and episode.record.simulated is not None for episode in self.episodes)
+
+    def check_measured(self, purpose: str) -> None:
+        """Refuse a dataset with simulated episodes where measured ones are meant.
+
+        Args:
+            purpose: What they are wanted for, in words.
+
+        Raises:
+            UsageError: If it has one.
+        """
+        if self.simulated:
+            raise UsageError(
+                f"{self.root}: {self.simulated} of {len(self.episodes)} episodes are simulated, nobody measured them",
+                f"recorded presses, for {purpose}",
+                "record a session, label and pack it, and name that dataset",
+            )
 
     @cached_property
     def sensor(self) -> Sensor:

@@ -48,9 +48,18 @@ class DatasetWriter:
     own_columns: bool = True
     """Whether rows get columns of ours: LeRobot wants the first file's in all, and its edits drop them."""
 
+    @property
+    def simulated(self) -> bool:
+        """Whether its episodes are simulated presses; others are refused then."""
+        return str(self.info["robot_type"]).endswith(SIMULATED)
+
     @classmethod
-    def create(cls, root: Path, sensor: Sensor, extra: Iterable[str] = ()) -> DatasetWriter:
+    def create(
+        cls, root: Path, sensor: Sensor, extra: Iterable[str] = (), *, simulated: bool = False
+    ) -> DatasetWriter:
         """Start a dataset, with some of `features.EXTRA` if asked for; its folder is made by the first append.
+
+        A simulated one has a ``robot_type`` of its own, by which LeRobot's tools refuse to merge it with recordings.
 
         Raises:
             UsageError: If the folder exists.
@@ -61,17 +70,19 @@ class DatasetWriter:
                 "a folder that does not exist yet",
                 "name another folder, or append to this dataset",
             )
-        info = folder.empty_info(features.lerobot_features(sensor, extra), sensor.taxels.rate, sensor.name)
-        return cls(root, sensor, info)
+        return cls(root, sensor, _empty_info(sensor, extra, simulated))
 
     @classmethod
-    def open(cls, root: Path, sensor: Sensor, extra: Iterable[str] | None = None) -> DatasetWriter:
+    def open(
+        cls, root: Path, sensor: Sensor, extra: Iterable[str] | None = None, *, simulated: bool = False
+    ) -> DatasetWriter:
         """Open an existing dataset to append episodes of ``sensor`` to it.
 
         Args:
             root: The folder.
             sensor: Whose episodes.
             extra: Which of `features.EXTRA` it must have; None takes what it has.
+            simulated: Whether a dataset that has no finished episode yet is to hold simulated ones.
 
         Raises:
             UsageError: If there is none.
@@ -80,8 +91,7 @@ class DatasetWriter:
         """
         if not (root / folder.INFO).exists() and (root / metadata.MAIN).exists():
             # The very first append never finished: nothing counts yet.
-            described = features.lerobot_features(sensor, extra or ())
-            return cls(root, sensor, folder.empty_info(described, sensor.taxels.rate, sensor.name))
+            return cls(root, sensor, _empty_info(sensor, extra or (), simulated))
         info = folder.read_info(root)
         main = metadata.read_main(root)
         if main is None:
@@ -131,6 +141,13 @@ class DatasetWriter:
     def _append(self, columns: dict[str, np.ndarray], record: EpisodeRecord, task: str) -> int:
         if record.recording in self.recordings:
             raise UsageError(f"{self.root} holds {record.recording_file} already", "each episode once", "leave it out")
+        if self.simulated != (record.simulated is not None):
+            held, given = ("simulated presses", "was recorded") if self.simulated else ("recordings", "is simulated")
+            raise UsageError(
+                f"{self.root} holds {held}, {record.recording_file} {given}",
+                "recordings and simulated presses in datasets of their own",
+                "name another folder",
+            )
         if record.sensor != self.sensor.content_hash:
             raise FormatError(
                 f"{record.recording_file} is of sensor {record.sensor[:8]}",
@@ -197,7 +214,14 @@ class DatasetWriter:
             folder.write_tasks(self.root, tasks)
 
 
+SIMULATED = "-simulated"
+"""Ending of a simulated dataset's ``robot_type``."""
 OWN_COLUMNS = ("tacdata/sensor", "tacdata/recording", "tacdata/label", "tacdata/indenter", "tacdata/quality")
+
+
+def _empty_info(sensor: Sensor, extra: Iterable[str], simulated: bool) -> dict[str, Any]:
+    robot = f"{sensor.name}{SIMULATED if simulated else ''}"
+    return folder.empty_info(features.lerobot_features(sensor, extra), sensor.taxels.rate, robot)
 
 
 def _own(record: EpisodeRecord) -> dict[str, Any]:

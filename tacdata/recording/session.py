@@ -16,6 +16,12 @@ from tacdata.recording.files import file_names
 from tacdata.sensor import Sensor
 
 FILE = "session.json"
+_OTHERS = {
+    "demonstrations.json": "it holds demonstrations by hand: process them with tacdata track",
+    "meta/tacdata.json": "it is a dataset: name the recordings that it was packed from; simulated presses have none",
+    "simulation.json": "it holds simulated presses, nobody recorded them: name recordings",
+}
+"""File of another kind of folder -> what to do with it."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +74,12 @@ def read_session(folder: Path) -> Session:
     """
     folder = Path(folder)
     if not (folder / FILE).is_file():
-        by_hand = (folder / "demonstrations.json").is_file()
-        raise UsageError(
-            f"{folder} is no session: no {FILE} in it",
-            "a folder written by tacdata record or tacdata import",
-            "it holds demonstrations by hand: process them with tacdata track"
-            if by_hand
-            else "check the path; measured files of another rig come in by `tacdata import`",
+        remedy = next(
+            (words for file, words in _OTHERS.items() if (folder / file).is_file()),
+            "check the path; measured files of another rig come in by `tacdata import`",
         )
+        allowed = "a folder written by tacdata record or tacdata import"
+        raise UsageError(f"{folder} is no session: no {FILE} in it", allowed, remedy)
     document = documents.read(folder / FILE, "session")
     origin = str(folder / FILE)
     found = file_names.finished(folder)
