@@ -35,7 +35,7 @@ def test_presses_lie_on_the_skin_and_mountings_come_once(name):
 
 
 def test_every_shipped_plan_is_among_them():
-    assert set(NAMES) >= {"training", "evaluation", "diagnostic"}
+    assert set(NAMES) >= {"training", "evaluation", "diagnostic", "health"}
     with pytest.raises(UsageError, match="did you mean 'evaluation'"):
         shipped_plan("evalution", SENSOR)
 

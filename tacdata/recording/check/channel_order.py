@@ -136,9 +136,17 @@ def misplaced(found: Answers) -> dict[int, int]:
     # A wrong channel spoils the fit that the others are compared with. So channels that fit elsewhere are moved there,
     # and all are tested again.
     _, place = linear_sum_assignment(-score)
-    score = likelihood(found, fit_answers(found, place).pattern)
-    _, place = linear_sum_assignment(-score)
+    return exchanged(likelihood(found, fit_answers(found, place).pattern))
+
+
+def exchanged(score: np.ndarray) -> dict[int, int]:
+    """Return the channels that fit at another's place, with that place.
+
+    Args:
+        score: Log-likelihood of each channel at each place (`likelihood`), shape (taxels, taxels).
+    """
     own = np.diag(score)
+    _, place = linear_sum_assignment(-score)
     gain = score[np.arange(len(own)), place] - own
     return {
         k: int(j) for k, j in enumerate(place) if j != k and gain[k] > CLEAR and _cycle_gain(place, gain, k) > CLEAR

@@ -1,0 +1,226 @@
+"""One visit beside another: what changed beyond its tolerance, tested one by one and corrected for all tests."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tacdata.health.estimate import Spread, UncertainValue, holm, mean
+from tacdata.health.gains import FEWEST, GainFit, fit_gains
+from tacdata.health.network_error import NetworkError, growth
+from tacdata.health.response import PressResponse
+from tacdata.health.visit import Visit
+from tacdata.health.wiring import Wiring, wiring
+
+LEVEL = 0.01
+"""Probability that any test of channels, or any of the unit, errs while nothing changed beyond its tolerance [1]."""
+COMMON, OWN = 0.03, 0.05
+"""Tolerance of the gain that all channels share, and of a channel's own beside it [1]."""
+ZERO, DRIFT = 0.05, 0.02
+"""Tolerance of a channel's zero, and of its drift in a minute: shares of its strongest answer [1]."""
+NOISE = 1.5
+"""Tolerance of noise: times what it was [1]."""
+LOOP = 0.03
+"""Tolerance of the loop's area [1]."""
+REPEATABLE = 0.02
+"""Tolerance of the relative standard deviation of a press repeated [1]."""
+DEPTH, SIDEWAYS = 0.06, 0.3
+"""Tolerance of the tip's place at the same commanded press: in depth and sideways [mm]."""
+NETWORK = 0.15
+"""Tolerance of the growth of a network's error [1]."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One quantity of a visit beside an earlier one, with its test."""
+
+    quantity: str
+    """One of: common gain, gain, zero, drift, noise, loop, repeatability, depth, x, y, network error."""
+    channel: int | None
+    """Channel; None if it concerns all."""
+    value: float
+    low: float
+    high: float
+    """Bounds of its interval at 95 %."""
+    unit: str
+    tolerance: float
+    p: float
+    """p-value of "it lies within its tolerance"."""
+    corrected: float = 1.0
+    """p-value corrected for all tests of the visit that concern channels, or the unit, by Holm's method."""
+
+    @property
+    def changed(self) -> bool:
+        """Whether it lies beyond its tolerance, by the corrected test."""
+        return self.corrected < LEVEL
+
+
+@dataclass(frozen=True)
+class VisitComparison:
+    """A visit beside an earlier one."""
+
+    against: int
+    """Number of the earlier visit, from 0."""
+    pairs: tuple[tuple[int, int], ...]
+    """Places of the same press in this visit's responses, and in the earlier one's."""
+    gains: GainFit | None
+    wiring: Wiring
+    changes: tuple[Change, ...]
+
+
+def matched(now: Visit, before: Visit) -> list[tuple[int, int]]:
+    """Return the presses that both visits hold: same indenter, place, depth and speed, the nth time with the nth."""
+    places: dict[Any, list[int]] = defaultdict(list)
+    for k, press in enumerate(before.responses):
+        places[press.key].append(k)
+    pairs = []
+    for k, press in enumerate(now.responses):
+        if places[press.key]:
+            pairs.append((k, places[press.key].pop(0)))
+    return pairs
+
+
+def compare(
+    now: Visit, before: Visit, against: int, network: tuple[NetworkError, NetworkError] | None = None
+) -> VisitComparison:
+    """Compare a visit with an earlier one.
+
+    Args:
+        now: The visit.
+        before: The earlier one.
+        against: Its number.
+        network: Errors of one network at both.
+    """
+    pairs = matched(now, before)
+    # Labels of different presses, too, tell gains apart: both beside the model.
+    enough = len(pairs) >= FEWEST
+    measured = [now.responses[a] for a, _ in pairs]
+    reference = [before.responses[b] for _, b in pairs]
+    faults = wiring([now.entries[a] for a, _ in pairs], measured, reference) if enough else wiring_alone(now)
+    order = _order(faults, len(now.noise))
+    gains = _gains(measured, reference, now, before, faults, order) if enough else _by_labels(now, before, faults)
+    changes = [*_gain_changes(gains), *_channel_changes(now, before, faults, order)]
+    if enough:
+        loops = np.array([a.loop - b.loop for a, b in zip(measured, reference, strict=True)])
+        changes.append(_change("loop", None, mean(loops), "1", LOOP))
+    if network and (grown := growth(*network, [(now.responses[a].press.index, before.responses[b].press.index)
+                                              for a, b in pairs])):  # fmt: skip
+        found = _change("network error", None, grown, "1", float(np.log1p(NETWORK)))
+        value, low, high = (float(np.expm1(v)) for v in (found.value, found.low, found.high))
+        changes.append(replace(found, value=value, low=low, high=high, tolerance=NETWORK))
+    return VisitComparison(against, tuple(pairs), gains, faults, tuple(changes))
+
+
+def wiring_alone(visit: Visit) -> Wiring:
+    """Return the wiring of a visit by itself: beside predictions if it is labelled, else beside a round pattern."""
+    return wiring(list(visit.entries), visit.responses, visit.predicted or None)
+
+
+def corrected(comparisons: Sequence[VisitComparison]) -> tuple[VisitComparison, ...]:
+    """Return a visit's comparisons with p-values corrected: all tests of channels together, all of the unit together.
+
+    Two families, as a channel is one of many and the unit is one.
+    """
+    every = [change for c in comparisons for change in c.changes]
+    p_values = np.ones(len(every))
+    for of_channel in (True, False):
+        rows = [k for k, change in enumerate(every) if (change.channel is not None) == of_channel]
+        p_values[rows] = holm([every[k].p for k in rows])
+    left = iter(p_values.tolist())
+    return tuple(replace(c, changes=tuple(replace(x, corrected=next(left)) for x in c.changes)) for c in comparisons)
+
+
+def _order(faults: Wiring, count: int) -> np.ndarray:
+    """Return which channel answers for each taxel, shape (taxels,)."""
+    order = np.arange(count)
+    for channel, taxel in faults.swapped:
+        order[taxel] = channel
+    return order
+
+
+def _gains(
+    measured: Sequence[PressResponse], reference: Sequence[PressResponse], now: Visit, before: Visit, faults: Wiring,
+    order: np.ndarray,
+) -> GainFit | None:  # fmt: skip
+    noise = np.array([max(now.noise[order[k]].value, spread.value) for k, spread in before.noise.items()])
+    sorted_back = [replace(p, levels=p.levels[:, order], slope=p.slope[:, order]) for p in measured]
+    return fit_gains(reference, sorted_back, noise, now.sensor, faults.unfit)
+
+
+def _by_labels(now: Visit, before: Visit, faults: Wiring) -> GainFit | None:
+    """Return the ratio of both visits' gains beside the model; None unless both are labelled."""
+    after, ahead = model_gains(now, faults), model_gains(before, wiring_alone(before))
+    if after is None or ahead is None:
+        return None
+    ratio = {k: _ratio(e, ahead.channels[k]) for k, e in after.channels.items() if k in ahead.channels}
+    own = {k: _ratio(e, ahead.own[k]) for k, e in after.own.items() if k in ahead.own}
+    return GainFit(ratio, _ratio(after.common, ahead.common), own, {}, min(after.presses, ahead.presses))
+
+
+def model_gains(visit: Visit, faults: Wiring) -> GainFit | None:
+    """Return the gains of a labelled visit beside the model's predictions; None without labels."""
+    if not visit.predicted:
+        return None
+    order = _order(faults, len(visit.noise))
+    noise = np.array([visit.noise[k].value for k in order.tolist()])
+    sorted_back = [replace(p, levels=p.levels[:, order], slope=p.slope[:, order]) for p in visit.responses]
+    return fit_gains(visit.predicted, sorted_back, noise, visit.sensor, faults.unfit, predicted=True)
+
+
+def _ratio(one: UncertainValue, other: UncertainValue) -> UncertainValue:
+    value = one.value / other.value
+    error = abs(value) * float(np.hypot(one.error / one.value, other.error / other.value))
+    return UncertainValue(value, error, min(one.freedom, other.freedom))
+
+
+def _gain_changes(gains: GainFit | None) -> list[Change]:
+    if gains is None:
+        return []
+    found = [_change("common gain", None, _less_one(gains.common), "1", COMMON)]
+    found += [_change("gain", k, _less_one(e), "1", OWN) for k, e in gains.own.items()]
+    limits = {"depth": DEPTH, "x": SIDEWAYS, "y": SIDEWAYS}
+    return found + [_change(name, None, e, "mm", limits[name]) for name, e in gains.shift.items()]
+
+
+def _less_one(gain: UncertainValue) -> UncertainValue:
+    return replace(gain, value=gain.value - 1.0)
+
+
+def _channel_changes(now: Visit, before: Visit, faults: Wiring, order: np.ndarray) -> list[Change]:
+    """Return what each channel did without contact, and how repeatable a press was."""
+    strongest = np.max([np.abs(press.hold) for press in before.responses], axis=0)
+    zero, noise, drift, ahead, noisy = now.zero, now.noise, now.drift, before.zero, before.noise
+    found = []
+    for taxel, channel in enumerate(order.tolist()):
+        if channel in faults.unfit or not strongest[taxel] > 0:
+            continue
+        moved = UncertainValue(
+            zero[channel].value - ahead[taxel].value, float(np.hypot(zero[channel].error, ahead[taxel].error)),
+            min(zero[channel].freedom, ahead[taxel].freedom),
+        )  # fmt: skip
+        found.append(_change("zero", channel, moved, now.unit, ZERO * float(strongest[taxel])))
+        found.append(_change("drift", channel, drift[channel], f"{now.unit}/min", DRIFT * float(strongest[taxel])))
+        found.append(_louder(channel, noise[channel], noisy[taxel]))
+    if repeated := now.repeatability:
+        low, high = repeated.interval
+        p = repeated.p_above(REPEATABLE)
+        found.append(Change("repeatability", None, repeated.value, low, high, "1", REPEATABLE, p))
+    return found
+
+
+def _louder(channel: int, now: Spread, before: Spread) -> Change:
+    """Return the ratio of two noises, with the bounds of F."""
+    ratio = now.value / max(before.value, 1e-9)
+    (low, high), (least, most) = now.interval, before.interval
+    half = np.hypot(np.log(high / low), np.log(most / least)) / 2 if before.value > 0 and now.value > 0 else 0.0
+    p = now.p_louder(before, NOISE)
+    return Change("noise", channel, ratio, ratio * float(np.exp(-half)), ratio * float(np.exp(half)), "1", NOISE, p)
+
+
+def _change(quantity: str, channel: int | None, found: UncertainValue, unit: str, tolerance: float) -> Change:
+    low, high = map(float, found.interval)
+    return Change(quantity, channel, float(found.value), low, high, unit, tolerance, found.p_beyond(tolerance))

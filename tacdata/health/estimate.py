@@ -1,0 +1,76 @@
+"""A value with its standard error and degrees of freedom: intervals, tests against a tolerance, Holm's correction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+COVERED = 0.95
+"""Probability that an interval covers the value [1]."""
+
+
+@dataclass(frozen=True)
+class UncertainValue:
+    """An estimate, normal about its value."""
+
+    value: float
+    error: float
+    """Standard error, in the value's unit."""
+    freedom: float
+    """Degrees of freedom of the error [1]."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Bounds that cover the value with `COVERED`."""
+        half = float(stats.t.ppf(0.5 + COVERED / 2, self.freedom)) * self.error
+        return self.value - half, self.value + half
+
+    def p_beyond(self, tolerance: float) -> float:
+        """Return the p-value of "it lies within ± the tolerance" (minimum-effect test)."""
+        if not np.isfinite(self.value):
+            return 1.0
+        return float(min(2 * stats.t.sf((abs(self.value) - tolerance) / max(self.error, 1e-12), self.freedom), 1.0))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A standard deviation estimated from normal numbers."""
+
+    value: float
+    freedom: float
+    """Degrees of freedom [1]."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Bounds that cover the standard deviation with `COVERED` (chi-squared)."""
+        high, low = stats.chi2.ppf([0.5 - COVERED / 2, 0.5 + COVERED / 2], self.freedom)
+        return self.value * float(np.sqrt(self.freedom / low)), self.value * float(np.sqrt(self.freedom / high))
+
+    def p_above(self, limit: float) -> float:
+        """Return the p-value of "it is at most the limit" (chi-squared)."""
+        return float(stats.chi2.sf(self.freedom * (self.value / limit) ** 2, self.freedom))
+
+    def p_louder(self, before: Spread, factor: float) -> float:
+        """Return the p-value of "it is at most so many times what it was before" (F test)."""
+        ratio = (self.value / max(before.value * factor, 1e-12)) ** 2
+        return float(stats.f.sf(ratio, self.freedom, before.freedom))
+
+
+def mean(values: np.ndarray) -> UncertainValue:
+    """Return the mean of independent values, shape (n,), with its standard error; NaN from fewer than two."""
+    known = values[np.isfinite(values)]
+    if len(known) < 2:
+        return UncertainValue(float(known.mean()) if len(known) else float("nan"), float("nan"), 1.0)
+    return UncertainValue(float(known.mean()), float(known.std(ddof=1) / np.sqrt(len(known))), len(known) - 1.0)
+
+
+def holm(p_values: Sequence[float]) -> np.ndarray:
+    """Return p-values corrected for all of these tests, shape (n,): Holm's step-down method."""
+    p = np.asarray(p_values, float)
+    order = np.argsort(p, kind="stable")
+    corrected = np.empty_like(p)
+    corrected[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)), 1.0)
+    return corrected

@@ -1,0 +1,111 @@
+"""The visits of one unit in the order of time, each beside the one before it and beside the first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tacdata.errors import UsageError
+from tacdata.health.comparison import Change, VisitComparison, compare, corrected, model_gains, wiring_alone
+from tacdata.health.gains import GainFit
+from tacdata.health.network_error import NetworkError
+from tacdata.health.visit import Visit
+from tacdata.health.wiring import Wiring
+
+
+@dataclass(frozen=True)
+class History:
+    """Visits and what changed between them."""
+
+    visits: tuple[Visit, ...]
+    """In the order of time."""
+    comparisons: tuple[tuple[VisitComparison, ...], ...]
+    """Of each visit: beside the one before it and, if that is another, beside the first. None for the first visit."""
+    model: tuple[GainFit | None, ...]
+    """Gains of each visit beside the model's predictions; None without labels."""
+    network: Mapping[int, NetworkError]
+    """Number of a visit -> errors of the network."""
+
+    @property
+    def last(self) -> Visit:
+        """The latest visit."""
+        return self.visits[-1]
+
+    @property
+    def wiring(self) -> Wiring:
+        """Faults of the channels at the latest visit."""
+        return self.wiring_at(len(self.visits) - 1)
+
+    def wiring_at(self, number: int) -> Wiring:
+        """Return the faults of the channels at a visit."""
+        found = self.comparisons[number]
+        return found[-1].wiring if found else wiring_alone(self.visits[number])
+
+    def beside_first(self, number: int) -> VisitComparison | None:
+        """Return a visit beside the first one; None for the first."""
+        return self.comparisons[number][-1] if self.comparisons[number] else None
+
+    @property
+    def changed(self) -> tuple[tuple[int, Change], ...]:
+        """What is changed at the latest visit, each with the number of the visit that it is compared with.
+
+        What is changed against the visit before and against the first stands once, against the visit before.
+        """
+        found: dict[tuple[str, int | None], tuple[int, Change]] = {}
+        for comparison in self.comparisons[-1]:
+            for change in comparison.changes:
+                if change.changed:
+                    found.setdefault((change.quantity, change.channel), (comparison.against, change))
+        return tuple(found.values())
+
+
+def history(visits: Sequence[Visit], network: Mapping[str, NetworkError] | None = None) -> History:
+    """Put the visits of one unit in order and compare them.
+
+    Args:
+        visits: Sessions as measured, in any order.
+        network: Folder of a session -> errors of one network at it.
+
+    Raises:
+        UsageError: If there are none, one is given twice, or they are of several units.
+    """
+    ordered = in_order(visits)
+    errors = {k: network[str(v.session.folder)] for k, v in enumerate(ordered) if network
+              and str(v.session.folder) in network}  # fmt: skip
+    comparisons: list[tuple[VisitComparison, ...]] = [()]
+    for number in range(1, len(ordered)):
+        found = []
+        for against in dict.fromkeys((number - 1, 0)):
+            pair = (errors[number], errors[against]) if number in errors and against in errors else None
+            found.append(compare(ordered[number], ordered[against], against, pair))
+        comparisons.append(corrected(found))
+    model = tuple(
+        model_gains(visit, found[-1].wiring if found else wiring_alone(visit)) if visit.predicted else None
+        for visit, found in zip(ordered, comparisons, strict=True)
+    )
+    return History(tuple(ordered), tuple(comparisons), model, errors)
+
+
+def in_order(visits: Sequence[Visit]) -> list[Visit]:
+    """Return the visits of one unit in the order of time.
+
+    Raises:
+        UsageError: If there are none, one is given twice, or they are of several units.
+    """
+    if not visits:
+        raise UsageError("no session", "one or more sessions of one unit", "name the folder of a session")
+    units: dict[str, list[Path]] = {}
+    for visit in visits:
+        taxels = visit.sensor.taxels
+        kind = f"{visit.sensor.name} ({taxels.columns} x {taxels.rows} taxels of {taxels.pitch_x:g} x "
+        units.setdefault(f"{kind}{taxels.pitch_y:g} mm)", []).append(visit.session.folder)
+    if len(units) > 1:
+        told = "; ".join(f"{name}: {', '.join(p.name for p in paths)}" for name, paths in units.items())
+        typed = "; ".join("tacdata health " + " ".join(map(str, paths)) for paths in units.values())
+        raise UsageError(f"sessions of {len(units)} units: {told}", "sessions of one unit", f"ask for each: {typed}")
+    folders = [visit.session.folder.resolve() for visit in visits]
+    twice = {path.name for path in folders if folders.count(path) > 1}
+    if twice:
+        raise UsageError(f"{', '.join(sorted(twice))} given twice", "each session once", "leave one out")
+    return sorted(visits, key=lambda visit: (visit.started, visit.name))

@@ -1,0 +1,96 @@
+"""Channels that are dead, swapped, tied, stuck or no numbers, seen over all presses of a visit."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.health.response import PressResponse
+from tacdata.recording.check.channel_order import (
+    SILENT,
+    Answers,
+    answers,
+    exchanged,
+    fit_answers,
+    likelihood,
+    misplaced,
+)
+from tacdata.recording.check.figures import RecordingFigures
+
+EXPECTED = 30.0
+"""Answer that must be expected of a channel before its silence counts [times the noise]."""
+SHARE = 0.05
+"""Part of what is expected that a dead channel does not reach [1]: a neighbour's crosstalk may."""
+MOST = 0.5
+"""Share of the recordings that must show a fault of the wiring [1]: it lasts."""
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """Faults of the channels at a visit."""
+
+    dead: tuple[int, ...] = ()
+    """Channels that do not answer where they should, or stand still."""
+    swapped: tuple[tuple[int, int], ...] = ()
+    """Channel, and the taxel that it answers like."""
+    tied: tuple[tuple[int, int], ...] = ()
+    """Pairs of channels that read the same."""
+    undefined: tuple[int, ...] = ()
+    """Channels whose readings are no numbers."""
+    saturated: tuple[int, ...] = ()
+    """Channels that ran into a limit."""
+
+    @property
+    def unfit(self) -> frozenset[int]:
+        """Channels whose gain says nothing."""
+        return frozenset({*self.dead, *self.undefined, *(k for pair in self.tied for k in pair)})
+
+
+def wiring(
+    entries: list[RecordingFigures], measured: Sequence[PressResponse], reference: Sequence[PressResponse] | None
+) -> Wiring:
+    """Return the faults.
+
+    Args:
+        entries: Figures of the recordings that are used.
+        measured: What the channels answered to each.
+        reference: What they answered before, or are predicted to; None to compare with a round pattern alone.
+    """
+    found = answers(entries)
+    if found is None:
+        return Wiring()
+    stuck, undefined, saturated = (_lasting(entries, name) for name in ("stuck", "undefined", "saturated"))
+    pairs = Counter((k, j) for entry in entries for k, j in entry.document["taxels"]["tied"])
+    tied = tuple(sorted(pair for pair, n in pairs.items() if n >= MOST * len(entries)))
+    found = replace(found, response=np.nan_to_num(np.array([p.hold for p in measured])))
+    expected = fit_answers(found).pattern if reference is None else _scaled(reference, found)
+    silent = _silent(found, expected)
+    dead = tuple(sorted({*stuck, *silent} - set(undefined)))
+    moved = misplaced(found) if reference is None else exchanged(likelihood(found, expected))
+    swapped = tuple((k, j) for k, j in moved.items() if k not in dead and j not in dead)
+    return Wiring(dead, swapped, tied, undefined, saturated)
+
+
+def _lasting(entries: list[RecordingFigures], name: str) -> tuple[int, ...]:
+    """Return the channels that most recordings list under a name."""
+    seen = Counter(k for entry in entries for k in entry.document["taxels"][name])
+    return tuple(sorted(k for k, n in seen.items() if n >= MOST * len(entries)))
+
+
+def _scaled(reference: Sequence[PressResponse], found: Answers) -> np.ndarray:
+    """Return the reference's answers [counts], shape (presses, taxels), as strong as those found."""
+    expected = np.array([press.hold for press in reference])
+    strong = expected > 0.2 * expected.max(axis=1, keepdims=True)
+    ratio = found.response[strong] / expected[strong]
+    alive = ratio[ratio > SHARE]
+    return expected * (float(np.median(alive)) if len(alive) else 1.0)
+
+
+def _silent(found: Answers, expected: np.ndarray) -> list[int]:
+    """Return the channels that answer nowhere, where plain answers are expected."""
+    due = expected > EXPECTED * found.noise
+    answered = np.abs(found.response) > np.maximum(SILENT * found.noise, SHARE * expected)
+    return [k for k in range(expected.shape[1]) if due[:, k].any() and not (answered & due)[:, k].any()]
