@@ -221,7 +221,7 @@ def from_document(document: dict[str, Any], origin: str = "indenter", folder: Pa
         Traceback (most recent call last):
             ...
         tacdata.errors.UsageError: 'cube' is not among the indenters
-          allowed: cone, cylinder, ellipsoid, flat_punch, mesh, prism, ring, sphere, square_punch
+          allowed: cone, cylinder, ellipsoid, flat_punch, mesh, pair, prism, ring, sphere, square_punch
           next:    choose one, or add tacdata/indenters/cube.py
     """
     values = dict(document)

@@ -33,9 +33,9 @@ class Pair(Indenter):
     """
 
     first: Indenter
-    """Solid at x = -distance / 2, a shape with its sizes."""
+    """Solid at x = -distance / 2: a shape with its sizes [mm, deg]."""
     second: Indenter
-    """Solid at x = +distance / 2, a shape with its sizes."""
+    """Solid at x = +distance / 2: a shape with its sizes [mm, deg]."""
     distance: float
     """Distance between the two solids' axes [mm]."""
 
