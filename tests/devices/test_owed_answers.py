@@ -211,7 +211,13 @@ def test_homing_that_was_broken_off_is_never_said_to_have_moved_nothing(rig):
     driver.home_first = True
     motion = GuardedMotion(driver, clock)
     assert motion.ending == ("motion: nothing was moved",)
-    threading.Timer(1.0, driver.close).start()
+
+    def break_off():
+        while not controller.machine.homing:
+            time.sleep(0.002)
+        driver.close()
+
+    threading.Thread(target=break_off, daemon=True).start()
     with pytest.raises(DeviceError):
         driver.open()
     clock.sleep(1)
