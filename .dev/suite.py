@@ -49,9 +49,7 @@ class Checks:
         self._head(name, command)
         said = ""
         # One thread a process: more would only wait for those of the others.
-        environment = {**os.environ, "OMP_NUM_THREADS": str(max(1, _cores() // MOST)), "PYTHONUNBUFFERED": "1"}
-        # Many tests start a process; each would compile all of its imports anew.
-        environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        environment = {**_compiling(), "OMP_NUM_THREADS": str(max(1, _cores() // MOST)), "PYTHONUNBUFFERED": "1"}
         with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, env=environment) as done:
             # Piece by piece: pytest's dots come long before the end of their line.
             while piece := os.read(done.stdout.fileno(), 65536).decode(errors="replace"):
@@ -87,6 +85,11 @@ class Checks:
             self.failed[name] = abs(code)
 
 
+def _compiling():
+    """Return the environment, with what was compiled kept: many tests start a process."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+
+
 def _cores():
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -115,10 +118,14 @@ def main(arguments):
         )
         try:
             # Once for all: else every test process, started at the same time, compiles all that is new here.
-            compiling = subprocess.Popen([sys.executable, "-m", "compileall", "-q", *PACKAGES], cwd=ROOT)
+            compiling = [
+                subprocess.Popen([sys.executable, *words], cwd=ROOT, env=_compiling())
+                for words in (["-m", "compileall", "-q", *PACKAGES], ["tests/running/rewritten.py"])
+            ]
             checks.run("lint", [str(BIN / "ruff"), "check", "."])
             checks.run("imports", [str(BIN / "lint-imports")])
-            compiling.wait()
+            for process in compiling:
+                process.wait()
             side_by_side = ["--numprocesses", str(min(_cores(), MOST) + WAITING), "--waiting", str(WAITING)]
             if not arguments or "--ci" in ours:
                 checks.tests("tests", *side_by_side)
