@@ -12,7 +12,7 @@ import numpy as np
 from label_farm.labels.make_label import make_label
 from label_farm.labels.request import LabelRequest
 from label_farm.simulated.readings import board_counts
-from label_farm.simulated.shard import read_shard, settled_numbers, shard_files
+from label_farm.simulated.shard import read_about, read_shard, shard_files
 from label_farm.simulated.simulation import Simulation
 from label_farm.simulated.specimen import differences
 from label_farm.simulated.timeline import timeline
@@ -74,7 +74,7 @@ def write_dataset(
     """
     begun = DatasetWriter.open if out.exists() else DatasetWriter.create
     writer = begun(out, simulation.sensor, extra, simulated=True)
-    where = {n: path for path in shard_files(simulation.folder) for n in settled_numbers(path) if n < presses}
+    where = {n: path for path in shard_files(simulation.folder) for n in read_about(path).numbers if n < presses}
     _refuse_others(simulation, writer, where, out)
     read = lru_cache(maxsize=2 * len(simulation.specimens))(read_shard)
     for number in sorted(where):

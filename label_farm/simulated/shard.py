@@ -67,15 +67,26 @@ def shard_files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("presses-*.npz") if _NAME.fullmatch(path.name))
 
 
-def settled_numbers(path: Path) -> list[int]:
-    """Return which presses a file settles, without reading their arrays.
+@dataclass(frozen=True)
+class ShardContents:
+    """What a file of solved presses holds, without its arrays."""
+
+    numbers: list[int]
+    """Presses that it settles, sorted; all of one specimen."""
+    identity: dict[str, Any]
+    """What decided the solutions."""
+
+
+def read_about(path: Path) -> ShardContents:
+    """Return what a file holds, without reading its arrays.
 
     Raises:
         FormatError: If the file is damaged.
     """
     try:
         with np.load(path) as arrays:
-            return sorted([*arrays["number"].tolist(), *map(int, json.loads(str(arrays["about"]))["failed"])])
+            about = json.loads(str(arrays["about"]))
+            return ShardContents(sorted([*arrays["number"].tolist(), *map(int, about["failed"])]), about["identity"])
     except (OSError, ValueError, KeyError, BadZipFile) as error:
         raise _damaged(path, error) from None
 

@@ -13,7 +13,7 @@ from label_farm.presses.job import Job
 from label_farm.presses.ladder import Ladder
 from label_farm.simulated.plan import SimulationPlan
 from label_farm.simulated.press_draw import draw_press
-from label_farm.simulated.shard import settled_numbers, shard_files
+from label_farm.simulated.shard import read_about, shard_files
 from label_farm.simulated.specimen import draw_specimen
 from tacdata import documents, provenance
 from tacdata.errors import FormatError, UsageError
@@ -21,10 +21,8 @@ from tacdata.plans import Press
 from tacdata.sensor import Sensor
 
 FILE = "simulation.json"
-_DECIDING = (
-    "tacdata.skin", "tacdata.indenters", "tacdata.surfaces", "label_farm.presses.ladder",
-    "label_farm.simulated.plan", "label_farm.simulated.press_draw", "label_farm.simulated.specimen",
-)  # fmt: skip
+_DRAWING = tuple(f"label_farm.simulated.{name}" for name in ("plan", "press_draw", "specimen"))
+"""Code that decides what is drawn; each file of presses states what solved it."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class Simulation:
         """The folder's `FILE`."""
         return {
             "version": schemas.version("simulation"), "plan": self.plan.document, "sensor": self.sensor.document,
-            "seed": self.seed, "mesh_error": self.mesh_error, "code": provenance.code_hash(*_DECIDING),
+            "seed": self.seed, "mesh_error": self.mesh_error, "code": provenance.code_hash(*_DRAWING),
         }  # fmt: skip
 
     @cached_property
@@ -108,10 +106,25 @@ class Simulation:
         spread = self.plan.specimens
         return tuple(draw_specimen(self.sensor, spread, self.seed, n) for n in range(spread.count))
 
+    def check_model(self, specimen: int, model: str) -> None:
+        """Refuse to solve on with another model than the folder's presses of a specimen were solved with.
+
+        Raises:
+            UsageError: If it is another.
+        """
+        for path in shard_files(self.folder):
+            about = read_about(path)
+            if about.numbers[0] % len(self.specimens) == specimen and about.identity["model"] != model:
+                raise UsageError(
+                    f"{path} was solved by model {about.identity['model'][:12]}, this release's is {model[:12]}",
+                    "presses of one model in a folder",
+                    "go on with the release that solved it, or name a new folder",
+                )
+
     @property
     def settled(self) -> set[int]:
         """Numbers of the presses that are solved or given up."""
-        return {number for path in shard_files(self.folder) for number in settled_numbers(path)}
+        return {number for path in shard_files(self.folder) for number in read_about(path).numbers}
 
     def press(self, number: int) -> Press:
         """Return a press by its number."""

@@ -51,6 +51,7 @@ def solve(
     # One specimen after the other: a GPU holds the inverse of one skin at a time.
     for specimen in sorted({number for number, _ in batches}):
         model = specimen_model(simulation, specimen, device)
+        simulation.check_model(specimen, model.content_hash)
         for number, numbers in batches:
             if number == specimen:
                 _solve_batch(simulation, model, numbers, _AT_A_TIME[kind], settled).write(simulation.folder)

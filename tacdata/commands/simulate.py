@@ -44,16 +44,14 @@ def run(
     """
     from label_farm.environment import cores
     from label_farm.simulated.crew import chosen_devices, solve_all
-    from label_farm.simulated.packing import write_dataset
     from label_farm.simulated.plan import DEFAULT, read_simulation_plan
     from label_farm.simulated.simulation import Simulation
-    from tacdata.dataset.format import features
     from tacdata.errors import SolveError, UsageError
     from tacdata.sensor import default_sensor, read_sensor
 
     if out is None and solved is None:
         raise UsageError("neither --out nor --solved", "a folder to write to", "add --out DATASET")
-    extra = features.asked_for(column or ())
+    extra = _asked_for(column) if column else ()
     folder = solved or Path(f"{out}.solved")
     skin = read_sensor(sensor) if sensor else default_sensor()
     simulation = Simulation(folder, read_simulation_plan(plan or DEFAULT), skin, seed, mesh_error)
@@ -83,6 +81,8 @@ def run(
     figures = {"solved": folder, "presses": presses, "new": missing, "given_up": failed.total()}
     if out is None:
         return Result(figures)
+    from label_farm.simulated.packing import write_dataset  # here: a computer that only solves needs no recorder
+
     with bars() as bar:
         task = bar.add_task("writing episodes", total=presses)
         episodes, total = write_dataset(simulation, presses, out, extra, lambda number: bar.update(task, advance=1))
@@ -90,3 +90,9 @@ def run(
     say(f"solved presses stay in {folder}")
     suggest("train", out, "--out NETWORK")
     return Result({**figures, "dataset": out, "episodes": episodes, "frames": total})
+
+
+def _asked_for(names: list[str]) -> tuple[str, ...]:
+    from tacdata.dataset.format import features
+
+    return features.asked_for(names)

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +13,6 @@ import pytest
 import yaml
 from fast_model import path
 from running.in_process import tacdata
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "dataset"))
-import press_example
 
 from label_farm.simulated import solving
 from label_farm.simulated.plan import DEFAULT, SimulationPlan, read_simulation_plan
@@ -28,6 +26,7 @@ from tacdata.recording.episode import PHASES
 from tacdata.sensor import default_sensor
 from tacdata.transduction import Loads, Transducer
 
+HERE = Path(__file__).resolve().parent
 SENSOR = default_sensor()
 SMALL = {
     "version": "1.0",
@@ -70,6 +69,14 @@ class BumpSkin:
                 yield number, SolveError("no equilibrium at state 3", "convergence", "reduce the depth")
             else:
                 yield number, path(self.sensor, request.depths, lambda d: 0.1 * d, request.x)
+
+
+def recorded():
+    """A recording and its label."""
+    sys.path.append(str(HERE.parent / "dataset"))
+    from press_example import episode, label
+
+    return episode(), label(episode())
 
 
 @pytest.fixture
@@ -144,7 +151,7 @@ def test_the_data_card_says_first_that_nobody_recorded_it(made):
 )
 def test_it_is_refused_where_measured_data_is_meant(made, verb, words):
     if not (made / "measured").exists():
-        measured, label = press_example.episode(), press_example.label(press_example.episode())
+        measured, label = recorded()
         pack([measured], lambda episode: label, made / "measured")
     done = tacdata(*verb, folder=made)
     assert done.returncode != 0
@@ -152,8 +159,7 @@ def test_it_is_refused_where_measured_data_is_meant(made, verb, words):
 
 
 def test_recordings_are_not_packed_into_it(made):
-    measured = press_example.episode()
-    label = press_example.label(measured)
+    measured, label = recorded()
     label = replace(label, taxel_counts=np.zeros_like(label.taxel_force))
     with pytest.raises(UsageError, match="holds simulated presses, episode-000000"):
         pack([measured], lambda episode: label, made / "sim", append=True, extra=["tacdata.taxel_counts"])
@@ -206,6 +212,36 @@ def test_presses_without_an_equilibrium_are_counted_and_left_out(bumps, tmp_path
     assert 0 < given_up < 12
     assert f"given up {given_up} times: no equilibrium at state 3" in words
     assert len(read_dataset(tmp_path / "sim").episodes) == 12 - given_up
+
+
+def test_presses_are_solved_without_the_recorders_and_the_learners_packages(tmp_path):
+    """As on a rented computer with a GPU that has torch, Warp and little else."""
+    words = ["simulate", "--presses", "2", "--solved", "presses", "--device", "cpu", "--workers", "1"]
+    done = subprocess.run(
+        [sys.executable, str(HERE / "bare_computer.py"), *words], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert "presses solved: 2" in done.stdout, done.stderr
+
+
+def test_another_model_does_not_go_on_in_a_folder(bumps, tmp_path, monkeypatch):
+    simulate(tmp_path)
+    monkeypatch.setattr(BumpSkin, "content_hash", "cd" * 32)
+    simulate(tmp_path)  # nothing is left to solve
+    done = tacdata("simulate", "plan.yaml", "--out", "sim", "--presses", 5, "--device", "cpu", "--workers", 1,
+                   folder=tmp_path)  # fmt: skip
+    assert done.returncode != 0
+    assert "was solved by model abababababab, this release's is cdcdcdcdcdcd" in done.stderr
+
+
+def test_noise_is_laid_over_presses_without_solving_them_again(bumps, tmp_path):
+    simulate(tmp_path, "--solved", "presses")
+    quiet = columns(tmp_path / "sim")
+    shutil.rmtree(tmp_path / "sim")
+    assert "solved:" not in simulate(tmp_path, "--solved", "presses", plan=NOISY)
+    loud = columns(tmp_path / "sim")
+    off = (loud[features.RAW] - quiet[features.RAW])[quiet[features.PHASE] == PHASES.index("rest")]
+    assert 2.0 < off.std() < 6.0
+    assert np.array_equal(loud[features.DEPTH], quiet[features.DEPTH])
 
 
 def test_another_seed_is_refused_in_a_folder_of_solved_presses(bumps, tmp_path):
