@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import Counter
 from pathlib import Path
@@ -14,6 +15,8 @@ from tacdata.progress import bars, say, suggest
 
 ORDER = 45
 PANEL = PIPELINE
+SAY_SECONDS = 30.0
+"""Seconds between two lines of progress where there is no terminal."""
 
 
 def run(
@@ -60,25 +63,15 @@ def run(
     simulation.open()
     missing = presses - len({n for n in simulation.settled if n < presses})
     count = max(1, min(workers or (cores() if devices == ("cpu",) else len(devices)), missing))
-    failed: Counter[str] = Counter()
-    began = time.monotonic()
-    with bars() as bar:
-        task = bar.add_task("solving presses", total=missing)
-
-        def settled(number: int, reason: str) -> None:
-            failed.update([reason] if reason else [])
-            bar.update(task, advance=1)
-
-        if missing:
-            solve_all(simulation, presses, devices, count, settled)
-    hours = (time.monotonic() - began) / 3600
+    solving = _Solving(missing)
     if missing:
-        print(f"presses solved: {missing - failed.total()}, given up: {failed.total()}; {missing / hours:.0f} an hour")
-    for reason, times in failed.most_common(3):
-        print(f"  given up {times} times: {reason.splitlines()[0]}")
-    if failed.total() == presses:
+        with solving:
+            solve_all(simulation, presses, devices, count, solving.settled)
+        solving.report()
+    given_up = solving.failed.total()
+    if given_up == presses:
         raise SolveError("none of the presses has an equilibrium", "presses that the skin can take", "narrow the plan")
-    figures = {"solved": folder, "presses": presses, "new": missing, "given_up": failed.total()}
+    figures = {"solved": folder, "presses": presses, "new": missing, "given_up": given_up}
     if out is None:
         return Result(figures)
     from label_farm.simulated.packing import write_dataset  # here: a computer that only solves needs no recorder
@@ -90,6 +83,41 @@ def run(
     say(f"solved presses stay in {folder}")
     suggest("train", out, "--out NETWORK")
     return Result({**figures, "dataset": out, "episodes": episodes, "frames": total})
+
+
+class _Solving:
+    """A bar with the time that remains; a line now and then where there is no terminal."""
+
+    def __init__(self, presses: int) -> None:
+        self.failed: Counter[str] = Counter()
+        self._presses, self._done = presses, 0
+        self._bar = bars(speed_estimate_period=24 * 3600.0)
+
+    def __enter__(self) -> None:
+        self._began = self._said = time.monotonic()
+        self._task = self._bar.add_task("solving presses", total=self._presses)
+        if sys.stdout.isatty():
+            self._bar.start()
+
+    def __exit__(self, *exception: object) -> None:
+        self._bar.stop()
+
+    def settled(self, number: int, reason: str) -> None:
+        """Count a press that is solved or given up."""
+        self._done += 1
+        self.failed.update([reason] if reason else [])
+        self._bar.update(self._task, completed=self._done)
+        if not sys.stdout.isatty() and time.monotonic() - self._said > SAY_SECONDS:
+            self._said = time.monotonic()
+            left = (self._said - self._began) * (self._presses - self._done) / self._done
+            say(f"  press {self._done} of {self._presses} solved, about {left / 60:.0f} min left")
+
+    def report(self) -> None:
+        """Say how many were solved, how fast, and why others were given up."""
+        hours, lost = (time.monotonic() - self._began) / 3600, self.failed.total()
+        print(f"presses solved: {self._presses - lost}, given up: {lost}; {self._presses / hours:.0f} an hour")
+        for reason, times in self.failed.most_common(3):
+            print(f"  given up {times} times: {reason.splitlines()[0]}")
 
 
 def _asked_for(names: list[str]) -> tuple[str, ...]:

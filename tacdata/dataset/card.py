@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -112,12 +113,23 @@ def _presses(presses: list[Press]) -> list[str]:
     lines = ["## Indenters", "", heads, "| --- | --- | ---: | ---: | ---: |"]
     for name in sorted({p.indenter_name for p in presses}):
         mine = [p for p in presses if p.indenter_name == name]
-        sizes = {k: v for k, v in mine[0].indenter.document.items() if k != "shape" and isinstance(v, int | float)}
-        words = ", ".join([mine[0].indenter.shape, *(f"{k} {v:g}" for k, v in sizes.items())])
+        words = ", ".join([mine[0].indenter.shape, *_sizes([p.indenter.document for p in mine])])
         depths, speeds = _range([p.depth for p in mine]), _range([p.speed for p in mine])
         lines.append(f"| {name} | {words} | {len(mine)} | {depths} | {speeds} |")
     purposes = Counter(p.purpose for p in presses if p.purpose)
     return [*lines, "", *([f"Purposes: {_counted(purposes)}.", ""] if purposes else [])]
+
+
+def _sizes(shapes: list[dict[str, Any]]) -> list[str]:
+    """Return name and range of every size of some solids of one shape; those of a pair's solids behind theirs."""
+    words = []
+    for name, value in shapes[0].items():
+        if isinstance(value, dict):
+            inner = ", ".join(_sizes([shape[name] for shape in shapes]))
+            words.append(f"{name}: {value['shape']} ({inner})")
+        elif name != "shape" and isinstance(value, int | float):
+            words.append(f"{name} {_range([shape[name] for shape in shapes])}")
+    return words
 
 
 def _coverage(presses: list[Press], dataset: Dataset) -> list[str]:

@@ -23,7 +23,7 @@ def test_the_card_says_what_is_inside(tmp_path: Path) -> None:
     assert "3 episodes, 60 frames" in text
     assert "- tacprint `" in text
     assert "specimens: tacprint (3)" in text
-    assert "| sphere0 | sphere, radius 2 | 2 | 1.2 | 1 |" in text
+    assert "| sphere0 | sphere, radius 2 to 4 | 2 | 1.2 | 1 |" in text
     assert "| sphere1 | sphere, radius 3 | 1 | 1.2 | 1 |" in text
     assert "skin model (content hash): cccccccccccc (3)" in text
     assert "3 episodes: made for a test" in text
