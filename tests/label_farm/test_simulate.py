@@ -14,6 +14,7 @@ import yaml
 from fast_model import path
 from running.in_process import tacdata
 
+from label_farm import environment
 from label_farm.simulated import solving
 from label_farm.simulated.plan import DEFAULT, SimulationPlan, read_simulation_plan
 from label_farm.simulated.press_draw import draw_press
@@ -47,10 +48,8 @@ NOISY = {**SMALL, "noise": {"readings": 4.0, "drift": 2.0}}
 def simulate(folder, *more, presses=3, plan=SMALL):
     """Type the verb in a folder and return what it printed."""
     (folder / "plan.yaml").write_text(yaml.safe_dump(plan))
-    done = tacdata(
-        "simulate", "plan.yaml", "--out", "sim", "--presses", presses, "--device", "cpu", "--workers", 1, *more,
-        folder=folder,
-    )  # fmt: skip
+    words = "simulate", "plan.yaml", "--out", "sim", "--presses", presses, "--device", "cpu", "--workers", 1
+    done = tacdata(*words, *more, folder=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -89,9 +88,9 @@ def bumps(monkeypatch):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A dataset of three presses on two specimens, whose labels' counts are carried along."""
+    """A dataset of three presses on two specimens, solved by two processes; its labels' counts are carried along."""
     folder = tmp_path_factory.mktemp("simulated")
-    simulate(folder, "--column", "taxel_counts")
+    assert "presses solved: 3, given up: 0" in simulate(folder, "--column", "taxel_counts", "--workers", 2)
     return folder
 
 
@@ -137,6 +136,7 @@ def test_the_data_card_says_first_that_nobody_recorded_it(made):
     assert words.splitlines()[4].startswith("**Simulated.** Nobody recorded this dataset")
     assert "drawn from plan small, seed 0 (3)" in words
     assert "recorded on" not in words
+    assert "note: 3 simulated presses, nobody recorded them" in tacdata("browse", "sim", folder=made).stdout
 
 
 @pytest.mark.parametrize(
@@ -221,6 +221,16 @@ def test_presses_are_solved_without_the_recorders_and_the_learners_packages(tmp_
         [sys.executable, str(HERE / "bare_computer.py"), *words], cwd=tmp_path, capture_output=True, text=True
     )
     assert "presses solved: 2" in done.stdout, done.stderr
+
+
+def test_a_process_that_dies_is_named_with_its_last_words(bumps, tmp_path, monkeypatch):
+    words = [sys.executable, "-c", "raise SystemExit('no memory is left')"]
+    monkeypatch.setattr(environment, "python", lambda module: words)
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(SMALL))
+    done = tacdata("simulate", "plan.yaml", "--out", "sim", "--device", "cpu", "--workers", 2, folder=tmp_path)
+    assert done.returncode != 0
+    assert "no memory is left" in done.stderr
+    assert "what was written is kept" in done.stderr
 
 
 def test_another_model_does_not_go_on_in_a_folder(bumps, tmp_path, monkeypatch):

@@ -120,7 +120,12 @@ def _dataset(root: Path, predictions: Path | None) -> EpisodeList:
     if predictions is not None:
         found = _with_dataset_errors(root, found, predictions)
     absent = sum(len(set(own["episodes"]) - set(own["packed"])) for own in known["sessions"].values())
-    return EpisodeList(root, "dataset", found, (f"{absent} more are waiting for labels, or failed",) if absent else ())
+    drawn = sum(record.simulated is not None for record in records.values())
+    remarks = (
+        f"{drawn} simulated presses, nobody recorded them" if drawn else "",
+        f"{absent} more are waiting for labels, or failed" if absent else "",
+    )
+    return EpisodeList(root, "dataset", found, tuple(filter(None, remarks)))
 
 
 def _record_keys(root: Path, rows: list[folder.EpisodeRow]) -> dict[int, int]:
