@@ -72,9 +72,12 @@ class _Hand:
         self._thread.start()
 
     def _listen(self, settled: Callable[[int, str], None]) -> None:
-        for line in self._process.stdout or ():
-            number, _, reason = line.rstrip("\n").partition(" ")
-            settled(int(number), reason)
+        if self._process.stdout is None:
+            return
+        with self._process.stdout as lines:
+            for line in lines:
+                number, _, reason = line.rstrip("\n").partition(" ")
+                settled(int(number), reason)
 
     def join(self) -> None:
         """Wait for its end.
@@ -95,3 +98,5 @@ class _Hand:
         """End it, if it still runs."""
         self._process.terminate()
         self._process.wait()
+        self._thread.join()
+        self._errors.close()

@@ -54,13 +54,23 @@ def solve(
         simulation.check_model(specimen, model.content_hash)
         for number, numbers in batches:
             if number == specimen:
-                _solve_batch(simulation, model, numbers, _AT_A_TIME[kind], settled).write(simulation.folder)
+                solve_batch(simulation, model, numbers, device, settled).write(simulation.folder)
         del model
 
 
-def _solve_batch(
-    simulation: Simulation, model: SkinModel, numbers: list[int], capacity: int, settled: Callable[[int, str], None]
+def solve_batch(
+    simulation: Simulation, model: SkinModel, numbers: list[int], device: str,
+    settled: Callable[[int, str], None] = lambda number, reason: None,
 ) -> Shard:
+    """Solve presses of one specimen together.
+
+    Args:
+        simulation: What they are drawn from.
+        model: The specimen's skin.
+        numbers: The presses.
+        device: What the model solves on.
+        settled: Called with each press's number, and why it was given up or "".
+    """
     from tacdata.skin.press import PressRequest
 
     version, requests = model.content_hash, []
@@ -73,7 +83,7 @@ def _solve_batch(
         )
     solutions: dict[int, PathSolution] = {}
     failed: dict[int, str] = {}
-    for index, outcome in model.solve_many(requests, min(capacity, len(requests))):
+    for index, outcome in model.solve_many(requests, min(_AT_A_TIME[device.split(":")[0]], len(requests))):
         number = numbers[index]
         if isinstance(outcome, SolveError):
             failed[number] = outcome.given
@@ -84,7 +94,11 @@ def _solve_batch(
 
 
 def specimen_model(simulation: Simulation, specimen: int, device: str) -> SkinModel:
-    """Return a specimen's skin on the design's mesh, stretched to its thickness."""
+    """Return a specimen's skin on the design's mesh, stretched to its thickness.
+
+    Raises:
+        SolveError: If it cannot be modelled.
+    """
     from tacdata.skin.mesh.build import MeshSettings, build_mesh
     from tacdata.skin.mesh.coarser import companion_mesh
     from tacdata.skin.model import ModelSettings, SkinModel
