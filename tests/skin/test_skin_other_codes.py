@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 from same_mesh import compare
 from solvers.alone import ours_press
 from solvers.calculix import CalculiX
+from solvers.differences import differences, grid, in_contact, reference_of
 from solvers.getfem import GetFEM, with_nodal_contact
 from solvers.ours import Ours
 
@@ -42,24 +43,42 @@ def here(command, *_):
     ours_press.main(*map(Path, command[2:]))
 
 
-def rows(folder, peer, sensor, mesh, depths, radius=4.0, indenter=None, yaw=0.0, apart=False):
-    """What `compare` says of an indenter, a sphere [mm] unless given, pressed near the middle, at each depth [mm].
-
-    Our own model runs in this process, unless ``apart``.
-    """
-    indenter = indenter or {"shape": "sphere", "radius": radius}
+def case_of(folder, sensor, mesh, depths, indenter=None, yaw=0.0):
+    """A case: an indenter, a sphere of 4 mm unless given, pressed near the middle, at each depth [mm]."""
+    indenter = indenter or {"shape": "sphere", "radius": 4.0}
     document = {"version": "1.0", "name": "press", "sensor": sensor.document, "indenter": indenter, "x": 0.2, "y": 0.1}
     document["yaw"] = yaw
     path = folder / "case.json"
     # The others know displacements alone: their volumes are taken at the points.
     documents.write(path, {**document, "depths": list(depths), "mesh": mesh, "volumes": "points"}, "case")
-    case = read_case(path)
-    skin = build_mesh(case.sensor, case.settings.mesh)
-    theirs = peer.solve(case, skin, folder / "theirs")
+    return read_case(path)
+
+
+def ours_of(case, skin, folder, apart=False):
+    """Our answer, solved in this process unless ``apart``."""
     with pytest.MonkeyPatch.context() as patch:
         if not apart:
             patch.setattr("solvers.ours.run_alone", here)
-        ours = Ours().solve(case, skin, folder / "ours")
+        return Ours().solve(case, skin, folder)
+
+
+def distance(case, answer, other):
+    """How far an answer lies from another one, at each depth."""
+    request, skin = case.request, case.sensor.skin
+    shape = (request.indenter, request.x, request.y, request.yaw)
+    reference = reference_of(other, grid(skin.size_x, skin.size_y), lambda *given: in_contact(*shape, *given))
+    return differences(answer, reference)
+
+
+def rows(folder, peer, sensor, mesh, depths, radius=4.0, indenter=None, yaw=0.0, apart=False):
+    """What `compare` says of an indenter, a sphere [mm] unless given, pressed near the middle, at each depth [mm].
+
+    Our own model runs in this process, unless ``apart``.
+    """
+    case = case_of(folder, sensor, mesh, depths, indenter or {"shape": "sphere", "radius": radius}, yaw)
+    skin = build_mesh(case.sensor, case.settings.mesh)
+    theirs = peer.solve(case, skin, folder / "theirs")
+    ours = ours_of(case, skin, folder / "ours", apart)
     found = compare(case, skin, ours, theirs)
     print(*({k: round(v, 4) for k, v in row.items()} for row in found), sep="\n")
     return found
@@ -146,12 +165,23 @@ def test_what_friction_takes_is_lost_alike_when_the_indenter_rises(tmp_path):
 
 @needs_calculix
 def test_calculix_agrees_too(tmp_path):
-    """Its contact is a softer penalty (200 MPa/mm) against a faceted sphere.
+    """Its contact is a softer penalty (200 MPa/mm) against a faceted sphere, so the codes agree in the limit only.
 
-    Contact differs at its edge, where an element is touched in part: on elements of 0.8, 0.6 and 0.45 mm the largest
-    difference is 4.8, 3.9 and 1.8 % of the depth.
+    At the edge of contact an element is touched in part. There either code is 2 to 5 % of the depth from our answer on
+    elements of half the size, as the mesh falls (it is not the same at each run of the mesher). So the codes may
+    differ by no more than that, and ours may be no farther from the finer answer than theirs.
     """
-    found = rows(tmp_path, CalculiX(), slab_sensor(), {"outer": 0.45, "interior": 1.2}, (0.25, 0.5))
-    assert_bar(found, force=0.5, largest=3.0)
-    assert max(row["top"] for row in found) < 0.4
-    assert max(row["contact"] for row in found) < 0.5
+    mesh, finer = {"outer": 0.45, "interior": 1.2}, {"outer": 0.225, "interior": 1.2}
+    case = case_of(tmp_path, slab_sensor(), mesh, (0.25, 0.5))
+    skin = build_mesh(case.sensor, case.settings.mesh)
+    theirs, ours = CalculiX().solve(case, skin, tmp_path / "theirs"), ours_of(case, skin, tmp_path / "ours")
+    fine_case = case_of(tmp_path, slab_sensor(), finer, (0.25, 0.5))
+    fine = ours_of(fine_case, build_mesh(fine_case.sensor, fine_case.settings.mesh), tmp_path / "fine")
+    apart = distance(case, ours, theirs)
+    from_fine, theirs_from_fine = distance(case, ours, fine), distance(case, theirs, fine)
+    for row in apart:
+        assert abs(row.force) < 1.0 and row.top < 0.5, row
+        assert row.contact < (2.5 if row.depth < 0.3 else 1.5), row
+    for row, mine, other in zip(apart, from_fine, theirs_from_fine, strict=True):
+        assert row.largest < max(mine.largest, other.largest) + 0.5, (row, mine, other)
+        assert abs(mine.force) < abs(other.force) + 0.5 and mine.contact < other.contact + 0.3, (mine, other)
