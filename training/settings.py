@@ -41,6 +41,14 @@ class TrainingSettings:
     """Mirror half of the frames about x and half about y, signals and labels alike: taxels and map are symmetric."""
     gain_jitter: float = 0.0
     """Standard deviation of a factor drawn for each channel of each frame [1]: other specimens' gains."""
+    scale_jitter: float = 0.0
+    """Standard deviation of a factor drawn for each frame, all channels alike [1]: a unit's gain is uncertain."""
+    exponent_jitter: float = 0.0
+    """Standard deviation of a change of the exponent drawn for each frame [1]: a unit's law is uncertain."""
+    calibrate: bool = False
+    """Turn readings into forces first, by a calibration fitted on the training presses."""
+    pull: float = 0.0
+    """Weight of the squared distance from the pretrained weights [1] (L2-SP; X. Li et al., ICML 2018)."""
     idle_share: float = 1.0
     """Share of the frames without contact in their label that an epoch takes, drawn anew [1]; the others all count."""
     precision: str = "float32"
@@ -65,8 +73,12 @@ class TrainingSettings:
                 raise UsageError(f"{name} = {getattr(self, name)!r}", ", ".join(allowed), f"change --{name}")
         if not 0.0 <= self.idle_share <= 1.0:
             raise UsageError(f"idle_share = {self.idle_share}", "0 to 1", "change --idle-share")
-        if not 0.0 <= self.gain_jitter < 1.0:
-            raise UsageError(f"gain_jitter = {self.gain_jitter}", "0 or more, less than 1", "change --gain-jitter")
+        for name in ("gain_jitter", "scale_jitter", "exponent_jitter"):
+            if not 0.0 <= (value := getattr(self, name)) < 1.0:
+                option = f"--{name.replace('_', '-')}"
+                raise UsageError(f"{name} = {value}", "0 or more, less than 1", f"change {option}")
+        if self.pull < 0.0:
+            raise UsageError(f"pull = {self.pull}", "0 or more", "change --pull")
 
     def rate_at(self, epoch: int) -> float:
         """Return the learning rate of an epoch, counted from 1."""
@@ -92,6 +104,10 @@ class TrainingSettings:
             "schedule",
             "mirror",
             "gain_jitter",
+            "scale_jitter",
+            "exponent_jitter",
+            "calibrate",
+            "pull",
             "idle_share",
             "epochs",
             "loss",

@@ -17,6 +17,7 @@ import torch
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import TacdataError, UsageError
+from training.frames.channel_calibration import calibrate
 from training.frames.frames import Frames
 from training.frames.variation import Variation
 from training.frames.windows import Windows
@@ -27,6 +28,7 @@ from training.loss import normalized
 from training.metrics import conformal_intervals, depth_maps, novelty
 from training.metrics.conformal_intervals import ConformalIntervals
 from training.networks.network import Network, create
+from training.rehearsal import Rehearsal
 from training.settings import TrainingSettings
 from training.splits.split import Split, divide
 
@@ -62,9 +64,48 @@ class _Run:
     forward: Callable[[torch.Tensor], torch.Tensor] = field(init=False)
     """The network, or what the compiler made of it."""
 
+    rehearsal: Rehearsal | None = None
+    """Simulated frames that are mixed in."""
+    origin: tuple[torch.Tensor, ...] = ()
+    """The pretrained weights that the loss pulls towards; empty if it does not."""
+
     def __post_init__(self) -> None:
         """Take the network as it is."""
-        self.forward = self.network
+        self.forward = self.network.maps
+
+    def start(
+        self, pretrained: checkpoint.Checkpoint | None, simulated: Frames | None, settings: TrainingSettings
+    ) -> None:
+        """Take along what a pretrained network brings.
+
+        Raises:
+            UsageError: If the run was started from another one, or with other simulated frames.
+        """
+        brought = {
+            "pretrained": pretrained.content_hash if pretrained else None,
+            "simulated": simulated.dataset_hash if simulated else None,
+        }
+        for name, now in brought.items():
+            if (before := self.document.get(name)) != now and self.epoch:
+                raise UsageError(
+                    f"resuming a run whose {name} is {(before or 'none')[:12]} with {(now or 'none')[:12]}",
+                    "what it was started with", "give the same --from and --simulated, or start a new run",
+                )  # fmt: skip
+        self.document |= {name: value for name, value in brought.items() if value}
+        place = self.network.get_buffer("mean").device
+        if settings.pull and pretrained:
+            weights = checkpoint.load(pretrained.path, place).network.parameters()
+            self.origin = tuple(weight.detach() for weight in weights)
+        if simulated:
+            self.rehearsal = Rehearsal(simulated, pretrained, self.network, place)
+
+    def loss(self, prediction: torch.Tensor, label: torch.Tensor, settings: TrainingSettings) -> torch.Tensor:
+        """Return the loss of a batch, over D_max, with the pull towards the pretrained weights."""
+        loss = settings.loss(prediction, label)
+        if not self.origin:
+            return loss
+        weights = zip(self.network.parameters(), self.origin, strict=True)
+        return loss + settings.pull * torch.stack([(now - then).square().sum() for now, then in weights]).sum()
 
 
 def train(
@@ -76,6 +117,9 @@ def train(
     threads: int | None = None,
     listener: Callable[[Progress], None] = lambda progress: None,
     compiled: bool = False,
+    pretrained: checkpoint.Checkpoint | None = None,
+    simulated: Frames | None = None,
+    split: Split | None = None,
 ) -> checkpoint.Checkpoint:
     """Train a network and write ``out``: best.safetensors, last.safetensors, metrics.jsonl.
 
@@ -90,6 +134,9 @@ def train(
         threads: CPU threads; by default one a core, at most `compute.THREADS`; others may change last bits.
         listener: Called after every step and every epoch.
         compiled: Let torch compile the network first; pays off on GPUs, and changes last bits.
+        pretrained: Start from its weights; it is calibrated anew to these frames.
+        simulated: Frames of a simulated dataset, of which each step takes as many (`training.rehearsal`).
+        split: Division of the dataset; by default the settings' own.
 
     Returns:
         The checkpoint of the epoch with the lowest validation loss.
@@ -106,9 +153,11 @@ def train(
             "choose another --out, or go on with that run by --resume",
         )
     with reproducible(threads):
-        run = _resumed(frames, settings, out, place) if resume else _started(frames, settings, place)
+        begun = split or divide(frames, settings.split, settings.seed)
+        run = _resumed(frames, settings, out, place) if resume else _started(frames, settings, begun, place, pretrained)
         if compiled:
-            run.forward = torch.compile(run.network)
+            run.forward = torch.compile(run.network.maps)
+        run.start(pretrained, simulated, settings)
         split = Split.from_document(run.document["split"])
         windows = Windows(frames, run.network.offsets, place)
         depth = _labels(frames.depth, place)
@@ -147,20 +196,32 @@ def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, s
 
 
 def normalization(taxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean and deviation of each channel [counts], (taxels,), float32, of readings (n, taxels).
+    """Return mean and deviation of each channel [counts or N], (taxels,), float32, of readings (n, taxels).
 
-    A channel that never moves gets a deviation of 1 count, so that it stays at 0 instead of becoming noise.
+    A channel that never moves gets a deviation of 1, so that it stays at 0 instead of becoming noise.
     """
     mean, sd = taxels.mean(axis=0, dtype=np.float64), taxels.std(axis=0, dtype=np.float64)
     still = sd <= 1e-6 * np.maximum(np.abs(mean), 1.0)
     return mean.astype(np.float32), np.where(still, 1.0, sd).astype(np.float32)
 
 
-def _started(frames: Frames, settings: TrainingSettings, place: torch.device) -> _Run:
-    split = divide(frames, settings.split, settings.seed)
+def _started(
+    frames: Frames, settings: TrainingSettings, split: Split, place: torch.device,
+    pretrained: checkpoint.Checkpoint | None,
+) -> _Run:  # fmt: skip
     torch.manual_seed(settings.seed)
     network = create(settings.network, frames.sensor, settings.arguments)
-    mean, sd = normalization(frames.taxels[frames.indices(split.train)])
+    readings, calibration = frames.taxels[frames.indices(split.train)], {}
+    if settings.calibrate:
+        fitted = calibrate(frames, split.train)
+        network.set_calibration(fitted)
+        calibration, readings = {"calibration": fitted.document}, fitted.force(readings)
+    if pretrained:
+        pretrained.check_sensor(frames.sensor, frames.origin)
+        network.load_state_dict(pretrained.network.state_dict())
+        mean, sd = (np.float32(pretrained.document["normalization"][name]) for name in ("mean", "sd"))
+    else:
+        mean, sd = normalization(readings)
     network.set_normalization(mean, sd)
     network.to(place)
     sensor_hash = frames.sensor.content_hash
@@ -181,6 +242,7 @@ def _started(frames: Frames, settings: TrainingSettings, place: torch.device) ->
             "virtual": frames.virtual,
         },
         "normalization": {"mean": mean.tolist(), "sd": sd.tolist()},
+        **calibration,
         "split": split.document,
         "settings": settings.document,
         "history": [],
@@ -262,10 +324,13 @@ def _epoch(
     total = torch.zeros((), device=place)
     for step, batch in enumerate(batches, start=1):
         label = normalized(depth[batch.to(depth.device)].to(place), frames.sensor.map.depth_max)
-        signals, label = varied(windows.batch(batch), label)
+        signals, label = varied(run.network.calibrated(windows.batch(batch)), label)
+        if run.rehearsal:
+            more, known = run.rehearsal.batch(len(batch))
+            signals, label = torch.cat([signals, more]), torch.cat([label, known])
         with torch.autocast(place.type, torch.bfloat16, enabled=settings.precision == "bfloat16"):
             prediction = run.forward(signals)
-        loss = settings.loss(prediction.float(), label)
+        loss = run.loss(prediction.float(), label, settings)
         run.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         run.optimizer.step()

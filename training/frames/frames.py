@@ -64,6 +64,8 @@ class Frames:
     """Where the dataset lies, as given; for messages and for finding it again."""
     virtual: bool | None = None
     """True if a virtual rig recorded it, False if a real one did, None if the dataset does not say."""
+    taxel_force: np.ndarray | None = None
+    """Normal force on each protrusion as the skin model says it [N], shape (n, taxels); None if not known."""
 
     def __post_init__(self) -> None:
         """Refuse arrays that no network may see.

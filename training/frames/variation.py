@@ -1,4 +1,4 @@
-"""Training frames varied at random: mirrored like the sensor, with gains of other specimens."""
+"""Training frames varied at random: mirrored like the sensor, with gains and exponents of other specimens."""
 
 from __future__ import annotations
 
@@ -15,26 +15,36 @@ class Variation:
     def __init__(self, network: Network, sensor: Sensor, settings: TrainingSettings) -> None:
         """Prepare the mirrored orders of the taxels (k = i + columns j)."""
         self.mirror, self.jitter = settings.mirror, settings.gain_jitter
+        self.scale, self.exponent = settings.scale_jitter, settings.exponent_jitter
         self.mean, self.sd = network.get_buffer("mean"), network.get_buffer("sd")
+        self.calibrated = network.is_calibrated
         order = torch.arange(sensor.taxels.count, device=self.mean.device)
         grid = order.reshape(sensor.taxels.rows, sensor.taxels.columns)
         self.orders = [grid.flip(dims).reshape(-1) for dims in ([], [1], [0], [0, 1])]
 
     def __call__(self, signals: torch.Tensor, label: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return signals [counts], (b, T, taxels), and labels over D_max, (b, pixels_x, pixels_y), varied."""
+        """Return signals [counts or N], (b, T, taxels), and labels over D_max, (b, pixels_x, pixels_y), varied."""
         if self.mirror:
             signals, label = self._mirrored(signals, label)
+        if self.exponent:
+            change = self.exponent * torch.randn(len(signals), 1, 1, device=signals.device)
+            unit = self.sd.square().mean().sqrt()
+            signals = signals * (signals.abs() / unit).clamp(min=1e-6).pow(change)
+        if self.scale:
+            signals = signals * (self.scale * torch.randn(len(signals), 1, 1, device=signals.device)).exp()
         if self.jitter:
             factor = 1.0 + self.jitter * torch.randn(len(signals), 1, signals.shape[2], device=signals.device)
             signals = signals * factor
         return signals, label
 
     def _mirrored(self, signals: torch.Tensor, label: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        # Mirrored after standardizing, so that a channel's gain does not travel to the channel opposite.
-        standard = (signals - self.mean) / self.sd
+        # Mirrored after standardizing, so that a channel's gain does not travel to the channel opposite. Forces are
+        # without gains.
+        standard = signals if self.calibrated else (signals - self.mean) / self.sd
         way = torch.randint(4, (len(signals),), device=signals.device)
         order = torch.stack(self.orders)[way]
         turned = standard.gather(2, order[:, None, :].expand(-1, signals.shape[1], -1))
         x, y = (way % 2 == 1)[:, None, None], (way >= 2)[:, None, None]
         label = torch.where(x, label.flip(1), label)
-        return turned * self.sd + self.mean, torch.where(y, label.flip(2), label)
+        turned = turned if self.calibrated else turned * self.sd + self.mean
+        return turned, torch.where(y, label.flip(2), label)

@@ -21,6 +21,7 @@ from safetensors.torch import save_file
 from tacdata import documents, provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import Sensor
+from training.frames.channel_calibration import ChannelCalibration
 from training.networks.network import Network, create
 from training.settings import TrainingSettings
 from training.splits.split import Split
@@ -51,6 +52,12 @@ class Checkpoint:
     def settings(self) -> TrainingSettings:
         """The recipe that it was trained with."""
         return TrainingSettings.from_document(self.document["settings"])
+
+    @property
+    def calibration(self) -> ChannelCalibration | None:
+        """How it turns readings into forces; None if it takes readings as they are."""
+        found = self.document.get("calibration")
+        return ChannelCalibration.from_document(found) if found else None
 
     @property
     def content_hash(self) -> str:
@@ -125,6 +132,8 @@ def load(path: Path, device: torch.device | str = "cpu") -> Checkpoint:
             "train again",
         )
     network.set_normalization(mean, sd)
+    if calibration := document.get("calibration"):
+        network.set_calibration(ChannelCalibration.from_document(calibration))
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
     return Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
 

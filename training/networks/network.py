@@ -8,7 +8,7 @@ and implements `estimate`. Every size must follow from the sensor's, so that ano
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -17,6 +17,7 @@ from torch import nn
 from tacdata import registry
 from tacdata.errors import FormatError
 from tacdata.sensor import Sensor
+from training.frames.channel_calibration import ChannelCalibration, power_law
 
 ROOM, BASE = "training.networks", "network"
 
@@ -26,6 +27,8 @@ class Network(nn.Module, ABC):
 
     offsets: tuple[int, ...]
     """Frames of the window relative to the target frame, ascending; the largest is the look-ahead."""
+    recipe: ClassVar[dict[str, Any]] = {}
+    """Training settings that suit it and differ from the paper's; a person's options come before them."""
 
     def __init__(self, taxels: int, map_shape: tuple[int, int], arguments: dict[str, Any]) -> None:
         """Keep the sizes and the arguments, from which `create` can build the same network again."""
@@ -34,6 +37,10 @@ class Network(nn.Module, ABC):
         # The checkpoint's document holds these two; a second copy among the weights could contradict it.
         self.register_buffer("mean", torch.zeros(taxels), persistent=False)
         self.register_buffer("sd", torch.ones(taxels), persistent=False)
+        self.register_buffer("gain", torch.ones(taxels), persistent=False)
+        self.register_buffer("exponent", torch.ones(()), persistent=False)
+        self.is_calibrated = False
+        """Whether readings are turned into forces before anything else."""
 
     @property
     def name(self) -> str:
@@ -45,9 +52,25 @@ class Network(nn.Module, ABC):
         self.get_buffer("mean").copy_(torch.as_tensor(mean, dtype=torch.float32))
         self.get_buffer("sd").copy_(torch.as_tensor(sd, dtype=torch.float32))
 
+    def set_calibration(self, calibration: ChannelCalibration) -> None:
+        """Turn readings into forces on the protrusions from now on."""
+        self.get_buffer("gain").copy_(torch.as_tensor(calibration.gain, dtype=torch.float32))
+        self.get_buffer("exponent").fill_(calibration.exponent)
+        self.is_calibrated = True
+
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
         """Return depth maps over D_max, not clipped; (b, T, taxels) [counts] -> (b, pixels_x, pixels_y)."""
-        return self.estimate((windows - self.get_buffer("mean")) / self.get_buffer("sd"))
+        return self.maps(self.calibrated(windows))
+
+    def calibrated(self, windows: torch.Tensor) -> torch.Tensor:
+        """Return forces [N] for readings [counts], (b, T, taxels); the readings where there is no calibration."""
+        return (
+            power_law(windows, self.get_buffer("gain"), self.get_buffer("exponent")) if self.is_calibrated else windows
+        )
+
+    def maps(self, signals: torch.Tensor) -> torch.Tensor:
+        """Return maps over D_max from what `calibrated` returned; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
+        return self.estimate((signals - self.get_buffer("mean")) / self.get_buffer("sd"))
 
     @abstractmethod
     def estimate(self, signals: torch.Tensor) -> torch.Tensor:

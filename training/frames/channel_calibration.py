@@ -1,0 +1,201 @@
+"""Calibration of a unit's channels: the force on each protrusion from its reading, fitted on labelled presses.
+
+    force = gain_k sign(c) (|c| / 1000 counts)^exponent
+
+The gain is the channel's own, the exponent common. The labels know the force on each protrusion from the skin model.
+So a few presses that touch every taxel are enough. Gains are shrunk towards their mean: a channel that was hardly
+touched takes the mean, one that was touched often its own value. Standard errors come from the jackknife over presses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from tacdata.errors import FormatError, UsageError
+
+if TYPE_CHECKING:
+    from training.frames.frames import Frames
+
+UNIT = 1000.0
+"""Reading at which a channel's force is its gain [counts]."""
+SPREAD = 0.25
+"""Standard deviation of a unit's gains about their mean that is expected before a reading was seen [1]."""
+EXPONENTS = np.linspace(0.4, 3.0, 53)
+"""Exponents that are tried [1], shape (53,); the answer lies between two of them."""
+_INDEPENDENT = 6.0
+"""As how many independent frames the frames of one press count [1]: neighbours err alike."""
+_GROUPS = 20
+"""Groups of presses that the jackknife leaves out, one after the other, where there are more presses [1]."""
+_TOUCHED = 0.02
+"""Share of the largest force that counts as a touch [1]."""
+_SWAPPED = 0.2
+"""By how much the correlation with another channel's force must be the larger one, both ways, for a swap [1]."""
+
+
+@dataclass(frozen=True)
+class ChannelCalibration:
+    """The force on each protrusion from its reading.
+
+    Example:
+        >>> import numpy as np
+        >>> from training.frames.channel_calibration import ChannelCalibration
+        >>> nothing = np.zeros(24)
+        >>> calibration = ChannelCalibration(np.full(24, 0.2), 1.5, nothing, 0.0, 10)
+        >>> calibration.force(np.full((1, 24), 2000.0))[0, 0].round(3)  # 0.2 N at 1000 counts
+        0.566
+    """
+
+    gain: np.ndarray
+    """Force at 1000 counts [N], shape (taxels,)."""
+    exponent: float
+    """Exponent of the reading [1], the same for all channels."""
+    gain_error: np.ndarray
+    """Standard error of the gains [N], shape (taxels,); `SPREAD` of the mean for a channel that no press touched."""
+    exponent_error: float
+    """Standard error of the exponent [1]."""
+    presses: int
+    """Presses that it was fitted on."""
+
+    def force(self, counts: np.ndarray) -> np.ndarray:
+        """Return forces [N] of tared readings [counts], shapes (n, taxels)."""
+        return _power(counts, self.exponent) * self.gain
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The calibration as plain data (in `schemas/checkpoint.schema.json`)."""
+        return {
+            "gain": self.gain.tolist(), "gain_error": self.gain_error.tolist(), "exponent": self.exponent,
+            "exponent_error": self.exponent_error, "presses": self.presses,
+        }  # fmt: skip
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> ChannelCalibration:
+        """Rebuild a calibration from `document`."""
+        gains = (np.asarray(document[name], float) for name in ("gain", "gain_error"))
+        gain, error = gains
+        return cls(gain, document["exponent"], error, document["exponent_error"], document["presses"])
+
+
+def power_law(counts: torch.Tensor, gain: torch.Tensor, exponent: torch.Tensor) -> torch.Tensor:
+    """Return forces [N] of tared readings [counts], shapes (..., taxels), as `ChannelCalibration.force`."""
+    size = (counts.abs() / UNIT).clamp(min=1e-9)
+    return gain * torch.sign(counts) * size.pow(exponent)
+
+
+def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
+    """Fit the calibration of a unit to labelled presses.
+
+    Args:
+        frames: The dataset, with the forces on the protrusions.
+        episodes: Numbers of the presses.
+
+    Raises:
+        FormatError: If the dataset does not say the forces.
+        UsageError: If no press touches, or two channels are swapped.
+    """
+    if frames.taxel_force is None:
+        raise FormatError(
+            f"{frames.origin} does not say the forces on the protrusions", "the column tacdata.taxel_force",
+            "label the recordings again and pack them",
+        )  # fmt: skip
+    presses = []
+    for span in frames.spans(episodes):
+        here = np.arange(span.start, span.stop)
+        force = np.asarray(frames.taxel_force[span.start : span.stop], float)
+        kept = here[frames.valid[span.start : span.stop] & (np.abs(force).max(axis=1) > 0)]
+        if len(kept):
+            presses.append((np.asarray(frames.taxels[kept], float), np.asarray(frames.taxel_force[kept], float)))
+    if not presses:
+        raise UsageError(
+            f"{frames.origin}: none of {len(episodes)} presses touches the skin", "a press that loads taxels",
+            "record presses deeper than 0.2 mm",
+        )  # fmt: skip
+    _check_order(presses, frames.origin)
+    sums = _sums(presses)
+    gain, exponent = _fitted(sums)
+    touched = np.array([_touched(force) for _, force in presses]).any(axis=0)
+    groups = min(len(presses), _GROUPS)
+    if groups == 1:
+        return ChannelCalibration(gain, exponent, np.full(len(gain), SPREAD * gain.mean()), 1.0, 1)
+    group = np.arange(len(presses)) % groups
+    left_out = [_fitted([part[..., group != k, :] for part in sums]) for k in range(groups)]
+    gain_error = _jackknife(np.array([gains for gains, _ in left_out]))
+    gain_error = np.where(touched, gain_error, SPREAD * gain.mean())
+    return ChannelCalibration(
+        gain, exponent, gain_error, float(_jackknife(np.array([one for _, one in left_out]))), len(presses)
+    )
+
+
+def _jackknife(left_out: np.ndarray) -> np.ndarray:
+    """Return the standard error, shape (...), from estimates that leave out one group each, shape (groups, ...)."""
+    groups = len(left_out)
+    return np.sqrt((groups - 1) / groups * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
+
+
+def _power(counts: np.ndarray, exponent: float) -> np.ndarray:
+    return np.sign(counts) * (np.abs(counts) / UNIT) ** exponent
+
+
+def _touched(force: np.ndarray) -> np.ndarray:
+    """Return which channels a press loads [bool], shape (taxels,), of its forces [N], shape (n, taxels)."""
+    return np.abs(force).max(axis=0) > _TOUCHED * np.abs(force).max()
+
+
+def _sums(presses: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """Return the sums that a least-squares fit of gains needs, over the frames of each press.
+
+    Returns:
+        Squared readings and readings times forces, shapes (exponents, presses, taxels), and squared forces, shape
+        (presses, taxels); readings to the power of each exponent of `EXPONENTS`.
+    """
+    square = np.empty((len(EXPONENTS), len(presses), presses[0][0].shape[1]))
+    product, total = np.empty_like(square), np.empty(square.shape[1:])
+    for k, (counts, force) in enumerate(presses):
+        weight = _INDEPENDENT / len(counts)
+        total[k] = weight * (force * force).sum(axis=0)
+        for j, exponent in enumerate(EXPONENTS):
+            x = _power(counts, exponent)
+            square[j, k], product[j, k] = weight * (x * x).sum(axis=0), weight * (x * force).sum(axis=0)
+    return [square, product, total]
+
+
+def _fitted(sums: list[np.ndarray]) -> tuple[np.ndarray, float]:
+    """Return gains [N], shape (taxels,), and the exponent with the least squared error of the forces."""
+    square, product, total = (part.sum(axis=-2) for part in sums)
+    mean = product.sum(axis=1, keepdims=True) / square.sum(axis=1, keepdims=True)
+    left = np.maximum((total - 2 * mean * product + mean**2 * square).mean(axis=1, keepdims=True), 0.0)
+    prior = left / (_INDEPENDENT * sums[2].shape[-2]) / (SPREAD * mean) ** 2
+    gain = (product + prior * mean) / (square + prior)
+    loss = (total - 2 * gain * product + gain**2 * square).sum(axis=1)
+    best = int(loss.argmin())
+    exponent = EXPONENTS[best]
+    if 0 < best < len(EXPONENTS) - 1:
+        # The vertex of the parabola through the best exponent and its neighbours.
+        below, here, above = loss[best - 1 : best + 2]
+        exponent += 0.5 * (EXPONENTS[1] - EXPONENTS[0]) * (below - above) / max(below - 2 * here + above, 1e-300)
+    return np.array([np.interp(exponent, EXPONENTS, one) for one in gain.T]), float(exponent)
+
+
+def _check_order(presses: list[tuple[np.ndarray, np.ndarray]], origin: str) -> None:
+    """Refuse channels that are swapped.
+
+    Raises:
+        UsageError: Naming the first such pair.
+    """
+    counts, force = (np.concatenate([press[k] for press in presses]) for k in (0, 1))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        both = np.nan_to_num(np.corrcoef(counts.T, force.T))
+    across = both[: counts.shape[1], counts.shape[1] :]
+    own = np.diag(across)
+    for k in range(len(own)):
+        j = int(across[k].argmax())
+        if j > k and across[k, j] > own[k] + _SWAPPED and across[j, k] > own[j] + _SWAPPED:
+            raise UsageError(
+                f"{origin}: channel {k} reads what channel {j} should, and channel {j} what channel {k} should "
+                f"(correlation with the model's forces {across[k, j]:.2f} and {across[j, k]:.2f})",
+                "channels in the order of the sensor file", "correct the wiring or the order, and record again",
+            )  # fmt: skip

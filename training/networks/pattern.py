@@ -1,0 +1,77 @@
+"""No look-ahead: the pattern of a window apart from its scale, through a residual perceptron to all pixels at once.
+
+Where an indenter touches is said by the pattern of readings, how deep by their size. A unit's gain is uncertain, its
+pattern is not. So the window over its own root mean square and the logarithms of that scale are separate inputs.
+Frames as in `history`. It is meant to be trained on forces (`training.frames.channel_calibration`), so that what it
+learned from simulated presses holds for any unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import Any, ClassVar
+
+import torch
+from torch import nn
+
+from training.loss import WeightedLoss
+from training.networks.history import OFFSETS
+from training.networks.network import Network
+
+_LEAST = 0.01
+"""Scale below which a window counts as noise, over the training frames' own [1]."""
+
+
+class Pattern(Network):
+    """Pattern and scale of the past to pixels."""
+
+    offsets = OFFSETS
+    recipe: ClassVar[dict[str, Any]] = {
+        "calibrate": True, "mirror": True, "schedule": "cosine", "batch_size": 128,
+        "gain_jitter": 0.05, "scale_jitter": 0.05, "exponent_jitter": 0.03,
+        "loss": WeightedLoss(mixture=0.9, threshold=1 / 30, foreground=3.0),
+    }  # fmt: skip
+
+    def __init__(
+        self,
+        taxels: int,
+        map_shape: tuple[int, int],
+        hidden: int = 384,
+        layers: int = 2,
+        offsets: Sequence[int] = OFFSETS,
+    ) -> None:
+        """Build the layers.
+
+        Args:
+            taxels: Number of input channels.
+            map_shape: Pixels along x and y.
+            hidden: Width of the layers.
+            layers: Residual layers.
+            offsets: Frames of the window relative to the target.
+        """
+        super().__init__(taxels, map_shape, {"hidden": hidden, "layers": layers, "offsets": list(offsets)})
+        self.offsets = tuple(offsets)
+        self.encoder = nn.Linear(taxels * len(self.offsets) + 2, hidden)
+        self.layers = nn.ModuleList(
+            nn.Sequential(nn.LayerNorm(hidden), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, hidden))
+            for _ in range(layers)
+        )
+        self.decoder = nn.Sequential(nn.LayerNorm(hidden), nn.Linear(hidden, prod(map_shape)))
+
+    def maps(self, signals: torch.Tensor) -> torch.Tensor:
+        """Return maps over D_max; (b, T, taxels) -> (b, pixels_x, pixels_y).
+
+        All channels are divided by one number, so that nothing stays nothing and the pattern stays what it is.
+        """
+        return self.estimate(signals / self.get_buffer("sd").square().mean().sqrt())
+
+    def estimate(self, signals: torch.Tensor) -> torch.Tensor:
+        """Return maps over D_max from scaled windows; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
+        window = (signals.square().mean(dim=(1, 2)) + _LEAST**2).sqrt()
+        newest = (signals[:, -1].square().mean(dim=1) + _LEAST**2).sqrt()
+        pattern = (signals / window[:, None, None]).flatten(1)
+        features = self.encoder(torch.cat([pattern, window.log()[:, None], newest.log()[:, None]], dim=1))
+        for layer in self.layers:
+            features = features + layer(features)
+        return self.decoder(features).reshape(-1, *self.map_shape)

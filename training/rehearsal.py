@@ -1,0 +1,51 @@
+"""Rehearsal: simulated frames mixed into training on recorded ones, so that what they taught is not forgotten.
+
+A few recorded presses show a small part of the skin. Trained on them alone, a network forgets the rest (R. French,
+Trends in Cognitive Sciences 3 (1999) 128). Each step therefore takes as many simulated frames as recorded ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from training.frames.channel_calibration import calibrate
+from training.frames.frames import Frames
+from training.frames.variation import Variation
+from training.frames.windows import Windows
+from training.inference.checkpoint import Checkpoint
+from training.loss import normalized
+from training.networks.network import Network, create
+from training.settings import TrainingSettings
+
+
+class Rehearsal:
+    """Simulated frames, drawn at random; varied as when the pretrained network saw them."""
+
+    def __init__(
+        self, frames: Frames, pretrained: Checkpoint | None, network: Network, place: torch.device | str
+    ) -> None:
+        """Prepare the windows.
+
+        Args:
+            frames: A simulated dataset of the same sensor.
+            pretrained: Whose calibration and variation the simulated frames get; calibrated here, not varied if None.
+            network: The network in training.
+            place: Where batches are gathered.
+        """
+        self._windows, self._depth = Windows(frames, network.offsets, place), torch.from_numpy(np.asarray(frames.depth))
+        self._usable = torch.as_tensor(np.flatnonzero(frames.valid))
+        self._depth_max, self._place = frames.sensor.map.depth_max, place
+        source = create(network.name, frames.sensor, network.arguments).to(place)
+        source.set_normalization(network.get_buffer("mean").cpu().numpy(), network.get_buffer("sd").cpu().numpy())
+        if network.is_calibrated:
+            known = pretrained.calibration if pretrained else None
+            source.set_calibration(known or calibrate(frames, tuple(span.number for span in frames.episodes)))
+        settings = pretrained.settings if pretrained else TrainingSettings()
+        self._source, self._varied = source, Variation(source, frames.sensor, settings)
+
+    def batch(self, size: int) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return signals [counts or N], (size, T, taxels), and labels over D_max, (size, pixels_x, pixels_y)."""
+        chosen = self._usable[torch.randint(len(self._usable), (size,))]
+        label = normalized(self._depth[chosen].to(self._place).float(), self._depth_max)
+        return self._varied(self._source.calibrated(self._windows.batch(chosen.to(self._place))), label)
