@@ -28,7 +28,7 @@ from training.loss import normalized
 from training.metrics import conformal_intervals, depth_maps, novelty
 from training.metrics.conformal_intervals import ConformalIntervals
 from training.networks.network import Network, create
-from training.rehearsal import Rehearsal
+from training.pretraining.rehearsal import Rehearsal
 from training.settings import TrainingSettings
 from training.splits.split import Split, divide
 
@@ -71,7 +71,7 @@ class _Run:
 
     def __post_init__(self) -> None:
         """Take the network as it is."""
-        self.forward = self.network.maps
+        self.forward = self.network.respond
 
     def start(
         self, pretrained: checkpoint.Checkpoint | None, simulated: Frames | None, settings: TrainingSettings
@@ -135,7 +135,7 @@ def train(
         listener: Called after every step and every epoch.
         compiled: Let torch compile the network first; pays off on GPUs, and changes last bits.
         pretrained: Start from its weights; it is calibrated anew to these frames.
-        simulated: Frames of a simulated dataset, of which each step takes as many (`training.rehearsal`).
+        simulated: Frames of a simulated dataset, of which each step takes as many (`training.pretraining.rehearsal`).
         split: Division of the dataset; by default the settings' own.
 
     Returns:
@@ -156,7 +156,7 @@ def train(
         begun = split or divide(frames, settings.split, settings.seed)
         run = _resumed(frames, settings, out, place) if resume else _started(frames, settings, begun, place, pretrained)
         if compiled:
-            run.forward = torch.compile(run.network.maps)
+            run.forward = torch.compile(run.network.respond)
         run.start(pretrained, simulated, settings)
         split = Split.from_document(run.document["split"])
         windows = Windows(frames, run.network.offsets, place)
@@ -214,7 +214,7 @@ def _started(
     readings, calibration = frames.taxels[frames.indices(split.train)], {}
     if settings.calibrate:
         fitted = calibrate(frames, split.train)
-        network.set_calibration(fitted)
+        network.set_calibration(fitted.gain, fitted.exponent)
         calibration, readings = {"calibration": fitted.document}, fitted.force(readings)
     if pretrained:
         pretrained.check_sensor(frames.sensor, frames.origin)

@@ -24,22 +24,31 @@ PANEL = PIPELINE
 def run(
     dataset: Annotated[Path, typer.Argument(help="Dataset folder.")],
     out: Annotated[Path, typer.Option(help="Folder of the run; must not exist yet.")],
-    epochs: Annotated[int, typer.Option(help="Passes over the training frames.")] = 50,
-    network: Annotated[str, typer.Option(help="A file name in training/networks.")] = "paper",
+    epochs: Annotated[int | None, typer.Option(help="Passes over the frames; default 50, or 20 with --from.")] = None,
+    network: Annotated[str | None, typer.Option(help="A file name in training/networks; default: paper.")] = None,
+    start: Annotated[
+        str | None, typer.Option("--from", help="Start from a pretrained checkpoint, or from `shipped`.")
+    ] = None,
+    simulated: Annotated[
+        Path | None, typer.Option(help="Mix in frames of a dataset that `tacdata simulate` made.")
+    ] = None,
     split: Annotated[str, typer.Option(help="A file name in training/splits.")] = "episode",
     seed: Annotated[int, typer.Option(help="Seed of the split, the weights and the order of frames.")] = 0,
     idle_share: Annotated[float, typer.Option(help="Share of the frames out of contact an epoch takes.")] = 1.0,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
-    batch_size: Annotated[int, typer.Option(min=1, help="Frames a step.")] = 32,
-    learning_rate: Annotated[float, typer.Option(help="AdamW's step size.")] = 1e-3,
-    schedule: Annotated[str, typer.Option(help="Course of the learning rate: constant or cosine.")] = "constant",
+    batch_size: Annotated[int | None, typer.Option(min=1, help="Frames a step; default 32.")] = None,
+    learning_rate: Annotated[float | None, typer.Option(help="AdamW's step size; default 0.001.")] = None,
+    schedule: Annotated[str | None, typer.Option(help="Course of the learning rate: constant or cosine.")] = None,
     mirror: Annotated[
-        bool, typer.Option("--mirror", help="Mirror frames at random, as the sensor is symmetric.")
-    ] = False,
-    gain_jitter: Annotated[
-        float, typer.Option(help="Vary each channel's gain at random by this share, for other specimens.")
-    ] = 0.0,
+        bool | None, typer.Option("--mirror/--no-mirror", help="Mirror frames at random: the sensor is symmetric.")
+    ] = None,
+    calibrate: Annotated[
+        bool | None, typer.Option("--calibrate/--no-calibrate", help="Turn readings into forces first.")
+    ] = None,
+    gain_jitter: Annotated[float | None, typer.Option(help="Vary each channel's gain at random by this share.")] = None,
+    scale_jitter: Annotated[float | None, typer.Option(help="Vary the common gain at random by this share.")] = None,
+    exponent_jitter: Annotated[float | None, typer.Option(help="Vary the exponent at random by this much.")] = None,
     precision: Annotated[str, typer.Option(help="float32 or bfloat16, for cards.")] = "float32",
     compiled: Annotated[bool, typer.Option("--compile", help="Let torch compile the network; for cards.")] = False,
     tensorboard: Annotated[bool, typer.Option("--tensorboard", help="Metrics for TensorBoard too, in RUN.")] = False,
@@ -47,21 +56,28 @@ def run(
 ) -> Result:
     """Train a network that maps taxel signals to depth maps; keeps the best and the last epoch.
 
-    The same dataset, options and machine give the same network. Ctrl-C keeps all finished epochs; --resume
-    goes on from there.
+    Options left out are those of the paper, or those that suit the network (`training/networks`). With --from, a
+    pretrained network is calibrated to the unit and trained on: a few recorded presses are enough. The same dataset,
+    options and machine give the same network. Ctrl-C keeps all finished epochs; --resume goes on from there.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     from training.frames.data import read_frames
-    from training.settings import TrainingSettings
+    from training.pretraining.recipe import recipe
+    from training.pretraining.shipped import pretrained
     from training.tensorboard import event_log
     from training.train import METRICS, train
 
-    settings = TrainingSettings(
-        network=network, split=split, seed=seed, epochs=epochs, batch_size=batch_size, learning_rate=learning_rate,
-        schedule=schedule, mirror=mirror, gain_jitter=gain_jitter, idle_share=idle_share, precision=precision,
-    )  # fmt: skip
+    begun = pretrained(start) if start else None
+    asked = {
+        "network": network, "split": split, "seed": seed, "epochs": epochs, "batch_size": batch_size,
+        "learning_rate": learning_rate, "schedule": schedule, "mirror": mirror, "calibrate": calibrate,
+        "gain_jitter": gain_jitter, "scale_jitter": scale_jitter, "exponent_jitter": exponent_jitter,
+        "idle_share": idle_share, "precision": precision,
+    }  # fmt: skip
+    settings = recipe(asked, begun, simulated is not None)
     frames = read_frames(dataset)
+    mixed = read_frames(simulated) if simulated else None
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     log = event_log(out) if tensorboard else lambda progress: None
     with bars(*columns) as bar:
@@ -71,7 +87,7 @@ def run(
             show(progress)
             log(progress)
 
-        best = train(frames, settings, out, device, resume, threads, listen, compiled)
+        best = train(frames, settings, out, device, resume, threads, listen, compiled, begun, mixed)
     document = best.document
     parts = ", ".join(f"{len(document['split'][part])} {part}" for part in ("train", "validation", "test"))
     print(f"episodes: {parts} (split {document['split']['name']!r})")

@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
 from tacdata.errors import FormatError, UsageError
+from training.networks.network import CALIBRATION_UNIT
 
 if TYPE_CHECKING:
     from training.frames.frames import Frames
 
-UNIT = 1000.0
-"""Reading at which a channel's force is its gain [counts]."""
 SPREAD = 0.25
 """Standard deviation of a unit's gains about their mean that is expected before a reading was seen [1]."""
 EXPONENTS = np.linspace(0.4, 3.0, 53)
@@ -80,12 +78,6 @@ class ChannelCalibration:
         return cls(gain, document["exponent"], error, document["exponent_error"], document["presses"])
 
 
-def power_law(counts: torch.Tensor, gain: torch.Tensor, exponent: torch.Tensor) -> torch.Tensor:
-    """Return forces [N] of tared readings [counts], shapes (..., taxels), as `ChannelCalibration.force`."""
-    size = (counts.abs() / UNIT).clamp(min=1e-9)
-    return gain * torch.sign(counts) * size.pow(exponent)
-
-
 def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
     """Fit the calibration of a unit to labelled presses.
 
@@ -137,7 +129,7 @@ def _jackknife(left_out: np.ndarray) -> np.ndarray:
 
 
 def _power(counts: np.ndarray, exponent: float) -> np.ndarray:
-    return np.sign(counts) * (np.abs(counts) / UNIT) ** exponent
+    return np.sign(counts) * (np.abs(counts) / CALIBRATION_UNIT) ** exponent
 
 
 def _touched(force: np.ndarray) -> np.ndarray:

@@ -133,7 +133,7 @@ def load(path: Path, device: torch.device | str = "cpu") -> Checkpoint:
         )
     network.set_normalization(mean, sd)
     if calibration := document.get("calibration"):
-        network.set_calibration(ChannelCalibration.from_document(calibration))
+        network.set_calibration(np.asarray(calibration["gain"]), calibration["exponent"])
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
     return Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
 

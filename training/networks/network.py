@@ -17,9 +17,10 @@ from torch import nn
 from tacdata import registry
 from tacdata.errors import FormatError
 from tacdata.sensor import Sensor
-from training.frames.channel_calibration import ChannelCalibration, power_law
 
 ROOM, BASE = "training.networks", "network"
+CALIBRATION_UNIT = 1000.0
+"""Reading at which a calibrated channel's force is its gain [counts]."""
 
 
 class Network(nn.Module, ABC):
@@ -52,23 +53,29 @@ class Network(nn.Module, ABC):
         self.get_buffer("mean").copy_(torch.as_tensor(mean, dtype=torch.float32))
         self.get_buffer("sd").copy_(torch.as_tensor(sd, dtype=torch.float32))
 
-    def set_calibration(self, calibration: ChannelCalibration) -> None:
-        """Turn readings into forces on the protrusions from now on."""
-        self.get_buffer("gain").copy_(torch.as_tensor(calibration.gain, dtype=torch.float32))
-        self.get_buffer("exponent").fill_(calibration.exponent)
+    def set_calibration(self, gain: np.ndarray, exponent: float) -> None:
+        """Turn readings into forces from now on: force = gain sign(c) (|c| / 1000 counts)^exponent.
+
+        Args:
+            gain: Force at 1000 counts [N], shape (taxels,).
+            exponent: Exponent of the reading [1].
+        """
+        self.get_buffer("gain").copy_(torch.as_tensor(gain, dtype=torch.float32))
+        self.get_buffer("exponent").fill_(exponent)
         self.is_calibrated = True
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
         """Return depth maps over D_max, not clipped; (b, T, taxels) [counts] -> (b, pixels_x, pixels_y)."""
-        return self.maps(self.calibrated(windows))
+        return self.respond(self.calibrated(windows))
 
     def calibrated(self, windows: torch.Tensor) -> torch.Tensor:
         """Return forces [N] for readings [counts], (b, T, taxels); the readings where there is no calibration."""
-        return (
-            power_law(windows, self.get_buffer("gain"), self.get_buffer("exponent")) if self.is_calibrated else windows
-        )
+        if not self.is_calibrated:
+            return windows
+        size = (windows.abs() / CALIBRATION_UNIT).clamp(min=1e-9)
+        return self.get_buffer("gain") * torch.sign(windows) * size.pow(self.get_buffer("exponent"))
 
-    def maps(self, signals: torch.Tensor) -> torch.Tensor:
+    def respond(self, signals: torch.Tensor) -> torch.Tensor:
         """Return maps over D_max from what `calibrated` returned; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
         return self.estimate((signals - self.get_buffer("mean")) / self.get_buffer("sd"))
 

@@ -59,7 +59,7 @@ class Pattern(Network):
         )
         self.decoder = nn.Sequential(nn.LayerNorm(hidden), nn.Linear(hidden, prod(map_shape)))
 
-    def maps(self, signals: torch.Tensor) -> torch.Tensor:
+    def respond(self, signals: torch.Tensor) -> torch.Tensor:
         """Return maps over D_max; (b, T, taxels) -> (b, pixels_x, pixels_y).
 
         All channels are divided by one number, so that nothing stays nothing and the pattern stays what it is.

@@ -40,7 +40,8 @@ class Rehearsal:
         source.set_normalization(network.get_buffer("mean").cpu().numpy(), network.get_buffer("sd").cpu().numpy())
         if network.is_calibrated:
             known = pretrained.calibration if pretrained else None
-            source.set_calibration(known or calibrate(frames, tuple(span.number for span in frames.episodes)))
+            known = known or calibrate(frames, tuple(span.number for span in frames.episodes))
+            source.set_calibration(known.gain, known.exponent)
         settings = pretrained.settings if pretrained else TrainingSettings()
         self._source, self._varied = source, Variation(source, frames.sensor, settings)
 

@@ -1,0 +1,1 @@
+"""Networks that know the skin before its first recorded press."""

@@ -1,0 +1,27 @@
+"""The pretrained network that ships for the default sensor, and how a person names one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from training.inference import checkpoint
+from training.inference.checkpoint import Checkpoint
+
+NAME = "shipped"
+PATH = Path(__file__).with_name("tacprint.safetensors")
+"""Made by `docs/how_to/pretrain.md` from presses that `tacdata simulate` solved."""
+
+
+def pretrained(model: str) -> Checkpoint:
+    """Return a pretrained network: a checkpoint's path, a run's folder, or "shipped".
+
+    Raises:
+        UsageError: If there is none.
+        FormatError: If it is damaged.
+
+    Example:
+        >>> from training.pretraining.shipped import pretrained
+        >>> pretrained("shipped").network.name
+        'pattern'
+    """
+    return checkpoint.load(PATH if model == NAME else Path(model))
