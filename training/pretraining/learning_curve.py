@@ -159,7 +159,7 @@ def _scored(network: Any, frames: Frames, test: tuple[int, ...], start: str, pre
     seen = touching & scores.predicted
     return CurvePoint(
         start, presses, seed,
-        centroid_error=float(np.median(scores.centroid_error[seen])) if seen.any() else float(np.hypot(*network.map_shape)),
+        centroid_error=float(np.median(scores.centroid_error[seen]) if seen.any() else np.hypot(*network.map_shape)),
         contact_rmse=float(np.median(scores.contact_rmse[touching])), iou=float(np.median(scores.iou[touching])),
         iou_deep=float(scores.iou[deep].mean()), missed=float(1 - seen.sum() / touching.sum()),
     )  # fmt: skip
