@@ -33,6 +33,8 @@ from training.settings import TrainingSettings
 from training.splits.split import Split, divide
 
 METRICS = "metrics.jsonl"
+_VALIDATED = 20_000
+"""Validation frames that choose the best epoch, evenly taken where there are more [count]."""
 
 
 @dataclass(frozen=True)
@@ -162,6 +164,8 @@ def train(
         windows = Windows(frames, run.network.offsets, place)
         depth = _labels(frames.depth, place)
         learned = torch.as_tensor(frames.indices(split.train))
+        validated = frames.indices(split.validation)
+        validated = validated[:: -(-len(validated) // _VALIDATED)]
         taken = torch.from_numpy(_always(frames, learned.numpy(), settings))
         while run.epoch < settings.epochs:
             began = time.monotonic()
@@ -170,7 +174,7 @@ def train(
             line = {
                 "epoch": run.epoch,
                 "train_loss": train_loss,
-                **_validate(run.network, windows, frames, frames.indices(split.validation), settings),
+                **_validate(run.network, windows, frames, validated, settings),
                 "seconds": round(time.monotonic() - began, 3),
             }
             _keep(run, line, out)
@@ -178,7 +182,6 @@ def train(
         best = checkpoint.load(out, place)
         if len(split.validation) > 1:
             conformal_intervals.write(out, _calibrated(best, windows, frames, split))
-        validated = frames.indices(split.validation)
         known = novelty.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
         if known is not None:
             novelty.write(out, known)
