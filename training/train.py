@@ -191,7 +191,8 @@ def train(
 def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, split: Split) -> ConformalIntervals:
     """Return how far off the best epoch's pixels are on the validation episodes."""
     grid, maps, labels = frames.sensor.map, [], []
-    for number in split.validation:
+    episodes = split.validation
+    for number in episodes[:: -(-len(frames.indices(episodes)) // _VALIDATED)]:
         chosen = frames.indices((number,))
         maps.append(predict(best.network, windows, chosen, grid.depth_max))
         labels.append(np.clip(frames.depth[chosen], 0.0, grid.depth_max))
