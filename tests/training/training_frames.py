@@ -14,7 +14,7 @@ def build_frames(episodes: int = 12, length: int = 24, seed: int = 0) -> Frames:
     sensor = default_sensor()
     generator = np.random.default_rng(seed)
     x, y = np.meshgrid(sensor.map.x, sensor.map.y, indexing="ij")
-    spans, depth, tip, phase, taxels = [], [], [], [], []
+    spans, depth, tip, phase, taxels, force = [], [], [], [], [], []
     for number in range(episodes):
         cx, cy, deepest = generator.uniform(-4, 4), generator.uniform(-3, 3), generator.uniform(0.8, 1.6)
         rest, ramp = length // 6, length // 4
@@ -34,6 +34,7 @@ def build_frames(episodes: int = 12, length: int = 24, seed: int = 0) -> Frames:
         at_taxels = np.exp(-((sensor.taxels.centers - (cx, cy)) ** 2).sum(axis=1) / (2 * 1.5**2))
         depth.append(course[:, None, None] * blob)
         taxels.append(1000 * course[:, None] * at_taxels + generator.normal(0, 2, (length, 24)))
+        force.append(0.2 * (course[:, None] * at_taxels) ** 1.5)
         tip.append(np.stack([np.full(length, cx), np.full(length, cy), course], axis=1))
         phase.append(marks)
         shape = SHAPES[number % 3]
@@ -53,4 +54,5 @@ def build_frames(episodes: int = 12, length: int = 24, seed: int = 0) -> Frames:
         dataset_hash="d" * 64,
         origin="synthetic",
         virtual=True,
+        taxel_force=np.concatenate(force).astype(np.float32),
     )

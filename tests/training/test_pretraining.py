@@ -1,0 +1,103 @@
+"""A network pretrained on many presses is fitted to a unit with few, and the curve shows what that is worth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from training_frames import build_frames
+
+from tacdata.errors import FormatError, UsageError
+from training.inference import checkpoint
+from training.pretraining import curve_picture
+from training.pretraining.learning_curve import learning_curve
+from training.pretraining.recipe import FITTING, PULL, recipe
+from training.pretraining.shipped import pretrained
+from training.train import train
+
+
+@pytest.fixture(scope="module")
+def many():
+    """Presses of a model: exact readings."""
+    return build_frames(60, seed=7)
+
+
+@pytest.fixture(scope="module")
+def unit():
+    """Recorded presses of a unit with gains of its own."""
+    frames = build_frames(16, seed=3)
+    gains = np.random.default_rng(5).normal(1.0, 0.15, 24)
+    return replace(frames, taxels=(frames.taxels * gains).astype(np.float32), dataset_hash="u" * 64)
+
+
+@pytest.fixture(scope="module")
+def known(many, tmp_path_factory):
+    settings = recipe({"network": "pattern", "epochs": 12, "learning_rate": 2e-3, "batch_size": 64})
+    return train(many, settings, tmp_path_factory.mktemp("known") / "run", "cpu", threads=1)
+
+
+def test_few_presses_are_worth_more_from_a_pretrained_network(known, unit, tmp_path):
+    points = learning_curve(
+        unit, known, tmp_path / "curve", (0, 4), (0,), networks=("pattern",), device="cpu", threads=1
+    )["points"]
+    at = {(point["start"], point["presses"]): point for point in points}
+    assert set(at) == {("pretrained", 0), ("pretrained", 4), ("pattern", 4)}
+    assert at["pretrained", 4]["centroid_error"] < 0.5 * at["pattern", 4]["centroid_error"]
+    assert at["pretrained", 4]["contact_rmse"] < at["pattern", 4]["contact_rmse"]
+    assert at["pretrained", 4]["contact_rmse"] < at["pretrained", 0]["contact_rmse"], "gains of the unit are learned"
+
+
+def test_a_curve_goes_on_where_it_ended_and_refuses_another(known, unit, many, tmp_path):
+    told = []
+    options = {"device": "cpu", "threads": 1, "networks": (), "told": told.append}
+    first = learning_curve(unit, known, tmp_path, (0, 3), (0,), **options)
+    learning_curve(unit, known, tmp_path, (0, 3), (0, 1), **options)
+    assert len(told) == 4 and len({(point.presses, point.seed) for point in told}) == 4
+    with pytest.raises(UsageError, match="another dataset"):
+        learning_curve(many, known, tmp_path, (0,), (0,), **options)
+    with pytest.raises(UsageError, match="0, or 2 to"):
+        learning_curve(unit, known, tmp_path / "new", (500,), (0,), **options)
+    curve_picture.draw(tmp_path / "curve.png", first)
+    assert (tmp_path / "curve.png").stat().st_size > 10_000
+    assert len(curve_picture.table(first).splitlines()) == 3
+
+
+def test_simulated_frames_are_mixed_in_and_remembered(known, unit, many, tmp_path):
+    settings = recipe({"epochs": 1}, known, simulated=True)
+    run = train(unit, settings, tmp_path / "run", "cpu", threads=1, pretrained=known, simulated=many)
+    assert run.document["simulated"] == many.dataset_hash
+    assert run.document["pretrained"] == known.content_hash
+    with pytest.raises(UsageError, match="give the same --from"):
+        train(unit, replace(settings, schedule="constant"), tmp_path / "run2", "cpu", threads=1, pretrained=known)
+        train(unit, replace(settings, schedule="constant", epochs=2), tmp_path / "run2", "cpu", True, 1)
+
+
+def test_the_pull_keeps_weights_near(known, unit, tmp_path):
+    def distance(pull):
+        settings = replace(recipe({"epochs": 3}, known), pull=pull)
+        run = train(unit, settings, tmp_path / f"{pull}", "cpu", threads=1, pretrained=known)
+        pairs = zip(run.network.parameters(), checkpoint.load(known.path).network.parameters(), strict=True)
+        return sum(float((a - b).detach().square().sum()) for a, b in pairs)
+
+    assert distance(10.0) < 0.5 * distance(0.0)
+
+
+def test_wishes_come_before_recipes(known):
+    assert recipe({"network": None}).network == "paper"
+    fitting = recipe({"seed": 3}, known)
+    assert (fitting.network, fitting.epochs, fitting.pull) == ("pattern", FITTING["epochs"], PULL)
+    assert recipe({"epochs": 5}, known, simulated=True).pull == 0.0
+    with pytest.raises(UsageError, match="--network paper from"):
+        recipe({"network": "paper"}, known)
+
+
+def test_a_network_of_another_sensor_is_refused(known, unit, tmp_path):
+    sensor = replace(unit.sensor, material=replace(unit.sensor.material, youngs_modulus=0.5))
+    with pytest.raises(FormatError, match="was trained for sensor"):
+        train(
+            replace(unit, sensor=sensor), recipe({}, known), tmp_path / "run", "cpu", threads=1, pretrained=known
+        )  # fmt: skip
+
+
+def test_what_is_no_checkpoint_is_refused(tmp_path):
+    with pytest.raises(UsageError, match="no checkpoint"):
+        pretrained(str(tmp_path / "nothing"))
