@@ -22,7 +22,7 @@ START_LIMIT = 60.0
 def run(
     out: Annotated[Path, typer.Option(help="Folder to make; if it exists, a numbered one beside it.")] = Path("demo"),
     presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 12,
-    epochs: Annotated[int, typer.Option(min=1, help="Passes of the training over its frames.")] = 10,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes of the training over its frames.")] = 20,
     speed: Annotated[
         float, typer.Option(min=1.0, max=16.0, help="Virtual seconds per second; less on a busy machine.")
     ] = 4.0,
@@ -88,12 +88,12 @@ class _Place:
 
     def learning(self, epochs: int, seed: int) -> list[tuple[str, list[str]]]:
         session, dataset, network = str(self.session), str(self.dataset), str(self.network)
-        train = ["train", dataset, "--out", network, "--epochs", str(epochs), "--seed", str(seed)]
+        train = ["train", dataset, "--from", "shipped", "--out", network, "--epochs", str(epochs), "--seed", str(seed)]
         return [
             ("check what was recorded", ["check", session]),
             ("label every frame by finite elements", ["label", session, "--no-uncertainty"]),
             ("pack recordings and labels as a LeRobot dataset", ["pack", session, "--out", dataset]),
-            ("train the paper's network", train),
+            ("fit the network that ships to this sensor", train),
             ("score it on presses that it has not seen", ["evaluate", network]),
         ]
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from training.pretraining.learning_curve import CurvePoint
     from training.train import Progress
 
-ORDER = 66
+ORDER = 65
 PANEL = PIPELINE
 PICTURE = "curve.png"
 

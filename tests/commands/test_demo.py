@@ -19,7 +19,6 @@ from tacdata.errors import UsageError
 FARM = Path(__file__).resolve().parents[1] / "label_farm"
 STAND_INS = {
     "label": ("--factory", "fast_model:FastModel", "--workers", "2"),
-    "train": ("--network", "direct", "--idle-share", "0.2"),
 }
 """What makes a stage short, by its verb."""
 DEMO = [sys.executable, "-m", "tacdata.cli", "demo"]

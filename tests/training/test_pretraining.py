@@ -18,7 +18,7 @@ from training.train import train
 @pytest.fixture(scope="module")
 def many():
     """Presses of a model: exact readings."""
-    return build_frames(60, seed=7)
+    return replace(build_frames(60, seed=7), simulated=True, dataset_hash="s" * 64)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_a_curve_goes_on_where_it_ended_and_refuses_another(known, unit, many, t
     learning_curve(unit, known, tmp_path, (0, 3), (0, 1), **options)
     assert len(told) == 4 and len({(point.presses, point.seed) for point in told}) == 4
     with pytest.raises(UsageError, match="another dataset"):
-        learning_curve(many, known, tmp_path, (0,), (0,), **options)
+        learning_curve(replace(unit, dataset_hash="o" * 64), known, tmp_path, (0,), (0,), **options)
     with pytest.raises(UsageError, match="0, or 2 to"):
         learning_curve(unit, known, tmp_path / "new", (500,), (0,), **options)
     curve_picture.draw(tmp_path / "curve.png", first)
@@ -101,3 +101,10 @@ def test_a_network_of_another_sensor_is_refused(known, unit, tmp_path):
 def test_what_is_no_checkpoint_is_refused(tmp_path):
     with pytest.raises(UsageError, match="no checkpoint"):
         pretrained(str(tmp_path / "nothing"))
+
+
+def test_simulated_and_recorded_are_not_confused(known, unit, many, tmp_path):
+    with pytest.raises(UsageError, match="is simulated"):
+        learning_curve(many, known, tmp_path / "curve", (0,), (0,))
+    with pytest.raises(UsageError, match="it holds recorded ones"):
+        train(unit, recipe({}, known, True), tmp_path / "run", "cpu", threads=1, pretrained=known, simulated=unit)

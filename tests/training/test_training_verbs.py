@@ -34,7 +34,7 @@ def write_dataset(root, frames, virtual=True):
             features.DEPTH: frames.depth[here],
             features.TIP: frames.tip[here],
             features.FORCE: np.zeros((n, 3), np.float32),
-            features.TAXEL_FORCE: np.zeros((n, 24), np.float32),
+            features.TAXEL_FORCE: frames.taxel_force[here],
             features.LABEL_ERROR: np.zeros(n, np.float32),
             features.TIME: frames.time_ns[here],
             features.PHASE: frames.phase[here],

@@ -45,6 +45,7 @@ def frames_of(dataset: Dataset) -> Frames:
         dataset_hash=dataset.content_hash,
         origin=str(dataset.root),
         virtual=(True in virtual) if virtual else None,
+        simulated=dataset.simulated > 0,
         taxel_force=dataset[key.TAXEL_FORCE],
     )
 

@@ -64,6 +64,8 @@ class Frames:
     """Where the dataset lies, as given; for messages and for finding it again."""
     virtual: bool | None = None
     """True if a virtual rig recorded it, False if a real one did, None if the dataset does not say."""
+    simulated: bool = False
+    """Whether nobody recorded them: `tacdata simulate` made some or all of the episodes."""
     taxel_force: np.ndarray | None = None
     """Normal force on each protrusion as the skin model says it [N], shape (n, taxels); None if not known."""
 

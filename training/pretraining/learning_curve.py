@@ -95,6 +95,11 @@ def learning_curve(
         FormatError: If the dataset is of another sensor.
     """
     pretrained.check_sensor(frames.sensor, frames.origin)
+    if frames.simulated:
+        raise UsageError(
+            f"{frames.origin} is simulated", "recorded presses: the curve says how many of them are needed",
+            "give the dataset of a unit",
+        )  # fmt: skip
     parents = {"dataset": frames.dataset_hash, "pretrained": pretrained.content_hash}
     parents |= {"simulated": simulated.dataset_hash} if simulated else {}
     held = divide(frames, split, seeds[0])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
+from tacdata.errors import UsageError
 from training.frames.channel_calibration import calibrate
 from training.frames.frames import Frames
 from training.frames.variation import Variation
@@ -32,7 +33,17 @@ class Rehearsal:
             pretrained: Whose calibration and variation the simulated frames get; calibrated here, not varied if None.
             network: The network in training.
             place: Where batches are gathered.
+
+        Raises:
+            UsageError: If the frames were recorded.
+            FormatError: If they are of another sensor.
         """
+        if not frames.simulated:
+            raise UsageError(
+                f"{frames.origin} as simulated frames: it holds recorded ones",
+                "a dataset that `tacdata simulate` made",
+                "give the recorded dataset as the first argument, and the simulated one as --simulated",
+            )  # fmt: skip
         self._windows, self._depth = Windows(frames, network.offsets, place), torch.from_numpy(np.asarray(frames.depth))
         self._usable = torch.as_tensor(np.flatnonzero(frames.valid))
         self._depth_max, self._place = frames.sensor.map.depth_max, place

@@ -1,0 +1,59 @@
+"""The commands of the page on pretraining run as they stand, with a stand-in for the skin model and few presses."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from running.in_process import tacdata
+from running.typed_pages import HOW_TO, commands
+from test_training_verbs import write_dataset
+from training_frames import build_frames
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
+from test_simulate import BumpSkin
+
+from label_farm.simulated import solving
+from tacdata import documents
+from tacdata.sensor import default_sensor
+from training.inference import checkpoint
+from training.pretraining import shipped
+
+PAGE = HOW_TO / "pretrain.md"
+QUICK = {
+    "train": ("--epochs", 1, "--threads", 1, "--device", "cpu"),
+    "learning-curve": ("--seeds", 1, "--threads", 1, "--device", "cpu"),
+    "simulate": ("--workers", 1, "--device", "cpu"),
+}
+"""What makes a command short, by its verb."""
+
+
+@pytest.fixture
+def typed(tmp_path, monkeypatch):
+    monkeypatch.setenv("TACDATA_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(
+        solving, "specimen_model", lambda simulation, number, device: BumpSkin(simulation.specimens[number], 99.0)
+    )
+    write_dataset(tmp_path / "dataset", build_frames(16, length=12))
+    documents.write(tmp_path / "sensor.yaml", default_sensor().document, "sensor")
+    said = {}
+    for words in commands(PAGE):
+        done = tacdata(*words, *QUICK.get(words[0], ()), folder=tmp_path)
+        assert done.returncode == 0, f"{words}: {done.stderr}"
+        said.setdefault(words[0], []).append(done.stdout)
+    return said
+
+
+def test_the_page_is_typed_from_its_first_command_to_its_last(typed, tmp_path):
+    assert set(typed) == {"train", "evaluate", "learning-curve", "simulate"}
+    fitted = checkpoint.load(tmp_path / "network")
+    assert fitted.document["pretrained"] == checkpoint.load(shipped.PATH).content_hash
+    own = checkpoint.load(tmp_path / "network_of_ours")
+    assert own.document["pretrained"] == checkpoint.load(tmp_path / "pretrained").content_hash
+    assert own.document["simulated"]
+    curve = documents.read(tmp_path / "curve" / "curve.json", "learning_curve")
+    assert {(point["start"], point["presses"]) for point in curve["points"]} == {
+        ("pretrained", 0), ("pretrained", 3), ("pattern", 3), ("pretrained", 10), ("pattern", 10),
+    }  # fmt: skip
+    [said] = typed["learning-curve"]
+    assert said.count("pretrained") >= 3 and "+-" in said
+    assert (tmp_path / "curve" / "curve.png").read_bytes()[:4] == b"\x89PNG"
