@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +17,7 @@ from tacdata import documents, provenance
 from tacdata.errors import TacdataError, UsageError
 from training.frames.channel_calibration import calibrate
 from training.frames.frames import Frames
+from training.frames.label_tensor import label_tensor
 from training.frames.variation import Variation
 from training.frames.windows import Windows
 from training.inference import checkpoint
@@ -162,7 +161,7 @@ def train(
         run.start(pretrained, simulated, settings)
         split = Split.from_document(run.document["split"])
         windows = Windows(frames, run.network.offsets, place)
-        depth = _labels(frames.depth, place)
+        depth = label_tensor(frames.depth, place)
         learned = torch.as_tensor(frames.indices(split.train))
         validated = frames.indices(split.validation)
         validated = validated[:: -(-len(validated) // _VALIDATED)]
@@ -359,28 +358,6 @@ def _always(frames: Frames, learned: np.ndarray, settings: TrainingSettings) -> 
         here = slice(span.start, span.stop)
         touching[here] = frames.depth[here].max(axis=(1, 2)) > depth_maps.CONTACT_THRESHOLD
     return touching[learned]
-
-
-def _labels(depth: np.ndarray, place: torch.device) -> torch.Tensor:
-    """Return the labels [mm], (n, pixels_x, pixels_y): on the GPU or in memory if they fit, else where they lie."""
-    if place.type == "cpu" and depth.nbytes < _free_memory() // 4:
-        # Read through once in order, instead of page by page in the order of the first epoch.
-        depth = np.array(depth)
-    with warnings.catch_warnings():
-        # A read-only memory map must not be copied into memory; nothing here writes to it.
-        warnings.filterwarnings("ignore", message="The given NumPy array is not writable")
-        labels = torch.from_numpy(depth)
-    if place.type == "cuda" and depth.nbytes < torch.cuda.mem_get_info(place)[0] // 2:
-        return labels.to(place)
-    return labels
-
-
-def _free_memory() -> int:
-    """Return the memory that is free [bytes]; 0 where the system does not say."""
-    try:
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError, AttributeError):
-        return 0
 
 
 def _validate(

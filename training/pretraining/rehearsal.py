@@ -12,6 +12,7 @@ import torch
 from tacdata.errors import UsageError
 from training.frames.channel_calibration import calibrate
 from training.frames.frames import Frames
+from training.frames.label_tensor import label_tensor
 from training.frames.variation import Variation
 from training.frames.windows import Windows
 from training.inference.checkpoint import Checkpoint
@@ -44,7 +45,8 @@ class Rehearsal:
                 "a dataset that `tacdata simulate` made",
                 "give the recorded dataset as the first argument, and the simulated one as --simulated",
             )  # fmt: skip
-        self._windows, self._depth = Windows(frames, network.offsets, place), torch.from_numpy(np.asarray(frames.depth))
+        self._windows = Windows(frames, network.offsets, place)
+        self._depth = label_tensor(frames.depth, torch.device(place))
         self._usable = torch.as_tensor(np.flatnonzero(frames.valid))
         self._depth_max, self._place = frames.sensor.map.depth_max, place
         source = create(network.name, frames.sensor, network.arguments).to(place)
@@ -59,5 +61,5 @@ class Rehearsal:
     def batch(self, size: int) -> tuple[torch.Tensor, torch.Tensor]:
         """Return signals [counts or N], (size, T, taxels), and labels over D_max, (size, pixels_x, pixels_y)."""
         chosen = self._usable[torch.randint(len(self._usable), (size,))]
-        label = normalized(self._depth[chosen].to(self._place).float(), self._depth_max)
+        label = normalized(self._depth[chosen.to(self._depth.device)].to(self._place).float(), self._depth_max)
         return self._varied(self._source.calibrated(self._windows.batch(chosen.to(self._place))), label)
