@@ -27,7 +27,7 @@ from training.loss import normalized
 from training.metrics import conformal_intervals, depth_maps, novelty
 from training.metrics.conformal_intervals import ConformalIntervals
 from training.networks.network import Network, create
-from training.pretraining.rehearsal import Rehearsal
+from training.rehearsal import Rehearsal
 from training.settings import TrainingSettings
 from training.splits.split import Split, divide
 
@@ -136,7 +136,7 @@ def train(
         listener: Called after every step and every epoch.
         compiled: Let torch compile the network first; pays off on GPUs, and changes last bits.
         pretrained: Start from its weights; it is calibrated anew to these frames.
-        simulated: Frames of a simulated dataset, of which each step takes as many (`training.pretraining.rehearsal`).
+        simulated: Frames of a simulated dataset, of which each step takes as many (`training.rehearsal`).
         split: Division of the dataset; by default the settings' own.
 
     Returns:
