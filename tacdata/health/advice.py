@@ -42,6 +42,9 @@ class Advice:
 def advice(history: History) -> tuple[Advice, ...]:
     """Return what to do, the gravest first."""
     faults, changed = history.wiring, history.changed
+    moved = elsewhere(history)
+    if moved:  # what gains change cannot be told from so large a shift
+        changed = tuple(c for c in changed if c[1].quantity not in ("common gain", "gain"))
     found = [*_wiring(history, faults), *_noise(history, [c for c in changed if c[1].quantity == "noise"])]
     for do, quantities in (
         (REGISTER, ("depth", "x", "y", "repeatability")),
@@ -59,6 +62,11 @@ def advice(history: History) -> tuple[Advice, ...]:
         why = "gains could not be compared: record the same plan at each visit, or label the sessions"
         return (Advice(FIRST, (), why),)
     return (Advice(NOTHING, (), "nothing changed beyond its tolerance"),)
+
+
+def elsewhere(history: History) -> bool:
+    """Return whether the tip stood elsewhere at the latest visit, beyond the tolerance."""
+    return any(change.quantity in ("depth", "x", "y") for _, change in history.changed)
 
 
 def _wiring(history: History, faults: Wiring) -> list[Advice]:

@@ -9,7 +9,7 @@ import numpy as np
 import schemas
 from tacdata import provenance
 from tacdata.health import comparison
-from tacdata.health.advice import Advice, advice, named
+from tacdata.health.advice import Advice, advice, elsewhere, named
 from tacdata.health.comparison import Change
 from tacdata.health.estimate import Spread, UncertainValue
 from tacdata.health.gains import GainFit
@@ -113,6 +113,8 @@ def not_assessed(history: History) -> list[str]:
             left = sorted(set(range(last.sensor.taxels.count)) - set(fit.channels) - history.wiring.unfit)
             if left:
                 found.append(f"gain of {named(left)}: no press near; `tacdata plan health` presses near every taxel")
+    if elsewhere(history):
+        found.append("gains: the tip stood elsewhere than before; register again and repeat the visit")
     if last.repeatability is None:
         found.append("repeatability: no press is repeated; the plan health repeats one")
     if not np.isfinite(last.drift[0].value):

@@ -13,7 +13,7 @@ from tacdata.recording.episode import PHASES, Episode
 
 LEVELS = (0.4, 0.7, 1.0)
 """Shares of the press's depth at which the way in is read [1]; the hold is one more level."""
-LOWEST = 0.15
+LOWEST = 0.3
 """Share of the depth from which the way in is fitted [1]: below it contact may not have begun."""
 DEGREE = 3
 """Degree of the polynomial of depth that smooths the way in."""

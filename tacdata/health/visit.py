@@ -102,11 +102,12 @@ class Visit:
     @property
     def repeatability(self) -> Spread | None:
         """Relative standard deviation of the answer to one press repeated [1]; None without a repeat."""
-        groups: dict[Any, list[float]] = defaultdict(list)
+        groups: dict[Any, list[np.ndarray]] = defaultdict(list)
         for press in self.responses:
-            strong = press.hold > STRONG * press.hold.max()
-            groups[press.key].append(float(press.hold[strong].sum()))
-        repeated = [np.log(group) for group in groups.values() if len(group) > 1 and min(group) > 0]
+            groups[press.key].append(np.abs(press.hold))
+        held = [np.array(group) for group in groups.values() if len(group) > 1]
+        strong = [group[:, group.mean(axis=0) > STRONG * group.mean(axis=0).max()].sum(axis=1) for group in held]
+        repeated = [np.log(group) for group in strong if len(group) and group.min() > 0]
         freedom = sum(len(group) - 1 for group in repeated)
         if not freedom:
             return None
