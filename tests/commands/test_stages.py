@@ -19,7 +19,7 @@ from pathlib import Path
 folder = Path(sys.argv[1])
 try:
     (folder / "started").touch()
-    time.sleep(30)
+    time.sleep(300)
 except KeyboardInterrupt:
     time.sleep(0.2)
     (folder / "closed").write_text("once")
@@ -42,7 +42,7 @@ def scripts(monkeypatch):
     monkeypatch.setattr(stages, "command_line", lambda arguments: [sys.executable, "-c", *arguments])
 
 
-def wait_for(condition, seconds=20.0):
+def wait_for(condition, seconds=60.0):
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "it did not happen"
@@ -118,7 +118,7 @@ def test_a_stage_closes_its_files_when_its_parent_is_killed(tmp_path, ignored):
 
 def test_a_background_verb_is_stopped_at_the_end(scripts, tmp_path):
     with stages.Background([PATIENT, str(tmp_path)], tmp_path / "log") as background:
-        background.wait_until((tmp_path / "started").exists, "a file", 20.0)
+        background.wait_until((tmp_path / "started").exists, "a file", 60.0)
         assert background.process.poll() is None
     assert background.process.poll() == 130
     assert (tmp_path / "closed").exists()

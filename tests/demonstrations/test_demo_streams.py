@@ -55,7 +55,7 @@ class Sink:
         self.notes.append((words, level))
 
 
-def until(true, patience=5.0):
+def until(true, patience=30.0):
     end = time.monotonic() + patience
     while not true() and time.monotonic() < end:
         time.sleep(0.005)

@@ -21,6 +21,7 @@ from tacdata.recording import read_episode
 from training.inference.prediction import PredictedMaps, write_prediction
 from training.settings import TrainingSettings
 from training.train import train
+from viewers.browse import catalogue
 from viewers.rerun import window
 
 TESTS = HOW_TO.parents[1] / "tests"
@@ -129,6 +130,7 @@ def looked_at(monkeypatch):
             with urllib.request.urlopen(address + path, timeout=60) as answer:
                 found[path] = answer.read()
 
+    monkeypatch.setattr(catalogue, "PORT", window.any_port())  # the catalogue's own tests may run at the same time
     monkeypatch.setattr(window, "has_display", lambda: False)
     monkeypatch.setattr(window, "until_interrupted", look)
     return found

@@ -59,7 +59,7 @@ def test_workers_of_other_code_are_refused(tmp_path):
     finally:
         for process in reversed(started):
             process.send_signal(signal.SIGINT)
-            process.wait(30)
+            process.wait(60)
     assert shown.returncode == 2 and "has the model asked for" in shown.stderr, shown.stderr
     assert not (tmp_path / "solves.log").exists() and not list((tmp_path / "s" / "labels").glob("*.json"))
 

@@ -174,8 +174,8 @@ def test_behind_time_only_the_newest_frame_is_estimated():
 def test_messages_reach_a_reader_as_the_schema_says():
     server = MessageServer(0)
     try:
-        with socket.create_connection(("127.0.0.1", server.port), timeout=5) as reader:
-            until = time.monotonic() + 5
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30) as reader:
+            until = time.monotonic() + 30
             while not server.readers and time.monotonic() < until:
                 time.sleep(0.01)
             (made,) = run(stream(causal=True), 4)
@@ -217,19 +217,15 @@ def test_an_estimate_from_readings_never_learnt_from_says_so():
 def test_a_reader_that_stalls_loses_messages_and_holds_up_nobody():
     server = MessageServer(0)
     try:
-        stalled = socket.create_connection(("127.0.0.1", server.port), timeout=5)
-        until = time.monotonic() + 5
+        stalled = socket.create_connection(("127.0.0.1", server.port), timeout=30)
+        until = time.monotonic() + 30
         while not server.readers and time.monotonic() < until:
             time.sleep(0.01)
         for number in range(3000):
             server.send({"number": number, "filler": "x" * 5000})  # 15 MB, far more than any buffer
         lines, file = [], stalled.makefile()
-        stalled.settimeout(1.0)
-        try:
-            while line := file.readline():
-                lines.append(json.loads(line)["number"])
-        except (TimeoutError, OSError):
-            pass
+        while lines[-1:] != [2999]:  # nothing comes after it
+            lines.append(json.loads(file.readline())["number"])
         assert lines == sorted(lines) and len(lines) < 2900
         assert lines[-1] == 2999 and lines[-WAITING:] == list(range(3000 - WAITING, 3000))
         stalled.close()

@@ -12,9 +12,13 @@ from running.durations import recorded
 from running.real_time import in_real_time
 from xdist.scheduler import LoadFileScheduling
 
+from viewers.rerun import window
+
 ROOT = Path(__file__).parents[2]
 STAND_BACK = 3
 """How much computing processes are put back (nice): more would leave them next to nothing on a busy machine."""
+PORTS = 7
+"""How far apart processes ask for a viewer's ports: two that begin at the same time would both find one free."""
 UNKNOWN = 5.0
 """What a file counts that has not been timed yet [s]."""
 
@@ -25,9 +29,15 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    """Stand back in a process that computes."""
-    if hasattr(config, "workerinput") and config.option.waiting and not waits(config.workerinput["workerid"], config):
+    """Stand back in a process that computes; have viewers of other processes take other ports."""
+    if not hasattr(config, "workerinput"):
+        return
+    worker = config.workerinput["workerid"]
+    if config.option.waiting and not waits(worker, config):
         os.nice(STAND_BACK)
+    own = PORTS * (1 + int(worker.removeprefix("gw")))
+    window.GRPC_PORT += own
+    window.WEB_PORT += own
 
 
 def waits(worker, config):

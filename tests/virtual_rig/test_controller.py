@@ -21,7 +21,7 @@ class Terminal:
     def say(self, data: bytes):
         self.line.write(data)
 
-    def hear(self, ending: str, seconds: float = 5.0) -> list[str]:
+    def hear(self, ending: str, seconds: float = 30.0) -> list[str]:
         heard, end = b"", time.monotonic() + seconds
         while time.monotonic() < end:
             heard += self.line.read(256)
@@ -32,7 +32,7 @@ class Terminal:
 
     def ask(self, text: str) -> str:
         self.say(text.encode() + b"\n")
-        end = time.monotonic() + 5
+        end = time.monotonic() + 30
         while time.monotonic() < end:
             answer = self.line.readline().decode().strip()
             if answer == "ok" or answer.startswith("error"):
@@ -46,8 +46,7 @@ def terminal():
     controller.start()
     terminal = Terminal(controller)
     terminal.controller = controller
-    time.sleep(0.1)
-    terminal.line.reset_input_buffer()
+    assert terminal.ask("") == "ok"  # the welcome, if it was heard, came before
     yield terminal
     terminal.line.close()
     controller.stop()

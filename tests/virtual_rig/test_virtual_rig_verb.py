@@ -20,7 +20,7 @@ def test_runs_until_terminated_and_leaves_only_the_truth(tmp_path):
         second = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     finally:
         process.send_signal(signal.SIGTERM)
-        said, complaint = process.communicate(timeout=30)
+        said, complaint = process.communicate(timeout=60)
     assert process.returncode == 0, complaint
     assert complaint == ""
     assert str(path) in said
