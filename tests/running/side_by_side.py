@@ -19,8 +19,8 @@ STAND_BACK = 3
 """How much computing processes are put back (nice): more would leave them next to nothing on a busy machine."""
 PORTS = 7
 """How far apart processes ask for a viewer's ports: two that begin at the same time would both find one free."""
-UNKNOWN = 5.0
-"""What a file counts that has not been timed yet [s]."""
+UNKNOWN = 60.0
+"""What a file counts that has not been timed yet [s]: it begins early, as a long one at the end would run alone."""
 
 
 def pytest_addoption(parser):
