@@ -43,7 +43,7 @@ class ChannelCalibration:
         >>> from training.frames.channel_calibration import ChannelCalibration
         >>> nothing = np.zeros(24)
         >>> calibration = ChannelCalibration(np.full(24, 0.2), 1.5, nothing, 0.0, 10)
-        >>> calibration.force(np.full((1, 24), 2000.0))[0, 0].round(3)  # 0.2 N at 1000 counts
+        >>> float(calibration.force(np.full((1, 24), 2000.0))[0, 0].round(3))  # 0.2 N at 1000 counts
         0.566
     """
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tacdata import registry
 from tacdata.errors import UsageError
-from training.inference.checkpoint import Checkpoint
 from training.networks.network import BASE, ROOM, Network
 from training.settings import TrainingSettings
+
+if TYPE_CHECKING:
+    from training.inference.checkpoint import Checkpoint
 
 FITTING: dict[str, Any] = {"epochs": 20, "learning_rate": 5e-4, "batch_size": 64}
 """What differs where a pretrained network is fitted to a few recorded presses: small steps, and soon done."""
