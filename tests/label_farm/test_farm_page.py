@@ -11,6 +11,15 @@ pytestmark = needs_chromium
 TOKEN = "0123456789abcdef0123"
 
 
+@pytest.fixture(scope="module")
+def idle(tmp_path_factory):
+    """A service that has nothing to solve, and a folder that is no session."""
+    folder = tmp_path_factory.mktemp("idle")
+    (folder / "empty").mkdir()
+    with Service(folder, workers=0, options=("--token", TOKEN)) as service:
+        yield service
+
+
 @pytest.fixture
 def gate(tmp_path):
     """Nothing is solved before the test opens it."""
@@ -18,21 +27,32 @@ def gate(tmp_path):
 
 
 @pytest.fixture
-def service(tmp_path, gate):
-    """A service of its own for every test, so that a second try begins like the first."""
+def busy(tmp_path, gate):
+    """A service with a worker and two sessions, made for one test: a second try begins like the first."""
     record(tmp_path, 2, 6)
-    (tmp_path / "empty").mkdir()
     options = ("--token", TOKEN)
     with Service(tmp_path, 1, seconds=0.0, options=options, gate=gate, FAST_MODEL_FAILS="-5.95") as service:
         yield service
 
 
 @pytest.fixture
-def page(browser, service):
+def idle_page(browser, idle):
+    """The page of the service that has nothing to solve."""
+    yield from shown(browser, idle)
+
+
+@pytest.fixture
+def busy_page(browser, busy):
+    """The page of the service with two sessions."""
+    yield from shown(browser, busy)
+
+
+def shown(browser, service):
+    """Open a service's page; it must end without an error in its script."""
     opened = browser.new_page(viewport={"width": 1100, "height": 900})
     faults = []
     opened.on("pageerror", lambda error: faults.append(str(error)))
-    opened.set_default_timeout(30_000)
+    opened.set_default_timeout(120_000)
     opened.goto(service.url)
     yield opened
     opened.close()
@@ -45,7 +65,8 @@ def log_in(page):
     page.wait_for_selector("#main:visible")
 
 
-def test_the_page_asks_for_the_token_first(page):
+def test_the_page_asks_for_the_token_first(idle_page):
+    page = idle_page
     page.wait_for_selector("#login:visible")
     assert not page.is_visible("#main")
     page.fill("#token", "wrong")
@@ -54,7 +75,8 @@ def test_the_page_asks_for_the_token_first(page):
     assert not page.is_visible("#main")
 
 
-def test_a_person_submits_watches_and_cancels(page, gate):
+def test_a_person_submits_watches_and_cancels(busy_page, gate):
+    page = busy_page
     log_in(page)
     for name in ("session-0", "session-1"):
         page.fill("[name=session]", name)
@@ -90,7 +112,8 @@ def test_a_person_submits_watches_and_cancels(page, gate):
         page.screenshot(path=f"{folder}/farm.png", full_page=True)
 
 
-def test_what_is_refused_is_said_on_the_page(page, service):
+def test_what_is_refused_is_said_on_the_page(idle_page, idle):
+    page = idle_page
     log_in(page)
     page.fill("[name=session]", "../elsewhere")
     page.fill("[name=by]", "eve")
@@ -99,6 +122,6 @@ def test_what_is_refused_is_said_on_the_page(page, service):
     for _ in range(2):
         page.wait_for_event("response", lambda answer: answer.url.endswith("/api/state"))
     assert "a path inside the folder" in page.inner_text("#refusal"), "it stays while the page goes on asking"
-    service.client(TOKEN).post("/api/submissions", {"session": "empty", "by": "eve"})
+    idle.client(TOKEN).post("/api/submissions", {"session": "empty", "by": "eve"})
     page.wait_for_selector("#submissions .refused")
     assert "session.json" in page.inner_text("#submissions tr:has-text('empty')")

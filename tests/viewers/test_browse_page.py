@@ -17,13 +17,17 @@ from viewers.browse.server import Pages, serving
 pytestmark = needs_chromium
 COUNT = 30
 GRABBING = b"""<!doctype html><canvas tabindex="0" id="c" style="width:100%;height:100%"></canvas><script>
-const c = document.getElementById("c"); c.focus(); setTimeout(() => c.focus(), 100);
+const c = document.getElementById("c"); c.focus(); setTimeout(() => { c.focus(); fetch("/grabbed"); }, 100);
 onkeydown = () => { document.title = "pressed"; };
 </script>"""
 
 
 class Grabber(BaseHTTPRequestHandler):
+    grabbed: threading.Semaphore
+
     def do_GET(self):
+        if self.path == "/grabbed":
+            self.grabbed.release()
         self.send_response(200)
         self.send_header("Content-Type", "text/html")
         self.end_headers()
@@ -50,10 +54,13 @@ def served(tmp_path):
         entries.append(Entry(k, name, "ball" if k % 2 else "pin", "sphere", 0.1 * k, 0.0, 0.4 + 0.05 * k, 1.0, 0.95,
                              "complete", "test", 0.01 * k))  # fmt: skip
     (tmp_path / "empty.rrd").write_bytes(b"")
-    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Grabber) as viewer:
+    grabbed = threading.Semaphore(0)
+    handler = type("Counted", (Grabber,), {"grabbed": grabbed})
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), handler) as viewer:
         threading.Thread(target=viewer.serve_forever, daemon=True).start()
         address = f"http://127.0.0.1:{viewer.server_address[1]}"
         pages = Quick(EpisodeList(tmp_path, "session", tuple(entries)), None, None, tmp_path, address)
+        pages.grabbed = grabbed
         with serving(pages, 0):
             yield pages
         viewer.shutdown()
@@ -65,6 +72,7 @@ def page(browser, served):
     opened = context.new_page()
     faults = []
     opened.on("pageerror", lambda error: faults.append(str(error)))
+    opened.set_default_timeout(120_000)
     opened.goto(served.address + "/")
     opened.wait_for_function(f"document.querySelectorAll('tbody tr').length === {COUNT}")
     yield opened
@@ -76,15 +84,16 @@ def opened(page):
     return int(page.inner_text("tr.open td:first-child"))
 
 
-def test_arrow_keys_work_although_the_viewer_grabs_the_keyboard(page):
+def test_arrow_keys_work_although_the_viewer_grabs_the_keyboard(page, served):
     for wanted in (1, 2, 3):
-        page.wait_for_timeout(400)  # the viewer has loaded and taken the focus, twice
+        assert served.grabbed.acquire(timeout=60), "the viewer has loaded and taken the focus, twice"
+        page.wait_for_function("document.activeElement !== document.querySelector('iframe')")
         page.keyboard.press("ArrowDown")
         page.wait_for_function(f"document.querySelector('tr.open td').textContent === '{wanted}'")
     page.mouse.move(1000, 400)  # over the viewer the keys are the viewer's
     page.mouse.click(1000, 400)
     page.keyboard.press("ArrowDown")
-    page.wait_for_timeout(200)
+    page.frames[1].wait_for_function("document.title === 'pressed'")
     assert opened(page) == 3
     page.mouse.move(200, 500)
     page.keyboard.press("ArrowUp")
