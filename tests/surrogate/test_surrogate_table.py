@@ -1,5 +1,6 @@
 """Tables of presses: where they are solved, how they are mirrored and continued, what they say in between."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -155,6 +156,7 @@ def test_a_shipped_press_is_what_the_model_of_today_says():
     asked = PressRequest(from_document({"shape": "sphere", "radius": 4.0}, "t"), 0.8, 0.8, 0.0, depths)
     kept = Shipped.of(SENSOR, MeshSettings()).get(asked)
     assert kept is not None
-    now = SkinModel(SENSOR, ModelSettings(error_estimate=False)).solve(asked)
+    # Straight to the deepest: what is asked in between is solved for its own sake.
+    now = SkinModel(SENSOR, ModelSettings(error_estimate=False)).solve(replace(asked, depths=depths[::4]))
     assert kept.normal[-1] == pytest.approx(now.force[-1, 2], rel=0.02)
     assert np.abs(kept.loads.force[-1] - now.taxel_force[-1]).max() < 0.02 * now.taxel_force[-1].max()
