@@ -76,7 +76,7 @@ def write_dataset(
     writer = begun(out, simulation.sensor, extra, simulated=True)
     where = {n: path for path in shard_files(simulation.folder) for n in read_about(path).numbers if n < presses}
     _refuse_others(simulation, writer, where, out)
-    read = lru_cache(maxsize=2 * len(simulation.specimens))(read_shard)
+    read = lru_cache(maxsize=len(simulation.specimens) + 1)(read_shard)
     for number in sorted(where):
         if recording_key(simulation, number) not in writer.recordings:
             solution = read(where[number]).solutions.get(number)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from tacdata.labels import PathSolution
 from tacdata.replacement import replacement
 
 GRAIN = 1e-4
-"""Resolution of stored maps [mm]; 16 bits then reach 3.2 mm, and what is lost is far below the mesh's error."""
+"""Resolution of stored maps [mm]: far below the mesh's error. 16 bits reach 3.2 mm; deeper maps take 32."""
 _FIELDS = ("taxel_force", "taxel_closure", "taxel_area", "force", "residual", "penetration")
 """Arrays of a solution that are kept in single precision."""
 _NAME = re.compile(r"presses-(\d{7})-(\d{7})\.npz")
@@ -51,7 +51,8 @@ class Shard:
             "about": np.array(json.dumps({"identity": self.identity, "failed": dict(self.failed)}, sort_keys=True)),
         }
         for name in ("surface", "numerical"):
-            arrays[name] = _joined([np.round(getattr(s, name) / GRAIN) for s in known], np.int16)
+            grains = _joined([np.round(getattr(s, name) / GRAIN) for s in known], np.int32)
+            arrays[name] = grains.astype(np.int16) if np.abs(grains).max(initial=0) < 2**15 else grains
         for name in (*_FIELDS, "force_error", "taxel_force_error"):
             arrays[name] = _joined([getattr(s, name) for s in known], np.float32)
         buffer = io.BytesIO()
@@ -84,10 +85,10 @@ def read_about(path: Path) -> ShardContents:
         FormatError: If the file is damaged.
     """
     try:
-        with np.load(path) as arrays:
+        with path.open("rb") as stream, np.load(stream) as arrays:
             about = json.loads(str(arrays["about"]))
             return ShardContents(sorted([*arrays["number"].tolist(), *map(int, about["failed"])]), about["identity"])
-    except (OSError, ValueError, KeyError, BadZipFile) as error:
+    except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
         raise _damaged(path, error) from None
 
 
@@ -98,23 +99,45 @@ def read_shard(path: Path) -> Shard:
         FormatError: If it is damaged.
     """
     try:
-        with np.load(path) as file:
+        with path.open("rb") as stream, np.load(stream) as file:
             arrays = {name: file[name] for name in file.files}
         about = json.loads(str(arrays.pop("about")))
-        ends = np.cumsum(arrays.pop("states"))[:-1]
-        parts = {name: np.split(values, ends) for name, values in arrays.items() if name != "number"}
-        numbers = arrays["number"].tolist()
-        solutions = {n: _solution({k: v[i] for k, v in parts.items()}, about) for i, n in enumerate(numbers)}
-        return Shard(solutions, {int(n): reason for n, reason in about["failed"].items()}, about["identity"])
-    except (OSError, ValueError, KeyError, BadZipFile) as error:
+        failed = {int(number): reason for number, reason in about["failed"].items()}
+        return Shard(StoredSolutions(arrays, about["identity"]), failed, about["identity"])
+    except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
         raise _damaged(path, error) from None
 
 
-def _solution(parts: dict[str, np.ndarray], about: dict[str, Any]) -> PathSolution:
-    values = {name: part.astype(float) for name, part in parts.items()}
-    for name in ("surface", "numerical"):
-        values[name] *= GRAIN
-    return PathSolution(**values, provenance={"made_by": "tacdata.skin", "parents": about["identity"]})
+class StoredSolutions(Mapping[int, PathSolution]):
+    """Solutions of a file, made when they are asked for: in the file's own precision a thousand take 40 MB."""
+
+    def __init__(self, arrays: dict[str, np.ndarray], identity: dict[str, Any]) -> None:
+        """Hold a file's arrays.
+
+        Args:
+            arrays: As `Shard.write` wrote them, without what is no array.
+            identity: What decided the solutions.
+        """
+        self._identity = identity
+        stops = np.cumsum(arrays["states"]).tolist()
+        parts = zip([0, *stops], stops, strict=False)
+        self._places = {n: slice(*part) for n, part in zip(arrays["number"].tolist(), parts, strict=True)}
+        self._arrays = {name: values for name, values in arrays.items() if name not in ("number", "states")}
+
+    def __getitem__(self, number: int) -> PathSolution:
+        """Return the solution of a press, in double precision."""
+        values = {name: stored[self._places[number]].astype(float) for name, stored in self._arrays.items()}
+        for name in ("surface", "numerical"):
+            values[name] *= GRAIN
+        return PathSolution(**values, provenance={"made_by": "tacdata.skin", "parents": self._identity})
+
+    def __iter__(self) -> Iterator[int]:
+        """Yield the numbers of the presses."""
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._places)
 
 
 def _joined(parts: list[np.ndarray], dtype: Any) -> np.ndarray:
