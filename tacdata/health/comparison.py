@@ -18,7 +18,7 @@ from tacdata.health.wiring import Wiring, wiring
 
 LEVEL = 0.01
 """Probability that any test of channels, or any of the unit, errs while nothing changed beyond its tolerance [1]."""
-COMMON, OWN = 0.05, 0.05
+COMMON, OWN = 0.04, 0.05
 """Tolerance of the gain that all channels share, and of a channel's own beside it [1]."""
 ZERO, DRIFT = 0.05, 0.02
 """Tolerance of a channel's zero, and of its drift in a minute: shares of its strongest answer [1]."""
