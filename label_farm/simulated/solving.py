@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from label_farm.simulated.shard import Shard
@@ -111,4 +111,4 @@ def specimen_model(simulation: Simulation, specimen: int, device: str) -> SkinMo
     coarse = companion_mesh(design, settings.mesh, mesh) if simulation.mesh_error else None
     thick = design.skin.thickness, own.skin.thickness
     meshes = [stretched(each, *thick) if each else None for each in (mesh, coarse)]
-    return SkinModel(own, replace(settings), device, *meshes)
+    return SkinModel(own, settings, device, *meshes)
