@@ -77,6 +77,19 @@ def test_columns_that_are_there_ask_for_nothing_more():
     assert seen.columns < 0.6 * whole.columns and (found.error <= 1e-4).all()
 
 
+def test_small_columns_of_a_sum_ask_for_little():
+    """Weighted, the second solution is a hundredth of the first: it needs two digits less."""
+    a, rough = matrix()
+    rhs, weight = fields(7, 2), torch.tensor([1.0, 0.01], dtype=torch.float64)
+    summed, apart = Counted(a, rough), Counted(a, rough)
+    zero = torch.zeros_like(rhs)
+    found = KrylovSpace(summed.product, summed.precondition).solve(rhs, zero, 1e-5, weight=weight)
+    KrylovSpace(apart.product, apart.precondition).solve(rhs, zero, 1e-5)
+    off = torch.linalg.vector_norm(found.x - exact(a, rhs), dim=(0, 1)) * weight
+    assert (off < 2e-5 * torch.linalg.vector_norm(exact(a, rhs), dim=(0, 1))[0]).all() and (found.error <= 1e-5).all()
+    assert summed.columns < 0.85 * apart.columns
+
+
 def test_equal_columns_and_those_without_a_right_hand_side():
     a, rough = matrix()
     seen, rhs = Counted(a, rough), fields(4, 1).repeat(1, 1, 3)

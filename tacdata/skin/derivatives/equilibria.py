@@ -110,7 +110,8 @@ class PathDerivatives:
     """The derivatives on their way along the load path, one column a parameter."""
 
     def __init__(
-        self, newton: Newton, free: torch.Tensor, label: str, tolerance: float = TOLERANCE, slack: Slack | None = None
+        self, newton: Newton, free: torch.Tensor, label: str, tolerance: float = TOLERANCE, slack: Slack | None = None,
+        weight: torch.Tensor | None = None,
     ) -> None:
         """Start.
 
@@ -121,9 +122,10 @@ class PathDerivatives:
             tolerance: Error of the linear solves [1].
             slack: How held nodes move with each parameter [mm over its unit], of the reactions [N], shapes (n, 3, p);
                 None: not at all.
+            weight: Of each parameter, shape (p,), where errors of all add up (`KrylovSpace.solve`).
         """
         self._tolerance, self._slack, self._newton = tolerance, slack, newton
-        self._free, self._label = free, label
+        self._free, self._label, self._weight = free, label, weight
         self.du = torch.empty(0)
         """Of the displacements [mm over the parameter's unit], shape (n, 3, p)."""
         self.changes: list[ContactChange] = []
@@ -209,7 +211,7 @@ class PathDerivatives:
             for own, change in zip(point.now, self.changes, strict=True)
         ]
         guess = point.joined(self.du * free, before)
-        found = KrylovSpace(product, precondition).solve(rhs, guess, self._tolerance)
+        found = KrylovSpace(product, precondition).solve(rhs, guess, self._tolerance, weight=self._weight)
         du, pressures = point.parted(found.x)
         self.du, self.products = du + held, self.products + found.products
         self.error = max(self.error, float(found.error.max()))

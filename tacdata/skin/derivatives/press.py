@@ -54,7 +54,7 @@ class Sensitivity:
 
 def sensitivities(
     model: SkinModel, request: PressRequest, parameters: Sequence[str], tolerance: float = TOLERANCE,
-    passages: Iterable[Passage] | None = None,
+    passages: Iterable[Passage] | None = None, spreads: Sequence[float] | None = None,
 ) -> Iterator[tuple[float, Equilibrium, Sensitivity]]:
     """Yield the requested states of a press with their derivatives, in the order of its depths.
 
@@ -67,6 +67,8 @@ def sensitivities(
         parameters: Names of parameters (`tacdata.skin.derivatives.parameters.known`).
         tolerance: Error of the linear solves, over what they find [1].
         passages: The states of the press, if the model has solved them before; solved here if not given.
+        spreads: Standard deviations of the parameters: errors are then over the largest change that one of them makes.
+            None: over what each parameter changes itself.
 
     Raises:
         UsageError: If a parameter is not one of this press.
@@ -85,7 +87,8 @@ def sensitivities(
     along = directions(model.sensor, request.indenter, names, press.conditions, touch)
     at_touch = _without_depth(names, along)
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
-    derivatives = PathDerivatives(skin.newton([request]), skin.free, label, tolerance, _slack(model, names))
+    weight = None if spreads is None else torch.tensor(spreads, dtype=torch.float64, device=model.device)
+    derivatives = PathDerivatives(skin.newton([request]), skin.free, label, tolerance, _slack(model, names), weight)
     for passage in _passed(model, request) if passages is None else passages:
         for reached in passage.reached:
             derivatives.advance(reached, along if derivatives.changes else at_touch)

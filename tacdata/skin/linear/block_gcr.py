@@ -52,7 +52,10 @@ class KrylovSpace:
         self._count = 0
         self._products = 0
 
-    def solve(self, rhs: torch.Tensor, guess: torch.Tensor, tolerance: float, limit: int = 300) -> GcrSolution:
+    def solve(
+        self, rhs: torch.Tensor, guess: torch.Tensor, tolerance: float, limit: int = 300,
+        weight: torch.Tensor | None = None,
+    ) -> GcrSolution:
         """Solve A x = rhs.
 
         Args:
@@ -60,6 +63,8 @@ class KrylovSpace:
             guess: Where to start, likewise.
             tolerance: Error at which all must arrive, as `GcrSolution` counts it [1].
             limit: Products with the matrix before giving up.
+            weight: Of each solution where they add up, shape (b,): an error counts over the largest of them, as
+                weighted; None: over its own.
         """
         there = _norm(rhs) > 0
         # Without a right-hand side the solution is 0 whatever the guess.
@@ -68,18 +73,19 @@ class KrylovSpace:
             residual = rhs - self._times(x)
             size = _norm(residual).clamp_min(1e-300)
             z = self._precondition((residual / size).to(torch.float32))
-            error = torch.where(there, _norm(z) * size / _norm(x).clamp_min(1e-300), 0.0)
+            error = torch.where(there, _norm(z) * size / _counted(_norm(x), weight).clamp_min(1e-300), 0.0)
             used = self._products - began
             if bool((error <= tolerance).all()) or used >= limit:
                 return GcrSolution(x, error, used)
-            x = x + self._correction(x, residual / size, size, tolerance, limit - used) * size
+            x = x + self._correction(x, residual / size, size, tolerance, limit - used, weight) * size
 
     def _times(self, p: torch.Tensor) -> torch.Tensor:
         self._products += 1
         return self._product(p)
 
     def _correction(
-        self, x: torch.Tensor, residual: torch.Tensor, size: torch.Tensor, tolerance: float, most: int
+        self, x: torch.Tensor, residual: torch.Tensor, size: torch.Tensor, tolerance: float, most: int,
+        weight: torch.Tensor | None,
     ) -> torch.Tensor:
         """Return the correction of x over ``size`` that brings the error to the tolerance.
 
@@ -91,6 +97,7 @@ class KrylovSpace:
             size: Lengths of the residuals, shape (b,).
             tolerance: As of `solve` [1].
             most: Products at most.
+            weight: As of `solve`.
         """
         shape, extent = residual.shape, _norm(x) / size
         left = residual.to(torch.float32).reshape(-1, shape[2])
@@ -104,8 +111,8 @@ class KrylovSpace:
                 left = left - self._w[:before].T @ share
             now = torch.linalg.vector_norm(left[:, wanted], dim=0).clamp_min(1e-30)
             z = self._precondition((left[:, wanted] / now).reshape(*shape[:2], -1))
-            goal = _ENOUGH * tolerance * torch.linalg.vector_norm(found, dim=0).maximum(extent)[wanted]
-            still = _norm(z) * now > goal
+            reached = _counted(torch.linalg.vector_norm(found, dim=0).maximum(extent) * size, weight) / size
+            still = _norm(z) * now > _ENOUGH * tolerance * reached[wanted]
             wanted = wanted[still]
             if not len(wanted):
                 break
@@ -139,6 +146,11 @@ class KrylovSpace:
         rows = slice(self._count, self._count + more)
         self._z[rows], self._w[rows] = z, w
         self._count += more
+
+
+def _counted(length: torch.Tensor, weight: torch.Tensor | None) -> torch.Tensor:
+    """Return the lengths that errors count over: each, or the largest as weighted."""
+    return length if weight is None else (length * weight).max() / weight
 
 
 def _norm(field: torch.Tensor) -> torch.Tensor:
