@@ -51,6 +51,14 @@ def test_states_are_found_again_at_their_depths_and_interpolated_between(passed)
     assert {part.dtype for part in (found.u, *found.multipliers)} == {torch.float64}
 
 
+def test_the_way_back_starts_from_the_way_down_and_what_friction_left(passed):
+    passed.add(BOTH, depths(0.25, 0.5, 0.0), field(1, 10, 0))
+    passed.add(BOTH, depths(0.5, 0.75, 0.0), field(3, 20, 0))
+    now, depth, attempt = field(3.5, 22, 0), depths(0.5, 0.75, 0.0), depths(0.25, 0.0, 0.0)
+    assert same(passed.back(now, depth, attempt, leaves=True), field(1.5, 0, 0)), "flat where the shape has left"
+    assert same(passed.back(now, depth, attempt, leaves=False), field(1.5, 2, 0)), "unless it sticks"
+
+
 def test_each_member_has_its_own_number_of_states(passed):
     for k in range(1, 4):
         passed.add(torch.tensor([True, False, False]), depths(0.1 * k, 0.9, 0.9), field(k, 7, 7))

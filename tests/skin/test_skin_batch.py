@@ -121,10 +121,18 @@ def test_a_batch_that_shrinks_keeps_everything_of_those_that_go_on(model):
 
 def test_an_observer_is_told_every_equilibrium_from_the_touch_on(model):
     """With the history that it was found with; depths between those wanted are told, too."""
-    told, placed = [], [model.skin.placed(k, PressRequest(Sphere(1.5), 0.3 * k, 0.0, 0.0, (0.4,))) for k in range(2)]
+    told, numbers = [], []
+    placed = [model.skin.placed(k, PressRequest(Sphere(1.5), 0.3 * k, 0.0, 0.0, (0.4,))) for k in range(2)]
+
+    def note(presses, reached):
+        numbers.append(presses)
+        told.append(reached)
+
     batch = model.skin.batch(PRESSES[:1], 2)
-    found = list(batch.run(placed, lambda new: [new.u[..., k] for k in range(len(new.column))], told.append))
+    found = list(batch.run(placed, lambda new: [new.u[..., k] for k in range(len(new.column))], note))
     touch, *others = told
+    assert numbers[0] == [0, 1] and {k for both in numbers for k in both} == {0, 1}
+    assert all(len(both) == at.u.shape[2] for both, at in zip(numbers, told, strict=True))
     assert touch.u.shape[2] == 2 and not touch.u.any() and not touch.multipliers[0].any()
     assert sum(at.u.shape[2] for at in others) > len(found) == 2
     [first, *_, last] = others

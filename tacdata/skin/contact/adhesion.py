@@ -121,6 +121,8 @@ def _product(real: type):
 class AdhesiveSurface(ContactSurface):
     """Contact of the outer face with a shape that it sticks to."""
 
+    attracts = True
+
     def __init__(
         self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distances: Mapping[float, wp.Function],
         rough: bool, activation: float, stick: float, adhesion: Adhesion,

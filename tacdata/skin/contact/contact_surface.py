@@ -36,6 +36,9 @@ SUBDIVISIONS = 2
 class ContactSurface:
     """Faces of the mesh against rigid shapes, one a member. It holds nothing that changes while presses are solved."""
 
+    attracts = False
+    """Whether it pulls where it does not touch."""
+
     def __init__(
         self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distances: Mapping[float, wp.Function],
         rough: bool, activation: float, stick: float, flat: bool = False,
@@ -125,7 +128,7 @@ class ContactSurface:
             pose: Of the shape.
             history: Where friction starts from.
             conditions: Friction, thickness, modulus and the shape's parameters.
-            friction_tangent: Stiffness of slipping nodes: 0 by the secant of friction, 1 by its tangent, shape (b,).
+            friction_tangent: Stiffness of slipping nodes, from 0, the secant, to 1, the tangent, shape (b,).
             near: Gap up to which nodes without pressure are active, too [mm], shape (b,).
             total: Receives the forces.
 

@@ -32,8 +32,8 @@ _HALVINGS, _SHORTER = 4, 4.0
 _TOUCHING = 0.02
 """Gap up to which nodes are active when a load step begins [mm]: the tips on the board bear load from the first."""
 
-_ANY = 1e3
-"""Residual that stands in for that before the first step of a load step [1]."""
+_ANY, _STARTED = 1e3, 0.15
+"""Residuals that stand in, whole or at the least, for that before the first step of a load step [1]."""
 
 _SLOW = 1.0
 """Share of the residual that a step by friction's tangent may leave at most [1]; else the secant takes over."""
@@ -115,6 +115,7 @@ class Batch:
         unknowns = self._at.unknowns
         self._base, self._accepted, self._rate = unknowns, unknowns.zeros(), unknowns.zeros()
         self._loading = LoadingStates(unknowns)
+        self._sticky = any(surface.attracts for surface in newton.surfaces)
         self._failed_at = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
         self._presses: list[PlacedPress | None] = [None] * capacity
         self._before = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
@@ -301,11 +302,12 @@ class Batch:
         heights = self._values({c: float(press.touch[2]) - press.path.attempt for c, press in busy.items()})
         moved, place = self._values(dict.fromkeys(busy, 1.0)) > 0, self._at.poses[0].place
         place[2] = torch.where(moved, heights, place[2])
-        guess = self._accepted.plus(self._rate, attempt - depth)
+        guess, near = self._accepted.plus(self._rate, attempt - depth), torch.full_like(depth, _TOUCHING)
         beyond = attempt >= self._loading.deepest
         if not bool((beyond | ~which).all()):
-            back = self._loading.at(attempt).plus(self._accepted.minus(self._loading.at(depth)))
-            guess = guess.where(beyond, back)
+            guess = guess.where(beyond, self._loading.back(self._accepted, depth, attempt, leaves=not self._sticky))
+            # The way down says which nodes are active on the way up, unless the skin sticks.
+            near = torch.where(beyond | self._sticky, near, 0.0)
         columns = which.nonzero()[:, 0]
         chosen = guess.take(columns)
         volume = self._newton.body.internal_force(chosen.u, self._at.conditions.take(columns))[1]
@@ -313,7 +315,7 @@ class Batch:
         state = self._at.unknowns.copy()
         state.put(columns, chosen)
         self._at.unknowns = state
-        self._at.near = torch.where(which, _TOUCHING, self._at.near)
+        self._at.near = torch.where(which, near, self._at.near)
         self._before = torch.where(which, torch.inf, self._before)
 
     def _step(self, now: Residual) -> None:
@@ -321,17 +323,18 @@ class Batch:
         busy = self._tensor(np.array([press is not None for press in self._presses]))
         if not bool(busy.any()):
             return
-        at = self._at
+        at, first = self._at, torch.isinf(self._before)
         # By the tangent, nodes may flip between opposite slips for ever; by the secant, a majorant, they do not.
         flipping = (at.friction_tangent > 0) & (now.relative > _SLOW * self._before)
-        self._failed_at = torch.where(at.near == 0, self._failed_at, torch.inf)
+        self._failed_at = torch.where(first, torch.inf, self._failed_at)
         self._failed_at = torch.where(flipping, self._before.minimum(self._failed_at), self._failed_at)
         may = now.relative < _NEARER * self._failed_at
         at.friction_tangent = torch.where(may, self._newton.friction_tangent(now), 0.0)
         moved, changes, used = self._newton.step(at, now, busy)
         self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
-        # The first step of a load step changes the active set: its residual says nothing.
-        self._base, self._before = at.unknowns, torch.where(at.near > 0, _ANY, now.relative)
+        # The first step of a load step changes the active set: the residual before says little, or nothing.
+        before = torch.where(at.near > 0, _ANY, now.relative)
+        self._base, self._before = at.unknowns, torch.where(first, before.clamp_min(_STARTED), before)
         at.unknowns = self._base.plus(Unknowns(moved, changes))
         at.near = torch.zeros_like(at.near)
 

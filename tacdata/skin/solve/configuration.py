@@ -51,7 +51,7 @@ class Configuration(Columns):
     histories: tuple[ContactHistory, ...]
     """Of each contact."""
     friction_tangent: torch.Tensor
-    """Stiffness of slipping nodes: 0 by the secant of friction, 1 by its tangent, shape (b,)."""
+    """Stiffness of slipping nodes, from 0, the secant of friction, to 1, its tangent, shape (b,)."""
     near: torch.Tensor
     """Gap up to which nodes without pressure are active, too [mm], shape (b,)."""
 

@@ -66,5 +66,17 @@ class LoadingStates:
         )
         return Unknowns(u, tuple(multipliers))
 
+    def back(self, now: Unknowns, depth: torch.Tensor, attempt: torch.Tensor, leaves: bool) -> Unknowns:
+        """Return a start for a step back up: what it was there on the way down, and what friction has left since.
+
+        Args:
+            now: Unknowns at the last equilibrium.
+            depth: Its depth [mm], shape (b,).
+            attempt: The depth to start at, likewise.
+            leaves: Whether the skin is flat once the shape is back where it touched.
+        """
+        lag = torch.where(attempt > 0, 1.0, 0.0) if leaves else 1.0
+        return self.at(attempt).plus(now.minus(self.at(depth)), lag)
+
     def _row(self, row: torch.Tensor) -> torch.Tensor:
         return self._values.gather(0, row[None, None, :].expand(1, *self._values.shape[1:]))[0]
