@@ -300,11 +300,12 @@ def test_an_impossible_press_is_named_and_takes_no_other_along(model):
 
 
 def test_where_slips_flip_by_frictions_tangent_the_secant_takes_over(monkeypatch):
-    """A leaning ellipsoid, 0.4 mm deep: by the tangent from a residual of 0.1 it goes up and down for ever.
+    """A leaning ellipsoid, 0.4 mm deep: by the whole tangent from a residual of 0.1 it goes up and down for ever.
 
     Even in small steps there is no way past; with the secant the depth is reached in one.
     """
     monkeypatch.setattr("tacdata.skin.solve.newton._NEAR", 0.1)
+    monkeypatch.setattr("tacdata.skin.solve.newton._TANGENT", 1.0)
     sensor = slab_sensor(friction=0.2)
     slab = SkinModel(sensor, ModelSettings(error_estimate=False), mesh=box_mesh(sensor, 6, 6, 2))
     request = PressRequest(Ellipsoid(3.0, 1.8, 2.0), 0.5, 1.0, 40.0, (0.2, 0.4), 8.7, 1.0)
@@ -331,6 +332,20 @@ def test_where_slips_flip_by_frictions_tangent_the_secant_takes_over(monkeypatch
     assert all(attempt == 0.4 and tangent for attempt, _, tangent, _ in flipping)
     assert errors.min() > 0.015 and errors.max() < 0.02
     assert np.all(np.diff(errors)[1:] * np.diff(errors)[:-1] < 0)
+
+
+def test_a_start_never_decides_a_state(monkeypatch):
+    """Unloading from the state before in place of the way down takes more steps to the same states."""
+    sensor = slab_sensor(friction=0.2)
+    slab = SkinModel(sensor, ModelSettings(error_estimate=False), mesh=box_mesh(sensor, 6, 6, 2))
+    request = PressRequest(Sphere(1.5), 0.2, -0.1, 0.0, (0.2, 0.4, 0.2, 0.1))
+    ours = [state for _, state in slab.states(request)]
+    monkeypatch.setattr("tacdata.skin.solve.loading_states.LoadingStates.back", lambda own, now, *_, **__: now)
+    theirs = [state for _, state in slab.states(request)]
+    for one, other in zip(ours, theirs, strict=True):
+        assert one.force == pytest.approx(other.force, abs=1e-3 * ours[1].force[2])
+        assert np.abs(one.displacement - other.displacement).max() < 1e-3 * 0.4
+    assert sum(one.newton for one in ours[2:]) < sum(other.newton for other in theirs[2:])
 
 
 def test_more_presses_than_a_card_holds_are_refused_in_words(model, monkeypatch):

@@ -74,6 +74,8 @@ class Newton:
         self.tangent = TangentStiffness(body, surfaces)
         self._free = (~fixed).to(torch.float64)[:, None, None]
         self._free_work = self._free.to(_WORK)
+        # Falling attraction needs all of it: near a jump the rest would be far too stiff.
+        self._tangent = 1.0 if any(surface.attracts for surface in surfaces) else _TANGENT
         cuda = isinstance(preconditioner.rest, DenseRest)
         self._cuda = CudaConjugateGradients(self.tangent, preconditioner) if cuda else None
 
@@ -113,7 +115,7 @@ class Newton:
 
     def friction_tangent(self, now: Residual) -> torch.Tensor:
         """Return the share of friction's tangent, shape (b,): 0, by the secant, for members far from the solution."""
-        return _TANGENT * (now.relative < _NEAR).to(torch.float64)
+        return self._tangent * (now.relative < _NEAR).to(torch.float64)
 
     def is_bad(self, before: torch.Tensor, now: Residual) -> torch.Tensor:
         """Return which members' step failed, shape (b,): residual more than doubled, or an element nearly inverted."""
