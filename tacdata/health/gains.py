@@ -186,6 +186,6 @@ def _fit(value: np.ndarray, covariance: np.ndarray, channels: list[int], sites: 
         {k: UncertainValue(float(gain[i]), float(error[i]), freedom) for i, k in pairs},
         UncertainValue(middle, shared, freedom),
         {k: UncertainValue(float(gain[i] / middle), float(own[i] / middle), freedom) for i, k in pairs},
-        {name: UncertainValue(*map(float, (value[i], error[i])), freedom) for i, name in enumerate(AXES, start=count)},
+        {name: UncertainValue(float(value[i]), float(error[i]), freedom) for i, name in enumerate(AXES, count)},
         sites,
     )
