@@ -24,7 +24,7 @@ class FallOff:
     unit: float
     """Squared distance that counts as 1 [mm^2]."""
     terms: np.ndarray
-    """Coefficients of its powers from the first on, shape (levels, `DEGREE`)."""
+    """Coefficients of its powers from the first on [1], shape (levels, `DEGREE`)."""
 
     def shifted(self, away: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what a shift of the tip does to answers, and how they change as it goes on.

@@ -22,7 +22,7 @@ class SiteRows:
     """The observations at one site: levels of each pressed channel, one channel after the other."""
 
     design: np.ndarray
-    """Shape (n, parameters)."""
+    """What a parameter adds for each of its units [counts], shape (n, parameters)."""
     answer: np.ndarray
     """What was measured [counts], shape (n,)."""
     known: np.ndarray
