@@ -3,8 +3,9 @@
     force = gain_k sign(c) (|c| / 1000 counts)^exponent
 
 The gain is the channel's own, the exponent common. The labels know the force on each protrusion from the skin model.
-So a few presses that touch every taxel are enough. Gains are shrunk towards their mean: a channel that was hardly
-touched takes the mean, one that was touched often its own value. Standard errors come from the jackknife over presses.
+So a few presses that touch every taxel are enough. Gains are shrunk towards their mean by what the presses tell: a
+channel that was hardly touched takes the mean, one that was touched often its own value. The exponent's standard error
+comes from the jackknife over presses.
 """
 
 from __future__ import annotations
@@ -20,16 +21,12 @@ from training.networks.network import CALIBRATION_UNIT
 if TYPE_CHECKING:
     from training.frames.frames import Frames
 
-SPREAD = 0.25
-"""Standard deviation of a unit's gains about their mean that is expected before a reading was seen [1]."""
+SPREAD = 0.1
+"""Standard deviation of a unit's gains about their mean that a stated error allows at least [1]."""
 EXPONENTS = np.linspace(0.4, 3.0, 53)
 """Exponents that are tried [1], shape (53,); the answer lies between two of them."""
-_INDEPENDENT = 6.0
-"""As how many independent frames the frames of one press count [1]: neighbours err alike."""
 _GROUPS = 20
 """Groups of presses that the jackknife leaves out, one after the other, where there are more presses [1]."""
-_TOUCHED = 0.02
-"""Share of the largest force that counts as a touch [1]."""
 _SWAPPED = 0.2
 """By how much the correlation with another channel's force must be the larger one, both ways, for a swap [1]."""
 
@@ -108,33 +105,18 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
         )  # fmt: skip
     _check_order(presses, frames.origin)
     sums = _sums(presses)
-    gain, exponent = _fitted(sums)
-    touched = np.array([_touched(force) for _, force in presses]).any(axis=0)
+    gain, error, exponent = _fitted(sums)
     groups = min(len(presses), _GROUPS)
     if groups == 1:
-        return ChannelCalibration(gain, exponent, np.full(len(gain), SPREAD * gain.mean()), 1.0, 1)
+        return ChannelCalibration(gain, exponent, error, 1.0, 1)
     group = np.arange(len(presses)) % groups
-    left_out = [_fitted([part[..., group != k, :] for part in sums]) for k in range(groups)]
-    gain_error = _jackknife(np.array([gains for gains, _ in left_out]))
-    gain_error = np.where(touched, gain_error, SPREAD * gain.mean())
-    return ChannelCalibration(
-        gain, exponent, gain_error, float(_jackknife(np.array([one for _, one in left_out]))), len(presses)
-    )
-
-
-def _jackknife(left_out: np.ndarray) -> np.ndarray:
-    """Return the standard error, shape (...), from estimates that leave out one group each, shape (groups, ...)."""
-    groups = len(left_out)
-    return np.sqrt((groups - 1) / groups * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
+    left_out = np.array([_fitted([part[..., group != k, :] for part in sums])[2] for k in range(groups)])
+    exponent_error = np.sqrt((groups - 1) / groups * ((left_out - left_out.mean()) ** 2).sum())
+    return ChannelCalibration(gain, exponent, error, float(exponent_error), len(presses))
 
 
 def _power(counts: np.ndarray, exponent: float) -> np.ndarray:
     return np.sign(counts) * (np.abs(counts) / CALIBRATION_UNIT) ** exponent
-
-
-def _touched(force: np.ndarray) -> np.ndarray:
-    """Return which channels a press loads [bool], shape (taxels,), of its forces [N], shape (n, taxels)."""
-    return np.abs(force).max(axis=0) > _TOUCHED * np.abs(force).max()
 
 
 def _sums(presses: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
@@ -147,7 +129,7 @@ def _sums(presses: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
     square = np.empty((len(EXPONENTS), len(presses), presses[0][0].shape[1]))
     product, total = np.empty_like(square), np.empty(square.shape[1:])
     for k, (counts, force) in enumerate(presses):
-        weight = _INDEPENDENT / len(counts)
+        weight = 1 / len(counts)
         total[k] = weight * (force * force).sum(axis=0)
         for j, exponent in enumerate(EXPONENTS):
             x = _power(counts, exponent)
@@ -155,21 +137,52 @@ def _sums(presses: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
     return [square, product, total]
 
 
-def _fitted(sums: list[np.ndarray]) -> tuple[np.ndarray, float]:
-    """Return gains [N], shape (taxels,), and the exponent with the least squared error of the forces."""
-    square, product, total = (part.sum(axis=-2) for part in sums)
-    mean = product.sum(axis=1, keepdims=True) / square.sum(axis=1, keepdims=True)
-    left = np.maximum((total - 2 * mean * product + mean**2 * square).mean(axis=1, keepdims=True), 0.0)
-    prior = left / (_INDEPENDENT * sums[2].shape[-2]) / (SPREAD * mean) ** 2
-    gain = (product + prior * mean) / (square + prior)
-    loss = (total - 2 * gain * product + gain**2 * square).sum(axis=1)
+def _fitted(sums: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return gains and their standard errors [N], shapes (taxels,), and the exponent with the least squared error."""
+    square, product, total = sums
+    gains, errors = np.empty((2, len(square), square.shape[-1]))
+    loss = np.empty(len(square))
+    for j in range(len(square)):
+        gains[j], errors[j] = _shrunk(square[j], product[j])
+        loss[j] = (total - 2 * gains[j] * product[j] + gains[j] ** 2 * square[j]).sum()
     best = int(loss.argmin())
     exponent = EXPONENTS[best]
     if 0 < best < len(EXPONENTS) - 1:
         # The vertex of the parabola through the best exponent and its neighbours.
         below, here, above = loss[best - 1 : best + 2]
         exponent += 0.5 * (EXPONENTS[1] - EXPONENTS[0]) * (below - above) / max(below - 2 * here + above, 1e-300)
-    return np.array([np.interp(exponent, EXPONENTS, one) for one in gain.T]), float(exponent)
+    at = [np.array([np.interp(exponent, EXPONENTS, one) for one in values.T]) for values in (gains, errors)]
+    return at[0], at[1], float(exponent)
+
+
+def _shrunk(square: np.ndarray, product: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return gains and their standard errors [N], shapes (taxels,): best linear unbiased predictions.
+
+    A one-way random-effects model: a channel's gain varies about the mean, and each press's estimate about the
+    channel's gain, since the model errs a little otherwise at each place. Both variances are found by moments
+    (R. DerSimonian, N. Laird, Controlled Clinical Trials 7 (1986) 177).
+
+    Args:
+        square: Sums of squared readings, shape (presses, taxels): the weights of the presses' own estimates.
+        product: Sums of readings times forces [N], shape (presses, taxels).
+    """
+    weight = square.sum(axis=0)
+    mean = product.sum() / weight.sum()
+    own = np.divide(product, square, out=np.full_like(square, mean), where=square > 0)
+    gain = np.divide((square * own).sum(axis=0), weight, out=np.full(len(weight), mean), where=weight > 0)
+    alone = np.divide((square**2).sum(axis=0), weight, out=np.zeros_like(weight), where=weight > 0)
+    free = (weight - alone).sum()
+    within = (square * (own - gain) ** 2).sum() / free if free > 0 else 0.0
+    # Of how many equal presses a channel's estimate is worth, and how much they tell.
+    count = np.divide(weight, alone, out=np.zeros_like(weight), where=alone > 0)
+    precision = count / within if within > 0 else np.where(count > 0, 1e300, 0.0)
+    sampling = np.divide(1.0, precision, out=np.zeros_like(weight), where=precision > 0)
+    over = (weight * ((gain - mean) ** 2 - sampling)).sum() / weight.sum()
+    between = max(float(over), 0.0) if free > 0 else 0.0
+    kept = between * precision / (1.0 + between * precision)
+    # The statement of the error allows a spread that few presses cannot tell.
+    error = np.sqrt(1.0 / (1.0 / max(between, (SPREAD * mean) ** 2) + precision))
+    return mean + kept * (gain - mean), error
 
 
 def _check_order(presses: list[tuple[np.ndarray, np.ndarray]], origin: str) -> None:
