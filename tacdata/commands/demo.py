@@ -21,7 +21,7 @@ START_LIMIT = 60.0
 
 def run(
     out: Annotated[Path, typer.Option(help="Folder to make; if it exists, a numbered one beside it.")] = Path("demo"),
-    presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 12,
+    presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 24,
     epochs: Annotated[int, typer.Option(min=1, help="Passes of the training over its frames.")] = 20,
     speed: Annotated[
         float, typer.Option(min=1.0, max=16.0, help="Virtual seconds per second; less on a busy machine.")
