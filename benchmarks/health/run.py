@@ -89,7 +89,7 @@ def main() -> None:
             if given.verbose:
                 print(f"unit {seed} is done", flush=True)
     print("| fault | found | something else beside it |\n|---|---|---|")
-    for title, (right, more) in rows.items():
+    for title, (right, more) in rows.items() if given.units else ():
         print(f"| {title} | {interval(right, given.units)} | {more} of {given.units} |")
     print(f"healthy units accused: {interval(sum(accused.values()), given.clean)}; {json.dumps(dict(accused))}")
 

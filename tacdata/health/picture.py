@@ -107,6 +107,7 @@ def _channels(axes: Any, history: History) -> None:
 def _series(axes: Any, history: History, quantity: str, values: Callable[[int], list[float]], label: str) -> None:
     """Draw a quantity of every channel over the visits."""
     bad = {change.channel for _, change in history.changed if change.quantity == quantity}
+    bad |= history.wiring.unfit | {channel for channel, _ in history.wiring.swapped}
     table = np.array([values(k) for k in range(len(history.visits))], float)
     for channel in range(table.shape[1]):
         color = BAD if channel in bad else GREY
