@@ -11,6 +11,7 @@ from training.inference import onnx_export
 from training.inference.onnx_export import export
 from training.inference.sequence import window_map
 from training.networks.network import BASE, ROOM
+from training.pretraining.recipe import recipe
 from training.settings import TrainingSettings
 from training.train import train
 
@@ -20,7 +21,7 @@ onnx = pytest.importorskip("onnx")
 
 @pytest.mark.parametrize("name", registry.names(ROOM, BASE))
 def test_every_network_answers_like_torch(name, frames, tmp_path):
-    trained = train(frames, TrainingSettings(network=name, epochs=1), tmp_path / "run", device="cpu", threads=1)
+    trained = train(frames, recipe({"network": name, "epochs": 1}), tmp_path / "run", device="cpu", threads=1)
     made = export(trained, tmp_path / "network.onnx")
     assert made.difference < 1e-4
     session = onnxruntime.InferenceSession(str(made.path), providers=["CPUExecutionProvider"])
