@@ -17,7 +17,7 @@ METRICS = {
 
 
 def summary(document: dict[str, Any]) -> dict[tuple[str, int], dict[str, tuple[float, float]]]:
-    """Return mean and standard deviation over the seeds of every metric, by start and number of presses."""
+    """Return mean and standard deviation (NaN of one seed) of every metric, by start and number of presses."""
     groups: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for point in document["points"]:
         groups.setdefault((point["start"], point["presses"]), []).append(point)
@@ -29,13 +29,10 @@ def summary(document: dict[str, Any]) -> dict[tuple[str, int], dict[str, tuple[f
 
 def table(document: dict[str, Any]) -> str:
     """Return the curve as text: one line a start and number of presses."""
-    lines = [f"{'start':<12} {'presses':>7}  {'centroid [px]':>14}  {'RMSE [mm]':>15}  {'IoU > 0.2 mm':>14}"]
+    lines = [f"{'start':<12} {'presses':>7}  {'centroid [px]':>15}  {'RMSE [mm]':>15}  {'IoU > 0.2 mm':>15}"]
     for (start, presses), means in summary(document).items():
-        (centroid, rmse, iou) = (means[metric] for metric in METRICS)
-        lines.append(
-            f"{start:<12} {presses:>7}  {centroid[0]:7.2f} +- {centroid[1]:.2f}  {rmse[0]:8.3f} +- {rmse[1]:.3f}"
-            f"  {iou[0]:7.2f} +- {iou[1]:.2f}"
-        )
+        cells = (_cell(*means[metric], digits) for metric, digits in zip(METRICS, (2, 3, 2), strict=True))
+        lines.append(f"{start:<12} {presses:>7}  {'  '.join(f'{cell:>15}' for cell in cells)}")
     return "\n".join(lines)
 
 
@@ -63,5 +60,10 @@ def draw(path: Path, document: dict[str, Any]) -> None:
     figure.savefig(path)
 
 
+def _cell(mean: float, deviation: float, digits: int) -> str:
+    """Return mean and deviation as text; the deviation of one seed is not known."""
+    return f"{mean:.{digits}f}" + ("" if np.isnan(deviation) else f" +- {deviation:.{digits}f}")
+
+
 def _spread(values: list[float]) -> tuple[float, float]:
-    return float(np.mean(values)), float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    return float(np.mean(values)), float(np.std(values, ddof=1)) if len(values) > 1 else float("nan")
