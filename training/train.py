@@ -222,7 +222,8 @@ def _started(
     if pretrained:
         pretrained.check_sensor(frames.sensor, frames.origin)
         network.load_state_dict(pretrained.network.state_dict())
-        mean, sd = (np.float32(pretrained.document["normalization"][name]) for name in ("mean", "sd"))
+        known = pretrained.document["normalization"]
+        mean, sd = (np.asarray(known[name], dtype=np.float32) for name in ("mean", "sd"))
     else:
         mean, sd = normalization(readings)
     network.set_normalization(mean, sd)

@@ -55,5 +55,5 @@ def test_the_page_is_typed_from_its_first_command_to_its_last(typed, tmp_path):
         ("pretrained", 0), ("pretrained", 3), ("pattern", 3), ("pretrained", 10), ("pattern", 10),
     }  # fmt: skip
     [said] = typed["learning-curve"]
-    assert said.count("pretrained") >= 3 and "+-" in said
+    assert said.count("pretrained") >= 3 and "IoU > 0.2 mm" in said
     assert (tmp_path / "curve" / "curve.png").read_bytes()[:4] == b"\x89PNG"
