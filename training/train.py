@@ -221,6 +221,7 @@ def _started(
         calibration, readings = {"calibration": fitted.document}, fitted.force(readings)
     if pretrained:
         pretrained.check_sensor(frames.sensor, frames.origin)
+        pretrained.check_unseen(frames.dataset_hash, frames.origin)
         network.load_state_dict(pretrained.network.state_dict())
         known = pretrained.document["normalization"]
         mean, sd = (np.asarray(known[name], dtype=np.float32) for name in ("mean", "sd"))

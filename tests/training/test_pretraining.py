@@ -108,3 +108,11 @@ def test_simulated_and_recorded_are_not_confused(known, unit, many, tmp_path):
         learning_curve(many, known, tmp_path / "curve", (0,), (0,))
     with pytest.raises(UsageError, match="it holds recorded ones"):
         train(unit, recipe({}, known, True), tmp_path / "run", "cpu", threads=1, pretrained=known, simulated=unit)
+
+
+def test_a_network_that_saw_the_presses_is_refused(known, many, tmp_path):
+    seen = replace(many, simulated=False)
+    with pytest.raises(UsageError, match="was trained on synthetic itself"):
+        train(seen, recipe({}, known), tmp_path / "run", "cpu", threads=1, pretrained=known)
+    with pytest.raises(UsageError, match="was trained on synthetic itself"):
+        learning_curve(seen, known, tmp_path / "curve", (0,), (0,))

@@ -79,6 +79,19 @@ class Checkpoint:
             "train a network for this sensor, or give the dataset of the other one",
         )
 
+    def check_unseen(self, dataset: str, origin: str) -> None:
+        """Refuse to start from a network that learned from the dataset: the presses held out would not be new to it.
+
+        Raises:
+            UsageError: If it was trained on the dataset with this hash.
+        """
+        if self.document["dataset"]["hash"] == dataset:
+            raise UsageError(
+                f"{self.path} was trained on {origin} itself",
+                "a network that has not seen these presses: others hold them out than it did",
+                "start from `shipped` or from one trained on simulated presses, or go on with that run by --resume",
+            )
+
 
 def save(path: Path, network: Network, optimizer: torch.optim.Optimizer | None, document: dict[str, Any]) -> None:
     """Write a checkpoint; a crash leaves the old file or the new one."""

@@ -100,6 +100,7 @@ def learning_curve(
             f"{frames.origin} is simulated", "recorded presses: the curve says how many of them are needed",
             "give the dataset of a unit",
         )  # fmt: skip
+    pretrained.check_unseen(frames.dataset_hash, frames.origin)
     parents = {"dataset": frames.dataset_hash, "pretrained": pretrained.content_hash}
     parents |= {"simulated": simulated.dataset_hash} if simulated else {}
     held = divide(frames, split, seeds[0])
