@@ -2,7 +2,7 @@
 
 Without arguments: lint, import directions, types and the quick tests, side by side. `--long`: those that are long by
 nature (tests/running/long_part.py). `--ci`: the quick ones, then of the long ones what changed since they last passed.
-Other arguments go to one pytest.
+Other arguments go to pytest: to one process, unless with one of these two.
 
 All checks run even if one fails; the exit status is that of the first that failed. The last line is pytest's summary.
 """
@@ -48,8 +48,12 @@ class Checks:
         command = [sys.executable, "-m", "pytest", *arguments]
         self._head(name, command)
         said = ""
-        # One thread a process: more would only wait for those of the others.
-        environment = {**_compiling(), "OMP_NUM_THREADS": str(max(1, _cores() // MOST)), "PYTHONUNBUFFERED": "1"}
+        # One thread a process: more would only wait for those of the others. Where a verb takes two, they sleep while
+        # they wait: by default they spin, which costs three times the work on a machine whose cores are all taken.
+        environment = {
+            **_compiling(), "OMP_NUM_THREADS": str(max(1, _cores() // MOST)), "OMP_WAIT_POLICY": "PASSIVE",
+            "PYTHONUNBUFFERED": "1",
+        }  # fmt: skip
         with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, env=environment) as done:
             # Piece by piece: pytest's dots come long before the end of their line.
             while piece := os.read(done.stdout.fileno(), 65536).decode(errors="replace"):
@@ -107,6 +111,10 @@ def _sum(lines, seconds):
     return f" {words} in {seconds:.2f}s ({time.strftime('%H:%M:%S', time.gmtime(seconds))}) ".center(100, "=")
 
 
+def _side_by_side(computing, waiting):
+    return ["--numprocesses", str(computing + waiting), "--waiting", str(waiting)]
+
+
 def main(arguments):
     """Return the exit status."""
     checks = Checks()
@@ -126,16 +134,15 @@ def main(arguments):
             checks.run("imports", [str(BIN / "lint-imports")])
             for process in compiling:
                 process.wait()
-            side_by_side = ["--numprocesses", str(min(_cores(), MOST) + WAITING), "--waiting", str(WAITING)]
+            rest = [argument for argument in arguments if argument not in ours]
             if not arguments or "--ci" in ours:
-                checks.tests("tests", *side_by_side)
+                checks.tests("tests", *_side_by_side(min(_cores(), MOST), WAITING), *rest)
             elif not ours:
                 checks.tests("tests", *arguments)
             if ours:
-                rest = [argument for argument in arguments if argument not in ours]
                 which = "changed" if "--ci" in ours else "all"
-                # One after the other: each fills the machine, and some hold an emulated rig against the clock.
-                checks.tests("long part", f"--long={which}", *rest, perhaps_none=True)
+                # One that holds a rig to the clock or fills the machine with workers, and one that computes beside it.
+                checks.tests("long part", f"--long={which}", *_side_by_side(1, 1), *rest, perhaps_none=True)
             checks.collect("types", types, beside, said)
         finally:
             beside.kill()

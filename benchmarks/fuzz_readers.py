@@ -1,6 +1,7 @@
 """Whether damaged files end in words: each reader gets thousands of truncated, flipped, emptied and foreign files.
 
-A reader must return, or raise one of our own errors. Anything else is a fault, and is listed with its seed.
+A reader must return, or raise one of our own errors. Anything else is a fault, and is listed with its seed. A process
+that ends by a signal is one as well, at its end too.
 
     python benchmarks/fuzz_readers.py [--tries N] [--only NAME ...] [--json FILE]
 """

@@ -37,7 +37,7 @@ def figures(cells: int) -> Figures:
     """Return the press on a mesh of so many cells along each side."""
     mesh = box_mesh(SENSOR, cells, cells, max(2, round(cells * THICKNESS / SIZE)))
     model = SkinModel(SENSOR, ModelSettings(error_estimate=False), mesh=mesh)
-    return model.figures(PRESS.depths, [state for _, state in model.states(PRESS)])
+    return model.figures(PRESS, PRESS.depths, [state for _, state in model.states(PRESS)])
 
 
 def compare(found: dict[int, Figures]) -> dict:

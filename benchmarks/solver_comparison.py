@@ -143,6 +143,21 @@ def rows_of(name: str, entry: Entry, answer: Answer, against: Reference) -> list
     ]
 
 
+def speed_and_error(rows: list[dict]) -> list[str]:
+    """Return one table of all codes: CPU time of an equilibrium, and the worst errors but at the first depth."""
+    lines = [
+        "| press | code | CPU s | force % | top % | contact % | protrusion % |", "|---|---|---|---|---|---|---|",
+    ]  # fmt: skip
+    for press, code in dict.fromkeys((r["press"], r["code"]) for r in rows):
+        own = [r for r in rows if (r["press"], r["code"]) == (press, code)]
+        later = own[1:] or own
+        seconds = sorted(r["cpu_seconds"] for r in own)
+        worst = [max(abs(r[name]) for r in later) for name in ("force", "top", "contact", "protrusion")]
+        figures = ["" if np.isnan(value) else f"{value:.2g}" for value in worst]
+        lines.append(f"| {press} | {code} | {seconds[0]:.2g} to {seconds[-1]:.2g} | {' | '.join(figures)} |")
+    return lines
+
+
 def table(rows: list[dict], absent: list[tuple[str, str, str]], against: dict[str, str]) -> str:
     """Return the report in Markdown."""
     load = ", ".join(f"{v:.1f}" for v in os.getloadavg())
@@ -154,6 +169,8 @@ def table(rows: list[dict], absent: list[tuple[str, str, str]], against: dict[st
         "CPU seconds and wall seconds are those of one equilibrium, from the depth before; setup comes once a press.",
         "Errors: force; root of the mean square of the depth field over the outer face, inside the contact; largest;",
         "protrusions in % of the largest. Linear elements are compared at their vertices, in their favour.",
+        "",
+        *speed_and_error(rows),
         "",
     ]
     for name, what in against.items():

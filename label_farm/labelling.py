@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import time
 import uuid
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
+from label_farm.growing_session import GrowingSession
 from label_farm.labels import make_label
 from label_farm.labels.label_index import Known, stamp
 from label_farm.labels.margin import Margin
@@ -24,10 +27,11 @@ from label_farm.settings import FarmSettings
 from label_farm.store.failure import Failure
 from label_farm.store.store import Store
 from label_farm.summary import LabellingSummary
-from label_farm.workers.engine import StoreFull
+from label_farm.workers.engine import POLL_SECONDS, StoreFull
 from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.episode import Episode
+from tacdata.recording.files.reader import read_episode
 from tacdata.sensor import Sensor
 
 Progress = Callable[[str, int, int], None]
@@ -84,6 +88,8 @@ class Labelling:
         self.sensors: dict[str, Sensor] = {}
         self._waiting: dict[str, list[Planned]] = defaultdict(list)
         self._read_already: dict[int, LabelRequest] = {}
+        self._recordings: Mapping[int, Callable[[], Episode]] = {}
+        self._paths: Mapping[int, Path] = {}
         self._jobs: dict[str, Job] = {}
         self._total = 0
         self._recall = Recall(folder)
@@ -98,6 +104,7 @@ class Labelling:
         recordings: Mapping[int, Callable[[], Episode]],
         sensor: Sensor | None = None,
         paths: Mapping[int, Path] | None = None,
+        later: GrowingSession | None = None,
     ) -> LabellingSummary:
         """Label recordings.
 
@@ -105,6 +112,7 @@ class Labelling:
             recordings: Episode number -> function that reads it; a whole session may not fit in memory.
             sensor: The skin to label with, if not each recording's own.
             paths: Episode number -> its recording's file, by which a second run knows it without reading it.
+            later: Gives further recordings while they are made.
 
         Raises:
             UsageError: If labels of another model version lie there (without ``redo``), or a folder cannot be
@@ -113,8 +121,7 @@ class Labelling:
         """
         try:
             since = self.plan(recordings, sensor, paths)
-            if self._jobs:
-                self._solve(since)
+            self._solve(since, sensor, later)
         except StoreFull:
             raise
         except (OSError, sqlite3.OperationalError) as error:
@@ -146,12 +153,13 @@ class Labelling:
             self._fail(number, failure, None)
         with Ledger(self.store.ledger_path, self.settings.lease_seconds) as ledger:
             since = ledger.last_change()
-            self._jobs = self._missing(requests)
-            self._total = len(self._jobs)
+            added = self._missing(requests)
+            self._jobs |= added
+            self._total += len(added)
             ledger.register({job.model: self.sensors[job.model].document for job in self._jobs.values()})
-            ledger.enqueue(self._jobs.values(), self.settings.priority, self.name)
-        if self._jobs:
-            self.progress("solve", 0, self._total)
+            ledger.enqueue(added.values(), self.settings.priority, self.name)
+        if added:
+            self.progress("solve", self._total - len(self._jobs), self._total)
         return since
 
     def settle(self, change: JobOutcome) -> None:
@@ -184,8 +192,9 @@ class Labelling:
         self, recordings: Mapping[int, Callable[[], Episode]], sensor: Sensor | None, paths: Mapping[int, Path]
     ) -> tuple[list[Planned], dict[int, Failure]]:
         wishes, unfit = [], {}
-        self._given, self._recordings, self._paths = self._skin(sensor) if sensor else None, recordings, paths
-        if not self.settings.redo:
+        self._given, first = self._skin(sensor) if sensor else None, not self._recordings
+        self._recordings, self._paths = {**self._recordings, **recordings}, {**self._paths, **paths}
+        if first and not self.settings.redo:
             self._recall.open(self._given, lambda skin: self._made(skin, self._version(skin)))
         numbers = list(recordings)
         for done, number in enumerate(numbers):
@@ -324,17 +333,35 @@ class Labelling:
             return None
         return failure
 
-    def _solve(self, since: int) -> None:
-        wanted = {version: self.sensors[version] for version in {job.model for job in self._jobs.values()}}
-        pool = self.settings.engine(
-            self.store, self.settings.factory, wanted, self.settings.workers, self.settings.lease_seconds,
-            self.settings.devices,
-        )  # fmt: skip
-        try:
-            while self._jobs:
-                since = pool.run(set(self._jobs), since, self.settle)
-        finally:
-            pool.close()
+    def _solve(self, since: int, sensor: Sensor | None, later: GrowingSession | None) -> None:
+        """Solve what is missing; recordings that come later are taken in by the same workers."""
+        while not self._jobs and self._take_in(sensor, later) is not None:
+            time.sleep(POLL_SECONDS)
+        while self._jobs:
+            wanted = {version: self.sensors[version] for version in {job.model for job in self._jobs.values()}}
+            pool = self.settings.engine(
+                self.store, self.settings.factory, wanted, self.settings.workers, self.settings.lease_seconds,
+                self.settings.devices,
+            )  # fmt: skip
+            try:
+                # A recording of another sensor ends this run: the next one has workers for it.
+                since = pool.run(
+                    set(self._jobs), since, self.settle, lambda wanted=wanted: self._take_in(sensor, later, set(wanted))
+                )
+            finally:
+                pool.close()
+
+    def _take_in(
+        self, sensor: Sensor | None, later: GrowingSession | None, models: set[str] | None = None
+    ) -> set[str] | None:
+        """Return keys of the presses that have come; None if no more will, or one is not of these models."""
+        if later is None or later.ended:
+            return None
+        before, paths = set(self._jobs), later.new()
+        if paths:
+            self.plan({number: partial(read_episode, path) for number, path in paths.items()}, sensor, paths)
+        added = set(self._jobs) - before
+        return None if models and any(self._jobs[key].model not in models for key in added) else added
 
     def _write(self, wish: Planned) -> bool:
         """Write a label; False if its solution is missing, or was found damaged and put aside."""

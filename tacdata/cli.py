@@ -96,8 +96,10 @@ def answering(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
         try:
             with progress.silenced(quiet), redirect_stdout(sys.stderr) if as_json else nullcontext():
                 result = verb(*arguments, **options)
-        except KeyboardInterrupt:
-            print("interrupted: what was finished is kept", file=sys.stderr)
+        except KeyboardInterrupt as error:
+            said = last_words(error)
+            kept = "" if said else ": what was finished is kept"
+            print("\n".join([f"interrupted{kept}", *said]), file=sys.stderr)
             raise typer.Exit(Exit.INTERRUPTED) from None
         except ModuleNotFoundError as error:
             raise missing_package(error, name) or error from None
@@ -142,6 +144,18 @@ def refused_by_system(error: OSError) -> DeviceError | None:
     allowed, remedy = REFUSALS[error.errno]
     paths = " to ".join(str(path) for path in (error.filename, error.filename2) if path is not None)
     return DeviceError(f"{paths or 'a file'}: {error.strerror}", allowed, remedy)
+
+
+def last_words(error: BaseException | None) -> list[str]:
+    """Return what an error says of its end: its own notes, or those of the error that it came upon.
+
+    A second Ctrl-C takes the place of the error that is on its way to the screen.
+    """
+    while error is not None:
+        if notes := getattr(error, "__notes__", []):
+            return [*notes]
+        error = error.__context__
+    return []
 
 
 def _end(result: Result, as_json: bool) -> None:
@@ -198,9 +212,10 @@ def main() -> None:
     except typer.Abort:
         raise SystemExit(int(Exit.INTERRUPTED)) from None
     except TacdataError as error:
-        print("\n".join([f"error: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
+        print("\n".join([f"error: {error}", *last_words(error)]), file=sys.stderr)
         raise SystemExit(int(error.exit_code)) from None
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
+        print("\n".join(["interrupted", *last_words(error)]), file=sys.stderr)
         raise SystemExit(int(Exit.INTERRUPTED)) from None
 
 

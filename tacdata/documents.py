@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import json
+import math
 import re
+import unicodedata
+from collections.abc import Hashable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +18,17 @@ from jsonschema import Draft202012Validator
 import schemas
 from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.replacement import replacement
+
+BYTE_ORDER_MARKS = {
+    codecs.BOM_UTF32_LE: "utf-32", codecs.BOM_UTF32_BE: "utf-32", codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}  # fmt: skip
+"""First bytes of a text and its encoding; the longer ones first."""
+WRITTEN_BY_PEOPLE = {
+    "calibration_board", "case", "demo_rig", "fingers", "frame_format", "gains", "import_mapping", "model_spec",
+    "mounting", "plan", "plan_recipe", "rig", "robot", "sensor", "simulation_plan",
+}  # fmt: skip
+"""Documents in which a number that is not finite is a mistake; ours may state one."""
 
 
 def read(path: Path, schema: str) -> dict[str, Any]:
@@ -29,44 +45,133 @@ def read(path: Path, schema: str) -> dict[str, Any]:
         >>> case["indenter"]
         {'shape': 'sphere', 'radius': 4.0}
     """
-    if not path.is_file():
-        raise UsageError(f"no file {path}", f"a {schema} file (YAML or JSON)", "check the path")
-    try:
-        document = parsed(path.read_text(encoding="utf-8"), str(path))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise FormatError(f"{path} is not readable as YAML: {error}", f"a {schema} file", "fix the syntax") from None
+    document = content_of(path, schema)
+    if schema in WRITTEN_BY_PEOPLE and (place := _not_finite(document)):
+        raise FormatError(f"{path}: {place}", "finite numbers", f"correct {place.split(':')[0]}, or leave it out")
     check(document, schema, str(path))
     return document
+
+
+def content_of(path: Path, schema: str) -> Any:
+    """Return what a YAML or JSON file holds, unchecked; ``schema`` names its kind in errors.
+
+    Raises:
+        UsageError: If there is no such file.
+        FormatError: If it is neither, or gives a key twice.
+    """
+    if not path.is_file():
+        raise UsageError(f"no file {path}", f"a {schema} file (YAML or JSON)", "check the path")
+    text = _decoded(path, schema)
+    if not text.strip():
+        raise FormatError(f"{path} is empty", f"a {schema} file (YAML or JSON)", "copy it again, or write it")
+    try:
+        return parsed(text, str(path))
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        words = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        form = "JSON" if path.suffix == ".json" else "YAML"
+        if form == "JSON" and (fault := _json_fault(text)):
+            words = fault
+        raise FormatError(f"{path} is not readable as {form}: {words}", f"a {schema} file", "fix the syntax") from None
+
+
+def _decoded(path: Path, schema: str) -> str:
+    """Return a file's text by its byte order mark, which YAML allows in UTF-16 and UTF-32, else as UTF-8."""
+    raw = path.read_bytes()
+    encoding = next((name for mark, name in BYTE_ORDER_MARKS.items() if raw.startswith(mark)), "utf-8-sig")
+    try:
+        return raw.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise FormatError(
+            f"{path} is no text in {encoding.removesuffix('-sig').upper()}: {error.reason} in line {line}",
+            f"a {schema} file in UTF-8", "save it as UTF-8",
+        ) from None  # fmt: skip
+
+
+def _json_fault(text: str) -> str:
+    """Return what is wrong with a JSON text, with its line; "" if nothing is."""
+    try:
+        json.loads(text)
+    except (ValueError, RecursionError) as error:
+        return str(error)
+    return ""
+
+
+def _not_finite(content: Any, place: str = "") -> str:
+    """Return where a number is not finite, and which; "" if all are."""
+    inner = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    for key, value in inner:
+        here = f"{place}/{key}" if place else str(key)
+        if isinstance(value, float) and not math.isfinite(value):
+            return f"{here}: {value}"
+        if found := _not_finite(value, here):
+            return found
+    return ""
 
 
 def parsed(text: str, origin: str) -> Any:
     """Return the content of a YAML or JSON text; ``origin`` names it in errors.
 
+    Names are composed (NFC), so that an umlaut of one character and one of two are the same key.
+
     Raises:
         FormatError: If a key is given twice, with both lines.
         yaml.YAMLError: If it is neither.
+        RecursionError: If it is nested too deeply.
     """
+    # Only a combining mark, written or escaped, can make one name look like another.
+    plain = text.isascii() and r"\u03" not in text
+    with suppress(ValueError):
+        content = json.loads(text, object_pairs_hook=_unique)
+        return content if plain else _referring(content)
+    # In JSON tabs are white space between the values, which YAML does not allow.
+    loader = _Loader(text.expandtabs(4) if text.lstrip().startswith(("{", "[")) else text)
+    loader.origin = origin
     try:
-        return json.loads(text, object_pairs_hook=_unique)
-    except ValueError:
-        loader = _Loader(text)
-        loader.origin = origin
-        try:
-            return loader.get_single_data()
-        finally:
-            loader.dispose()
+        content = loader.get_single_data()
+        return content if plain else _referring(content)
+    finally:
+        loader.dispose()
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return an object of a JSON text; duplicate keys are left to `_Loader`, which knows the lines."""
-    found = dict(pairs)
+    found = {composed(name): value for name, value in pairs}
     if len(found) < len(pairs):
         raise ValueError("a key twice")
     return found
 
 
+def composed(text: str) -> str:
+    """Return a text in Unicode's composed form (NFC): some systems write an umlaut as two characters."""
+    return unicodedata.normalize("NFC", text)
+
+
+def _referring(content: Any) -> Any:
+    """Return a document whose texts that mean one of its keys are written as that key is."""
+    keys: set[str] = set()
+
+    def collect(part: Any) -> bool:
+        """Add the keys of a part; return whether a text in it is decomposed."""
+        if isinstance(part, dict):
+            keys.update(key for key in part if isinstance(key, str))
+            return sum(collect(value) for value in part.values()) > 0
+        if isinstance(part, list):
+            return sum(collect(value) for value in part) > 0
+        return isinstance(part, str) and not unicodedata.is_normalized("NFC", part)
+
+    def named(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {key: named(value) for key, value in part.items()}
+        if isinstance(part, list):
+            return [named(value) for value in part]
+        return composed(part) if isinstance(part, str) and composed(part) in keys else part
+
+    return named(content) if collect(content) else content
+
+
 class _Loader(yaml.SafeLoader):
-    """YAML 1.2's numbers (``1e-7``, ``1.0e12``), and no duplicate keys."""
+    """YAML 1.2's numbers (``1e-7``, ``010`` is ten, ``1:30`` is a text), and no duplicate keys."""
 
     origin = ""
 
@@ -81,21 +186,46 @@ class _Loader(yaml.SafeLoader):
             if key.tag == "tag:yaml.org,2002:merge":
                 continue  # merged keys may be overridden: that is their purpose
             name, line = self.construct_object(key, deep=True), key.start_mark.line + 1
-            if name in lines:
+            if isinstance(name, str):
+                name = key.value = composed(name)
+            if not isinstance(name, Hashable):
                 raise FormatError(
-                    f"{self.origin}: {name!r} is given twice, in line {lines[name]} and in line {line}",
+                    f"{self.origin}: line {line}: a list or mapping as a key", "a text or a number", "correct the key"
+                )
+            if name in lines:
+                places = f"in line {lines[name]} and in line {line}" if lines[name] != line else f"in line {line}"
+                raise FormatError(
+                    f"{self.origin}: {name!r} is given twice, {places}",
                     "each key once",
                     "delete or rename one of the two",
                 )
             lines[name] = line
         return super().construct_mapping(node, deep)
 
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        """Return a whole number: decimal, 0x hexadecimal or 0o octal."""
+        text = str(self.construct_scalar(node))
+        return int(text, 0) if text.lstrip("-+").startswith(("0x", "0o")) else int(text)
 
+
+# YAML 1.1 read 010 as eight, 1:30 as ninety and 1_0 as ten; YAML 1.2 does not.
+_Loader.yaml_implicit_resolvers = {
+    letter: [entry for entry in entries if entry[0] not in ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")]
+    for letter, entries in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_NUMBERS = list("-+0123456789.")
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:int", re.compile(r"(?:[-+]?[0-9]+|0x[0-9a-fA-F]+|0o[0-7]+)$"), _NUMBERS
+)
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
-    re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"),
-    list("-+0123456789."),
+    re.compile(
+        r"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)$|[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"
+        r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$"
+    ),
+    _NUMBERS,
 )
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
 
 
 def check(document: Any, schema: str, origin: str) -> None:

@@ -12,6 +12,22 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 
+class Condition(threading.Condition):
+    """A condition that an interrupt may leave without its lock.
+
+    After a wait the lock is taken back, and a Ctrl-C may come before that is done. Then there is nothing to release:
+    the plain condition would hide the interrupt behind an error of its own.
+    """
+
+    def __exit__(self, *raised: Any) -> None:
+        """Release the lock, if it is held."""
+        try:
+            super().__exit__(*raised)
+        except RuntimeError:
+            if raised[0] is None:
+                raise
+
+
 class Host:
     """The computer that this process runs on.
 
@@ -50,7 +66,7 @@ class Host:
 
     def condition(self) -> threading.Condition:
         """Return a condition with a reentrant lock of its own."""
-        return threading.Condition()
+        return Condition()
 
     def lock(self) -> Any:
         """Return a reentrant lock."""

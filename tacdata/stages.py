@@ -11,10 +11,17 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from tacdata.errors import DeviceError, TacdataError
+
+_YIELDING = 10
+"""Niceness of a background verb that leaves the processor to others."""
+
+_TAIL = 40
+"""Lines shown of what a background verb said that has ended."""
 
 PATIENCE = 60.0
 """Time for an interrupted verb to stop the motion and close its files [s]."""
@@ -63,11 +70,22 @@ class Line:
             StageError: With the verb's exit code, if it fails.
             KeyboardInterrupt: If interrupted, once the verb has closed its files.
         """
+        started = self._announce(purpose)
+        print(f"$ {written(arguments)}", flush=True)
+        self._end(arguments, _run(command_line(arguments)), tolerated, started)
+
+    def join(self, purpose: str, background: Background, tolerated: int = 0) -> None:
+        """Wait for a verb that was begun in the background, and show what it says from here on; as `run`."""
+        started = self._announce(purpose)
+        self._end(background.arguments, background.follow(), tolerated, started)
+
+    def _announce(self, purpose: str) -> float:
         self.number += 1
         started = time.monotonic()
-        print(f"\n[{self.number}/{self.total}] {purpose}   (after {clock_face(started - self.begin)})")
-        print(f"$ {written(arguments)}", flush=True)
-        code = _run(command_line(arguments))
+        print(f"\n[{self.number}/{self.total}] {purpose}   (after {clock_face(started - self.begin)})", flush=True)
+        return started
+
+    def _end(self, arguments: list[str], code: int, tolerated: int, started: float) -> None:
         if code not in (0, tolerated):
             raise StageError(self.number, written(arguments), code, self.kept)
         if code:
@@ -145,15 +163,41 @@ def stop(process: subprocess.Popen) -> None:
 class Background:
     """A verb that runs in the background and writes to a log file; stopped at the end of a ``with`` block."""
 
-    def __init__(self, arguments: list[str], log: Path) -> None:
-        self.arguments, self.log = arguments, log
+    def __init__(self, arguments: list[str], log: Path, yielding: bool = False) -> None:
+        """Prepare.
+
+        Args:
+            arguments: What would be typed behind ``tacdata``.
+            log: File that it writes to.
+            yielding: Whether it leaves the processor to others that want it.
+        """
+        self.arguments, self.log, self._yielding = arguments, log, yielding
 
     def __enter__(self) -> Background:
         """Start it."""
         print(f"$ {written(self.arguments)} &", flush=True)
         with self.log.open("wb") as stream:
             self.process = _start(command_line(self.arguments), stdout=stream, stderr=stream)
+        if self._yielding:
+            # Gone already: then `follow` or `wait_until` says why.
+            with suppress(ProcessLookupError):
+                niceness = max(_YIELDING, os.getpriority(os.PRIO_PROCESS, 0))
+                os.setpriority(os.PRIO_PROCESS, self.process.pid, niceness)
         return self
+
+    def follow(self) -> int:
+        """Show the last line of its log and all that comes, until it ends; return its exit code."""
+        with self.log.open(errors="replace") as stream:
+            said = stream.read()
+            for one in said.rstrip().splitlines()[-1 if self.process.poll() is None else -_TAIL :]:
+                print(one, flush=True)
+            while True:
+                code = self.process.poll()
+                if said := stream.read():
+                    print(said, end="", flush=True)
+                if code is not None:
+                    return code
+                time.sleep(0.05)
 
     def wait_until(self, ready: Callable[[], bool], what: str, timeout: float) -> None:
         """Wait until ``ready()``, at most ``timeout`` [s]; ``what`` describes it.

@@ -48,7 +48,8 @@ class TrainingSettings:
     calibrate: bool = False
     """Turn readings into forces first, by a calibration fitted on the training presses."""
     pull: float = 0.0
-    """Weight of the squared distance from the pretrained weights [1] (L2-SP; X. Li et al., ICML 2018)."""
+    """Weight of the squared distance from the pretrained weights [1], of 10 presses to train on or fewer; beside more
+    it falls as one over their number (L2-SP; X. Li et al., ICML 2018)."""
     idle_share: float = 1.0
     """Share of the frames without contact in their label that an epoch takes, drawn anew [1]; the others all count."""
     precision: str = "float32"

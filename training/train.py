@@ -32,6 +32,8 @@ from training.settings import TrainingSettings
 from training.splits.split import Split, divide
 
 METRICS = "metrics.jsonl"
+_PULLED = 10
+"""Training presses up to which the pull towards pretrained weights has its full weight [count]."""
 _VALIDATED = 20_000
 """Validation frames that choose the best epoch, evenly taken where there are more [count]."""
 
@@ -69,6 +71,8 @@ class _Run:
     """Simulated frames that are mixed in."""
     origin: tuple[torch.Tensor, ...] = ()
     """The pretrained weights that the loss pulls towards; empty if it does not."""
+    pull: float = 0.0
+    """Weight of that pull [1]."""
 
     def __post_init__(self) -> None:
         """Take the network as it is."""
@@ -97,6 +101,8 @@ class _Run:
         if settings.pull and pretrained:
             weights = checkpoint.load(pretrained.path, place).network.parameters()
             self.origin = tuple(weight.detach() for weight in weights)
+            # The loss is a mean over frames, the pull a prior: beside more data it weighs less.
+            self.pull = settings.pull * min(1.0, _PULLED / len(self.document["split"]["train"]))
         if simulated:
             self.rehearsal = Rehearsal(simulated, pretrained, self.network, place)
 
@@ -106,7 +112,7 @@ class _Run:
         if not self.origin:
             return loss
         weights = zip(self.network.parameters(), self.origin, strict=True)
-        return loss + settings.pull * torch.stack([(now - then).square().sum() for now, then in weights]).sum()
+        return loss + self.pull * torch.stack([(now - then).square().sum() for now, then in weights]).sum()
 
 
 def train(
@@ -245,6 +251,7 @@ def _started(
             "episodes": len(frames.episodes),
             "frames": len(frames.taxels),
             "virtual": frames.virtual,
+            **({"simulated": True} if frames.simulated else {}),
         },
         "normalization": {"mean": mean.tolist(), "sd": sd.tolist()},
         **calibration,

@@ -77,6 +77,7 @@ def _labelled(
         from tacdata.dataset.reader import read_dataset
 
         dataset = read_dataset(path)
+        dataset.check_measured("networks side by side")
         number = _common(dataset, folders) if episode is None else episode
         if not 0 <= number < len(dataset.episodes):
             raise UsageError(f"--episode {number}", f"0 to {len(dataset.episodes) - 1}", "choose one of them")

@@ -12,6 +12,7 @@ from pathlib import Path
 from tacdata.errors import UsageError
 from viewers import output_file
 from viewers.rerun import window
+from viewers.rerun.steering import Moment, deepest_moment
 from viewers.scene.scene import Scene
 
 
@@ -101,7 +102,7 @@ def show(scene: Scene, output: Output) -> None:
             file = output.save or Path(folder) / "episode.rrd"
             if output.save is None:
                 write_rerun(scene, file)
-            show_file(file, output.web)
+            show_file(file, output.web, deepest_moment(scene))
 
 
 def show_saved(path: Path, output: Output) -> None:
@@ -123,13 +124,13 @@ def write_rerun(scene: Scene, file: Path) -> None:
     RerunBackend(file).draw(scene)
 
 
-def show_file(file: Path, web: bool) -> None:
-    """Open a Rerun file; ends when the window is closed, or with Ctrl-C."""
+def show_file(file: Path, web: bool, moment: Moment | None = None) -> None:
+    """Open a Rerun file, at a moment if one is given; ends when the window is closed, or with Ctrl-C."""
     with suppress(KeyboardInterrupt):
         if not web:
-            window.window(file)
+            window.window(file, moment)
             return
-        with window.web_server(file) as (server, address):
+        with window.web_server(file, moment) as (server, address):
             print(f"open {address}\nCtrl-C ends it", flush=True)
             if window.has_display():
                 webbrowser.open(address)

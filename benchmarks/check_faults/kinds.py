@@ -45,7 +45,7 @@ def frames_twice(p, size, rng):
         setattr(p, name, getattr(p, name)[again])
 
 
-@kind("repeats", (5, 15, 45))
+@kind("repeats", (2, 5, 45))
 def values_held(p, size, rng):
     """Hold all readings for some frames."""
     p.counts[p.row() : p.row() + size] = p.counts[p.row()]

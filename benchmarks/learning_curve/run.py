@@ -2,31 +2,37 @@
 
     tacdata simulate benchmarks/learning_curve/rig_presses.yaml --solved SOLVED --presses 500
     python benchmarks/learning_curve/run.py SOLVED --out OUT [--from shipped] [--simulated DATASET] [--rigs 3]
+    tacdata simulate benchmarks/learning_curve/rig_contacts.yaml --solved CONTACTS --presses 240
+    python benchmarks/learning_curve/run.py SOLVED --contacts CONTACTS --out OUT
 
 The presses are solved once: nominal poses, as labels are. The readings are those of the virtual rig's world, whose skin
 is not the model's: other contact, other taxels, relaxation, gains, an indenter and a sensor that lie a little aside.
 The wires, the recorder and the controller are left out, as they take hours. Held out are three shapes, presses at the
-edge, and a sixth of the others.
+edge, and a sixth of the others. With --contacts, pairs and wide contacts are scored too; nothing is trained on them.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from label_farm.simulated.packing import simulated_episode
 from label_farm.simulated.plan import SimulationPlan
 from label_farm.simulated.shard import read_shard, shard_files
 from label_farm.simulated.simulation import FILE, Simulation
 from tacdata import documents
+from tacdata.plans import Press
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor
 from tacdata.virtual_rig.world.world import World, draw
 from training.frames.frames import EpisodeSpan, Frames
+from training.metrics.contacts import ContactMatch, match
 from training.metrics.depth_maps import score_frames
 from training.pretraining import curve_picture
 from training.pretraining.learning_curve import DEEP, learning_curve
@@ -36,10 +42,17 @@ UNSEEN = ("square", "ring", "prism")
 """Shapes that no press to train on has."""
 REST = 0.9
 """Time before a press over which its readings are tared [s]."""
+torch.set_num_threads(1)  # rigs may be run beside each other
 
 
-def rig_frames(folder: Path, rig: int) -> Frames:
-    """Return solved presses as the virtual rig ``rig`` reads them, labelled as a recording is."""
+def rig_frames(folder: Path, rig: int, only: Callable[[Press], bool] = lambda press: True) -> Frames:
+    """Return solved presses as the virtual rig ``rig`` reads them, labelled as a recording is.
+
+    Args:
+        folder: Where the solved presses lie.
+        rig: The rig's seed.
+        only: Which presses are pressed.
+    """
     document = documents.read(folder / FILE, "simulation")
     sensor = Sensor.from_document(document["sensor"], str(folder))
     plan = SimulationPlan.from_document(document["plan"], str(folder))
@@ -49,6 +62,8 @@ def rig_frames(folder: Path, rig: int) -> Frames:
     spans, parts, start = [], [], 0
     for path in shard_files(folder):
         for number, solution in sorted(read_shard(path).solutions.items()):
+            if not only(simulation.press(number)):
+                continue
             episode, label = simulated_episode(simulation, number, solution)
             press, times = episode.press, label.time_ns
             tips = label.tip * (1.0, 1.0, -1.0)
@@ -120,6 +135,36 @@ def scores(network, frames: Frames) -> dict[str, float]:
     }
 
 
+def contacts(network, frames: Frames) -> dict[str, dict[str, float]]:
+    """Return for each indenter how often all contacts of a press are found at full depth, how far off, the overlap."""
+    from training.frames.windows import Windows
+    from training.inference.predictor import predict
+
+    top, windows = frames.sensor.map.depth_max, Windows(frames, network.offsets)
+    found: dict[str, list[tuple[ContactMatch, float]]] = {}
+    for span in frames.episodes:
+        depth = frames.tip[span.start : span.stop, 2]
+        full = span.start + np.flatnonzero(depth >= depth.max() - 0.01)
+        label = np.clip(frames.depth[full], 0.0, top).mean(axis=0)
+        predicted = predict(network, windows, full, top).mean(axis=0)
+        overlap = float(score_frames(predicted[None], label[None]).iou[0])
+        found.setdefault(span.indenter, []).append((match(predicted, label, frames.sensor.map.pixel_pitch), overlap))
+    return {name: _found(matches) for name, matches in sorted(found.items())}
+
+
+def _found(presses: list[tuple[ContactMatch, float]]) -> dict[str, float]:
+    matches = [one for one, _ in presses]
+    errors = np.concatenate([one.error for one in matches])
+    return {
+        "presses": len(matches),
+        "contacts": float(np.mean([len(one.labelled) for one in matches])),
+        "all_found": float(np.mean([not one.missed for one in matches])),
+        "invented": float(np.mean([one.invented > 0 for one in matches])),
+        "centroid": float(np.nanmedian(errors)) if np.isfinite(errors).any() else float("nan"),
+        "iou": float(np.median([overlap for _, overlap in presses])),
+    }
+
+
 def main() -> None:
     """Draw the curve of each rig; print the table over rigs and seeds."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -129,6 +174,7 @@ def main() -> None:
     parser.add_argument("--presses", default="0,3,10,30,100,300")
     parser.add_argument("--rigs", type=int, default=3)
     parser.add_argument("--simulated", type=Path)
+    parser.add_argument("--contacts", type=Path, help="solved presses of rig_contacts.yaml")
     parser.add_argument("--network", nargs="*", default=["pattern", "paper"])
     arguments = parser.parse_args()
     start, numbers = pretrained(arguments.start), [int(n) for n in arguments.presses.split(",")]
@@ -143,19 +189,28 @@ def main() -> None:
         unseen = [span for span in frames.episodes if span.indenter in UNSEEN]
         edge = [span for span in frames.episodes if span not in unseen and at_edge(span, frames.sensor)]
         rest = [span for span in frames.episodes if span not in unseen and span not in edge]
+        others = rig_frames(arguments.contacts, rig) if arguments.contacts else None
         folder = arguments.out / f"rig-{rig}"
         document = learning_curve(
             part(frames, rest), start, folder, numbers, (rig,), networks=arguments.network, simulated=simulated,
-            told=lambda point: print(point, flush=True),
+            threads=1, told=lambda point: print(point, flush=True),
         )  # fmt: skip
         for run in sorted(folder.glob("*-*-*")):
             from training.inference import checkpoint
 
             network = checkpoint.load(run).network
             for name, spans in (("unseen shapes", unseen), ("edge", edge)):
+                if not spans:
+                    continue
                 apart.append({"run": run.name, "rig": rig, "on": name, **scores(network, part(frames, spans))})
                 print(apart[-1], flush=True)
+            if others:
+                test = part(frames, list(frames.spans(tuple(document["held_out"]))))
+                both = {**contacts(network, test), **contacts(network, others)}
+                apart.append({"run": run.name, "rig": rig, "on": "contacts", "indenters": both})
+                print(apart[-1], flush=True)
         merged = document if merged is None else {**merged, "points": [*merged["points"], *document["points"]]}
+    assert merged, "no rig was asked for"
     curve_picture.draw(arguments.out / "curve.png", merged)
     (arguments.out / "apart.json").write_text(json.dumps(apart, indent=1) + "\n")
     print(curve_picture.table(merged))

@@ -18,6 +18,9 @@ from tacdata import documents
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import Label, PathSolution, file_names, read_label, table, write_label
 
+_PULL = 0.01
+"""Force that pulls over the largest that pushes, from which on it is no error of the solver [1]."""
+
 
 class SessionLabels:
     """The folder ``SESSION/labels``: one label file an episode, or the reason why there is none."""
@@ -26,6 +29,7 @@ class SessionLabels:
         """Name the folder; it is made when the first file is written."""
         self.folder = folder
         self._parents: dict[int, dict[str, str] | None] = {}
+        self._passed = 0
 
     @classmethod
     def of(cls, session: Path) -> Self:
@@ -81,7 +85,11 @@ class SessionLabels:
 
     def _read_parents(self, path: Path) -> dict[str, str] | None:
         try:
-            return dict(read_label(path).provenance["parents"]) if path.exists() else None
+            if not path.exists():
+                return None
+            label = read_label(path)
+            self._passed += passed_through(label)
+            return dict(label.provenance["parents"])
         except table.LabelVersionError as error:
             # Not damaged: it must not be replaced unasked.
             return {"model": error.given.rpartition(": ")[2]}
@@ -101,9 +109,11 @@ class SessionLabels:
                 others.append((request, str(found.get("model"))))
         if others:
             request, model = others[0]
+            wrong = f"; in {self._passed} the skin passed through the indenter" if self._passed else ""
             raise UsageError(
                 f"{self.folder} is a label store from another model version: {len(others)} of "
-                f"{len(requests)} labels, first {self.path(request.episode).name}, are of {_short(model)}",
+                f"{len(requests)} labels, first {self.path(request.episode).name}, are of "
+                f"{_short(model)}{wrong}",
                 f"labels of the current model {request.model[:12]}… (sensor, law, mesh, settings, code)",
                 "give --redo to replace them, or use the tacdata release and sensor file that made them",
             )
@@ -126,6 +136,18 @@ class SessionLabels:
         if self.path(episode).exists():
             self.path(episode).replace(self.path(episode).with_suffix(".superseded"))
         self._parents.pop(episode, None)
+
+
+def passed_through(label: Label) -> bool:
+    """Return whether the skin of a label without adhesion pulls at an indenter that it pushed before.
+
+    Older releases took it for an equilibrium when the skin had come out on the far side of a thin shape.
+    """
+    solver = label.provenance.get("parameters", {}).get("solver") or {}
+    if solver.get("parameters", {}).get("adhesion"):
+        return False
+    lift = label.force[:, 2]
+    return bool(lift.max(initial=0.0) > 0 and lift.min(initial=0.0) < -_PULL * lift.max(initial=0.0))
 
 
 def _short(model: str) -> str:

@@ -25,7 +25,7 @@ from label_farm.ledger.tables import (
     TABLES,
     TAKE,
     UNWANTED,
-    WAITING_LIKE_IT,
+    WAITING_TOGETHER,
 )
 from label_farm.presses.job import Job
 from tacdata.errors import FormatError
@@ -188,10 +188,10 @@ class Ledger:
             run: Who asks, if the asking is to be taken back some day (`withdraw`).
         """
         listed = list(jobs)
-        rows = ((job.key, job.model, job.batch, json.dumps(job.document), -priority) for job in listed)
+        rows = ((job.key, job.model, json.dumps(job.document), -priority) for job in listed)
         with self._transaction():
             self._db.executemany(
-                f"INSERT INTO job (key, model, batch, document, state, rank, changed) VALUES (?, ?, ?, ?, 0, ?, {NEXT})"
+                f"INSERT INTO job (key, model, document, state, rank, changed) VALUES (?, ?, ?, 0, ?, {NEXT})"
                 " ON CONFLICT (key) DO UPDATE"
                 " SET rank = min(rank, excluded.rank), state = 0, error = NULL, alone = 0,"
                 " tries = CASE state WHEN 0 THEN tries ELSE 0 END"
@@ -205,7 +205,7 @@ class Ledger:
                 self._db.executemany("INSERT OR REPLACE INTO wish (run, key, rank) VALUES (?, ?, ?)", wishes)
 
     def claim(self, owner: str, model: str, count: int = 1) -> list[Lease]:
-        """Take up to ``count`` jobs of one model version that share their indenter: by priority, else an expired one.
+        """Take up to ``count`` jobs of one model version: by priority, else an expired one.
 
         No more than a worker's share, so that none stands idle beside a full one. A job in whose company a worker died
         is taken alone, so that it can be told which of them is to blame.
@@ -216,11 +216,11 @@ class Ledger:
             first = self._db.execute(FIRST_WAITING, (model,)).fetchone()
             if first is None:
                 keys = [row[0] for row in self._db.execute(FIRST_EXPIRED, (model, now))]
-            elif first[2] or count == 1:
+            elif first[1] or count == 1:
                 keys = [first[0]]
             else:
                 share = self._share(model, count, now)
-                keys = [row[0] for row in self._db.execute(WAITING_LIKE_IT, (model, first[1], share))]
+                keys = [row[0] for row in self._db.execute(WAITING_TOGETHER, (model, share))]
             grant = (owner, self._boot, now + self.lease_seconds)
             rows = [self._db.execute(TAKE, (*grant, key)).fetchone() for key in keys]
         return [_lease(document, tries) for document, tries in rows]

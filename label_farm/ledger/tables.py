@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-LAYOUT = 2
+LAYOUT = 3
 """Of the tables; a ledger of another layout is refused, and may be deleted: no result is in it."""
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS job (
-    key TEXT PRIMARY KEY, model TEXT NOT NULL, batch TEXT NOT NULL, document TEXT NOT NULL, state INTEGER NOT NULL,
+    key TEXT PRIMARY KEY, model TEXT NOT NULL, document TEXT NOT NULL, state INTEGER NOT NULL,
     rank INTEGER NOT NULL, changed INTEGER NOT NULL, owner TEXT, boot TEXT, lease REAL,
     tries INTEGER NOT NULL DEFAULT 0, alone INTEGER NOT NULL DEFAULT 0, error TEXT, seconds REAL
 );
@@ -19,7 +19,7 @@ CREATE TABLE IF NOT EXISTS worker (
     done INTEGER NOT NULL DEFAULT 0, failed INTEGER NOT NULL DEFAULT 0, busy REAL NOT NULL DEFAULT 0, note TEXT
 );
 CREATE INDEX IF NOT EXISTS waiting ON job (model, rank, changed) WHERE state = 0;
-CREATE INDEX IF NOT EXISTS together ON job (model, batch, rank, changed) WHERE state = 0 AND alone = 0;
+CREATE INDEX IF NOT EXISTS together ON job (model, rank, changed) WHERE state = 0 AND alone = 0;
 CREATE INDEX IF NOT EXISTS leased ON job (model, lease) WHERE state = 1;
 CREATE INDEX IF NOT EXISTS owned ON job (owner) WHERE state = 1;
 CREATE INDEX IF NOT EXISTS changes ON job (changed);
@@ -30,9 +30,9 @@ CREATE INDEX IF NOT EXISTS wished ON wish (key);
 NEXT = "(SELECT coalesce(max(changed), 0) + 1 FROM job)"
 
 # Statements of their own, each served by one partial index: "state = 0 OR lease < now" in one scans the whole table.
-FIRST_WAITING = "SELECT key, batch, alone FROM job WHERE state = 0 AND model = ? ORDER BY rank, changed LIMIT 1"
-WAITING_LIKE_IT = (
-    "SELECT key FROM job WHERE state = 0 AND alone = 0 AND model = ? AND batch = ? ORDER BY rank, changed LIMIT ?"
+FIRST_WAITING = "SELECT key, alone FROM job WHERE state = 0 AND model = ? ORDER BY rank, changed LIMIT 1"
+WAITING_TOGETHER = (
+    "SELECT key FROM job INDEXED BY together WHERE state = 0 AND alone = 0 AND model = ? ORDER BY rank, changed LIMIT ?"
 )
 FIRST_EXPIRED = "SELECT key FROM job WHERE state = 1 AND model = ? AND lease < ? LIMIT 1"
 # Named, as the planner would take the index of all states and pass over other models' jobs one by one.

@@ -28,8 +28,8 @@ _AGAIN = 1.5
 """By which factor a state must miss the tolerance for its path to be solved again [1]: what it misses is what its
 neighbours would say without it, several times what they leave out with it."""
 
-_AT_A_TIME = {"cpu": 8, "cuda": 512}
-"""How many presses a device solves at a time [1] (benchmarks/skin_throughput.py): a CPU reads its factor once for 8."""
+_AT_A_TIME = {"cpu": 16, "cuda": 512}
+"""Presses that a device solves at a time [1] (benchmarks/skin_throughput.py); a CPU reads its factor once for all."""
 
 _DECIDING = tuple(f"label_farm.presses.{name}" for name in ("fem", "interpolate", "tolerance"))
 """Files of the farm that decide which states a path gets."""

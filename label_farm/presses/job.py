@@ -61,11 +61,6 @@ class Job:
         """Hash of everything that decides the result (hex, 64 characters), not the format's version."""
         return provenance.content_hash(self._content)
 
-    @cached_property
-    def batch(self) -> str:
-        """Hash of the indenter (hex): jobs of one model that share it may be solved as one batch."""
-        return provenance.content_hash(self.indenter)[:16]
-
     @classmethod
     def of_text(cls, text: str) -> Job:
         """Rebuild a job from JSON that this code wrote itself, so that it is not checked again."""

@@ -30,7 +30,7 @@ class Tolerance:
 
     Not at the worst pixel: where the contact's edge passes, a map goes on by whole elements, and no number of states
     makes that smooth. Under a sphere of 3 mm radius, 1 mm deep, twice the states take the largest loss from 9.4 to
-    9.1 um (tests/label_farm/test_interpolated_press.py). That is the mesh's error, which
+    9.1 um (tests/label_farm/presses/test_interpolated_press.py). That is the mesh's error, which
     `tacdata.skin.validity.mesh_error` estimates.
     """
 

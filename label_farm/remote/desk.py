@@ -52,7 +52,7 @@ class RemoteDesk:
         return self._sensors[version]
 
     def claim(self, version: str, count: int) -> list[Lease]:
-        """Take up to ``count`` jobs that share model and indenter; none while the service cannot be reached."""
+        """Take up to ``count`` jobs of one model; none while the service cannot be reached."""
         try:
             taken = self._client.post("/api/work/claim", self._me(version=version, count=count))
         except DeviceError:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.labels import Label, read_label
+from tacdata.labels.table import read_header
 
 SCALE = 6
 """Picture points a pixel of the map."""
@@ -18,6 +19,42 @@ STOPS = np.array([[13, 22, 48], [35, 74, 140], [33, 145, 140], [122, 209, 81], [
 def deepest_frame(label: Label) -> int:
     """Return the number of the frame whose map is deepest."""
     return int(label.depth.reshape(len(label.time_ns), -1).max(axis=1).argmax())
+
+
+def account(path: Path) -> str:
+    """Return who made a label, how and how well, from what is written in its file: one line a fact.
+
+    Raises:
+        UsageError: If there is no such file.
+        FormatError: If it is damaged.
+    """
+    made = read_header(path)["provenance"]
+    solver = made["parameters"].get("solver") or {}
+    own = solver.get("parameters", {})
+    job = made["parameters"].get("job") or {}
+    lines = [f"label made {made['made_at']} by {made['made_by']} {made['code_version']}"]
+    if solver:
+        lines.append(f"press solved {solver.get('made_at', '')} by worker {solver.get('worker', '?')} in "
+                     f"{solver.get('seconds', float('nan')):.1f} s, on {own.get('device', '?')}")  # fmt: skip
+    else:
+        lines.append("no press was solved: the indenter never touches")
+    if job:
+        shape = ", ".join(f"{key} {value}" for key, value in job["indenter"].items())
+        lines.append(f"indenter {shape} at ({job['x']:g}, {job['y']:g}) mm, yaw {job['yaw']:g} deg")
+        lines.append(f"{len(job['depths'])} states, deepest {max(job['depths']):g} mm")
+    if "newton" in own:
+        lines.append(f"law {own.get('law', '?')}; Newton steps a state: {' '.join(map(str, np.ravel(own['newton'])))}")
+    lines += _quality(read_label(path))
+    parents = made["parents"]
+    lines += [f"{name} {parents[name]}" for name in ("recording", "model", "solution") if parents.get(name)]
+    return "\n".join(lines)
+
+
+def _quality(label: Label) -> list[str]:
+    lines = [f"{len(label.time_ns)} frames, error at most {1000 * np.nanmax(label.error):.1f} um"]
+    if label.uncertainty is not None:
+        lines.append(f"standard deviation at most {1000 * np.nanmax(label.uncertainty):.1f} um")
+    return lines
 
 
 def picture(path: Path) -> tuple[bytes, float]:

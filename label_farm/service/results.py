@@ -46,6 +46,13 @@ def add_results(api: FastAPI, foreman: Foreman) -> None:
         content, depth = picture(_labels(foreman, number).path(episode))
         return Response(content, media_type="image/png", headers={"X-Depth": f"{depth:.4f}"})
 
+    @api.get("/api/submissions/{number}/labels/{episode}/log")
+    def log(number: str, episode: int) -> dict[str, str]:
+        """Who made a finished label, how, and how well; one line a fact."""
+        from label_farm.service.preview import account
+
+        return {"log": account(_labels(foreman, number).path(episode))}
+
     @api.get("/api/submissions/{number}/failures/{episode}.png")
     def failed(number: str, episode: int) -> Response:
         """A press that has no label as a picture: place, depth over time, reason."""

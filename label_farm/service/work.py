@@ -85,7 +85,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
 
     @api.post("/api/work/claim")
     def claim(asked: ClaimRequest) -> list[dict[str, Any]]:
-        """Take up to ``count`` jobs that share model and indenter."""
+        """Take up to ``count`` jobs of one model."""
         with opened() as ledger:
             leases = ledger.claim(remote(asked.owner), asked.version, asked.count)
             if leases:

@@ -11,10 +11,12 @@ import numpy as np
 
 from label_farm.labels.make_label import make_label
 from label_farm.labels.request import LabelRequest
+from label_farm.simulated.press_effects import readings_with
 from label_farm.simulated.readings import board_counts
 from label_farm.simulated.shard import read_about, read_shard, shard_files
 from label_farm.simulated.simulation import Simulation
 from label_farm.simulated.specimen import differences
+from label_farm.simulated.swallowed_shape import swallowed_at
 from label_farm.simulated.timeline import timeline
 from tacdata import provenance
 from tacdata.dataset import DatasetWriter, frames
@@ -43,6 +45,8 @@ def simulated_episode(simulation: Simulation, number: int, solution: PathSolutio
     )  # fmt: skip
     label = make_label(request, solution)
     ideal = np.asarray(label.taxel_counts, dtype=float)
+    effects = simulation.effects[number % len(simulation.specimens)]
+    ideal = readings_with(effects, episode, label, specimen, ideal)
     limit = specimen.transduction.full_scale if specimen.transduction else None
     counts = board_counts(ideal, times, simulation.plan.noise, limit, rng)
     return replace(episode, taxels=replace(episode.taxels, counts=counts)), label
@@ -55,16 +59,17 @@ def recording_key(simulation: Simulation, number: int) -> str:
 
 def write_dataset(
     simulation: Simulation, presses: int, out: Path, extra: Sequence[str] = (),
-    done: Callable[[int], None] = lambda number: None,
+    done: Callable[[int, str], None] = lambda number, left_out: None,
 ) -> tuple[int, int]:
     """Append the solved presses that a dataset lacks; an interruption keeps what is finished.
 
     Args:
         simulation: What is drawn and solved.
-        presses: How many presses are wanted in all; those given up are left out.
+        presses: How many presses are wanted in all. Those given up are left out, and those whose skin lies above the
+            shape (`swallowed_shape`).
         out: Folder of the dataset, made if missing.
         extra: Optional columns of the labels (`features.EXTRA`).
-        done: Called with each press's number.
+        done: Called with each press's number, and why a solved one is left out or "".
 
     Returns:
         Episodes and frames that the dataset has now.
@@ -78,21 +83,28 @@ def write_dataset(
     _refuse_others(simulation, writer, where, out)
     read = lru_cache(maxsize=len(simulation.specimens) + 1)(read_shard)
     for number in sorted(where):
+        reason = ""
         if recording_key(simulation, number) not in writer.recordings:
             solution = read(where[number]).solutions.get(number)
             if solution is not None:
-                _append(writer, simulation, number, solution, extra)
-        done(number)
+                reason = _append(writer, simulation, number, solution, extra)
+        done(number, reason)
     return writer.info["total_episodes"], writer.info["total_frames"]
 
 
 def _append(
     writer: DatasetWriter, simulation: Simulation, number: int, solution: PathSolution, extra: Sequence[str]
-) -> None:
+) -> str:
+    """Append a press; return why it is left out, or ""."""
+    job = simulation.job(simulation.press(number), solution.provenance["parents"]["model"])
+    depth = swallowed_at(job, simulation.specimen(number), solution)
+    if depth is not None:
+        return f"the skin lies above the {job.indenter['shape']} from {depth:.2f} mm on"
     episode, label = simulated_episode(simulation, number, solution)
     record = _record(simulation, episode, label)
     task = f"press the simulated skin with {episode.press.indenter_name}"
     writer.append(frames.episode_columns(episode, label, extra), record, task)
+    return ""
 
 
 def _record(simulation: Simulation, episode: Episode, label: Label) -> EpisodeRecord:
@@ -104,6 +116,10 @@ def _record(simulation: Simulation, episode: Episode, label: Label) -> EpisodeRe
     drawn = {
         "plan": simulation.plan.name, "seed": simulation.seed, "press": number,
         "simulation": simulation.content_hash, "specimen": differences(specimen, simulation.sensor),
+        "effects": [
+            {"effect": one.effect.name, "values": {name: value.tolist() for name, value in one.values.items()}}
+            for one in simulation.effects[number % len(simulation.specimens)]
+        ],
     }  # fmt: skip
     return replace(found, specimen=specimen.name, label_provenance=made, simulated=drawn)
 

@@ -13,9 +13,11 @@ from label_farm.presses.job import Job
 from label_farm.presses.ladder import Ladder
 from label_farm.simulated.plan import SimulationPlan
 from label_farm.simulated.press_draw import draw_press
+from label_farm.simulated.press_effects import specimen_effects
 from label_farm.simulated.shard import read_about, shard_files
 from label_farm.simulated.specimen import draw_specimen
 from tacdata import documents, provenance
+from tacdata.effects import Placed
 from tacdata.errors import FormatError, UsageError
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
@@ -55,15 +57,18 @@ class Simulation:
         """Refuse a plan that this sensor cannot serve, before seconds go into a mesh.
 
         Raises:
-            FormatError: If no press can be drawn, no specimen, or no taxel would feel anything.
+            FormatError: If no press can be drawn, no specimen, no effect, or no taxel would feel anything.
         """
-        self.press(0)
-        if not self.specimens[0].skin.protrusion_radius:
+        if not self.sensor.skin.protrusion_radius:
             raise FormatError(
-                f"sensor {self.sensor.name}: a skin without protrusions, of whose taxels the model knows no load",
-                "a skin whose protrusions stand over its taxels",
-                "set skin/protrusion_radius and contact/board in the sensor file",
+                f"sensor {self.sensor.name}: a flat skin, of whose taxels the model knows no load",
+                "a skin with protrusions on a board (skin/protrusion_radius, contact/board), and transduction",
+                "describe these in the sensor file, as examples/eight_by_eight.yaml does; a flat skin's network learns "
+                "from recorded presses alone (tacdata train)",
             )
+        self.press(0)
+        draw_specimen(self.sensor, self.plan.specimens, self.seed, 0)
+        specimen_effects(self.plan, self.sensor, self.seed, 0)
 
     def open(self) -> None:
         """Make the folder, or see that it is of the same simulation.
@@ -134,6 +139,11 @@ class Simulation:
         """Return the specimen that a press is on: presses are dealt out in turn."""
         return self.specimens[number % len(self.specimens)]
 
+    @cached_property
+    def effects(self) -> tuple[tuple[Placed, ...], ...]:
+        """What is laid over the readings, for each specimen."""
+        return tuple(specimen_effects(self.plan, self.sensor, self.seed, n) for n in range(len(self.specimens)))
+
     def job(self, press: Press, model: str) -> Job:
         """Return what is solved for a press, by a model of its specimen with this content hash."""
         step = self.plan.load_step
@@ -157,5 +167,6 @@ class Simulation:
 
 
 def _solved_by(plan: dict[str, Any]) -> dict[str, Any]:
-    """Return the part of a plan that decides solved presses: noise comes later."""
-    return {name: value for name, value in plan.items() if name not in ("version", "name", "purpose", "noise")}
+    """Return the part of a plan that decides solved presses: effects and noise come later."""
+    later = ("version", "name", "purpose", "noise", "effects")
+    return {name: value for name, value in plan.items() if name not in later}

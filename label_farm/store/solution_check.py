@@ -30,6 +30,7 @@ def check_solution(job: Job, solution: PathSolution, sensor: Sensor) -> None:
         "force_error": (states,),
         "residual": (states,),
         "penetration": (states,),
+        "traction": (states, 3, *sensor.map.shape),
         "uncertainty": (states, *sensor.map.shape),
         "force_uncertainty": (states, 3),
         "taxel_force_uncertainty": (states, sensor.taxels.count),

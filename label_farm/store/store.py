@@ -37,7 +37,8 @@ class Store:
         self.folder = folder
         mark = folder / MARK
         if not mark.exists():
-            if folder.exists() and (not folder.is_dir() or {p.name for p in folder.iterdir()} - {WRITING}):
+            # Whoever makes this store at the same time wrote the mark before anything else: asked for once more.
+            if self._holds_something() and not mark.exists():
                 raise UsageError(
                     f"{folder} is no label store (no {MARK})",
                     "a label store, an empty folder or a new one",
@@ -46,6 +47,16 @@ class Store:
             self._create(mark)
         documents.read(mark, "label_store")
         self._sweep()
+
+    def _holds_something(self) -> bool:
+        """Return whether the folder is none, or holds what is no beginning of a store."""
+        begun = f".{MARK}."
+        try:
+            return any(p.name != WRITING and not p.name.startswith(begun) for p in self.folder.iterdir())
+        except FileNotFoundError:
+            return False
+        except NotADirectoryError:
+            return True
 
     def _create(self, mark: Path) -> None:
         try:

@@ -27,7 +27,7 @@ class Desk(Protocol):
         ...
 
     def claim(self, version: str, count: int) -> list[Lease]:
-        """Take up to ``count`` jobs that share model and indenter."""
+        """Take up to ``count`` jobs of one model."""
         ...
 
     def has(self, job: Job) -> bool:
@@ -104,7 +104,7 @@ class LocalDesk:
         return self._sensors[version]
 
     def claim(self, version: str, count: int) -> list[Lease]:
-        """Take up to ``count`` jobs that share model and indenter."""
+        """Take up to ``count`` jobs of one model."""
         return self.ledger.claim(self.owner, version, count)
 
     def has(self, job: Job) -> bool:

@@ -36,13 +36,17 @@ class Engine(ABC):
         if sensors is not None:
             self._ledger.register({version: sensor.document for version, sensor in sensors.items()})
 
-    def run(self, keys: set[str], since: int, on_change: Callable[[JobOutcome], None]) -> int:
+    def run(
+        self, keys: set[str], since: int, on_change: Callable[[JobOutcome], None],
+        grow: Callable[[], set[str] | None] = lambda: None,
+    ) -> int:
         """Run until every job is solved or failed, by these workers or those of another run.
 
         Args:
             keys: Keys of the jobs, already in the ledger.
             since: The ledger's last change before the store was asked for results.
             on_change: Called for each of the keys as it is finished or failed.
+            grow: Asked several times a second for further keys, in the ledger as well; None ends the asking.
 
         Returns:
             Number of the last change that was told.
@@ -53,10 +57,14 @@ class Engine(ABC):
             SolveError: If workers cannot start or keep dying.
             DeviceError: If the workers' cluster cannot be reached.
         """
-        pending, settled = set(keys), False
+        pending, settled, growing = set(keys), False, True
         self._ledger.release_dead()
         try:
-            while pending:
+            while pending or growing:
+                if growing:
+                    added = grow()
+                    growing = added is not None
+                    pending |= added or set()
                 self.tend(len(pending), settled)
                 time.sleep(POLL_SECONDS)
                 settled = False

@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 import schemas
 from tacdata import provenance
+from tacdata.plans.beside_skin import tip_aside
 from tacdata.sensor import Sensor
 from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.mesh.generation.true_volume import volume_error
@@ -71,6 +72,8 @@ class CaseAnswer:
         }
         if blunt := fineness.remark(self.model.mesh, self.model.sensor, self.request):
             document["remarks"].append(blunt)
+        if beside := tip_aside(self.request.indenter):
+            document["remarks"].append(beside)
         if self.error is not None:
             document["error_seconds"] = round(self.error_seconds, 3)
             if self.error.remark:
@@ -140,7 +143,7 @@ def answer(
         seconds.append(time.perf_counter() - began)
         done(depth)
         began = time.perf_counter()
-    figures = model.figures(request.depths, states)
+    figures = model.figures(request, request.depths, states)
     began = time.perf_counter()
     error = model.numerical_error(request, figures) if error_estimate else None
     return CaseAnswer(model, request, states, seconds, figures, error, time.perf_counter() - began)

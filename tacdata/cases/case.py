@@ -12,6 +12,7 @@ from tacdata.cases.answer import CaseAnswer, answer
 from tacdata.cases.mesh import mesh_for
 from tacdata.errors import UsageError
 from tacdata.indenters import from_document
+from tacdata.plans.beside_skin import check_touch
 from tacdata.sensor import Sensor, default_sensor, read_sensor
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings
@@ -52,6 +53,10 @@ def read_case(path: Path) -> Case:
         float(document.get("y", 0.0)), float(document.get("yaw", 0.0)), tuple(float(d) for d in document["depths"]),
         float(document.get("tilt_x", 0.0)), float(document.get("tilt_y", 0.0)),
     )
+    deepest, upright = max(request.depths), request.tilt_x == request.tilt_y == 0
+    if upright and deepest > 0 and not sensor.skin.curved:
+        size = sensor.skin.size_x, sensor.skin.size_y
+        check_touch(request.indenter, size, (request.x, request.y), request.yaw, deepest, str(path))
     mesh = mesh_for(sensor, request)
     if "mesh" in document:
         given = dict(document["mesh"])

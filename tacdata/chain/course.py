@@ -12,6 +12,8 @@ FORGOTTEN = 1e9
 """Longer than any skin remembers [s]."""
 CORNERS = 0.1
 """A smaller share of rows off the straight line between their neighbours are corners of a path, not noise [1]."""
+NUDGE = 0.005
+"""A little deeper or higher [stroke]: steps of derivatives by depth."""
 MIDDLE = 1.4826
 """Standard deviation over the median of what is off without its sign [1]."""
 
@@ -161,6 +163,12 @@ class Course:
     def stroke(self) -> float:
         """Range of commanded depth [mm], at least a thousandth."""
         return float(max(np.ptp(self.tip[:, 2]), 1e-3))
+
+    @cached_property
+    def nudged(self) -> tuple[Self, Self]:
+        """The course with every tip a little deeper, and a little higher."""
+        down = np.array([0.0, 0.0, NUDGE * self.stroke])
+        return replace(self, tip=self.tip + down), replace(self, tip=self.tip - down)
 
     def of(self, episodes: np.ndarray) -> np.ndarray:
         """Return which rows belong to some episodes, shape (n,), bool."""

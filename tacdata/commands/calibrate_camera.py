@@ -63,11 +63,12 @@ def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, out: P
     import yaml
 
     from tacdata import documents, provenance
-    from tacdata.tags.calibration.intrinsics import calibrate
+    from tacdata.tags.calibration.intrinsics import LEAST_VIEWS, calibrate
     from tacdata.tags.calibration.picture import draw_calibration
 
     say(f"{picker.seen} images, the board in {picker.with_board}, {len(picker.views)} views taken")
-    picker.check_board()
+    if odd := picker.check_board(LEAST_VIEWS):
+        print(f"note: {odd}")
     found = calibrate(picker.views, board, picker.size or (0, 0), model)
     now = datetime.now(UTC).isoformat(timespec="seconds")
     document = found.document(board, source, provenance.code_version(), now)

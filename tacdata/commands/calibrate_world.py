@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -30,7 +31,7 @@ def run(
     calibration: Annotated[
         Path | None, typer.Option(help="With --board: what tacdata calibrate-camera wrote for this camera.")
     ] = None,
-    camera: Annotated[str, typer.Option(help="With --board: name of the camera.")] = "camera",
+    camera: Annotated[str, typer.Option(help="With --board: name of the camera in the demo rig.")] = "camera",
     frame: Annotated[str, typer.Option(help="With --board: name of the world.")] = "board",
 ) -> Result:
     """Find where a camera stands: by a robot that carries a tag cube (hand-eye), or by a board on the table."""
@@ -75,5 +76,6 @@ def _by_board(board: Path, images: Path, calibration: Path, camera: str, frame: 
     from tacdata.tags.calibration.view_picker import images_of
 
     intrinsics = documents.read(calibration, "camera_calibration")["intrinsics"]
-    poses, rms, spread = board_poses(images_of(images), read_board(board), intrinsics)
-    return board_world(camera, frame, poses, rms, spread)
+    known = read_board(board)
+    poses, rms, spread = board_poses(images_of(images), known, intrinsics)
+    return replace(board_world(camera, frame, poses, rms, spread), board=known.document)

@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import PurePath
 from typing import Any
@@ -41,6 +43,16 @@ class Result:
     def text(self) -> str:
         """The document as JSON."""
         return json.dumps(plain(self.document), indent=1, ensure_ascii=False, allow_nan=False)
+
+
+@contextmanager
+def before_it_moves() -> Iterator[None]:
+    """Let a Ctrl-C say that nothing was moved yet."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        error.add_note("  motion: nothing was moved\n  data:   nothing was written\n  then:   the same command")
+        raise
 
 
 def plain(value: Any) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +22,7 @@ START_LIMIT = 60.0
 
 def run(
     out: Annotated[Path, typer.Option(help="Folder to make; if it exists, a numbered one beside it.")] = Path("demo"),
-    presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 24,
+    presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 48,
     epochs: Annotated[int, typer.Option(min=1, help="Passes of the training over its frames.")] = 20,
     speed: Annotated[
         float, typer.Option(min=1.0, max=16.0, help="Virtual seconds per second; less on a busy machine.")
@@ -32,16 +33,23 @@ def run(
     place = _Place(_new_folder(out))
     recording, learning = place.recording(presses, seed), place.learning(epochs, seed)
     kept = f"what was finished is in {place.folder}; on a busy machine run again with a lower --speed"
-    line = stages.Line(len(recording) + len(learning) + 1, kept)
+    line = stages.Line(len(recording) + len(learning) + 3, kept)
     begin = time.monotonic()
     try:
-        with stages.Background(place.virtual_rig(speed, seed), place.folder / "virtual-rig.log") as background:
-            background.wait_until(place.rig.is_file, "a virtual rig that writes its rig file", START_LIMIT)
-            for purpose, arguments in recording:
-                line.run(purpose, arguments)
-        for purpose, arguments in learning:
+        with ExitStack() as stack:
+            with stages.Background(place.virtual_rig(speed, seed), place.folder / "virtual-rig.log") as background:
+                background.wait_until(place.rig.is_file, "a virtual rig that writes its rig file", START_LIMIT)
+                for purpose, arguments in recording[:-1]:
+                    line.run(purpose, arguments)
+                # Recording is mostly waiting: labels are computed beside it, and it has the processor first.
+                log = place.folder / "label.log"
+                labelling = stack.enter_context(stages.Background(place.labelling(), log, yielding=True))
+                line.run(*recording[-1])
+            line.run("check what was recorded", ["check", str(place.session)])
             # A press that could not be solved has no label and is left out of the dataset; the others go on.
-            line.run(purpose, arguments, tolerated=SolveError.exit_code if arguments[0] == "label" else 0)
+            line.join("label every frame by finite elements", labelling, tolerated=SolveError.exit_code)
+        for purpose, arguments in learning:
+            line.run(purpose, arguments)
         line.run(*place.viewing())
     except KeyboardInterrupt:
         print(f"\nstopped at stage {line.number}: what was finished is in {place.folder}", file=sys.stderr)
@@ -86,12 +94,13 @@ class _Place:
             ("record every press of the plan", record),
         ]
 
+    def labelling(self) -> list[str]:
+        return ["label", str(self.session), "--follow", "--no-uncertainty"]
+
     def learning(self, epochs: int, seed: int) -> list[tuple[str, list[str]]]:
         session, dataset, network = str(self.session), str(self.dataset), str(self.network)
         train = ["train", dataset, "--from", "shipped", "--out", network, "--epochs", str(epochs), "--seed", str(seed)]
         return [
-            ("check what was recorded", ["check", session]),
-            ("label every frame by finite elements", ["label", session, "--no-uncertainty"]),
             ("pack recordings and labels as a LeRobot dataset", ["pack", session, "--out", dataset]),
             ("fit the network that ships to this sensor", train),
             ("score it on presses that it has not seen", ["evaluate", network]),

@@ -67,12 +67,13 @@ def run(
     for targets in episodes:
         for words in (*doubts(targets), *_notes(targets)):
             print(f"note: {targets.recording}: {words}")
-    for words in limits:
+    for words in (*limits, *writer.remarks):
         print(f"note: {words}")
     print(f"written to {out} ({form}), poses in frame {episodes[0].frame!r}")
     told = [{"recording": t.recording, "kind": t.kind, "targets": len(t.time_ns), "notes": _notes(t)} for t in episodes]
     unfit = bool(limits) and writer.needs_robot
-    return Result({"targets": told, "limits": limits, "folder": out}, Exit.UNFIT if unfit else Exit.DONE)
+    made = {"targets": told, "limits": limits, "remarks": writer.remarks, "folder": out}
+    return Result(made, Exit.UNFIT if unfit else Exit.DONE)
 
 
 def _presses(session: Path) -> Iterator[Demonstration]:

@@ -31,6 +31,9 @@ def run(
     redo: Annotated[
         bool, typer.Option("--redo", help="Replace labels of another model version; retry failed presses.")
     ] = False,
+    follow: Annotated[
+        bool, typer.Option("--follow", help="Begin while `tacdata record` adds presses; end with its plan.")
+    ] = False,
     load_step: Annotated[float, typer.Option(help="Largest depth step while loading [mm].")] = 0.25,
     unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
     uncertainty: Annotated[
@@ -56,6 +59,7 @@ def run(
     from functools import partial
 
     from label_farm.environment import cores, devices, idle_gpus
+    from label_farm.growing_session import GrowingSession
     from label_farm.labelling import Labelling
     from label_farm.labels.dataset_flow import DatasetFlow
     from label_farm.presses.ladder import Ladder
@@ -70,8 +74,10 @@ def run(
     from tacdata.recording.session import read_session
     from tacdata.sensor import read_sensor
 
+    if follow:
+        _wait_for(session)
     recorded = read_session(session)
-    if not recorded.episodes:
+    if not recorded.episodes and not follow:
         raise UsageError(f"{session} holds no finished recording", "at least one", "record: `tacdata record`")
     settings = FarmSettings(
         factory=factory or FACTORY,
@@ -95,11 +101,23 @@ def run(
     with _Bars() as bars:
         labelling = Labelling(labels, Store(store or file_names.store(labels)), settings, bars.show, deliver)
         try:
-            summary = labelling.run(recordings, skin, paths)
+            later = GrowingSession(session, paths) if follow else None
+            summary = labelling.run(recordings, skin, paths, later)
         finally:
             if flow:
                 flow.say()
+    if later and later.remaining:
+        say(f"{later.remaining} presses of the plan were not recorded: label again when they are")
     return _report(summary, labels, session)
+
+
+def _wait_for(session: Path) -> None:
+    """Wait until a recorder has made a folder with its first recording, or for long."""
+    from label_farm.growing_session import GrowingSession
+
+    coming = GrowingSession(session)
+    while not coming.new() and not coming.ended:
+        time.sleep(0.2)
 
 
 class _Bars:

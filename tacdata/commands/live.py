@@ -23,7 +23,7 @@ PANEL = TOOLS
 
 
 def run(
-    network: Annotated[Path, typer.Argument(help="A training run or checkpoint.")],
+    network: Annotated[str, typer.Argument(help="A training run or checkpoint, fitted to this unit; or `shipped`.")],
     rig: Annotated[Path, typer.Option(help="Rig or demo rig file: which board.")],
     finger: Annotated[str | None, typer.Option(help="With a demo rig: whose board; default: the first.")] = None,
     causal: Annotated[
@@ -43,11 +43,11 @@ def run(
     from tacdata.live.message_server import MessageServer
     from tacdata.live.source import touched_board
     from tacdata.recording.live.device_streams import stream_clock
-    from training.inference.checkpoint import load
     from training.inference.sequence import window_map
     from training.metrics import novelty
+    from training.pretraining.shipped import pretrained, unfitted
 
-    trained = load(network)
+    trained = pretrained(network)
     source = touched_board(rig, finger, trained.sensor)
     trained.check_sensor(source.sensor, str(rig))
     offsets, known = trained.network.offsets, novelty.read(trained.path.parent, trained.content_hash)
@@ -56,6 +56,8 @@ def run(
         known.novelty if known else None,
     )  # fmt: skip
     say(_mode(trained.network.name, max(offsets), causal, source.rate))
+    if words := unfitted(trained):
+        print(f"note: {words}", flush=True)
     with ExitStack() as stack:
         watch = server = None
         if view:

@@ -87,19 +87,16 @@ def _document(
 
 def _read(path: Path) -> dict[str, Any]:
     """Read a plan or a recipe, whichever it is."""
-    import yaml
-
     from tacdata import documents
     from tacdata.plans.recipe import read_recipe
 
-    try:
-        has_blocks = "blocks" in (documents.parsed(path.read_text(), str(path)) or {}) if path.is_file() else False
-    except (yaml.YAMLError, UnicodeDecodeError, TypeError):
-        has_blocks = False  # the reader below says it in words
+    content = documents.content_of(path, "plan")
+    has_blocks = isinstance(content, dict) and "blocks" in content
     return read_recipe(path) if has_blocks else documents.read(path, "plan")
 
 
 def _summary(plan: Plan, skin: Sensor, expected: PlanTime) -> str:
+    from tacdata.plans.beside_skin import tip_aside
     from tacdata.recording.motion.plan_time import SECONDS_PER_MOUNTING, USUAL_LIMITS
 
     presses = plan.presses
@@ -115,4 +112,6 @@ def _summary(plan: Plan, skin: Sensor, expected: PlanTime) -> str:
         f"time: about {minutes:.0f} min of pressing at {USUAL_LIMITS.acceleration[0]:g} mm/s^2, and "
         f"{expected.mountings} mounting{'s' * (expected.mountings > 1)}, about {mounting:.0f} min",
     ]
+    shapes = {p.indenter_name: p.indenter for p in presses}
+    lines += [f"note: {name}: {said}" for name, shape in shapes.items() if (said := tip_aside(shape))]
     return "\n".join(lines)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata import progress
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import PIPELINE, Result, before_it_moves
 from tacdata.errors import Exit
 from tacdata.progress import say, suggest
 
@@ -58,21 +58,22 @@ def run(
         from tacdata.errors import UsageError
 
         raise UsageError("no --plan", "a plan file, or --demo", "make one with tacdata plan")
-    from contextlib import nullcontext
+    with before_it_moves():
+        from contextlib import nullcontext
 
-    from tacdata.plans import read_plan
-    from tacdata.recording.live.detection_process import in_background
-    from tacdata.recording.live.interruption import Interruption
-    from tacdata.recording.motion.preflight import Preflight
-    from tacdata.recording.recorder import Recorder
-    from tacdata.registration.chosen import chosen_registration
-    from tacdata.rig import read_rig
-    from tacdata.sensor import default_sensor, read_sensor
-    from tacdata.tags import look
+        from tacdata.plans import read_plan
+        from tacdata.recording.live.detection_process import in_background
+        from tacdata.recording.live.interruption import Interruption
+        from tacdata.recording.motion.preflight import Preflight
+        from tacdata.recording.recorder import Recorder
+        from tacdata.registration.chosen import chosen_registration
+        from tacdata.rig import read_rig
+        from tacdata.sensor import default_sensor, read_sensor
+        from tacdata.tags import look
 
-    skin = read_sensor(sensor) if sensor else default_sensor()
-    chosen = chosen_registration(read_rig(rig), rig, registration, skin)
-    bench = chosen.rig
+        skin = read_sensor(sensor) if sensor else default_sensor()
+        chosen = chosen_registration(read_rig(rig), rig, registration, skin)
+        bench = chosen.rig
 
     def confirm(summary: Preflight) -> bool:
         print(summary.text, flush=True)
@@ -127,7 +128,8 @@ def _by_hand(
     except KeyboardInterrupt as error:
         print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
         raise typer.Exit(Exit.INTERRUPTED) from None
-    print(f"{len(session.episodes)} demonstrations in {out}")
+    count = len(session.episodes)
+    print(f"{count} demonstration{'' if count == 1 else 's'} in {out}")
     suggest("track", out)
     return Result({"session": out, "demonstrations": [path.name for path in session.episodes]})
 

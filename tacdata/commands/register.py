@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import PIPELINE, Result, before_it_moves
 from tacdata.errors import Exit
 from tacdata.progress import say, suggest
 
@@ -43,15 +43,16 @@ def run(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the first move.")] = False,
 ) -> Result:
     """Touch the sensor and find its origin, yaw and tilt in the guide's frame, with uncertainties, into a file."""
-    from tacdata.registration import RegistrationSettings
-    from tacdata.rig import read_rig
-    from tacdata.sensor import default_sensor, read_sensor
+    with before_it_moves():
+        from tacdata.registration import RegistrationSettings
+        from tacdata.rig import read_rig
+        from tacdata.sensor import default_sensor, read_sensor
 
-    bench, skin = read_rig(rig), read_sensor(sensor) if sensor else default_sensor()
-    target = out or rig.with_name("registration.yaml")
-    settings = RegistrationSettings(above, limit, depth, repeats, tuple(taxel or ()))
-    specimen = _specimen(indenter)
-    _check(settings, skin, target)
+        bench, skin = read_rig(rig), read_sensor(sensor) if sensor else default_sensor()
+        target = out or rig.with_name("registration.yaml")
+        settings = RegistrationSettings(above, limit, depth, repeats, tuple(taxel or ()))
+        specimen = _specimen(indenter)
+        _check(settings, skin, target)
     try:
         document, text = _measure(bench, skin, settings, specimen, yes)
     except KeyboardInterrupt as error:
@@ -112,6 +113,7 @@ def _measure(
         try:
             return _touch(rig, sensor, settings, specimen, yes, devices, motion, interruption)
         except BaseException as error:
+            interruption.last_words()
             data = ("nothing was written",)
             error.add_note(ending(motion, devices.cnc.position_lost, data, "the same command", error))
             raise
@@ -122,13 +124,14 @@ def _touch(
     devices: RigDevices, motion: GuardedMotion, interruption: Interruption,
 ) -> tuple[dict[str, Any], str]:  # fmt: skip
     from tacdata.errors import UsageError
-    from tacdata.recording.live.lost_position import require_found, why_lost
+    from tacdata.recording.live.lost_position import guard_homing, require_found, why_lost
     from tacdata.registration.guarded_probe import guarded_probe
     from tacdata.registration.procedure import described, register
     from tacdata.registration.result import document_of
     from tacdata.registration.touch_off import LIFT_SPEED
 
     safe = rig.registration.origin[2] + max(3.0, settings.above + 1.0)
+    guard_homing(devices.cnc, _agreed)
     with devices.opened():
         controller = devices.cnc.settings()
         print(described(sensor, rig.registration, settings))

@@ -10,6 +10,7 @@ import typer
 from tacdata.commands.command import TOOLS, Result
 
 if TYPE_CHECKING:
+    from tacdata.demonstrations.demonstration import Demonstration
     from tacdata.replay.scene import ReplayScene
     from tacdata.replay.trials import Trials
 
@@ -83,19 +84,18 @@ def run(
     weight = {} if mass is None else {"mass": mass}
     scene = scene_of(name, thing, None if radius is None else radius / 1000, stiffness=stiffness, **weight)
     known, chosen = {"compensated": read_gains(gains).of(name)}, None
-    if find_gain:
-        training = Trials(source, {}, scene)
+    # Before the search: it may fail by what is said here.
+    for one in {one.recording_hash: one for one in (source, *made)}.values():
+        seen = Trials(one, {}, scene).seen
         if not with_guesses:
-            check_guesses(training.seen)
-        found = training.find_gain(GripDemand(preliminary, most_slip / 1000, most_force, least_grip))
+            check_guesses(seen)
+        for words in (*doubts(seen), *one.guesses(), *(_other_network(source, one) if find_gain else ())):
+            print(f"note: {one.recording}: {words}")
+    if find_gain:
+        found = Trials(source, {}, scene).find_gain(GripDemand(preliminary, most_slip / 1000, most_force, least_grip))
         print(f"found on {source.recording}: {found.text}")
         chosen, known["chosen"] = (source, found), dict.fromkeys(source.tracks, found.gain)
     tried = [Trials(one, known, scene) for one in made]
-    for one in tried:
-        if not with_guesses:
-            check_guesses(one.seen)
-        for words in (*doubts(one.seen), *one.made.guesses()):
-            print(f"note: {one.made.recording}: {words}")
     if view is not None or video is not None:
         _save(view, video, tried[0], scene)
     document = result(tried, seeds, scene, chosen)
@@ -107,6 +107,17 @@ def run(
         documents.write(out, document, "replay_result")
         print(f"written to {out}")
     return Result(document)
+
+
+def _other_network(source: Demonstration, made: Demonstration) -> tuple[str, ...]:
+    """Say that a gain was found with another network than the one that predicted a demonstration's depth."""
+    theirs, own = ((one.network or {}).get("hash", "") for one in (source, made))
+    if theirs == own:
+        return ()
+    return (
+        f"its depth is predicted by checkpoint {own[:12]}, the gain is found with {theirs[:12]}: a gain makes up for "
+        "the errors of one network on one unit, so find it with the same",
+    )
 
 
 def _tracks(path: Path) -> Path:

@@ -37,6 +37,10 @@ def run(
     mesh_error: Annotated[
         bool, typer.Option("--mesh-error", help="Ask a coarser mesh how far off each map is; costs about half more.")
     ] = False,
+    effects: Annotated[
+        list[Path] | None,
+        typer.Option(help="Verdict or model spec whose effects are laid over the readings, beside the plan's own."),
+    ] = None,
     column: Annotated[
         list[str] | None, typer.Option(help="Optional column of the labels to carry along, such as taxel_counts.")
     ] = None,
@@ -48,6 +52,7 @@ def run(
     from label_farm.environment import cores
     from label_farm.simulated.crew import chosen_devices, solve_all
     from label_farm.simulated.plan import DEFAULT, read_simulation_plan
+    from label_farm.simulated.press_effects import effects_of, with_effects
     from label_farm.simulated.simulation import Simulation
     from tacdata.errors import SolveError, UsageError
     from tacdata.sensor import default_sensor, read_sensor
@@ -57,7 +62,10 @@ def run(
     extra = _asked_for(column) if column else ()
     folder = solved or Path(f"{out}.solved")
     skin = read_sensor(sensor) if sensor else default_sensor()
-    simulation = Simulation(folder, read_simulation_plan(plan or DEFAULT), skin, seed, mesh_error)
+    drawn = read_simulation_plan(plan or DEFAULT)
+    for path in effects or ():
+        drawn = with_effects(drawn, effects_of(path))
+    simulation = Simulation(folder, drawn, skin, seed, mesh_error)
     devices = chosen_devices(device)
     simulation.check()
     simulation.open()
@@ -76,13 +84,29 @@ def run(
         return Result(figures)
     from label_farm.simulated.packing import write_dataset  # here: a computer that only solves needs no recorder
 
+    left_out = Counter[str]()
     with bars() as bar:
         task = bar.add_task("writing episodes", total=presses)
-        episodes, total = write_dataset(simulation, presses, out, extra, lambda number: bar.update(task, advance=1))
+
+        def done(number: int, reason: str) -> None:
+            left_out.update([reason] if reason else [])
+            bar.update(task, advance=1)
+
+        episodes, total = write_dataset(simulation, presses, out, extra, done)
+    if not total:
+        raise SolveError(
+            f"none of {presses} presses is left: {left_out.most_common(1)[0][0]}", "presses that the skin can take",
+            "solve anew into another --solved folder, or narrow the plan",
+        )
+    if left_out:
+        say(f"left out: {left_out.total()} solved presses; {left_out.most_common(1)[0][0]}")
+        say("an older release may have solved them: to have them too, solve anew into another --solved folder")
     print(f"simulated dataset: {episodes} episodes, {total} frames, {len(simulation.specimens)} specimens in {out}")
     say(f"solved presses stay in {folder}")
     suggest("train", out, "--out NETWORK")
-    return Result({**figures, "dataset": out, "episodes": episodes, "frames": total})
+    return Result(
+        {**figures, "dataset": out, "episodes": episodes, "frames": total, "left_out": left_out.total()}
+    )
 
 
 class _Solving:

@@ -13,7 +13,7 @@ from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
-    from tacdata.demonstrations.paths.tracking import Estimator
+    from tacdata.demonstrations.paths.estimator import Estimator
 
 ORDER = 120
 PANEL = TOOLS
@@ -22,7 +22,12 @@ PANEL = TOOLS
 def run(
     path: Annotated[Path, typer.Argument(help="A folder that record --demo wrote, or one of its recordings.")],
     network: Annotated[
-        Path | None, typer.Option(help="A training run or checkpoint: its predicted depth is added, marked as such.")
+        list[str] | None,
+        typer.Option(
+            metavar="[FINGER=]RUN",
+            help="A training run, a checkpoint or `shipped`: its predicted depth is added, marked as such. With "
+            "FINGER= for one fingertip, each of which is a unit of its own.",
+        ),
     ] = None,
     every_image: Annotated[
         bool,
@@ -33,7 +38,7 @@ def run(
     """Smooth the fingertip paths of demonstrations, mark gaps, name faults, and add a network's predicted depth."""
     from tacdata.demonstrations.compensation import contact_depth
     from tacdata.demonstrations.paths.second_look import look_again
-    from tacdata.demonstrations.paths.tracking import track
+    from tacdata.demonstrations.paths.tracking import UNSEARCHED, track
     from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks, write_tracks
     from tacdata.demonstrations.recording.reader import read_demo
     from tacdata.demonstrations.recording.session import read_demo_session
@@ -42,13 +47,13 @@ def run(
     recordings = read_demo_session(path).episodes if path.is_dir() else (path,)
     if not recordings:
         raise UsageError(f"no finished demonstration in {path}", "one or more", "record with tacdata record --demo")
-    estimator = _estimator(network) if network else None
+    estimators = _estimators(network or [])
     told = []
     for recording in recordings:
         read = read_demo(recording)
-        made = track(look_again(read, _told) if every_image else read, rate, estimator)
+        made = track(look_again(read, _told) if every_image else read, rate, estimators)
         before = path_of(recording)
-        if estimator is None and before.is_file() and (lost := read_tracks(before).network):
+        if not estimators and before.is_file() and (lost := read_tracks(before).network):
             print(f"note: {before.name} held depth predicted by {lost['hash'][:12]}; without --network it goes")
         write_tracks(before, made)
         _draw(made, recording)
@@ -72,6 +77,10 @@ def run(
         })  # fmt: skip
         for remark in made.remarks:
             print(f"  note: {remark}")
+    if any(words.startswith(UNSEARCHED) for one in told for words in one["remarks"]) and not every_image:
+        named = " ".join(f"--network {words}" for words in network or [])
+        suggest("track", path, f"{named} --every-image".strip())
+        return Result({"recordings": told})
     hint = "" if network else "  (with --network the targets can be compensated)"
     suggest("export", path, "--out EXPORT", hint)
     return Result({"recordings": told})
@@ -99,13 +108,30 @@ def _draw(made: Demonstration, recording: Path) -> None:
     draw_tracks(recording.with_suffix(".tracks.png"), made.seconds, strips, title)
 
 
-def _estimator(network: Path) -> Estimator:
-    from tacdata.demonstrations.paths.tracking import Estimator
-    from training.inference.checkpoint import load
+def _estimators(given: list[str]) -> dict[str, Estimator]:
+    """Read the networks that --network names: finger -> estimator, `ALL` for one without finger."""
+    from tacdata.demonstrations.paths.estimator import ALL
+    from tacdata.errors import UsageError
+
+    found: dict[str, Estimator] = {}
+    for words in given:
+        finger, equals, run = words.partition("=")
+        finger, run = (finger, run) if equals and not Path(words).exists() else (ALL, words)
+        if finger in found:
+            which = f"finger {finger}" if finger else "all fingers"
+            raise UsageError(f"two networks for {which}", "one each", "leave one --network out")
+        found[finger] = _estimator(run)
+    return found
+
+
+def _estimator(run: str) -> Estimator:
+    from tacdata.demonstrations.paths.estimator import Estimator
     from training.inference.sequence import identity, sequence_maps
     from training.metrics import novelty
+    from training.pretraining.shipped import pretrained, unfitted
 
-    trained = load(network)
+    trained = pretrained(run)
     known = novelty.read(trained.path.parent, trained.content_hash)
-    maps = partial(sequence_maps, trained)
-    return Estimator(identity(trained), trained.sensor, maps, known.novelty if known else None)
+    maps, words = partial(sequence_maps, trained), unfitted(trained)
+    who = identity(trained) | ({"unfitted": words} if words else {})
+    return Estimator(who, trained.sensor, maps, known.novelty if known else None)

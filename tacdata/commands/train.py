@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from rich.progress import Progress as Bar
 
+    from training.frames.frames import Frames
+    from training.inference.checkpoint import Checkpoint
     from training.train import Progress
 
 ORDER = 50
@@ -51,6 +53,10 @@ def run(
     exponent_jitter: Annotated[float | None, typer.Option(help="Vary the exponent at random by this much.")] = None,
     precision: Annotated[str, typer.Option(help="float32 or bfloat16, for cards.")] = "float32",
     compiled: Annotated[bool, typer.Option("--compile", help="Let torch compile the network; for cards.")] = False,
+    leave_out: Annotated[
+        int | None,
+        typer.Option("--leave-out", help="Intervals for unseen shapes: networks to train without some."),
+    ] = None,
     tensorboard: Annotated[bool, typer.Option("--tensorboard", help="Metrics for TensorBoard too, in RUN.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the run's last epoch.")] = False,
 ) -> Result:
@@ -58,13 +64,15 @@ def run(
 
     Options left out are those of the paper, or those that suit the network (`training/networks`). With --from, a
     pretrained network is calibrated to the unit and trained on: a few recorded presses are enough. The same dataset,
-    options and machine give the same network. Ctrl-C keeps all finished epochs; --resume goes on from there.
+    options and machine give the same network. With --leave-out, the pixels' intervals hold on unseen shapes. Ctrl-C
+    keeps all finished epochs; --resume goes on from there.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     from training.frames.data import read_frames
     from training.pretraining.recipe import recipe
     from training.pretraining.shipped import pretrained
+    from training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
     from training.tensorboard import event_log
     from training.train import METRICS, train
 
@@ -88,13 +96,34 @@ def run(
             log(progress)
 
         best = train(frames, settings, out, device, resume, threads, listen, compiled, begun, mixed)
+        if leave_out is not None:
+            calibrate_on_unseen_shapes(best, frames, leave_out, device, threads, begun, mixed, lambda group: show)
     document = best.document
     parts = ", ".join(f"{len(document['split'][part])} {part}" for part in ("train", "validation", "test"))
     print(f"episodes: {parts} (split {document['split']['name']!r})")
+    _say_calibration(best, frames)
     print(f"best epoch {document['epoch']}: validation loss {document['best']['validation_loss']:.5f}")
     print(f"checkpoint {best.path}\nmetrics    {out / METRICS}")
     suggest("evaluate", out)
     return Result({**document, "checkpoint": best.path})
+
+
+def _say_calibration(best: Checkpoint, frames: Frames) -> None:
+    """Say how readings become forces, and what the presses cannot tell."""
+    import numpy as np
+
+    from training.frames.channel_calibration import doubts
+
+    known = best.calibration
+    if not known:
+        return
+    mean, error = known.gain.mean(), float(np.median(known.gain_error / known.gain))
+    print(
+        f"calibration: {mean:.3g} N at 1000 counts, each channel to {100 * error:.0f} %; "
+        f"exponent {known.exponent:.2f} ± {known.exponent_error:.2f}; {known.presses} presses"
+    )
+    for words in doubts(known, frames, best.split.train):
+        print(f"note: {words}")
 
 
 def _listener(bar: Bar) -> Callable[[Progress], None]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import signal
 import threading
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tacdata.commands.command import TOOLS
+
+if TYPE_CHECKING:
+    from tacdata.sensor import Sensor
 
 ORDER, PANEL = 110, TOOLS
 
@@ -21,7 +24,13 @@ def run(
     ] = None,
     seed: Annotated[int, typer.Option(help="which world: registration error, gains, noise")] = 0,
     camera: Annotated[bool, typer.Option(help="with a camera that watches the AprilTag cube")] = True,
-    sensor: Annotated[Path | None, typer.Option(help="sensor file; default: the paper's")] = None,
+    sensor: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[FINGER=]FILE",
+            help="sensor file; default: the paper's. With --demo also one for each finger: --sensor thumb=FILE",
+        ),
+    ] = None,
     rough: Annotated[bool, typer.Option("--rough", help="sensor put down by eye, to be registered first")] = False,
     demo: Annotated[
         bool, typer.Option("--demo", help="a hand at a task, for record --demo: writes demo_rig.yaml")
@@ -48,7 +57,6 @@ def run(
 ) -> None:
     """Emulate a rig (GRBL, taxel board, camera) that other verbs reach by its rig.yaml, until Ctrl-C."""
     from tacdata.errors import UsageError
-    from tacdata.sensor import read_sensor
     from tacdata.virtual_rig.rig import VirtualRig
     from tacdata.virtual_rig.world.hidden import hidden_from
 
@@ -64,17 +72,17 @@ def run(
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
-    skin = read_sensor(sensor) if sensor else None
+    skins = _skins(sensor or [], demo)
     if demo:
         from tacdata.virtual_rig.demo import VirtualDemo
         from tacdata.virtual_rig.world.hand import RADIUS
 
         rig = VirtualDemo(
-            directory, 0.5 if speed is None else speed, seed, cameras, fault, skin, task,
+            directory, 0.5 if speed is None else speed, seed, cameras, fault, skins, task,
             RADIUS if nub is None else nub, thing,
         )  # fmt: skip
     else:
-        rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skin, rough, secret)
+        rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skins.get("thumb"), rough, secret)
     try:
         rig.start()
         print("\n".join([*rig.emulates, f"rig file           {rig.path}", "Ctrl-C stops it."]), flush=True)
@@ -83,3 +91,23 @@ def run(
     finally:
         rig.stop()
     print("stopped", flush=True)
+
+
+def _skins(given: list[str], demo: bool) -> dict[str, Sensor]:
+    """Read the sensor files of --sensor: finger -> sensor. A file without finger is for all that are not named."""
+    from tacdata.errors import UsageError
+    from tacdata.sensor import read_sensor
+    from tacdata.virtual_rig.world.hand import DIRECTIONS
+
+    found: dict[str, Sensor] = {}
+    for words in given:
+        finger, equals, file = words.partition("=")
+        finger, file = (finger, file) if equals and not Path(words).exists() else ("", words)
+        if finger and not demo:
+            raise UsageError(f"--sensor {words} without --demo", "--sensor FILE", "leave the finger out, or add --demo")
+        if finger in found:
+            which = f"finger {finger}" if finger else "all fingers"
+            raise UsageError(f"two sensors for {which}", "one each", "leave one --sensor out")
+        found[finger] = read_sensor(Path(file))
+    rest = found.pop("", None)
+    return found if rest is None else {**dict.fromkeys(DIRECTIONS, rest), **found}

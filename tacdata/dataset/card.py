@@ -86,8 +86,15 @@ def _simulated(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
         "read them.",
         "",
         f"- drawn from {_counted(drawn)}",
+        *_laid_over(records),
         "",
     ]
+
+
+def _laid_over(records: list[EpisodeRecord]) -> list[str]:
+    """Name the effects that are laid over simulated readings."""
+    over = Counter(effect["effect"] for r in records if r.simulated for effect in r.simulated.get("effects", []))
+    return [f"- laid over their readings: {_counted(over)}"] if over else []
 
 
 def _sensor(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,15 @@ import numpy as np
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import FormatError
+
+UNNAMED = "camera"
+"""Name of a camera that nobody named; its file passes for any."""
+FARTHEST = 50.0
+"""Largest plausible distance from the world's origin [m]; more are millimetres."""
+REMEASURED = 0.02
+"""Largest difference of a square's side that is one of measuring it [1]."""
+WORST = (0.1, "m", "are these millimetres?"), (0.35, "rad", "are these degrees?")
+"""Largest plausible standard uncertainty of position and rotation, its unit, and what more of it may be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +42,8 @@ class CameraWorld:
     cube: np.ndarray | None = None
     """The cube in the gripper's frame, homogeneous, shape (4, 4) [m]; hand-eye only."""
     remarks: tuple[str, ...] = field(default=())
+    board: dict[str, Any] | None = None
+    """The board that is the world, as in its file; by a board only."""
 
     def document(self, date: str) -> dict[str, Any]:
         """Return the document for a file; ``date`` is ISO 8601."""
@@ -44,6 +56,8 @@ class CameraWorld:
             made["spread"] = _errors(self.spread)
         if self.cube is not None:
             made["cube"] = _flat(self.cube)
+        if self.board is not None:
+            made["board"] = self.board
         return {**made, "remarks": list(self.remarks), "date": date, "code_version": provenance.code_version()}
 
     @classmethod
@@ -55,19 +69,62 @@ class CameraWorld:
         """
         documents.check(document, "camera_world", origin)
         spread, cube = document.get("spread"), document.get("cube")
+        _check_spread(spread, origin)
         return cls(
             document["camera"], document["frame"], pose_matrix(document, origin), document["method"],
             document["poses"], (document["residual"]["position"], document["residual"]["rotation"]),
             (spread["position"], spread["rotation"]) if spread else None,
             pose_matrix(cube, f"{origin}: cube") if cube else None, tuple(document.get("remarks", ())),
+            document.get("board"),
         )  # fmt: skip
+
+
+def check_worlds(worlds: dict[str, CameraWorld], origin: str) -> None:
+    """Refuse a camera's file that is another camera's, or of another board.
+
+    Args:
+        worlds: Camera -> what its file says.
+        origin: The rig file, for words.
+
+    Raises:
+        FormatError: Naming both.
+    """
+    for name, world in worlds.items():
+        if world.camera not in (name, UNNAMED):
+            raise FormatError(
+                f"{origin}: the world of camera {name} is a file of camera {world.camera}",
+                f"one that was made for camera {name}",
+                f"name its own file, or calibrate it by tacdata calibrate-world --camera {name}",
+            )
+    for (name, world), (rest, other) in combinations(worlds.items(), 2):
+        alike = np.allclose(world.matrix, other.matrix, rtol=0, atol=1e-9)
+        if UNNAMED in (world.camera, other.camera) and alike:
+            given = f"{origin}: cameras {name} and {rest} stand in the same place: is one file named twice?"
+            raise FormatError(given, "a place of its own for each camera", "name each camera's own file")
+        if world.board and other.board and not _same_board(world.board, other.board):
+            raise FormatError(
+                f"{origin}: cameras {name} and {rest} were calibrated on different boards, of "
+                f"{_squares(world.board)} and {_squares(other.board)}",
+                "one board for all cameras, which lies still meanwhile",
+                "calibrate both again, with the board in one place",
+            )
+
+
+def _same_board(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Return whether two files describe one board; its squares may have been measured twice."""
+    same = all(one.get(name) == other.get(name) for name in ("columns", "rows", "dictionary", "legacy"))
+    return same and abs(one["square"] - other["square"]) < REMEASURED * one["square"]
+
+
+def _squares(board: dict[str, Any]) -> str:
+    return f"{board['columns']} x {board['rows']} squares of {board['square']:g} mm"
 
 
 def pose_matrix(entry: dict[str, Any], origin: str) -> np.ndarray:
     """Return a pose's ``position`` [m] and ``quaternion`` (xyzw) as a homogeneous matrix, shape (4, 4).
 
     Raises:
-        FormatError: If the quaternion is not of length 1.
+        FormatError: If the quaternion is not of length 1, or the position is farther than `FARTHEST`.
     """
     from scipy.spatial.transform import Rotation
 
@@ -75,10 +132,21 @@ def pose_matrix(entry: dict[str, Any], origin: str) -> np.ndarray:
     if not 0.99 < np.linalg.norm(turn) < 1.01:
         given = f"{origin}: quaternion {turn.tolist()} of length {np.linalg.norm(turn):.3f}"
         raise FormatError(given, "xyzw of length 1", "correct it; no rotation is [0, 0, 0, 1]")
+    if not (away := float(np.linalg.norm(entry["position"]))) <= FARTHEST:
+        given = f"{origin}: a position {away:g} m away: are these millimetres?"
+        raise FormatError(given, f"metres, up to {FARTHEST:g} m", "give it in metres")
     matrix = np.eye(4)
     matrix[:3, :3] = Rotation.from_quat(turn).as_matrix()
     matrix[:3, 3] = entry["position"]
     return matrix
+
+
+def _check_spread(spread: dict[str, float] | None, origin: str) -> None:
+    """Refuse a standard uncertainty that is negative, in millimetres or in degrees."""
+    for name, most, unit, other in (("position", *WORST[0]), ("rotation", *WORST[1])):
+        if spread is not None and not 0 <= spread[name] <= most:
+            given = f"{origin}: a spread of the {name} of {spread[name]:g} {unit}: {other}"
+            raise FormatError(given, f"0 to {most:g} {unit}", f"give it in {unit}, or calibrate the camera again")
 
 
 def _errors(values: tuple[float, float]) -> dict[str, float]:

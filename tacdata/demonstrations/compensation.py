@@ -15,6 +15,8 @@ LARGEST = 10
 DEFAULT = Path(__file__).with_name("gains.yaml")
 MOST = 0.1
 """Largest plausible gain [m/mm]: 10 cm of target per millimetre felt. The paper's are near 0.01."""
+LEAST = 1e-4
+"""Smallest plausible gain [m/mm] that is not 0: 0.1 mm of target per millimetre felt."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,12 @@ def read_gains(path: Path | None = None) -> Gains:
                 f"{path or DEFAULT}: tasks/{task}: a gain of {largest:g} m/mm, {1000 * largest:g} mm a millimetre felt",
                 f"0 to {MOST:g} m/mm; the paper's are 0.004 to 0.012",
                 "gains are metres for each millimetre: divide by 1000 if these are mm for each mm",
+            )
+        if (smallest := min((float(value) for value in values if value > 0), default=MOST)) < LEAST:
+            raise FormatError(
+                f"{path or DEFAULT}: tasks/{task}: a gain of {smallest:g} m/mm, {1000 * smallest:g} mm a mm felt",
+                f"0, or {LEAST:g} to {MOST:g} m/mm; the paper's are 0.004 to 0.012",
+                "gains are metres for each millimetre: multiply by 1000 if these are m for each um",
             )
     tasks = {task: dict(zip(order, map(float, values), strict=True)) for task, values in document["tasks"].items()}
     return Gains(tasks, str(path) if path else "the paper's gains")

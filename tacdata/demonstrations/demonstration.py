@@ -11,6 +11,11 @@ import numpy as np
 from tacdata.demonstrations import touch
 from tacdata.sensor import Sensor
 
+GUESS = 0.003
+"""Standard deviation of an axis above which a place that no steady camera saw is a guess [m]; a grasp tolerates no
+more.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class FingerTrack:
@@ -28,7 +33,7 @@ class FingerTrack:
     covariance: np.ndarray
     """Covariance of a small rotation [rad] and the position [m], both in the demonstration's frame, shape (n, 6, 6)."""
     gap: np.ndarray
-    """Whether no sighting is near, so that the pose is interpolated or unknown; shape (n,), bool."""
+    """Whether no sighting is near, or only one of a camera that was moved, shape (n,), bool: the pose is a guess."""
     sightings: int
     """Images in which the finger was seen."""
     outliers: int
@@ -71,17 +76,30 @@ class Demonstration:
     smoothing: dict[str, Any] = field(default_factory=dict)
     """Settings of the smoother and the process noise that it chose, by finger."""
     network: dict[str, Any] | None = None
-    """Network behind the predicted depth: hash, network, epoch, lookahead [frames], sensor; None without."""
+    """Network behind the predicted depth: hash, network, epoch, lookahead [frames], sensor; None without. Where each
+    finger has its own, their identities stand under ``fingers``, and the hash is of all hashes.
+    """
     remarks: tuple[str, ...] = ()
     """Remarks for a person, as sentences."""
     provenance: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def networks(self) -> dict[str, dict[str, Any]]:
+        """Finger -> identity of the network behind its predicted depth; fingers without one are missing."""
+        if self.network is None:
+            return {}
+        felt = [name for name, track in self.tracks.items() if track.depth is not None]
+        each = self.network.get("fingers", dict.fromkeys(felt, self.network))
+        return {name: each[name] for name in felt if name in each}
+
     def guesses(self, fingers: Iterable[str] = ()) -> list[str]:
         """Describe where the predicted depth of some fingers (by default all) is a guess.
 
-        That is where the network has not been trained on similar readings.
+        That is where the network has not been trained on similar readings, and all of it if it is fitted to no unit.
         """
         words, chosen = [], tuple(fingers) or tuple(self.tracks)
+        networks = {name: one for name, one in self.networks.items() if name in chosen}
+        words += dict.fromkeys(one["unfitted"] for one in networks.values() if "unfitted" in one)
         for name, track in self.tracks.items():
             if name in chosen and track.signals is not None and track.novelty is not None:
                 words += touch.unknown(name, track.signals, track.novelty)

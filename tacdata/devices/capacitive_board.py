@@ -13,7 +13,7 @@ from tacdata.devices.device import StreamCounts, TaxelBoard, TaxelFrame
 from tacdata.errors import DeviceError
 from tacdata.wire import Decoder, FrameFormat, default_format, read_format
 from tacdata.wire.frames.frame_format import from_document
-from tacdata.wire.serial_port import open_port, read_available
+from tacdata.wire.serial_port import open_port, read_available, why_broken
 
 FINE_TICK = 0.0002
 """Coarsest tick of a board's own time stamp that is preferred to its frame counter [s]."""
@@ -146,7 +146,7 @@ class CapacitiveBoard(TaxelBoard):
     def _break(self, error: Exception) -> None:
         with self._changed:
             self._fault = DeviceError(
-                f"the line to the taxel board on {self.port} broke: {error}",
+                f"the line to the taxel board on {self.port} broke: {why_broken(error)}",
                 "a port that stays connected",
                 "check the cable and the power; what was received so far is kept",
             )

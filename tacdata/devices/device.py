@@ -33,6 +33,11 @@ __all__ = [
 class StandsStill(DeviceError):
     """A machine that has come to rest, and whose motion cannot be abandoned."""
 
+    def __init__(self, given: str, allowed: str, remedy: str, at: tuple[float, float, float] | None = None) -> None:
+        """Say why; ``at`` is where it stands [mm, machine], if that is known."""
+        super().__init__(given, allowed, remedy)
+        self.at = at
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -144,6 +149,24 @@ class MotionController(Device):
         return ""
 
     @property
+    def alarm(self) -> str:
+        """What locked it, in words. Empty if it was merely switched on."""
+        return ""
+
+    @property
+    def unreadable(self) -> str:
+        """The latest report if it could not be read, else nothing."""
+        return ""
+
+    @property
+    def damaged_reports(self) -> int:
+        """Status reports that could not be read since the port was opened [count]."""
+        return 0
+
+    def lose_position(self, why: str) -> None:
+        """Take that its position is unknown from now on, and why, in words; a controller without memory forgets it."""
+
+    @property
     def moved(self) -> bool:
         """Whether any motion was commanded since this was created, homing at opening included."""
         return False
@@ -151,6 +174,14 @@ class MotionController(Device):
     @abstractmethod
     def move(self, position: tuple[float, float, float], speed: float) -> Motion:
         """Queue a straight move to a machine position [mm] at ``speed`` [mm/s]; returns once it is acknowledged."""
+
+    def rise(self, position: tuple[float, float, float], speed: float) -> Motion:
+        """Queue a move straight up to ``position`` [mm, machine] at ``speed`` [mm/s].
+
+        Where a controller can, x and y are not stated: if what it says of them is wrong, a tip in the skin still moves
+        up alone.
+        """
+        return self.move(position, speed)
 
     @abstractmethod
     def dwell(self, seconds: float) -> Motion:

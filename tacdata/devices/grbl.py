@@ -10,17 +10,23 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, Motion, MotionController, StandsStill
 from tacdata.errors import DeviceError, UsageError
-from tacdata.wire.grbl.lines import BRAKING, MOVING, OPENED_AGAIN
+from tacdata.wire.grbl import codes
+from tacdata.wire.grbl.lines import AT_REST, BRAKING, MOVING, OPENED_AGAIN
 from tacdata.wire.grbl.link import GrblLink
-from tacdata.wire.grbl.opening import ANSWER, clear, greet, locked, straighten
+from tacdata.wire.grbl.opening import ANSWER, clear, greet, locked, name_alarm, straighten, unblock
 from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.settings import GrblSettings
+from tacdata.wire.patience import Patience
 from tacdata.wire.serial_port import open_port
 
 HOMING = 600.0
-"""Longest homing cycle [s of the clock]: 1.5 times the travel of two cycles at a slow seek rate."""
+"""Longest homing cycle [s of the clock]: 1.5 times the travel of two slow cycles."""
 COMING_TO_REST = 30.0
 """Longest deceleration of a feed hold [s of the clock]."""
+STANDING = 3.0
+"""A machine that reports the same place for so long stands still, whatever its state says [s of the clock]."""
+LOOK = 0.05
+"""Time between two reports that are compared [s, real time]."""
 LATE = (1.5, 15.0)
 """Motion counts as a fault when it takes longer than this many times its expected duration, plus this time [s of the
 clock].
@@ -87,9 +93,11 @@ class Grbl(MotionController):
             state = self._make_ready(link)
             is_locked = link.fresh_status(ANSWER).state.split(":")[0] == "Alarm"
             if is_locked:
+                name_alarm(link, self._answers)
                 if not self.home_first:
                     raise locked(link, self._answers)
                 self.before_homing()
+                unblock(link)
                 self.home()
                 self._read(link)
             self._cautions = straighten(link)
@@ -132,6 +140,32 @@ class Grbl(MotionController):
         return (self._link.lost if self._link is not None else "") or self._lost
 
     @property
+    def alarm(self) -> str:
+        """What locked it, in words. Empty if it was merely switched on."""
+        link = self._link
+        if link is None or link.last is None or not link.last.state.startswith("Alarm"):
+            return ""
+        if link.alarm not in (None, codes.HOMING_REQUIRED):
+            return codes.alarm_in_words(link.alarm)
+        here = link.last.position
+        was_on = f"the controller is locked and says {_text(here)} mm: it was not just switched on"
+        return was_on if np.any(here) else ""
+
+    @property
+    def unreadable(self) -> str:
+        """The latest report if it could not be read, else nothing."""
+        return self._link.unread if self._link is not None else ""
+
+    @property
+    def damaged_reports(self) -> int:
+        """Status reports that could not be read since the port was opened [count]."""
+        return self._link.statuses.damaged if self._link is not None else 0
+
+    def lose_position(self, why: str) -> None:
+        """Take that the position is unknown, and why, in words."""
+        self._lost = self._lost or why
+
+    @property
     def moved(self) -> bool:
         """Whether a move or a homing cycle was sent since this was created."""
         return self._moved
@@ -163,6 +197,12 @@ class Grbl(MotionController):
         self._queue(self._duration(np.array(position), speed))
         self._target, self._moved = np.array(position), True
         return self._send(f"G53G90G94G21G1X{x:.4f}Y{y:.4f}Z{z:.4f}F{60 * speed:.3f}")
+
+    def rise(self, position: tuple[float, float, float], speed: float) -> Motion:
+        """Queue a move straight up; the line states no x and y, so a wrong report of them moves nothing sideways."""
+        self._queue(self._duration(np.array(position), speed))
+        self._target, self._moved = np.array(position), True
+        return self._send(f"G53G90G94G21G1Z{position[2]:.4f}F{60 * speed:.3f}")
 
     def dwell(self, seconds: float) -> Motion:
         """Pause [s]; GRBL answers only when the planner is empty and the pause is over."""
@@ -218,22 +258,26 @@ class Grbl(MotionController):
         if link.halted and link.fault:
             raise StandsStill(link.fault.given, link.fault.allowed, link.fault.remedy)
         status = self._rest(link)
-        stands = "stands at (" + ", ".join(f"{value:.2f}" for value in status.position) + ") mm"
+        stands, (x, y, z) = f"stands at {_text(status.position)} mm", status.position.tolist()
         if link.pendant:
             raise StandsStill(
                 f"a pendant has control of the machine, which {stands}", "one master",
-                "give control back at the pendant and look where the tip stands",
+                "give control back at the pendant and look where the tip stands", (x, y, z),
             )  # fmt: skip
         if status.state.startswith("Door") and status.state not in OPENED_AGAIN:
             raise StandsStill(
                 f"the safety door is open; the machine {stands}", "a closed door",
-                "close it; the next start lifts the tip first",
+                "close it; the next start lifts the tip first", (x, y, z),
             )  # fmt: skip
-        link.soft_reset(ANSWER)
-        link.rearm()
-        link.command("", ANSWER)  # after refusing a line, grblHAL refuses every line until an empty one
-        straighten(link)
-        x, y, z = link.fresh_status(ANSWER).position.tolist()
+        try:
+            link.soft_reset(ANSWER)
+            link.rearm()
+            link.command("", ANSWER)  # after refusing a line, grblHAL refuses every line until an empty one
+            straighten(link)
+            x, y, z = link.fresh_status(ANSWER).position.tolist()
+        except DeviceError as error:  # it was at rest, and nothing that moves was sent since
+            stood = "" if link.halted else f"; the machine {stands}"
+            raise StandsStill(f"{error.given}{stood}", error.allowed, error.remedy) from None
         return x, y, z
 
     def home(self, timeout: float = HOMING) -> None:
@@ -249,10 +293,6 @@ class Grbl(MotionController):
             link.lost = self._lost = ""
         finally:
             link.homing = link.waiting  # a timed-out homing still moves
-
-    @property
-    def _version(self) -> str:
-        return self._answers.answers.get("VER", "nothing")
 
     def _opened(self) -> GrblLink:
         if self._link is None:
@@ -299,8 +339,7 @@ class Grbl(MotionController):
         self._answers = answers = GrblSettings.read(link, ANSWER)
         link.statuses.unit, link.statuses.automatic = answers.unit, answers.reports_by_itself
         link.rx_bytes = answers.rx_bytes or link.rx_bytes
-        if link.statuses.offset is None:
-            link.statuses.offset = answers.work_offset
+        link.statuses.place(answers.work_offset)
         answers.refuse_moves_at_start(self.port)
         answers.limits("$12", 1.0, self.port)
         answers.limits("$11", 60.0, self.port)
@@ -308,8 +347,9 @@ class Grbl(MotionController):
     def _remember_opening(self, link: GrblLink, state: str, homed: bool) -> None:
         """Keep what was found; a board without homing that was just reset counts from an unknown place."""
         position = link.last.position if link.last is not None else np.full(3, np.nan)
+        version = self._answers.answers.get("VER", "nothing")
         self._found = {
-            "banner": link.welcome or f"none, the board was not reset by opening; $I says {self._version}",
+            "banner": link.welcome or f"none, the board was not reset by opening; $I says {version}",
             "reset_at_opening": "yes" if link.resets else "no", "state_at_opening": state,
             "homed_at_opening": "yes" if homed else "no",
             "position_at_opening": ",".join(f"{value:.3f}" for value in position + 0.0),
@@ -324,8 +364,24 @@ class Grbl(MotionController):
             DeviceError: On a fault, or if it goes on moving.
         """
         end = self.clock.now_ns() + round(COMING_TO_REST * 1e9)
-        while (status := link.fresh_status(ANSWER)).state.split(":")[0] in MOVING or status.state in BRAKING:
-            if status.state.split(":")[0] in MOVING:
+        standing = Patience(STANDING, self.clock.rate, STANDING / 2, host=self.clock.host)
+        place = np.full(3, np.nan)
+        while True:
+            status = link.fresh_status(ANSWER)
+            moved, place = not np.array_equal(status.position, place), status.position
+            state = status.state.split(":")[0]
+            if state not in MOVING and status.state not in BRAKING:
+                if not moved or status.state in AT_REST or state in AT_REST:
+                    return status  # a hold with another substate, or with none, may still brake
+                self.clock.host.sleep(LOOK)
+            if moved:
+                standing.restart()
+            elif standing.over() and state != "Door":
+                raise StandsStill(
+                    f"the controller stays in state {status.state}; the machine stands at {_text(place)} mm",
+                    "a controller that comes to rest", "look at it, then reset it and find its zero again",
+                )  # fmt: skip
+            if state in MOVING:
                 link.realtime(b"!")
             if self.clock.now_ns() > end:
                 raise DeviceError(
@@ -333,7 +389,10 @@ class Grbl(MotionController):
                     "a machine at rest",
                     "press the emergency stop and look at it",
                 )
-        return status
+
+
+def _text(position: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in position) + ")"
 
 
 def _moves(link: GrblLink) -> bool:

@@ -28,6 +28,8 @@ class Exporter(ABC):
     def __init__(self, robot: Path | None = None, recordings: Path | None = None) -> None:
         """Keep the robot file and the folder of the recordings, where there are any; the latter hold the images."""
         self.robot, self.recordings = robot, recordings
+        self.remarks: list[str] = []
+        """What a person should know of what `write` made, though nothing of it is unfit."""
 
     @abstractmethod
     def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
@@ -38,7 +40,7 @@ class Exporter(ABC):
             out: The folder; it does not exist.
 
         Returns:
-            Remarks for a person, above all what a robot cannot do.
+            What a robot cannot do, as sentences.
 
         Raises:
             UsageError: If something that the format needs is missing.

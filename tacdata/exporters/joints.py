@@ -39,6 +39,8 @@ class Joints(Exporter):
         robot, said = read_robot(self.robot), []
         solved = [follow(robot, targets)[0] for targets in episodes]
         new_folder(out)
+        if solved:
+            self.remarks += [*robot.remarks, *_unchecked(solved[0])]
         for targets, path in zip(episodes, solved, strict=True):
             stem = Path(targets.recording).stem
             said += [f"{stem}: {words}" for words in in_words(path, targets, robot.tolerance[1] is not None)]
@@ -94,6 +96,17 @@ def in_words(path: JointPath, targets: FingertipTargets, turned: bool = True) ->
     for name, rows in path.too_abrupt.items():
         when = _when(rows, seconds)
         said.append(f"joint {name} would have to accelerate more than its limit at {len(rows)} times ({when})")
+    return said
+
+
+def _unchecked(path: JointPath) -> list[str]:
+    """Describe which speeds and accelerations were not held against a limit, as none is known."""
+    said = []
+    for what, known in (("velocity", "speed"), ("acceleration", "acceleration")):
+        free = [joint.name for joint in path.joints if getattr(joint, what) is None]
+        if free:
+            which = "any joint" if len(free) == len(path.joints) else f"joint {', '.join(free)}"
+            said.append(f"no limit of the {known} of {which} is known, so none was checked ({what} in the robot file)")
     return said
 
 

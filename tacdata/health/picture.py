@@ -49,6 +49,8 @@ def _gains(axes: Any, history: History) -> None:
     name, fits = reference(history)
     bad = set(_marked(history))
     known = [(k, fit) for k, fit in enumerate(fits) if fit is not None]
+    if not known:
+        _say_unknown(axes)
     start = [(0, 1.0)] if known and known[0][0] > 0 else []
     for channel in sorted({c for _, fit in known for c in fit.channels}):
         line = start + [(k, fit.channels[channel].value) for k, fit in known if channel in fit.channels]
@@ -59,6 +61,13 @@ def _gains(axes: Any, history: History) -> None:
     _errors(axes, [(k, fit.common) for k, fit in known])
     axes.set(title=f"gain beside {name}", ylabel="gain [1]")
     _visits(axes, history)
+
+
+def _say_unknown(axes: Any) -> None:
+    """Write into an empty panel what it needs."""
+    axes.text(
+        0.5, 0.5, "known from a second visit on,\nor with labels", transform=axes.transAxes, ha="center", va="center"
+    )
 
 
 def _errors(axes: Any, series: list[tuple[int, UncertainValue]]) -> None:
@@ -82,26 +91,28 @@ def _array(axes: Any, history: History) -> None:
         values.reshape(taxels.rows, taxels.columns), cmap="RdBu", vmin=-most, vmax=most, origin="lower",
         aspect=taxels.pitch_y / taxels.pitch_x,
     )  # fmt: skip
-    axes.figure.colorbar(image, ax=axes, label="own gain [%]")
+    axes.figure.colorbar(image, ax=axes)
     dead, moved = set(history.wiring.unfit), dict(history.wiring.swapped)
     for k in range(taxels.count):
         word = "dead" if k in dead else f"{k} for {moved[k]}" if k in moved else str(k)
         color = BAD if k in dead or k in moved else "black"
         axes.text(k % taxels.columns, k // taxels.columns, word, ha="center", va="center", fontsize=7, color=color)
-    axes.set(title=f"{history.last.name}: array from above", xticks=[], yticks=[])
+    axes.set(title=f"{history.last.name}: own gains [%], from above", xticks=[], yticks=[])
 
 
 def _channels(axes: Any, history: History) -> None:
     """Draw the latest gains over the channels with their intervals and the tolerance."""
     _, fits = reference(history)
     axes.axhspan(-100 * OWN, 100 * OWN, color="0.93")
+    if not fits[-1]:
+        _say_unknown(axes)
     bad = set(_marked(history))
     for channel, gain in (fits[-1].own if fits[-1] else {}).items():
         low, high = (100 * (bound - 1) for bound in gain.interval)
         color = BAD if channel in bad else GOOD
         axes.plot([channel, channel], [low, high], color=color, linewidth=1.5)
         axes.plot(channel, 100 * (gain.value - 1), ".", color=color)
-    axes.set(title="own gains; grey: tolerance", xlabel="channel", ylabel="own gain [%]")
+    axes.set(title="own gains; grey: tolerance", xlabel="channel", ylabel="beside the common gain [%]")
 
 
 def _series(axes: Any, history: History, quantity: str, values: Callable[[int], list[float]], label: str) -> None:

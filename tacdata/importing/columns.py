@@ -8,12 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.documents import composed
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.text_layout import THOUSANDS
-from tacdata.importing.units import composed, factor, split_unit
+from tacdata.importing.units import factor, split_unit
 
 Selector = str | int | list[Any]
+
+
+WRITTEN = re.compile(r"[-+]?\d*[.,]?\d+([eE][-+]?\d+)?")
+"""A number in a text."""
 
 
 def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
@@ -51,8 +56,9 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
             return chosen
     elif 0 <= selector < len(names):
         return [names[selector]]
+    left_out = [note for note in table.notes if "left out" in note]
     raise FormatError(
-        f"{where}: column {selector!r} is not in {table.path.name}",
+        f"{where}: column {selector!r} is not in {table.path.name}" + (f" ({'; '.join(left_out)})" * bool(left_out)),
         ", ".join(names[:40]) + (f" and {len(names) - 40} more" if len(names) > 40 else ""),
         "correct the column in the mapping (columns count from 0)",
     )
@@ -113,9 +119,15 @@ def axis(
     if table is None:
         raise FormatError(f"{where}: a column without a file", "a number, or a file for the column", "add file: NAME")
     name = single(table, entry["column"], where)
-    given = entry.get("unit") or table.units.get(name) or split_unit(name)[1] or unit
+    given = unit_of(table, entry, where) or unit
     values = numbers(table, [name], missing, where)[:, 0]
     return values * factor(given, unit, where) * entry.get("scale", 1.0) + entry.get("offset", 0.0)
+
+
+def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
+    """Return the unit of a column, by the mapping or the file; "" if neither gives one."""
+    name = single(table, entry["column"], where)
+    return entry.get("unit") or table.units.get(name) or split_unit(name)[1]
 
 
 def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> FormatError:
@@ -124,8 +136,11 @@ def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> Form
     given = f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}"
     if known and sum(bool(THOUSANDS.fullmatch(text)) for text in known) > len(known) / 2:
         return FormatError(
-            f"{given}: numbers with a sign between thousands", "numbers", "save it again without that sign"
-        )
+            f"{given}: numbers with a sign between thousands, or with three decimal places, as text", "numbers",
+            "save it again as numbers, without a sign between thousands",
+        )  # fmt: skip
+    if known and sum(bool(WRITTEN.fullmatch(text)) for text in known) > len(known) / 2:
+        return FormatError(f"{given}: numbers as text", "numbers", "save it again as numbers")
     return FormatError(
         given, "numbers", "name another column, or add the texts that stand for no value to the file's missing"
     )
@@ -133,3 +148,51 @@ def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> Form
 
 def _example(values: np.ndarray) -> Any:
     return next((value for value in values.tolist() if value is not None), None)
+
+
+def label_of(entry: str | dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str], where: str) -> str:
+    """Return a word of a trial: given, from the path, or what most rows of a column hold.
+
+    Args:
+        entry: As in the mapping: a word, {part: name, pattern: ...} or {column: name, file: name}.
+        tables: Name under ``files`` -> rows of the trial.
+        parts: {part} of the paths -> its text.
+        where: The mapping's key, for messages.
+
+    Raises:
+        FormatError: If there is no such part, column or match.
+    """
+    if isinstance(entry, str):
+        return entry
+    if "part" in entry:
+        return _from_path(entry, parts, where)
+    table = tables.get(entry.get("file", next(iter(tables))))
+    if table is None:
+        raise FormatError(f"{where}: file {entry.get('file')!r}", ", ".join(tables), "name one under files")
+    values = table.column(single(table, entry.get("column", ""), where))
+    if values.dtype == object:
+        words = [str(value).strip() for value in values.tolist() if value is not None and str(value).strip()]
+    else:
+        numbers = values.astype(float)
+        words = [f"{value:g}" for value in numbers[np.isfinite(numbers)]]
+    if not words:
+        raise FormatError(f"{where}: a column without a value", "a word or a number", "name another column")
+    return max(dict.fromkeys(words), key=words.count)
+
+
+def _from_path(entry: dict[str, Any], parts: dict[str, str], where: str) -> str:
+    name, pattern = entry["part"], entry.get("pattern")
+    if name not in parts:
+        raise FormatError(f"{where}: part {name!r}", ", ".join(parts) or "none: no path has a {part}", "correct part")
+    if pattern is None:
+        return parts[name]
+    try:
+        match = re.search(pattern, parts[name])
+    except re.error as error:
+        raise FormatError(f"{where}: pattern {pattern!r}: {error}", "a regular expression", "correct it") from None
+    if match is None or not match.groups():
+        raise FormatError(
+            f"{where}: {pattern!r} finds nothing in {parts[name]!r}", "a pattern with one group, as in ([A-Za-z]+)",
+            "correct pattern",
+        )  # fmt: skip
+    return match[1]

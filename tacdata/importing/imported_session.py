@@ -96,12 +96,20 @@ class _Import:
 
     def add(self, files: FileSet) -> None:
         """Import one set of files."""
+        if files.fault:
+            self.failures.append((files.label or self.source.name, files.fault))
+            return
         try:
             tables = {name: read_table(path, self.mapping["files"][name]) for name, path in files.paths.items()}
         except TacdataError as error:
             self.failures.append((files.label or self.source.name, error))
             return
-        for label, rows in split_tables(tables, self.mapping.get("trials", {})):
+        try:
+            trials = list(split_tables(tables, self.mapping.get("trials", {})))
+        except TacdataError as error:
+            self.failures.append((files.label or self.source.name, error))
+            return
+        for label, rows in trials:
             named = " ".join(part for part in (files.label, label) if part)
             try:
                 for imported in self._presses(files, named, tables, rows):

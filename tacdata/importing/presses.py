@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import axis, single
+from tacdata.importing.columns import axis, label_of, single
 from tacdata.importing.foreign_sensor import foreign_sensor
 from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.press_path import PressPath, press_path
@@ -60,10 +60,13 @@ def presses_of(
     Raises:
         FormatError: If columns, units or clocks are wrong, or there is neither position nor schedule.
     """
-    known = _known(mapping.get("press", {}), tables, parts, "press")
+    stated = dict(mapping.get("press", {}))
+    if specimen := stated.pop("specimen", ""):
+        record = {**record, "specimen": label_of(specimen, tables, parts, "press: specimen")}
+    known = _known(stated, tables, parts, "press")
     contact = mapping.get("contact", {})
     resolved = _known({k: v for k, v in contact.items() if k != "known_from"}, tables, parts, "contact")
-    mapping = {**mapping, "press": {**mapping.get("press", {}), **known}, "contact": {**contact, **resolved}}
+    mapping = {**mapping, "press": {**stated, **known}, "contact": {**contact, **resolved}}
     streams = read_streams(mapping, tables)
     scheduled = read_schedule(mapping, tables, streams.taxels)
     if streams.position is None and not scheduled:
@@ -74,11 +77,12 @@ def presses_of(
     shift = max(-min(int(stream.time_ns[0]) for stream in streams.all if len(stream.time_ns)), 0)
     streams, scheduled = _shifted(streams, shift), [replace(s, start_ns=s.start_ns + shift) for s in scheduled]
     place, unsaid = _registration(mapping, streams)
-    cuts = _cuts(mapping, streams, scheduled, place)
+    cuts, short = _cuts(mapping, streams, scheduled, place), 0
     for number, (begin, end, planned) in enumerate(cuts):
         trial = record["trial"] + (f" #{number}" if len(cuts) > 1 else "")
         part = streams.within(begin, end)
         if len(part.taxels.time_ns) < 2:
+            short += 1
             continue
         if planned:
             part = replace(part, position=_commanded(planned, begin, end))
@@ -87,6 +91,11 @@ def presses_of(
         yield _imported(mapping, beside, part, place, planned, known, [*unsaid], {
             **record, "trial": trial.strip(), "time_shift_ns": shift, "notes": list(streams.notes),
         })  # fmt: skip
+    if short:
+        raise FormatError(
+            f"{short} of {len(cuts)} stretches hold fewer than two rows of the channels", "two rows or more",
+            "leave the file out, or split the trials otherwise",
+        )  # fmt: skip
 
 
 def _imported(

@@ -18,18 +18,26 @@ SHORT = ("s", "ms", "us", "ns", "min", "h", "d")
 """Units of time that a mapping may name; others stand in the header and are read from there."""
 GUESSES = {
     "time": r"(time|t|timestamp|stamp|zeit|clock|datetime|date)",
-    "depth": r"(depth|indentation|displacement|disp|travel|stroke|weg|eindringtiefe|d)",
+    "depth": r"(depth|indentation|displacement|disp|travel|stroke|extension|pos(ition)?|weg|eindringtiefe|d)",
     "x": r"(x|pos_?x|x_?pos(ition)?|stage_?x)",
     "y": r"(y|pos_?y|y_?pos(ition)?|stage_?y)",
     "z": r"(z|pos_?z|z_?pos(ition)?|stage_?z|height)",
     "force": r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy])",
     "temperature": r"(temp(erature)?|t_?amb)",
     "trial": r"(trial|run|cycle|episode|press|repeat|rep|test|versuch|element)(_?(id|no|nr|number))?",
+    "specimen": (
+        r"(specimen|material|coupon|silicone|elastomer|werkstoff)(_?(id|no|nr|number|name))?"
+        r"|sample_?(id|no|nr|number|name)"
+    ),
     "counter": r"(counter|frame|seq(uence)?|sample|index|n)",
 }
 """Meaning of a column by its name without the unit."""
 GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
 """Words that mark a length as measured beside the commanded one."""
+NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
+"""A number in a file's name: "run_0.2" and "run_1" are two runs of one kind."""
+SPECIMEN = re.compile(r"(?:specimen|spec|sample|material|coupon)[-_ ]?$", re.IGNORECASE)
+"""What stands in a path before the number of a specimen."""
 INSIDE = "::"
 """Between a file's path and the table inside it."""
 SHOWN = 30
@@ -48,9 +56,8 @@ def described(source: Path) -> tuple[dict[str, SourceTable], str]:
     tables: dict[str, SourceTable] = {}
     count: dict[str, int] = {}
     refused = []
-    for path in paths:
-        below = path.relative_to(source) if path != source else Path(path.name)
-        kind = re.sub(r"\d+", "#", below.with_suffix("").as_posix()) + below.suffix  # the 3 of .db3 counts nothing
+    below = [path.relative_to(source) if path != source else Path(path.name) for path in paths]
+    for path, kind in zip(paths, _kinds(below), strict=True):
         count[kind] = count.get(kind, 0) + 1
         if count[kind] > 1:
             continue
@@ -62,7 +69,8 @@ def described(source: Path) -> tuple[dict[str, SourceTable], str]:
         except Exception as error:  # a README beside the data is no error
             if is_one(source) and isinstance(error, TacdataError):
                 raise
-            refused.append(error.given if isinstance(error, TacdataError) else f"{kind}: {type(error).__name__}")
+            words = error.given if isinstance(error, TacdataError) else f"{kind}: {type(error).__name__}"
+            refused.append(words.removeprefix(f"{source}/"))
     if not tables:
         raise UsageError(
             f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
@@ -77,7 +85,15 @@ def described(source: Path) -> tuple[dict[str, SourceTable], str]:
         if len(table.columns) > SHOWN:
             lines.append(f"    and {len(table.columns) - SHOWN} more columns")
         lines += [f"    {note}" for note in table.notes]
+    lines += [f"not read: {text}" for text in refused]
     return tables, "\n".join(lines)
+
+
+def _kinds(paths: list[Path]) -> list[str]:
+    """Return the paths with # in place of numbers; a minus is part of the number where others have none there."""
+    kinds = [NUMBER.sub("#", path.with_suffix("").as_posix()) + path.suffix for path in paths]  # the 3 of .db3 stays
+    positive = set(kinds)
+    return [signed if (signed := kind.replace("-#", "#")) in positive else kind for kind in kinds]
 
 
 def _line(table: SourceTable, name: str) -> str:
@@ -141,7 +157,18 @@ def proposed_mapping(source: Path, tables: dict[str, SourceTable]) -> dict[str, 
                 document.setdefault("measured", {})[key] = entry
         if "trial" in found:
             document["trials"] = {"column": found["trial"][0]}
+        if specimen := _specimen(alias, aliases[alias], tables[aliases[alias]], found):
+            document.setdefault("press", {"specimen": specimen})
     return document
+
+
+def _specimen(alias: str, kind: str, table: SourceTable, roles: dict[str, list[str]]) -> dict[str, Any]:
+    """Return where a file says which specimen was pressed: in a column, or in its path; {} if nowhere."""
+    for name in roles.get("specimen", []):
+        if len({str(value) for value in table.columns[name].tolist() if value is not None}) > 1:
+            return {"file": alias, "column": name}
+    before = kind.partition(INSIDE)[0].split("#")[:-1]
+    return next(({"part": f"part{k}"} for k, text in enumerate(before) if SPECIMEN.search(text)), {})
 
 
 def _unit(table: SourceTable, name: str) -> str:
@@ -163,6 +190,9 @@ def _roles(table: SourceTable) -> dict[str, list[str]]:
     roles["depth"] = sorted(roles.get("depth", []), key=lambda name: bool(re.search(GAUGE, name.lower())))
     if not roles["depth"]:
         del roles["depth"]
+        if "x" in roles and not {"y", "z"} & set(roles):
+            # One axis only: it is the one that presses.
+            roles["depth"] = roles.pop("x")
     if "time" not in roles and table.columns and not any(re.search(r"[A-Za-z]", name) for name in table.columns):
         # Without a header, the first increasing column is most likely the time.
         for name in list(roles["channels"]):

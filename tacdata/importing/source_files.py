@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from tacdata import provenance
+from tacdata.documents import composed
 from tacdata.errors import FormatError, UsageError
-from tacdata.importing.units import composed
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,8 @@ class FileSet:
     """Value of each {part} of the paths."""
     paths: dict[str, Path] = field(default_factory=dict)
     """Name under ``files`` -> path."""
+    fault: FormatError | None = None
+    """Why the files are not complete."""
 
     @property
     def label(self) -> str:
@@ -61,7 +63,6 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
 
     Raises:
         UsageError: If the source does not exist or no file fits.
-        FormatError: If a trial lacks one of its files.
     """
     if not source.exists():
         raise UsageError(f"no file or folder {source}", "measured data", "check the path")
@@ -84,18 +85,19 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
     leading = max(keys, key=lambda name: len(keys[name]))
     sets = []
     for parts, _ in matches[leading]:
-        paths = {}
+        paths, fault = {}, None
         for name in files:
             fitting = [
                 p for own, p in matches[name] if all(parts.get(key, value) == value for key, value in own.items())
             ]
             if len(fitting) != 1:
-                raise FormatError(
+                fault = FormatError(
                     f"{len(fitting)} files {files[name]['path']} for {parts or 'the source'}", "exactly one",
                     "complete the source, or narrow the path with a {part} in the mapping",
                 )  # fmt: skip
+                break
             paths[name] = fitting[0]
-        sets.append(FileSet(parts, paths))
+        sets.append(FileSet(parts, paths, fault))
     return sets
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import axis, numbers, select, single
+from tacdata.importing.columns import axis, numbers, select, single, unit_of
 from tacdata.importing.formats.source_format import INNER, SourceTable
 from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import factor, plain, quantity_of, split_unit
@@ -186,7 +187,16 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
     if not whole.any():
         raise FormatError("position: no row has all of its numbers", "a position", "correct the columns or missing")
     kept = np.isfinite(stream.values).all(axis=1)
-    return replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept]), depth_given
+    notes = (*stream.notes, *_taken_as_mm(table, entry))
+    return replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept], notes=notes), depth_given
+
+
+def _taken_as_mm(table: SourceTable, entry: dict[str, Any]) -> Iterator[str]:
+    """Yield a remark for each column of a position whose unit neither the mapping nor the file gives."""
+    for key in ("x", "y", "z", "depth"):
+        if isinstance(given := entry.get(key), dict) and not unit_of(table, given, f"position: {key}"):
+            name = single(table, given["column"], f"position: {key}")
+            yield f"position: {name} has no unit and is taken in mm; else give unit under position/{key} in the mapping"
 
 
 def _measured(mapping: dict[str, Any], name: str, entry: dict[str, Any], tables: dict[str, SourceTable]) -> Stream:

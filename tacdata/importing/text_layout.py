@@ -8,26 +8,31 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
+from tacdata.documents import composed
 from tacdata.errors import FormatError
-from tacdata.importing.units import composed, split_unit
+from tacdata.importing.units import BRACKETED, OTHERS, plain, quantity_of, split_unit
 
 COMMENTS = ("#", "%", "//")
 SHEET_ERRORS = (
     "#N/A", "#DIV/0!", "#NAME?", "#NULL!", "#NUM!", "#REF!", "#VALUE!", "#SPILL!", "#CALC!", "#FIELD!", "#BLOCKED!",
-    "#CONNECT!", "#BUSY!", "#UNKNOWN!", "#GETTING_DATA", "#WERT!", "#ZAHL!", "#BEZUG!", "#NV",
+    "#CONNECT!", "#BUSY!", "#UNKNOWN!", "#GETTING_DATA", "#WERT!", "#ZAHL!", "#BEZUG!", "#NV", "#VALEUR!", "#NOMBRE!",
+    "#VALOR!", "#NUM.",
 )  # fmt: skip
 """What a spreadsheet writes for a cell without a value; it begins like a comment and is none."""
 MISSING = (
-    "", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "None", "-", "--", "---", "?", *SHEET_ERRORS,
+    "", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "n.a.", "null", "NULL", "(null)", "None", "<NA>", "NaT", "-",
+    "--", "---", "?", "-nan", "-nan(ind)", "nan(ind)", "1.#QNAN", "-1.#QNAN", "1.#IND", "-1.#IND", "1.#INF", "-1.#INF",
+    *(f"{sign}1.#{word}" for sign in ("", "-") for word in ("IND0", "IND00", "INF0", "INF00", "QNAN0", "QNB", "J")),
+    *(f"Err:{number}" for number in range(501, 541)), *("*" * width for width in range(3, 25)), *SHEET_ERRORS,
 )  # fmt: skip
-"""Texts that stand for a missing value in any file."""
+"""Texts that stand for a missing value in any file: C, LibreOffice, Fortran and spreadsheets write some of them."""
 DELIMITERS = ("\t", ";", ",", "|", " ")
 GUESSED = ("delimiter", "decimal")
 """Options of a mapping that can be told from the file instead."""
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(([.,' \u00a0\u202f])\d{3})(\2\d{3})*([.,]\d+)?")
 """A number with a sign between its thousands."""
-SAMPLE = 400
-"""Lines that are examined."""
+SAMPLE, TAIL = 2000, 100
+"""Lines that are examined, and the last of them, which tell the layout."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +65,16 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     Raises:
         FormatError: If there are no rows of one and the same number of columns.
     """
-    lines = text.splitlines()[:SAMPLE]
+    if not text.strip():
+        raise FormatError(f"{origin} is empty", "a text file of columns", "leave it out, or copy it again")
+    lines = text.split("\n")[:SAMPLE]  # splitlines would part lines at other signs, too, which counts rows wrongly
     skip = int(options.get("skip", 0))
     missing = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
     lines_of_data = [line for line in lines[skip:] if line.strip() and not is_comment(line, missing)]
     delimiter = {"tab": "\t", "space": " "}.get(options.get("delimiter", ""), options.get("delimiter"))
     delimiter = delimiter or _delimiter(lines_of_data)
     rows = [split(line, delimiter) for line in lines_of_data]
-    width = Counter(len(row) for row in rows[-max(len(rows) // 2, 1) :]).most_common(1)[0][0] if rows else 0
+    width = Counter(len(row) for row in rows[-_told(rows) :]).most_common(1)[0][0] if rows else 0
     decimal = options.get("decimal") or _decimal(rows)
     first = _first_row(rows, width, decimal)
     if first is None:
@@ -151,8 +158,13 @@ def is_number(field: str, decimal: str) -> bool:
     return "_" not in field
 
 
+def _told(lines: list[Any]) -> int:
+    """Return how many of the last lines tell the layout: no header reaches as far."""
+    return max(min(len(lines) // 2, TAIL), 1)
+
+
 def _delimiter(lines: list[str]) -> str:
-    tail = lines[-max(len(lines) // 2, 1) :]
+    tail = lines[-_told(lines) :]
     for delimiter in DELIMITERS:
         widths = Counter(len(split(line, delimiter)) for line in tail)
         width, count = widths.most_common(1)[0] if widths else (1, 0)
@@ -180,9 +192,13 @@ def _first_row(rows: list[list[str]], width: int, decimal: str) -> int | None:
     if not numeric:
         return None
     for number, row in enumerate(rows):
-        if len(row) != width or not all(is_number(row[k], decimal) for k in numeric):
+        if len(row) != width:
             continue
-        if any(row[k] not in MISSING for k in numeric):
+        told = [is_number(row[k], decimal) and row[k] not in MISSING for k in numeric]
+        # A word among the numbers of the first rows makes no header of them: one without numbers stands before.
+        above = rows[number - 1] if number else []
+        named = len(above) == width and not any(is_number(above[k], decimal) for k in numeric)
+        if any(told) and (all(is_number(row[k], decimal) for k in numeric) or (named and 2 * sum(told) >= len(told))):
             return number
     return None
 
@@ -192,8 +208,7 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
         return tuple(str(k) for k in range(width)), {}
     rows = [[*row, *[""] * (width - len(row))][:width] for row in header[-2:]]
     units: dict[str, str] = {}
-    # Two header lines: names, then units, if the second one looks like units throughout.
-    looks_like_units = len(rows) == 2 and all(len(field.strip("[]() ")) <= 8 for field in rows[1])
+    looks_like_units = len(rows) == 2 and all(rows[0][1:]) and _are_units(rows[1])
     titles = rows[0] if looks_like_units else rows[-1]
     names: list[str] = []
     for k, title in enumerate(titles):
@@ -205,6 +220,14 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
         if unit:
             units[name] = unit
     return tuple(names), units
+
+
+def _are_units(fields: list[str]) -> bool:
+    """Return whether a second header line gives units: short, and at least half of them in brackets or known."""
+    given = [field for field in fields if field]
+    known = [bool(re.fullmatch(BRACKETED, field)) or quantity_of(field) or plain(field).lower() in OTHERS
+             for field in given]  # fmt: skip
+    return all(len(field.strip("[]() ")) <= 8 for field in given) and 2 * sum(map(bool, known)) >= max(len(given), 1)
 
 
 def _kind(fields: list[str], decimal: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.columns import single
 from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.units import FACTORS, factor, plain, split_unit
+from tacdata.importing.units import FACTORS, clock_unit, factor, plain, split_unit
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0
 """Unix times between which a clock that does not say its zero is taken for Unix time [s]."""
@@ -21,6 +21,8 @@ DAY = 86_400.0
 """Length of a day [s]."""
 FASTEST = 100_000.0
 """Rows a second above which times are no times of a tactile sensor [Hz]: the unit is another one."""
+FASTEST_UNSAID, FASTEST_DATE, SLOWEST_UNSAID = 5000.0, 500.0, 1.0
+"""Between these rates times need no unit [Hz]. Numbers that could be dates in days have a lower bound above."""
 NO_UNIT = {"", "unix", "epoch", "posix", "utc", "gmt", "local", "time", "timestamp", "a.u.", "-"}
 """What stands in brackets behind a clock's name and is no unit (compared in lower case)."""
 
@@ -46,7 +48,7 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
     if isinstance(clock["column"], list):
         table, clock = _joined(table, clock, where)
     name = single(table, clock["column"], f"{where}: column")
-    unit = clock.get("unit") or plain(table.units.get(name) or split_unit(name)[1])
+    unit = clock.get("unit") or plain(table.units.get(name) or split_unit(name)[1] or clock_unit(name))
     values = table.column(name)
     if values.dtype == object and (clocked := _times_of_day(values)) is not None:
         return _shifted(clocked, clock), clock.get("zero", "shared")
@@ -56,11 +58,12 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
         return _of_days(values, unit, clock), clock.get("zero", "unix")
     if unit.lower() in NO_UNIT:
         unit = _guessed(values)
-        _refuse_days(values, unit, f"{where}: {name}")
+        _refuse_unsaid(values, unit, f"{where}: {name}")
     zero = clock.get("zero")
     scale = factor(unit, "s", f"{where}: {name}")
     if scale == DAY and (dated := _dated(values)):
         return _of_days(values, dated, clock), clock.get("zero", "unix")
+    _refuse_fast(values, unit, scale, f"{where}: {name}")
     middle = float(np.nanmedian(values.astype(float))) * scale if len(values) else 0.0
     looks_unix = YEAR_2000 < middle < YEAR_2100
     if zero == "unix" and not looks_unix:
@@ -116,40 +119,74 @@ def _dated(values: np.ndarray) -> str | None:
     return next((n for n, zero in DAY_ZERO.items() if YEAR_2000 < (middle - zero) * DAY < YEAR_2100), None)
 
 
-def _refuse_days(values: np.ndarray, unit: str, where: str) -> None:
-    """Refuse times without a unit that are days by all appearance: as seconds they would come too fast.
+def _refuse_unsaid(values: np.ndarray, unit: str, where: str) -> None:
+    """Refuse times without a unit that in seconds would come too fast or too slowly.
 
     Raises:
         FormatError: Saying which unit the mapping may give.
     """
-    steps = np.diff(values.astype(float))
-    steps = steps[np.isfinite(steps) & (steps > 0)]
-    if not len(steps) or 1 / (np.median(steps) * FACTORS["s"][unit]) <= FASTEST:
+    steps = _steps(values)
+    middle = float(np.nanmedian(values.astype(float))) if len(values) else 0.0
+    if not len(steps) or unit != "s" or YEAR_2000 < middle < YEAR_2100:
+        return  # the values themselves say that they are Unix times
+    rate, dated = float(1 / (np.median(steps) * FACTORS["s"][unit])), _dated(values)
+    if SLOWEST_UNSAID < rate <= (FASTEST_DATE if dated else FASTEST_UNSAID):
         return
-    rate = 1 / (np.median(steps) * FACTORS["s"][unit])
-    dated = _dated(values)
-    next_ = f"unit: {dated}" if dated else "unit: d, or whichever it is"
     like = {"datenum": "MATLAB's datenum", "excel": "Excel's serial time"}.get(dated or "", "days, for example")
+    fitting = [u for u in ("ms", "us", "ns", "min", "h", "d") if 2 < 1 / (np.median(steps) * FACTORS["s"][u]) <= 2000]
+    if rate > SLOWEST_UNSAID and dated:
+        fitting = [dated]
+    step = f"the rows come at {rate:.3g} Hz" if rate > SLOWEST_UNSAID else f"a row comes every {1 / rate:.6g} s"
     raise FormatError(
-        f"{where}: no unit is given, and read in {unit} the rows come at {rate:.3g} Hz",
-        f"times at no more than {FASTEST:.0f} Hz, or their unit ({like} counts days)" if dated
-        else f"times at no more than {FASTEST:.0f} Hz, or their unit",
-        f"give {next_} under time in the mapping",
+        f"{where}: no unit is given, and read in {unit} {step}",
+        f"{SLOWEST_UNSAID:g} to {FASTEST_UNSAID:g} Hz, or a unit"
+        + (f" ({like} counts days)" if rate > SLOWEST_UNSAID and dated else ""),
+        f"give unit: {' or '.join([*fitting, *([unit] if rate <= FASTEST else [])])} under time in the mapping; "
+        "of a counter of rows give time: {rate: HZ}",
+    )
+
+
+def _refuse_fast(values: np.ndarray, unit: str, scale: float, where: str) -> None:
+    """Refuse times that come too fast in the unit that is given. Bursts are left alone: the mean counts.
+
+    Raises:
+        FormatError: Saying which unit would fit.
+    """
+    known = values.astype(float)
+    known = known[np.isfinite(known)]
+    span = float(known.max() - known.min()) * scale if len(known) else 0.0
+    if span <= 0 or (len(known) - 1) / span <= FASTEST:
+        return
+    dated = _dated(values)
+    raise FormatError(
+        f"{where}: in {unit} the rows come at {(len(known) - 1) / span:.3g} Hz",
+        f"times at no more than {FASTEST:.0f} Hz",
+        f"correct unit under time in the mapping, to {dated or 'd'} for example",
     )  # fmt: skip
 
 
+def _steps(values: np.ndarray) -> np.ndarray:
+    steps = np.diff(values.astype(float))
+    return steps[np.isfinite(steps) & (steps > 0)]
+
+
 def _times_of_day(values: np.ndarray) -> np.ndarray | None:
-    """Return seconds since the first midnight [s], shape (n,), of texts like 12:34:56.789; None for other texts."""
-    known = [text for text in values.tolist() if text is not None]
-    if not known or not all(re.fullmatch(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?", str(text).strip()) for text in known):
+    """Return seconds since the first midnight [s], shape (n,), of texts like 12:34:56.789; None for other texts.
+
+    Excel shows times as 34:56.7 and begins again every hour: seconds are then counted from the first one.
+    """
+    known = [str(text).strip() for text in values.tolist() if text is not None]
+    forms = {r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?": 86_400, r"\d{1,2}:\d{2}[.,]\d+": 3600}
+    turn = next((turn for form, turn in forms.items() if all(re.fullmatch(form, text) for text in known)), 0)
+    if not known or not turn:
         return None
     seconds = np.full(len(values), np.nan)
     for row, text in enumerate(values.tolist()):
         if text is not None:
-            hours, minutes, rest = str(text).strip().replace(",", ".").split(":")
-            seconds[row] = 3600 * int(hours) + 60 * int(minutes) + float(rest)
-    back = np.diff(seconds, prepend=seconds[0]) < -43_200
-    return seconds + 86_400 * np.cumsum(back)
+            *hours, minutes, rest = str(text).strip().replace(",", ".").split(":")
+            seconds[row] = 3600 * int(hours[0] if hours else 0) + 60 * int(minutes) + float(rest)
+    back = np.diff(seconds, prepend=seconds[0]) < -turn / 2
+    return seconds + turn * np.cumsum(back)
 
 
 DATES = (

@@ -3,47 +3,56 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 
 from tacdata.errors import FormatError
 
 GRAVITY = 9.80665
 """Standard gravity [m/s^2]: a load cell in grams was calibrated with weights (CGPM 1901)."""
 FACTORS: dict[str, dict[str, float]] = {
-    "mm": {
-        "m": 1e3, "dm": 100.0, "cm": 10.0, "mm": 1.0, "um": 1e-3, "micron": 1e-3, "microns": 1e-3, "nm": 1e-6,
-        "in": 25.4, "inch": 25.4, "mil": 0.0254,
-    },
+    "mm": {"m": 1e3, "dm": 100.0, "cm": 10.0, "mm": 1.0, "um": 1e-3, "nm": 1e-6, "in": 25.4, "mil": 0.0254,
+           "ft": 304.8},
     "N": {
-        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "g": GRAVITY * 1e-3, "gf": GRAVITY * 1e-3, "kg": GRAVITY,
-        "kgf": GRAVITY, "lbf": 4.4482216152605, "lb": 4.4482216152605, "cN": 1e-2,
+        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "cN": 1e-2, "g": GRAVITY * 1e-3, "gf": GRAVITY * 1e-3,
+        "kg": GRAVITY, "kgf": GRAVITY, "lbf": 4.4482216152605, "lb": 4.4482216152605, "ozf": 0.27801385095378125,
     },
-    "s": {
-        "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0,
-        "sec": 1.0, "secs": 1.0, "second": 1.0, "msec": 1e-3, "msecs": 1e-3, "millis": 1e-3, "millisecond": 1e-3,
-        "milliseconds": 1e-3, "usec": 1e-6, "usecs": 1e-6, "micros": 1e-6, "microsecond": 1e-6, "microseconds": 1e-6,
-        "nsec": 1e-9, "nsecs": 1e-9, "nanos": 1e-9, "nanosecond": 1e-9, "nanoseconds": 1e-9,
-        "mins": 60.0, "minute": 60.0, "minutes": 60.0, "hr": 3600.0, "hrs": 3600.0, "hour": 3600.0, "hours": 3600.0,
-        "day": 86_400.0, "days": 86_400.0,
-    },
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0},
     "mm/s": {"mm/s": 1.0, "mm/min": 1 / 60, "um/s": 1e-3, "m/s": 1e3, "cm/s": 10.0},
     "deg": {"deg": 1.0, "rad": 57.29577951308232},
 }  # fmt: skip
 """Our unit -> the units that can be converted to it, and the factor."""
+_LENGTHS = ("", "milli", "micro", "nano", "centi")
+SPELLED = {
+    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("usec", "usecs", "micros", "microsec", "microsecs", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"), "ns"),
+    **dict.fromkeys(("mins", "minute", "minutes"), "min"),
+    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"), "day": "d", "days": "d",
+    **{f"{size}met{end}": unit for size, unit in zip(_LENGTHS, ("m", "mm", "um", "nm", "cm"), strict=True)
+       for end in ("er", "ers", "re", "res")},
+    "micron": "um", "microns": "um", "inch": "in", "inches": "in", "mils": "mil", "thou": "mil",
+    "foot": "ft", "feet": "ft",
+    "newton": "N", "newtons": "N", "millinewton": "mN", "millinewtons": "mN", "kilonewton": "kN", "gram": "g",
+    "grams": "g", "kilogram": "kg", "kilograms": "kg", "kp": "kgf", "lbs": "lb", "oz": "ozf",
+    "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "mm/sec": "mm/s", "m/sec": "m/s",
+}  # fmt: skip
+"""Other spellings, in lower case -> the unit."""
+SCALE = re.compile(
+    r"[x\u00d7*]?\s*(?:10\^?([-+]\d+)|(1/)?(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?))\s*[*x\u00b7\u00d7]?\s*([^\d\s].*)"
+)
+"""A number before a unit, as a counter's step has one: "10 ms", "0.1 um", "1/20 s", "10^-3 s"."""
+WIDE_BRACKETS = str.maketrans("\uff08\uff09\uff3b\uff3d\u3010\u3011\uff5b\uff5d", "()[][]{}")
+"""Brackets of Chinese and Japanese programs, and ours."""
+BRACKETED = r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*"
 OTHERS = {"pf", "ff", "nf", "v", "mv", "uv", "count", "counts", "lsb", "adc", "ut", "mt", "gauss", "kpa", "pa", "mpa",
           "degc", "c", "k", "ohm", "kohm", "a", "ma", "hz", "1", "raw", "%"}  # fmt: skip
 """Units that are recognized behind a column's name but not converted."""
 
 
-def composed(text: str) -> str:
-    """Return a text in Unicode's composed form (NFC): some systems write an umlaut as two characters."""
-    return unicodedata.normalize("NFC", text)
-
-
 def plain(unit: str) -> str:
     """Return a unit's name in ASCII, as the tables have it."""
-    name = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg")
-    return "s" if name == "seconds" else name
+    name = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg").rstrip(".")
+    return SPELLED.get(name.lower(), name)
 
 
 def factor(unit: str, wanted: str, origin: str) -> float:
@@ -52,17 +61,25 @@ def factor(unit: str, wanted: str, origin: str) -> float:
     Raises:
         FormatError: If the unit is none of those that can be converted to it.
     """
-    table = FACTORS[wanted]
-    name = plain(unit)
+    found = _factor(unit, wanted)
+    if found is None:
+        raise FormatError(f"{origin}: unit {unit!r}", ", ".join(FACTORS[wanted]), "correct the unit in the mapping")
+    return found
+
+
+def _factor(unit: str, wanted: str) -> float | None:
+    table, name = FACTORS[wanted], plain(unit)
     if name in table:
         return table[name]
-    lowered = {key.lower(): value for key, value in table.items() if key != "mN"}
-    if name.lower() in lowered and wanted != "N":
-        return lowered[name.lower()]
-    # A counter's step: "10 ms", "0.1 um".
-    if match := re.fullmatch(r"(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[*x]?\s*([^\d\s].*)", name):
-        return float(match[1]) * factor(match[2], wanted, origin)
-    raise FormatError(f"{origin}: unit {unit!r}", ", ".join(table), "correct the unit in the mapping")
+    # Capitals tell mN from MN and nothing else.
+    if wanted != "N" and (value := {key.lower(): value for key, value in table.items()}.get(name.lower())):
+        return value
+    if match := SCALE.fullmatch(name):
+        power, over, number, rest = match.groups()
+        steps = 10.0 ** int(power) if power else 1 / float(number) if over and float(number) else float(number)
+        inner = _factor(rest, wanted)
+        return None if inner is None else steps * inner
+    return None
 
 
 def quantity_of(unit: str) -> str | None:
@@ -71,12 +88,35 @@ def quantity_of(unit: str) -> str | None:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Return a column's name without its unit, and the unit, as in "Fz [N]", "Fz (N)", "Fz / N" or "fz_N"."""
-    if match := re.fullmatch(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*", name):
-        return match[1].strip(), (match[2] or match[3] or "").strip()
-    match = re.fullmatch(r"(.+?)\s*[/_ ]\s*([A-Za-z\u00b5\u03bc%]+)", name)
-    # Without brackets a lone "d" is a name (depth, distance), no unit of days.
-    if not match or match[2] == "d":
-        return name, ""
-    known = quantity_of(match[2]) or plain(match[2]).lower() in OTHERS - {"c", "k", "a", "v", "1"}
-    return (match[1].strip(), match[2]) if known else (name, "")
+    """Return a column's name without its unit, and the unit.
+
+    As in "Fz [N]", "Fz (N)", "Fz {N}", "Fz / N", "fz_N", "Fz, N", "t [ms] since start" or "timeMs".
+    """
+    name = name.translate(WIDE_BRACKETS)
+    if match := re.fullmatch("(.*?)" + BRACKETED, name):
+        return match[1].strip(), next((text for text in match.groups()[1:] if text), "").strip()
+    for match in re.finditer(BRACKETED, name):
+        unit = next((text for text in match.groups() if text), "").strip()
+        if quantity_of(unit):
+            return f"{name[: match.start()]} {name[match.end() :]}".strip(), unit
+    if match := re.fullmatch(r"(.+?)\s*[/_ ,;|]\s*([A-Za-z\u00b5\u03bc%]+)", name):
+        known = quantity_of(match[2]) or plain(match[2]).lower() in OTHERS - {"c", "k", "a", "v", "1"}
+        # Without brackets a lone "d" is a name (depth, distance), no unit of days.
+        return (match[1].strip(), match[2]) if known and match[2] != "d" else (name, "")
+    if match := re.fullmatch(r"(.+?)\s*[-.:]\s*([A-Za-z\u00b5]{2,})", name) or re.fullmatch(
+        r"(.*[a-z\d])((?:Ms|Us|Ns|Mm|Um|Sec|Msec|Usec|Millis|Micros|Nanos|Seconds))", name
+    ):
+        hump = name[match.start(2) - 1].isalnum()
+        unit = plain(match[2].lower() if hump or match[2].lower() in SPELLED else match[2])
+        # "min" and "in" behind a point are rather a minimum and an input.
+        return (match[1].strip(), unit) if quantity_of(unit) and unit not in ("min", "in") else (name, "")
+    return name, ""
+
+
+def clock_unit(name: str) -> str:
+    """Return the unit of time that stands anywhere in a clock's name: "millis", "ms_rel", "time_10ms"; "" if none."""
+    if _factor(bare := name.strip().removesuffix("()"), "s") and len(bare) > 1:
+        return bare
+    words = re.findall(r"\d+(?:\.\d+)?[A-Za-z]+|[A-Za-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name))
+    found = [word for word in words if len(word) > 1 and word.lower() != "min" and _factor(word.lower(), "s")]
+    return found[0] if len(found) == 1 else ""

@@ -51,6 +51,11 @@ class Cylinder(Indenter):
         """Distance [mm] of the end corners (before rounding, an upper bound) from the vertical axis."""
         return float(np.hypot(self.length / 2, self.radius))
 
+    @property
+    def height(self) -> float:
+        """The diameter [mm]."""
+        return 2 * self.radius
+
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return R - sqrt(s^2 - y^2) [mm], s the section's radius at x: R, less in the fillets."""
         e = self.edge_radius

@@ -41,6 +41,11 @@ class Ellipsoid(Indenter):
         """The longer horizontal semi-axis [mm]."""
         return max(self.a, self.b)
 
+    @property
+    def height(self) -> float:
+        """The vertical axis [mm]."""
+        return 2 * self.c
+
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return c - c sqrt(1 - x^2/a^2 - y^2/b^2) [mm]."""
         inside = 1 - (x / self.a) ** 2 - (y / self.b) ** 2

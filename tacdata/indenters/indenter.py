@@ -126,6 +126,11 @@ class Indenter(ABC):
     def extent(self) -> float:
         """Largest horizontal distance [mm] of the solid from its axis."""
 
+    @property
+    def height(self) -> float:
+        """Height of the upright solid [mm]; ``inf`` where it goes on upward without end. A press cannot be deeper."""
+        return np.inf
+
     def surface(self, height: float = 6.0) -> trimesh.Trimesh:
         """Return a surface for pictures [mm, indenter frame], cut at ``height`` [mm].
 

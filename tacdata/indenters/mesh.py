@@ -13,7 +13,7 @@ from tacdata import provenance
 from tacdata.errors import FormatError
 from tacdata.indenters.indenter import Indenter, warp
 from tacdata.surfaces import store
-from tacdata.surfaces.solid import Solid, solid
+from tacdata.surfaces.solid import TOP, Solid, solid
 
 if TYPE_CHECKING:
     import trimesh
@@ -24,6 +24,8 @@ SHAPES = Path(__file__).parent / "shapes"
 
 _SMALLEST, _LARGEST = 0.2, 200.0
 """Smallest and largest extent of a solid [mm]; others are files in another unit."""
+_UNITS = {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0, "micrometres": 1e-3}
+"""Other units of surface files [mm]."""
 _OFF_AXIS = 0.02
 """Minimum distance of the press axis from the border of the bounding box, over the box's size [1]."""
 
@@ -122,6 +124,12 @@ class Mesh(Indenter):
         vertices = np.asarray(self.solid.mesh.vertices)
         return 1.005 * float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
 
+    @property
+    def height(self) -> float:
+        """Height of the solid [mm]; a tall one goes on as a column (`tacdata.surfaces.solid.TOP`)."""
+        top = float(self.solid.mesh.bounds[1, 2])
+        return top if top < TOP else np.inf
+
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the height at which vertical lines first meet the solid [mm]: sphere tracing, then bisection."""
         grid, top = self.solid.grid, float(self.solid.mesh.bounds[1, 2])
@@ -217,10 +225,12 @@ def _check_size(body: Solid, indenter: Mesh, origin: str) -> None:
     extents = np.asarray(body.mesh.extents)
     if extents.max() < _SMALLEST or extents.min() > _LARGEST or extents.max() > 10 * _LARGEST:
         size = " x ".join(f"{v:.3g}" for v in extents)
-        guess = 1000 * indenter.scale if extents.max() < _SMALLEST else indenter.scale / 1000
+        fitting = [f"{scale * indenter.scale:g} ({unit})" for unit, scale in _UNITS.items()
+                   if _SMALLEST <= scale * extents.max() <= _LARGEST]  # fmt: skip
         raise FormatError(
             f"{origin}: {indenter.file} is {size} mm with scale {indenter.scale:g}",
-            f"an indenter of {_SMALLEST:g} to {_LARGEST:g} mm", f"is it in another unit? try scale: {guess:g}",
+            f"an indenter of {_SMALLEST:g} to {_LARGEST:g} mm",
+            "if the file is in another unit, give scale: " + (" or ".join(fitting) or "its unit in mm"),
         )
 
 
@@ -233,9 +243,10 @@ def _check_axis(body: Solid, indenter: Mesh, origin: str) -> None:
     inset = _OFF_AXIS * (high - low)
     if np.any(low + inset > 0) or np.any(high - inset < 0):
         middle = (low + high) / 2
+        away = ", ".join(f"{0.0 - m:.4g}" for m in np.round(middle, 6))
         raise FormatError(
             f"{origin}: {indenter.file} spans x {low[0]:.4g} to {high[0]:.4g} mm and y {low[1]:.4g} to {high[1]:.4g} "
             f"mm: the press axis, x = y = 0, passes beside it",
             "a solid around the z axis, along which it is pressed",
-            f"move it by ({-middle[0]:.4g}, {-middle[1]:.4g}) mm in the CAD file, or wherever its tip's axis is",
+            f"move it by ({away}) mm in the CAD file, or wherever its tip's axis is",
         )

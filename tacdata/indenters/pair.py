@@ -106,6 +106,11 @@ class Pair(Indenter):
         """How far the solid that reaches farther lies from the holder's axis [mm]."""
         return self.distance / 2 + max(self.first.extent, self.second.extent)
 
+    @property
+    def height(self) -> float:
+        """Height of the lower solid [mm]."""
+        return min(self.first.height, self.second.height)
+
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the lower of the two profiles [mm]."""
         half = self.distance / 2

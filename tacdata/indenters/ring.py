@@ -49,6 +49,11 @@ class Ring(Indenter):
         """The outer radius [mm]."""
         return self.ring_radius + self.tube_radius
 
+    @property
+    def height(self) -> float:
+        """The diameter of the tube [mm]."""
+        return 2 * self.tube_radius
+
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return t - sqrt(t^2 - (r - R)^2) [mm]; ``inf`` in the hole too."""
         t = self.tube_radius

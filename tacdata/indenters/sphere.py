@@ -46,6 +46,11 @@ class Sphere(Indenter):
         """The radius [mm]."""
         return self.radius
 
+    @property
+    def height(self) -> float:
+        """The diameter [mm]."""
+        return 2 * self.radius
+
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return R - sqrt(R^2 - r^2) [mm]."""
         inside = self.radius**2 - x**2 - y**2

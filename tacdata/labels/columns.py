@@ -21,6 +21,7 @@ REQUIRED = {
 }
 """Unit, type and kind of each column that every label has; the first axis is the frames."""
 OPTIONAL = {
+    "traction": ("MPa", "float16", "vector map"),
     "interpolation_error": ("mm", "float32", "frame"),
     "uncertainty": ("mm", "float16", "map"),
     "force_uncertainty": ("N", "float32", "vector"),
@@ -33,7 +34,7 @@ OPTIONAL = {
 ALL = {**REQUIRED, **OPTIONAL}
 UNITS = {name: unit for name, (unit, _, _) in ALL.items()}
 DTYPES = {name: dtype for name, (_, dtype, _) in ALL.items()}
-NDIM = {"frame": 1, "vector": 2, "taxels": 2, "map": 3}
+NDIM = {"frame": 1, "vector": 2, "taxels": 2, "map": 3, "vector map": 4}
 
 
 def present(label: Label) -> tuple[str, ...]:
@@ -43,7 +44,7 @@ def present(label: Label) -> tuple[str, ...]:
 
 def shape(name: str, frames: int, pixels: tuple[int, int], taxels: int) -> tuple[int, ...]:
     """Return a column's shape."""
-    kinds = {"frame": (), "vector": (3,), "taxels": (taxels,), "map": pixels}
+    kinds = {"frame": (), "vector": (3,), "taxels": (taxels,), "map": pixels, "vector map": (3, *pixels)}
     return (frames, *kinds[ALL[name][2]])
 
 

@@ -17,7 +17,7 @@ class PathSolution:
     surface: np.ndarray
     """Undeformed minus deformed height of the outer face at the pixel centres [mm], shape (k, pixels_x, pixels_y).
 
-    Signed: bulging is negative."""
+    Signed: bulging is negative. Where the skin touches the indenter, the height is that of the indenter's surface."""
     taxel_force: np.ndarray
     """Normal force carried by each protrusion [N], shape (k, taxels)."""
     taxel_closure: np.ndarray
@@ -35,9 +35,13 @@ class PathSolution:
     residual: np.ndarray
     """Norm of the out-of-balance force over the contact force [1], shape (k,)."""
     penetration: np.ndarray
-    """Largest penetration of the indenter at a contact point [mm], shape (k,)."""
+    """Largest penetration of the indenter, as a mean under the hat of a contact node [mm], shape (k,)."""
     provenance: dict[str, Any]
     """What made it: key, sensor, material law, mesh, solver settings, code version, seconds."""
+    traction: np.ndarray | None = None
+    """Contact force on the indenter by area of the map, seen from above [MPa], shape (k, 3, pixels_x, pixels_y): z is
+    pressure where the face is level, x and y are shear. Times a pixel's area it sums to ``force``. None in files of
+    older releases."""
     uncertainty: np.ndarray | None = None
     """One standard deviation of ``surface`` by the spreads that the sensor file states [mm], shape (k, pixels_x,
     pixels_y); None if it states none or none was asked for. So are the three below."""
@@ -70,7 +74,7 @@ class Label:
     signed: np.ndarray
     """Undeformed minus deformed height of the outer face [mm], shape (n, pixels_x, pixels_y), float32.
 
-    Signed: bulging is negative."""
+    Signed: bulging is negative. Where the skin touches the indenter, the height is that of the indenter's surface."""
     taxel_force: np.ndarray
     """Normal force carried by each protrusion [N], shape (n, taxels), float32."""
     taxel_closure: np.ndarray
@@ -90,6 +94,9 @@ class Label:
     """Estimated numerical error of ``force``, all components together [N], shape (n,), float32; made up alike."""
     provenance: dict[str, Any]
     """What made it: recording, path solution, sensor, code."""
+    traction: np.ndarray | None = None
+    """Contact force on the indenter by area of the map, seen from above [MPa], shape (n, 3, pixels_x, pixels_y),
+    float16: z is pressure where the face is level, x and y are shear. None in labels of older releases."""
     interpolation_error: np.ndarray | None = None
     """How far, at the pixel where it is most, the states beside each frame lie from what their neighbours say of them
     [mm], shape (n,), float32. A state is left out at twice the distance, so this bounds what is lost at the frame."""

@@ -87,7 +87,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
 
     Args:
         path: The file.
-        names: Columns that every label has (`columns.REQUIRED`).
+        names: Columns; those that not every label has (`columns.OPTIONAL`) are left out where this one lacks them.
 
     Raises:
         UsageError: If it does not exist.
@@ -125,8 +125,9 @@ def map_batches(path: Path, name: str, rows: int) -> Iterator[np.ndarray]:
 
 def _arrays(file: pq.ParquetFile, path: Path, names: Sequence[str]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     header = _checked(file, path)
+    names = [name for name in names if name not in columns.OPTIONAL or name in file.schema_arrow.names]
     try:
-        table = file.read(columns=list(names))
+        table = file.read(columns=names)
     except (pa.ArrowException, OSError) as error:
         raise _damaged(path, error) from None
     size = (header["frames"], (header["pixels_x"], header["pixels_y"]), header["taxels"])

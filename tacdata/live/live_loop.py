@@ -16,7 +16,7 @@ PATIENCE = 0.05
 """Timeout of a read [s of the host's clock]."""
 LATE = 2.0
 """A frame that waited longer [frame periods] is estimated only if no newer one is there."""
-TOUCHED = "the skin was touched while it was tared; lift what touches it and tare again"
+TOUCHED = "the skin was touched while it was tared; lift what touches it and tare again (Enter, or tare on the socket)"
 """What a reading below the tare means."""
 SAID_EVERY = 1.0
 """Interval between status lines for a person [s of real time]."""
@@ -47,6 +47,8 @@ class LiveLoop:
         self.skipped = 0
         """Estimates left out because computing did not keep up."""
         self._stopped = self._tare_wanted = False
+        if server is not None:
+            server.tare = self.tare
 
     def tare(self) -> None:
         """Tare again before the next frame; safe in any thread."""

@@ -1,10 +1,14 @@
-"""Sends one line of JSON per estimate to every reader of a socket (`schemas/live_message.schema.json`); never waits."""
+"""Sends one line of JSON per estimate to every reader of a socket (`schemas/live_message.schema.json`); never waits.
+
+A reader may write a line `tare`, which tares anew.
+"""
 
 from __future__ import annotations
 
 import json
 import socket
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -13,6 +17,8 @@ from tacdata.errors import UsageError
 from tacdata.live.depth_stream import Estimate
 
 LOOPBACK = "127.0.0.1"
+TARE = b"tare"
+"""What a reader writes to have the skin tared anew."""
 WAITING = 4
 """Messages that wait for a slow reader; beyond that the oldest are dropped [count]."""
 
@@ -62,6 +68,8 @@ class MessageServer:
         self.port: int = self._socket.getsockname()[1]
         self._readers: list[_Reader] = []
         self._closed = False
+        self.tare: Callable[[], None] = lambda: None
+        """Called, in a thread of its own, when a reader asks for taring."""
         self._thread = threading.Thread(target=self._accept, name="live-messages", daemon=True)
         self._thread.start()
 
@@ -94,20 +102,21 @@ class MessageServer:
                 connection, _ = self._socket.accept()
             except OSError:
                 return
-            self._readers.append(_Reader(connection))
+            self._readers.append(_Reader(connection, lambda: self.tare()))
 
 
 class _Reader:
     """One connection with a thread of its own: a controller that stalls must not delay the others."""
 
-    def __init__(self, connection: socket.socket) -> None:
-        self.alive = True
+    def __init__(self, connection: socket.socket, tare: Callable[[], None]) -> None:
+        self.alive, self._tare = True, tare
         self._connection, self._lines = connection, []
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         # A large buffer would give old messages to a slow reader.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 32768)
         self._changed = threading.Condition()
-        threading.Thread(target=self._write, name="live-reader", daemon=True).start()
+        for part in (self._write, self._listen):
+            threading.Thread(target=part, name="live-reader", daemon=True).start()
 
     def offer(self, line: bytes) -> None:
         with self._changed:
@@ -121,6 +130,13 @@ class _Reader:
         with suppress(OSError):
             self._connection.shutdown(socket.SHUT_RDWR)
         self._connection.close()
+
+    def _listen(self) -> None:
+        # A reader that closes only its writing side still gets its messages.
+        with suppress(OSError), self._connection.makefile("rb") as lines:
+            for line in lines:
+                if line.strip() == TARE:
+                    self._tare()
 
     def _write(self) -> None:
         while self.alive:

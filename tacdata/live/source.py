@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from tacdata import documents
 from tacdata.clock import Clock
 from tacdata.demonstrations.recording.rig import read_demo_rig
@@ -44,11 +42,8 @@ def touched_board(path: Path, finger: str | None, assumed: Sensor) -> Source:
     """
     if not path.is_file():
         raise UsageError(f"no file {path}", "a rig or demo rig file", "check the path")
-    try:
-        parsed = documents.parsed(path.read_text(), str(path))
-    except (yaml.YAMLError, UnicodeDecodeError):
-        parsed = None  # the rig reader describes what is wrong
-    if isinstance(parsed, dict) and "boards" in parsed:
+    content = documents.content_of(path, "rig")
+    if isinstance(content, dict) and "boards" in content:
         demo = read_demo_rig(path)
         name = finger or next(iter(demo.boards), "")
         if name not in demo.boards:

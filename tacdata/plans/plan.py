@@ -9,6 +9,7 @@ from typing import Any
 from tacdata import documents
 from tacdata.errors import FormatError
 from tacdata.indenters import Indenter, from_document
+from tacdata.plans.beside_skin import check_touch
 from tacdata.sensor import Sensor
 
 
@@ -199,6 +200,9 @@ class Plan:
                         f"-{size / 2:g} to {size / 2:g} mm",
                         f"move the press or enlarge skin/size_{axis}",
                     )
+            if press.deepest > 0 and press.tilt_x == press.tilt_y == 0:
+                size = sensor.skin.size_x, sensor.skin.size_y
+                check_touch(press.indenter, size, (press.x, press.y), press.yaw, press.deepest, where)
 
 
 def _press(index: int, entry: dict[str, Any], indenter: Indenter, motion: MotionSettings) -> Press:

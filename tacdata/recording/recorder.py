@@ -20,7 +20,7 @@ from tacdata.recording.live.ending import ending, on_disk
 from tacdata.recording.live.guarded_motion import WATCH, GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
-from tacdata.recording.live.lost_position import Ask, require_found, require_free, why_lost
+from tacdata.recording.live.lost_position import Ask, guard_homing, require_found, why_lost
 from tacdata.recording.live.reading_health import BadReadings
 from tacdata.recording.live.rig_devices import RigDevices, require_channels
 from tacdata.recording.live.rig_streams import RigStreams
@@ -45,7 +45,7 @@ from tacdata.sensor import Sensor
 FIRST_FRAME = 5.0
 """Time allowed for the streams to begin [s of real time]."""
 FIRST_SEARCH = 20.0
-"""Time that the motion waits for the tag detector to load [s of real time]; then it starts without."""
+"""Time for the tag detector to load [s of real time]; then the motion starts without."""
 
 
 class Recorder:
@@ -129,11 +129,12 @@ class Recorder:
         except BaseException as error:
             if isinstance(error, BadReadings) and self._paused(error):
                 return self.run(lambda summary: True)
+            self._interruption.last_words()
             lost = self.devices.cnc.position_lost
             with suppress(TacdataError):  # the fault itself must be reported first
                 if lost and self.out.exists():
                     lose_position(read_session(self.out), lost)
-            error.add_note(self._ending(lost, error))
+            error.add_note(self._ending(lost or self._remembered_loss(), error))
             raise
 
     def _paused(self, error: BadReadings) -> bool:
@@ -153,8 +154,8 @@ class Recorder:
     def _open_and_record(
         self, session: Session | None, wanted: tuple[int, ...], confirm: Callable[[Preflight], bool]
     ) -> Session:
-        if session:  # earlier presses may have left the tip in the skin
-            self.devices.cnc.before_homing = lambda why=session.position_lost: require_free(why, self._ask)
+        remembered = session.position_lost if session else ""
+        guard_homing(self.devices.cnc, self._ask, remembered, session is not None)
         with self.devices.opened() as devices:
             cnc = devices.cnc
             limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))
@@ -162,7 +163,6 @@ class Recorder:
             summary = preflight(self.plan, self.sensor, self.rig, limits, wanted, *bounds, self._tap)
             if not confirm(summary):
                 raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
-            remembered = session.position_lost if session else ""
             require_found(why_lost(cnc, remembered, session is not None), self._height, self._ask)
             session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
             session = find_position(session)
@@ -179,6 +179,12 @@ class Recorder:
                     raise
             session = refresh(session)
         return session
+
+    def _remembered_loss(self) -> str:
+        """Return why an earlier run lost the position, which was not found since; empty if none did."""
+        with suppress(TacdataError):
+            return read_session(self.out).position_lost if self.out.exists() else ""
+        return ""
 
     def _ending(self, lost: str, error: BaseException) -> str:
         again = "the same command" + (" with --resume" if self.out.exists() else "")

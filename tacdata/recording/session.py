@@ -10,9 +10,10 @@ from typing import Any
 
 import schemas
 from tacdata import documents, provenance
-from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.errors import DeviceError, FormatError, TacdataError, UsageError
 from tacdata.plans import Plan
 from tacdata.recording.files import file_names
+from tacdata.recording.files.reader import read_recording
 from tacdata.sensor import Sensor
 
 FILE = "session.json"
@@ -85,8 +86,9 @@ def read_session(folder: Path) -> Session:
     found = file_names.finished(folder)
     missing = [entry["file"] for entry in document["episodes"] if not (folder / entry["file"]).is_file()]
     if missing:
+        others = f" and {len(missing) - 3} others" if len(missing) > 3 else ""
         raise FormatError(
-            f"{origin} names {', '.join(missing)}, not in {folder}",
+            f"{origin} names {', '.join(missing[:3])}{others}, not in {folder}",
             "every finished recording beside its session.json",
             "put the files back, or remove their entries",
         )
@@ -138,6 +140,8 @@ def create_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
 def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]) -> Session:
     """Continue a session; a file that a crash left half written is renamed and kept.
 
+    A recording that a crash left whole, before it had got its name, gets it now.
+
     Raises:
         UsageError: If it was made with another plan or sensor, or the skin lies elsewhere on the rig.
     """
@@ -157,8 +161,17 @@ def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
             )
     for path in folder.glob(f"*{file_names.PARTIAL}"):
         final = path.with_name(path.name.removesuffix(file_names.PARTIAL) + ".mcap")
-        path.rename(file_names.next_interrupted(final))
+        path.rename(final if _is_whole(path, final) else file_names.next_interrupted(final))
     return refresh(read_session(folder))
+
+
+def _is_whole(path: Path, final: Path) -> bool:
+    if not file_names.EPISODE.fullmatch(final.name) or final.exists():
+        return False
+    try:
+        return read_recording(path).episode.complete
+    except TacdataError:
+        return False
 
 
 def refresh(session: Session) -> Session:

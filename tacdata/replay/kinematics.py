@@ -59,6 +59,9 @@ class Kinematics:
             reason = str(error).strip().splitlines()[0]
             raise FormatError(f"the URDF of {robot.name}: {reason}", "a URDF that MuJoCo reads", "correct it") from None
         self.joints = tuple(self._joint(k) for k in range(self.model.njnt))
+        if not self.moving:
+            given = f"robot {robot.name}: no joint moves the fingertip of {', '.join(fingers)}"
+            raise FormatError(given, "a link that joints move", "name another link in the robot file")
         for joint, value in zip(self.joints, self.home, strict=True):
             if (joint.lower is not None and value < joint.lower) or (joint.upper is not None and value > joint.upper):
                 given = f"home of joint {joint.name} of {robot.name}: {value:g} {joint.unit}"

@@ -11,11 +11,12 @@ import numpy as np
 import schemas
 from tacdata import provenance
 from tacdata.demonstrations.compensation import compensate, contact_depth
-from tacdata.demonstrations.demonstration import Demonstration
+from tacdata.demonstrations.demonstration import GUESS, Demonstration
+from tacdata.demonstrations.paths.path_faults import CONTRADICTING
 from tacdata.errors import UsageError
 
-GUESS = 0.003
-"""Standard deviation of an axis above which a target over a gap is a guess [m]; a grasp tolerates no more."""
+FAR = 0.05
+"""Shift by compensation that is said [m]; the paper's gains move a target by at most 36 mm."""
 UNITS = {"time_ns": "ns", "position": "m", "quaternion": "1 (xyzw)", "seen": "m", "depth": "mm", "gap": "1"}
 
 
@@ -105,9 +106,14 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
             )  # fmt: skip
         for k, (name, track) in enumerate(zip(names, tracks, strict=True)):
             position[:, k] = compensate(seen[:, k], track.normal, depths[k], gains[name])
+            away = float(np.nanmax(np.linalg.norm(position[rows, k] - seen[rows, k], axis=1)))
+            if away > FAR:
+                meant = f"is the gain of {gains[name]:g} m/mm meant?"
+                remarks.append(f"{name}: moved by up to {1000 * away:.0f} mm: {meant}")
             blind = int(np.isnan(depths[k][rows]).sum())
             if blind:
-                remarks.append(f"{name}: not moved at {blind} times without predicted depth")
+                count = rows.stop - rows.start
+                remarks.append(f"{name}: not moved at {blind} of {count} times, as no depth is predicted there")
     used = {name: float(gains[name]) for name in names} if gains is not None else {}
     kind, parents = "direct" if gains is None else "compensated", {"recording": made.recording_hash}
     if made.network:
@@ -121,12 +127,21 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
 
 
 def doubts(targets: FingertipTargets) -> list[str]:
-    """Describe what is doubtful in a demonstration's targets, one line per finger: stretches without sightings.
+    """Describe what is doubtful in a demonstration's targets: stretches without sightings, and those that contradict.
 
     A target over a gap is a guess where its standard deviation exceeds `GUESS`.
     """
     words = []
+    tracks = targets.source.tracks if targets.source else {}
+    for name, track in ((name, tracks[name]) for name in targets.fingers if name in tracks):
+        if track.outliers > CONTRADICTING * track.sightings:
+            words.append(f"{name}: {track.outliers} of {track.sightings} sightings contradicted the others")
     for name, bridged, spread in _bridged(targets):
+        if (vague := ~bridged & (spread > GUESS)).any():
+            words.append(
+                f"{name}: {vague.mean():.0%} of the targets were seen and are still uncertain, with standard "
+                f"deviations of up to {1000 * spread[vague].max():.0f} mm"
+            )
         if not bridged.any():
             continue
         rows = np.flatnonzero(bridged)
@@ -150,8 +165,9 @@ def check_guesses(targets: FingertipTargets) -> None:
         guess = bridged & (spread > GUESS)
         if guess.any():
             raise UsageError(
-                f"{targets.recording}: {name} was not seen for {guess.sum() / targets.rate:.1f} s; its targets there "
-                f"are guesses with a standard deviation of up to {1000 * spread[guess].max():.0f} mm",
+                f"{targets.recording}: {name} was not seen for {guess.sum() / targets.rate:.1f} s by a camera in its "
+                f"place; its targets there are guesses with a standard deviation of up to "
+                f"{1000 * spread[guess].max():.0f} mm",
                 f"targets known to {1000 * GUESS:g} mm, or a stretch without gaps",
                 "record again with the cubes in view, export fingers that were seen (--finger), or let them pass with "
                 "--with-guesses",

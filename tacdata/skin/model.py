@@ -14,15 +14,18 @@ from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 from tacdata.skin.code_version import code_versions
-from tacdata.skin.contact.first_touch import reach
+from tacdata.skin.contact.first_touch import reach, rise, rotation, touch
 from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.mesh.coarser import blind_spot, companion_mesh, edge_ratio
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
+from tacdata.skin.solve.coarse_path import CoarseStart
 from tacdata.skin.solve.equilibrium import Equilibrium
+from tacdata.skin.solve.mesh_transfer import MeshTransfer
 from tacdata.skin.solve.meshed_skin import MeshedSkin
 from tacdata.skin.solve.passage import PathRecorder
 from tacdata.skin.solve.settings import ModelSettings
+from tacdata.skin.surface.pressed_shape import PressedShape, around, touching_share
 from tacdata.skin.validity import fineness
 from tacdata.skin.validity.coarse_press import CoarsePress, press_coarsely
 from tacdata.skin.validity.mesh_error import Figures, NumericalError, estimate
@@ -103,7 +106,7 @@ class SkinModel:
 
     def states_many(
         self, requests: Iterable[PressRequest], capacity: int = 1, with_displacement: bool = True,
-        observe: PathRecorder | None = None,
+        observe: PathRecorder | None = None, coarse: Sequence[CoarsePress | None] | None = None,
     ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
         """Solve presses, many at a time.
 
@@ -112,6 +115,7 @@ class SkinModel:
             capacity: How many presses are in work at a time.
             with_displacement: Whether states hold displacements.
             observe: Is told of every equilibrium on the way, if given.
+            coarse: What the companion found of them (`solve_coarsely`): load steps start from there.
 
         Yields:
             The press's index, the depth [mm] and the state, as found; or, in its place, why the press was given up.
@@ -128,9 +132,19 @@ class SkinModel:
         batch = self.skin.batch([request for _, request in possible], min(capacity, len(possible)))
         # Columns that fall idle at the end cost, above all on a GPU: the longest paths come first.
         possible.sort(key=lambda one: -one[1].steps(self.settings.step))
-        presses = (self.skin.placed(number, request) for number, request in possible)
+        starts = [self._start(one) for one in coarse or ()] or [None] * (1 + max(number for number, _ in possible))
+        presses = (replace(self.skin.placed(number, request), coarse=starts[number]) for number, request in possible)
         yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement), observe)
         self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
+
+    @cached_property
+    def _transfer(self) -> MeshTransfer | None:
+        """From the companion's unknowns to those on this mesh."""
+        contacts = 2 if self.skin.board else 1
+        return self.companion and MeshTransfer(self.companion.mesh, self.mesh, contacts, self.device)
+
+    def _start(self, coarse: CoarsePress | None) -> CoarseStart | None:
+        return CoarseStart(coarse.path, self._transfer) if coarse and coarse.path and self._transfer else None
 
     def states(self, request: PressRequest) -> Iterator[tuple[float, Equilibrium]]:
         """Yield ``(depth, Equilibrium)`` for each requested depth, solving the path between them in bounded steps.
@@ -189,7 +203,7 @@ class SkinModel:
         rows: dict[int, list[Equilibrium]] = {number: [] for number in range(len(requests))}
         began = time.perf_counter()
         beside = coarse or self._coarsely(requests, capacity, keep=False)
-        for number, _, state in self.states_many(requests, capacity):
+        for number, _, state in self.states_many(requests, capacity, coarse=beside):
             if isinstance(state, SolveError):
                 del rows[number]
                 yield number, state
@@ -199,14 +213,30 @@ class SkinModel:
                 seconds, began = time.perf_counter() - began, time.perf_counter()
                 yield number, self._answer(requests[number], rows.pop(number), beside[number], seconds)
 
-    def figures(self, depths: Sequence[float], states: list[Equilibrium]) -> Figures:
-        """Return what states (with displacements) at depths [mm] say."""
-        grid = self.sensor.map
-        maps = [self.skin.face.depth_map(grid.x, grid.y, state.displacement, grid.sampling) for state in states]
+    def figures(self, request: PressRequest, depths: Sequence[float], states: list[Equilibrium]) -> Figures:
+        """Return what states (with displacements) of a press at depths [mm] say.
+
+        Maps are the indenter's surface where it touches (`tacdata.skin.surface.pressed_shape`).
+        """
+        grid, maps = self.sensor.map, []
+        for depth, state in zip(depths, states, strict=True):
+            shape = self.pressed_shape(request, depth, state)
+            maps.append(self.skin.face.depth_map(grid.x, grid.y, state.displacement, grid.sampling, shape))
         return Figures(
             np.array(depths, dtype=float), np.array(maps).reshape(-1, *grid.shape),
             np.array([state.force for state in states]).reshape(-1, 3),
             np.array([state.taxel_force for state in states]).reshape(-1, self.sensor.taxels.count),
+        )
+
+    def pressed_shape(self, request: PressRequest, depth: float, state: Equilibrium) -> PressedShape:
+        """Return the indenter as it presses in a state at a depth [mm]."""
+        place, turn = touch(self.sensor, self.skin.face, request) - np.array([0.0, 0.0, depth]), rotation(request)
+        lowest = float(place[2]) - rise(request.indenter, turn)
+        slots = self.skin.tractions.slots
+        touching = touching_share(state.traction, slots)
+        borne = self.skin.board or "bottom" in self.sensor.contact.bonded
+        return PressedShape(
+            request.indenter, place, turn, lowest, touching, around(touching, slots) if borne else touching
         )
 
     def numerical_error(
@@ -248,7 +278,7 @@ class SkinModel:
         }
         for depth, state in zip(request.depths, states, strict=True):
             self._stable.check(depth, state.displacement)
-        fine = self.figures(request.depths, states)
+        fine = self.figures(request, request.depths, states)
         if self.settings.error_estimate:
             error = self.numerical_error(request, fine, coarse)
         else:
@@ -259,6 +289,7 @@ class SkinModel:
         return PathSolution(
             depth=fine.depth,
             surface=fine.surface,
+            traction=np.stack([self.skin.tractions.traction(s.displacement, s.traction) for s in states]),
             numerical=error.surface,
             taxel_force=fine.taxel_force,
             taxel_force_error=error.taxel_force,

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 import warp as wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
 
+import tacdata.warp_runtime  # noqa: F401 - starts Warp
+
 
 @wp.func
 def _pierces(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
 
+import tacdata.warp_runtime  # noqa: F401 - starts Warp
+
 
 @wp.kernel(module="unique", enable_backward=False)
 def _query(

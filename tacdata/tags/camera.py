@@ -10,6 +10,9 @@ import numpy as np
 
 from tacdata.errors import FormatError, UsageError
 
+WIDEST, LONGEST = 0.1, 50.0
+"""Shortest and longest plausible focal length, over the image's width [1]: 157 and 1 degrees of view."""
+
 
 @dataclass(frozen=True, eq=False)
 class PinholeCamera:
@@ -51,6 +54,11 @@ class PinholeCamera:
                 "positive and finite",
                 "calibrate the camera",
             )
+        if not WIDEST * width <= min(fx, fy) or not max(fx, fy) <= LONGEST * width:
+            raise FormatError(
+                f"{origin}: fx {fx}, fy {fy} px for an image {width} px wide: are these millimetres?",
+                f"{WIDEST * width:g} to {LONGEST * width:g} px", "calibrate the camera",
+            )  # fmt: skip
         distortion = np.array(document.get("distortion", ()), float)
         if len(distortion) not in (0, 4, 5, 8, 12, 14):
             given = f"{origin}: {len(distortion)} distortion coefficients"

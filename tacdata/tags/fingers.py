@@ -12,6 +12,9 @@ from tacdata import documents
 from tacdata.errors import FormatError
 from tacdata.tags.cube.cube import Cube
 
+FARTHEST = 0.5
+"""Largest plausible distance of a fingertip from its cube's centre [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Finger:
@@ -66,6 +69,17 @@ def read_fingers(path: Path) -> dict[str, Finger]:
     return fingers_of(documents.read(Path(path), "fingers"), str(path))
 
 
+def _check_tip(place: np.ndarray, cube: Cube, origin: str) -> None:
+    """Refuse a fingertip within its cube, as metres would place it, or far away from it."""
+    given = f"{origin}: a fingertip at {[round(1000 * float(value), 3) for value in place]} mm"
+    if 0 < np.abs(place).max() < cube.side / 2000:
+        where, remedy = f"is inside the cube of {cube.side:g} mm", "give tip/position in mm, from the cube's centre"
+        raise FormatError(f"{given} {where}: is it in metres?", "a place outside of the cube", remedy)
+    if not np.linalg.norm(place) <= FARTHEST:
+        where, remedy = "is away from its cube", "give tip/position in mm, from the cube's centre"
+        raise FormatError(f"{given} {where}: is it in micrometres?", f"up to {1000 * FARTHEST:g} mm", remedy)
+
+
 def _finger(name: str, entry: dict[str, Any], origin: str) -> Finger:
     from scipy.spatial.transform import Rotation
 
@@ -80,5 +94,6 @@ def _finger(name: str, entry: dict[str, Any], origin: str) -> Finger:
     tip[:3, 3] = np.array(entry["tip"]["position"], float) / 1000
     spread = float(entry["tip"].get("residual", 0.0)) / 1000
     cube = Cube.from_document(entry["cube"], f"{origin}: {name}: cube")
+    _check_tip(tip[:3, 3], cube, f"{origin}: {name}")
     kind = entry.get("finger") or next((k for k in ("thumb", "index", "middle") if k in name), "")
     return Finger(name, cube, tip, spread, entry.get("hand", ""), kind)

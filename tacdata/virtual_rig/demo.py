@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,8 @@ class VirtualDemo:
 
     def __init__(
         self, directory: Path, speed: float = 1.0, seed: int = 0, cameras: int = 2, fault: str | None = None,
-        sensor: Sensor | None = None, task: str = "grasp", nub: float = RADIUS, thing: str | None = None,
+        sensor: Sensor | Mapping[str, Sensor] | None = None, task: str = "grasp", nub: float = RADIUS,
+        thing: str | None = None,
     ) -> None:  # fmt: skip
         """Set up a hand whose clock runs ``speed`` times as fast as real time.
 
@@ -76,13 +77,13 @@ class VirtualDemo:
             seed: Decides grasp, skins, boards and camera errors.
             cameras: One or two.
             fault: One of `FAULTS`, or none.
-            sensor: The skin on every finger.
+            sensor: The skin on every finger, or finger -> skin; by default, and for fingers left out, the paper's.
             task: One of `TASKS`.
             nub: Radius of what presses each skin [mm].
             thing: Object that is grasped, one of `GRASPED`; by default the ball, to wipe always the eraser.
 
         Raises:
-            UsageError: If a number is out of range or there is no such fault or task.
+            UsageError: If a number is out of range or there is no such fault, task or finger.
         """
         if not 0 < speed <= 8 or not 1 <= cameras <= len(EYES):
             raise UsageError(f"speed {speed:g}, {cameras} cameras", "above 0 to 8; 1 or 2 cameras", "choose others")
@@ -98,18 +99,10 @@ class VirtualDemo:
             raise UsageError(f"nubs of {nub:g} mm", f"{NUBS[0]:g} to {NUBS[1]:g} mm", "choose another radius")
         self.directory, self.path, self.fault, self.seed = directory, directory / "demo_rig.yaml", fault, seed
         self.hand = replace(draw_hand(seed, task, thing), nub=nub)
-        self.clock, self.sensor = Clock.start(speed), sensor or default_sensor()
+        self.clock, self.sensors = Clock.start(speed), _worn(sensor)
         self.start_ns = self.clock.now_ns()
-        layout = board_format(self.sensor)
-        baud = next((b for b in BAUDS if b >= layout.size * 10 * layout.rate / 0.8), BAUDS[-1])
-        self.layout = layout
-        self.boards = {
-            name: VirtualBoard(
-                self.clock, layout, draw_timing(10 * seed + k, self.start_ns, layout.rate), self._reader(name, k), baud,
-                10 * seed + k,
-            )
-            for k, name in enumerate(DIRECTIONS)
-        }  # fmt: skip
+        self.layouts = {name: board_format(skin) for name, skin in self.sensors.items()}
+        self.boards = {name: self._board(name, k) for k, name in enumerate(DIRECTIONS)}
         self.eyes = {name: looking_at(EYES[name], AIM) for name in list(EYES)[:cameras]}
         self._noise = NoiseStretch(np.random.default_rng([seed, 12]))
         self.cameras = {
@@ -126,11 +119,11 @@ class VirtualDemo:
             "boards": {
                 name: {
                     "driver": "capacitive_board", "port": board.port.path, "baud": board.baud,
-                    "format": self.layout.document,
+                    "format": self.layouts[name].document,
                 }
                 for name, board in self.boards.items()
             },
-            "sensors": dict.fromkeys(self.boards, self.sensor.document),
+            "sensors": {name: sensor.document for name, sensor in self.sensors.items()},
             "cameras": {
                 name: {
                     "driver": "opencv_camera", "source": camera.url, "rate": RATE, "intrinsics": dict(INTRINSICS),
@@ -148,7 +141,7 @@ class VirtualDemo:
     @property
     def emulates(self) -> list[str]:
         """What is emulated, one line each."""
-        boards = [f"{name:<7} {board.port.path}  {self.layout.rate:g} Hz" for name, board in self.boards.items()]
+        boards = [f"{name:<7} {board.port.path}  {self.layouts[name].rate:g} Hz" for name, board in self.boards.items()]
         return [
             *boards, *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
             f"{self.hand.task} ({self.hand.thing}) every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} "
@@ -184,9 +177,15 @@ class VirtualDemo:
         for device in (*self.cameras.values(), *self.boards.values()):
             device.stop()
 
+    def _board(self, finger: str, number: int) -> VirtualBoard:
+        layout, seed = self.layouts[finger], 10 * self.seed + number
+        baud = next((b for b in BAUDS if b >= layout.size * 10 * layout.rate / 0.8), BAUDS[-1])
+        timing = draw_timing(seed, self.start_ns, layout.rate)
+        return VirtualBoard(self.clock, layout, timing, self._reader(finger, number), baud, seed)
+
     def _reader(self, finger: str, number: int) -> Callable[[int], np.ndarray]:
         flat = Registration((0.0, 0.0, 0.0), 0.0)
-        world = World(draw(100 * self.seed + number, self.sensor, flat), self.sensor)
+        world = World(draw(100 * self.seed + number, self.sensors[finger], flat), self.sensors[finger])
         ball = Sphere(self.hand.nub)
 
         def read(sampled_ns: int) -> np.ndarray:
@@ -222,6 +221,16 @@ class VirtualDemo:
         if finger == "index" and self.fault == "turned-tag":
             return {**carried, "turned": [FACE_UP]}
         return carried
+
+
+def _worn(given: Sensor | Mapping[str, Sensor] | None) -> dict[str, Sensor]:
+    """Return each finger's skin; refuse skins of fingers that are not there."""
+    if isinstance(given, Sensor):
+        return dict.fromkeys(DIRECTIONS, given)
+    strangers = sorted(set(given or {}) - set(DIRECTIONS))
+    if strangers:
+        raise UsageError(f"a sensor for {', '.join(strangers)}", ", ".join(DIRECTIONS), "name one of these fingers")
+    return {name: (given or {}).get(name) or default_sensor() for name in DIRECTIONS}
 
 
 def _when(fault: str) -> str:

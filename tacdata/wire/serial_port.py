@@ -70,6 +70,11 @@ def read_available(line: serial.SerialBase) -> bytes:
     return line.read(max(1, getattr(line, "in_waiting", 0)))
 
 
+def why_broken(error: Exception) -> str:
+    """Return why a line broke, for a person; pyserial's words for a device that is gone are a programmer's."""
+    return "the device is gone (unplugged, or switched off)" if "returned no data" in str(error) else str(error)
+
+
 def write_all(line: serial.SerialBase, data: bytes) -> None:
     """Write all bytes, waiting at most `WRITE` for room.
 

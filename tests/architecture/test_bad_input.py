@@ -172,7 +172,7 @@ def test_what_the_system_refuses_a_file_for_is_said_in_words(number, words, monk
         raise OSError(number, "no", "/data/page.png")
 
     monkeypatch.setattr("tacdata.plans.read_plan", full)
-    monkeypatch.setattr("tacdata.documents.read", full)
+    monkeypatch.setattr("tacdata.documents.content_of", full)
     monkeypatch.setattr(sys, "argv", ["tacdata", "plan", __file__])
     with pytest.raises(SystemExit) as end:
         cli.main()

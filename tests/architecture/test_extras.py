@@ -128,6 +128,7 @@ def test_every_light_room_can_be_imported_without_the_extras(beyond):
         assert f"'.[{ROOMS[rooms[0]]}]'" in remedy, f"{module}: {remedy}"
 
 
+@pytest.mark.long("tacdata/commands", "tacdata/example", "viewers", reason="eight verbs one after the other")
 def test_a_first_look_works_without_the_extras(beyond, tmp_path):
     lines = [
         ["--help"],

@@ -1,6 +1,7 @@
 """How the tests are run: what decides a long test, who takes which file, and what a run says at its end."""
 
 import ast
+import gc
 import importlib.util
 import subprocess
 import sys
@@ -41,6 +42,13 @@ def test_words_decide_no_long_test_and_constants_do(tmp_path):
         path.write_text(text)
     one, reworded, changed = map(long_part._content, paths)
     assert one == reworded != changed
+    page, block = tmp_path / "page.md", "```sh\ntacdata list\n```\n"
+    contents = []
+    for text in (f"So.\n{block}", f"Otherwise.\n{block}", f"So.\n{block.replace('list', 'plan')}"):
+        long_part._content.cache_clear()
+        page.write_text(text)
+        contents.append(long_part._content(page))
+    assert contents[0] == contents[1] != contents[2]
 
 
 def test_a_room_brings_what_it_imports():
@@ -55,7 +63,7 @@ def test_the_longest_file_of_a_kind_goes_first_and_nobody_idles(monkeypatch):
     scheduler, given = object.__new__(side_by_side.ByKind), []
     take_first = lambda self, node: given.append(self.workqueue.popitem(last=False)[0])  # noqa: E731
     monkeypatch.setattr(LoadFileScheduling, "_assign_work_unit", take_first)
-    scheduler.config = SimpleNamespace(option=SimpleNamespace(waiting=1))
+    scheduler.config = SimpleNamespace(option=SimpleNamespace(waiting=1, long=None))
     scheduler.workqueue = OrderedDict.fromkeys(files)
     for worker in ("gw1", "gw0", "gw0", "gw0"):
         scheduler._assign_work_unit(SimpleNamespace(gateway=SimpleNamespace(id=worker)))
@@ -95,3 +103,7 @@ def test_the_last_line_is_one_of_pytests(lines, words):
     suite = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(suite)
     assert words in suite._sum(lines, 7.0)
+
+
+def test_garbage_is_looked_for_again_once_all_is_collected():
+    assert gc.isenabled() and gc.get_freeze_count() > 10_000  # one small file alone brings 45,000

@@ -135,3 +135,35 @@ def test_a_background_verb_that_dies_is_named_with_its_last_words(scripts, tmp_p
 def test_a_command_line_is_this_installation():
     shown = subprocess.run(stages.command_line(["--help"]), capture_output=True, text=True, check=True).stdout
     assert "soft tactile skins" in shown or "Usage" in shown
+
+
+def test_a_background_verb_ends_as_a_stage_that_shows_what_it_says_from_then_on(scripts, tmp_path, capfd):
+    program = """
+import os, sys, time
+from pathlib import Path
+print("ear" + "ly", flush=True)
+print("wait" + "ing", flush=True)
+while not (Path(sys.argv[1]) / "go").exists():
+    time.sleep(0.01)
+print("niceness", os.nice(0))
+sys.exit(3)
+"""
+    line, log = stages.Line(1, "kept"), tmp_path / "log"
+    with stages.Background([program, str(tmp_path)], log, yielding=True) as background:
+        wait_for(lambda: "waiting" in log.read_text())
+        threading.Timer(0.3, (tmp_path / "go").touch).start()
+        line.join("wait for it", background, tolerated=3)
+    shown = capfd.readouterr().out
+    assert "[1/1] wait for it" in shown and "exit code 3: going on" in shown
+    assert "early" not in shown and "waiting" in shown
+    assert int(shown.rsplit("niceness ", 1)[1].split()[0]) >= 10
+
+
+def test_a_background_verb_that_failed_before_it_is_joined_is_shown_whole(scripts, tmp_path, capfd):
+    line = stages.Line(1, "kept")
+    with stages.Background(["print('why'); print('what next'); raise SystemExit(4)"], tmp_path / "log") as background:
+        background.process.wait()
+        with pytest.raises(stages.StageError, match="exit code 4"):
+            line.join("wait for it", background)
+    shown = capfd.readouterr().out
+    assert "why" in shown and "what next" in shown

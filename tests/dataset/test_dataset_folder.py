@@ -331,6 +331,8 @@ def test_maps_are_made_once_and_anew_after_a_change(tmp_path: Path, own_cache: P
         (lambda root: (root / folder.INFO).write_text("{"), FormatError, "unreadable"),
         (lambda root: edit_info(root, codebase_version="v2.1"), FormatError, "LeRobot format v2.1"),
         (lambda root: edit_info(root, codebase_version="v2.1"), FormatError, "convert_dataset_v21_to_v30"),
+        (lambda root: edit_info(root, codebase_version="v2.0"), FormatError, "convert_dataset_v20_to_v21"),
+        (lambda root: edit_info(root, codebase_version="v1.6"), FormatError, "pack the session again"),
         (lambda root: edit_info(root, fps=29.97), FormatError, "29.97 frames a second"),
         (lambda root: edit_info(root, total_episodes=7), FormatError, "describes 3 episodes"),
         (

@@ -1,5 +1,6 @@
 """A demonstration made of arrays: a hand from the virtual rig, seen by one or two cameras with noise."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +32,18 @@ def rig(cameras=("eye",), fingers=FINGERS, boards=("thumb", "index", "middle"), 
     return demo_rig_of(document, "bench.yaml")
 
 
+@cache
+def tips(finger, times):
+    """Frames of a fingertip at times [s] (a tuple), shape (n, 4, 4): most tests ask for the same."""
+    frames = np.array([HAND.tip(finger, t) for t in times])
+    frames.flags.writeable = False
+    return frames
+
+
 def view(finger, seconds=8.5, rate=25.0, camera="eye", seed=0, begin=0.0):
     rng = np.random.default_rng([seed, len(finger)])
     times = begin + np.arange(int(seconds * rate)) / rate
-    truth = np.array([HAND.tip(finger, t) for t in times])
+    truth = tips(finger, tuple(times))
     turns = Rotation.from_rotvec(rng.normal(0, NOISE[1], (len(times), 3))) * Rotation.from_matrix(truth[:, :3, :3])
     covariance = np.diag([NOISE[1] ** 2] * 3 + [NOISE[0] ** 2] * 3)
     first = FINGERS["fingers"][finger]["cube"]["ids"]["+x"]
@@ -78,7 +87,7 @@ def changed(stream, where, **values):
 
 
 def truth_at(finger, time_ns):
-    return np.array([HAND.tip(finger, t) for t in (time_ns - START) * 1e-9])
+    return tips(finger, tuple((time_ns - START) * 1e-9))
 
 
 __all__ = ["HAND", "NOISE", "START", "Sightings", "changed", "recording", "rig", "taxels", "truth_at", "view"]

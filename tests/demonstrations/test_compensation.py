@@ -58,6 +58,9 @@ def test_a_gains_file_is_checked(tmp_path):
     path.write_text(yaml.safe_dump({**document, "tasks": {"turn": [0.001, 5.0]}}))
     with pytest.raises(FormatError, match="5000 mm a millimetre"):
         read_gains(path)
+    path.write_text(yaml.safe_dump({**document, "tasks": {"turn": [0.0, 5e-6]}}))
+    with pytest.raises(FormatError, match=r"0\.005 mm a mm felt"):
+        read_gains(path)
     path.write_text(yaml.safe_dump({**document, "fingers": ["thumb", "thumb"], "tasks": {"turn": [0.001, 0.01]}}))
     with pytest.raises(FormatError, match="non-unique"):
         read_gains(path)

@@ -3,6 +3,7 @@
 import time
 
 import numpy as np
+import pytest
 
 from tacdata.clock import Clock
 from tacdata.demonstrations.recording.streams import DemoStreams
@@ -15,14 +16,14 @@ class Board(TaxelBoard):
 
     def __init__(self, clock, most=None):
         super().__init__(clock)
-        self._counts, self._most, self.quiet = StreamCounts(), most, False
+        self._counts, self._most, self.quiet, self.frozen = StreamCounts(), most, False, None
 
     @property
     def counts(self):
         return self._counts
 
     def describe(self):
-        return {"rate": {"nominal": 500.0}, "clock": "counter"}
+        return {"rate": {"nominal": 500.0}, "clock": "counter", "format": {"channels": {"type": "uint16"}}}
 
     def open(self):
         pass
@@ -37,7 +38,8 @@ class Board(TaxelBoard):
         if self.quiet:
             return []
         self._counts.received += 1
-        return [TaxelFrame(self.clock.now_ns(), self._counts.received, np.full(24, 9000.0))]
+        reading = 9000.0 + self._counts.received % 7 if self.frozen is None else self.frozen
+        return [TaxelFrame(self.clock.now_ns(), self._counts.received, np.full(24, reading))]
 
 
 class Sink:
@@ -105,3 +107,24 @@ def test_a_board_that_falls_silent_may_speak_again(monkeypatch):
         board.quiet = False
         until(lambda: not streams.silent)
     assert "nothing received for 0.05 s; check cable and power" in said[0] and "speaks again" in said[1]
+
+
+IMPOSSIBLE = [(9001.0, "no channel has changed for"), (65535.0, "have read 65535 counts")]
+
+
+@pytest.mark.parametrize(("reading", "words"), IMPOSSIBLE)
+def test_readings_that_cannot_be_are_said_within_two_seconds_and_kept_in_the_file(reading, words):
+    clock, said = Clock.start(), []
+    boards = {"thumb": Board(clock), "index": Board(clock)}
+    with DemoStreams(boards, {}, {}, {}, None, said.append) as streams:
+        until(lambda: len(streams.heard) == 2)
+        sink, _ = recorded(streams, clock, 100)
+        streams.record_into(sink)
+        begun = time.monotonic()
+        boards["index"].frozen = reading
+        until(lambda: said)
+        assert time.monotonic() - begun < 2.0
+        assert said[0].startswith("taxels index: ") and words in said[0]
+        assert (said[0], "error") in sink.notes
+        time.sleep(0.3)
+    assert len(said) == 1

@@ -167,4 +167,5 @@ def test_images_of_a_board_give_it_too(tmp_path):
     assert "put  world: eye.yaml  into the camera's entry" in done.stdout
     world = CameraWorld.from_document(yaml.safe_load((tmp_path / "eye.yaml").read_text()), "eye")
     place, turn = off(world.matrix, np.linalg.inv(truth))
+    assert world.board == board.document, "so that a rig refuses cameras of different boards"
     assert world.camera == "eye" and place < 0.002 and turn < 0.004

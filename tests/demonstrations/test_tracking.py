@@ -1,6 +1,7 @@
 """Fingertip paths: how near to the truth, how honest about it, and every planted fault named."""
 
 import copy
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -8,17 +9,35 @@ import pytest
 from demo_examples import START, changed, recording, rig, taxels, truth_at, view
 from scipy.spatial.transform import Rotation
 
+from tacdata.demonstrations.paths import tracking
 from tacdata.demonstrations.paths.acquisition import acquire
+from tacdata.demonstrations.paths.estimator import ALL, Estimator
 from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.motion_filter import ProcessNoise, exponential, logarithm, smooth
 from tacdata.demonstrations.paths.sightings import sightings_of
-from tacdata.demonstrations.paths.tracking import Estimator, track
+from tacdata.demonstrations.paths.tracking import track
 from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks, write_tracks
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import default_sensor
 from tacdata.virtual_rig.demo import FINGERS
 
 NAMES = ("thumb", "index", "middle")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def smoothed_once():
+    """Most tests change one finger of the same demonstration: what was smoothed already is not smoothed again."""
+    smooth_finger, known = tracking._path, {}
+
+    def path(seen, times):
+        key = pickle.dumps((seen, times))
+        if key not in known:
+            known[key] = pickle.dumps(smooth_finger(seen, times))
+        return pickle.loads(known[key])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tracking, "_path", path)
+        yield
 
 
 def errors(made, name):
@@ -315,3 +334,44 @@ def test_a_folder_in_place_of_tracks_is_answered_with_what_is_in_it(tmp_path):
     (tmp_path / "demos" / "episode-000000.tracks.parquet").touch()
     with pytest.raises(UsageError, match=r"episode-000000\.tracks\.parquet"):
         read_tracks(tmp_path / "demos.tracks.parquet")
+
+
+def test_each_fingertip_may_have_a_network_of_its_own(tmp_path):
+    sensor, wide = default_sensor(), "learnt from simulated presses alone"
+
+    def one(depth, **more):
+        identity = {"hash": f"{depth}" * 64, "network": "stand-in", "epoch": 1, **more}
+        return Estimator(identity, sensor, lambda tared: np.full((len(tared), 35, 26), float(depth), np.float32))
+
+    made = track(recording(tmp_path), estimator={ALL: one(1), "index": one(2, unfitted=wide)})
+    assert {name: float(np.nanmax(t.depth)) for name, t in made.tracks.items()} == {"thumb": 1, "index": 2, "middle": 1}
+    assert made.networks["index"]["hash"] == "2" * 64 and made.networks["thumb"]["hash"] == "1" * 64
+    assert made.network["hash"] not in ("1" * 64, "2" * 64)
+    assert wide in made.remarks and made.guesses() == [wide] and made.guesses(("thumb",)) == []
+    assert len(note(made, "seen.json")) == 1
+    unfitted = track(recording(tmp_path), estimator=one(2, unfitted=wide))
+    assert note(unfitted, wide) and not note(unfitted, "seen.json")
+    path = tmp_path / "x.tracks.parquet"
+    write_tracks(path, made)
+    assert read_tracks(path).networks == made.networks
+    lone = track(recording(tmp_path), estimator={"index": one(2)})
+    assert lone.tracks["thumb"].depth is None and note(lone, "thumb", "no network, so no predicted depth")
+    with pytest.raises(UsageError, match="a network for pinky, of which there is no board"):
+        track(recording(tmp_path), estimator={"pinky": one(1)})
+
+
+def test_many_stretches_without_a_searched_image_are_one_sentence(tmp_path):
+    from tacdata.demonstrations.paths.tracking import _unsearched_words
+
+    stretches = [(0.5 * k, 0.5 * k + 0.3) for k in range(20)]
+    (words,) = _unsearched_words([*stretches, (12.0, 13.7)])
+    said = "no image was searched for tags in 21 stretches of 7.7 s in all, the longest 1.7 s from 12.0"
+    assert words.startswith(said)
+    assert len(_unsearched_words(stretches[:3])) == 3
+
+
+def test_a_recorder_without_time_for_tags_is_no_hidden_tag(tmp_path):
+    short = [changed(view(name, seconds=0.12), [True] * 3, faces=0) for name in NAMES]
+    with pytest.raises(FormatError, match="only 3 were searched for tags while recording") as caught:
+        track(recording(tmp_path, views=short))
+    assert "--every-image" in str(caught.value)

@@ -178,7 +178,7 @@ def test_what_cannot_be_ended_is_refused(rig):
     clock, controller, driver = rig
     controller.machine.execute("G51X2", clock.now_ns())
     controller.inject_wire(to_controller=lambda line: "" if line == "G50" else line)
-    with pytest.raises(DeviceError, match=r"bends coordinates and does not end it: G51"):
+    with pytest.raises(DeviceError, match="does not leave a state that spoils every move: G51"):
         driver.open()
 
 

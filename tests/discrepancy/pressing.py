@@ -1,6 +1,7 @@
 """Presses of a small made-up sensor, time-stepped apart from the library."""
 
 import numpy as np
+from scipy.signal import lfilter
 
 from tacdata.chain import Course, Tool
 from tacdata.chain.rows import rows_of
@@ -20,28 +21,24 @@ def course(
     """
     slips = np.array([0.03, 0.08, 0.2])
     rng = np.random.default_rng(seed)
-    parts, clock, slow, late = [], 0.0, np.zeros(3), np.zeros(3)
+    parts, clock, slow = [], 0.0, np.zeros(3)
     for k in range(episodes):
         rate, depth = rng.choice(rates), rng.choice([0.6, 1.0])
         way = (depth + 0.3) / rate
         at = np.cumsum([0, 0.5, way, hold, way, 0.8])
         path = np.array([-0.3, -0.3, depth, depth, -0.3, -0.3])
         time = np.arange(0, at[-1], 1 / FINE)
-        tip, follower = np.interp(time, at, path), -0.3
+        tip = np.interp(time, at, path)
         weights = np.array([[1.0, 0.5, 0.2], [0.2, 0.6, 1.0]])[k % 2]
-        read = np.empty((len(time), 3))
-        slow, late = slow * np.exp(-1 / 2.0), late * 0
         jitter = 0.002 * rng.normal()
-        held, pressed = np.zeros(3), 0.0
-        for i, z in enumerate(tip):
-            follower = min(max(follower, z - 0.0), z + play)
-            pressed, before = max(follower + jitter, 0.0) ** 1.5, pressed
-            held = np.clip(held + pressed - before, -slips, slips) if pressed > 0 else np.zeros(3)
-            load = weights * max((1 - friction) * pressed + friction * held.mean(), 0.0)
-            slow += (load - slow) / (FINE * 2.0)
-            now = load - relaxed * slow if pulls else np.maximum(load - relaxed * slow, 0.0)
-            late = late + (now - late) / (FINE * lag) if lag > 0 else now
-            read[i] = 5000 + 800 * (late if power == 1.0 else np.maximum(late, 0.0) ** power)
+        pressed = np.maximum(followed(tip, play) + jitter, 0.0) ** 1.5
+        carried = (1 - friction) * pressed + friction * slid(pressed, slips) if friction else pressed
+        load = weights * np.maximum(carried, 0.0)[:, None]
+        slow = lagged(load, 2.0, slow * np.exp(-1 / 2.0))
+        now = load - relaxed * slow if pulls else np.maximum(load - relaxed * slow, 0.0)
+        slow = slow[-1]
+        late = lagged(now, lag, np.zeros(3)) if lag > 0 else now
+        read = 5000 + 800 * (late if power == 1.0 else np.maximum(late, 0.0) ** power)
         pick = np.arange(rng.integers(6), len(time), 6)
         by = np.where(time[pick] < at[3], delay, delay if recovery is None else recovery)
         before = np.maximum(pick - np.round(by * FINE).astype(int), 0)
@@ -58,3 +55,27 @@ def course(
         site=np.arange(episodes) % 2, tools=(Tool("ball", "sphere", 4.0),),
         names=tuple(f"press {k}" for k in range(episodes)), centers=np.array([[-1.0, 0], [0, 0], [1, 0]]),
     )  # fmt: skip
+
+
+def lagged(values, lag, before):
+    """Return values [any unit], shape (n, channels), after a first-order lag [s] that stood at ``before``."""
+    share = 1 / (FINE * lag)
+    return lfilter([share], [1, share - 1], values, axis=0, zi=(1 - share) * before[None])[0]
+
+
+def followed(tip, play):
+    """Return the depth of a follower with play [mm], shape (n,)."""
+    depth, made = -0.3, []
+    for z in tip.tolist():
+        depth = min(max(depth, z), z + play)
+        made.append(depth)
+    return np.array(made)
+
+
+def slid(pressed, slips):
+    """Return the mean load of elements that slip beyond loads of their own and rest in the air, shape (n,)."""
+    held, made = np.zeros(len(slips)), []
+    for now, before in zip(pressed, [0.0, *pressed[:-1]], strict=True):
+        held = np.clip(held + now - before, -slips, slips) if now > 0 else np.zeros(len(slips))
+        made.append(held.mean())
+    return np.array(made)

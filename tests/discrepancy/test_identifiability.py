@@ -61,6 +61,14 @@ def test_a_hold_is_told_from_a_path_with_noise():
     assert "hysteresis" in lookalikes(held, load("relaxation"), {"tau": 4.0})
 
 
+def test_quick_relaxation_at_one_rate_may_be_a_lag():
+    """A relaxation of 0.1 s beside a press of a second is a lag of the other sign; two rates split them."""
+    held = course(rates=(1.0,), hold=1.5)
+    assert "latency" in lookalikes(held, load("relaxation_read"), {"tau": 0.1})
+    assert lookalikes(held, load("relaxation_read"), {"tau": 0.5}) == ()
+    assert lookalikes(course(rates=(0.5, 2.0), hold=1.5), load("relaxation_read"), {"tau": 0.1}) == ()
+
+
 def stepped(pressing, letting_go, hold=2.0):
     """Return presses at their own rates, let go of at one or several [mm/s]; the depth read with noise."""
     made, parts = course(episodes=len(pressing)), []

@@ -11,7 +11,8 @@ from tacdata.discrepancy.levels.constancy import spread
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.remainder import _size
 from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.verdict.decide import beside_much, finest, stands, stands_in
+from tacdata.discrepancy.verdict.decide import beside_much, finest, leading, lends_form, seems_early, stands, stands_in
+from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.effects import Placed, load
 
 MARGINS = {"creep": 9.0, "backlash": 9.0}
@@ -80,6 +81,61 @@ def test_one_that_looks_like_another_family_is_there_without_a_name():
     alike = replace(ONE, rivals=("backlash",), bought=100.0)
     assert stands(leaving(30.0), alike, beside) and beside_much(leaving(30.0), alike, beside) is None
     assert not stands(leaving(30.0), replace(alike, at_bound=("f",)), beside)
+
+
+@pytest.mark.parametrize(
+    ("spread", "after", "margin", "there"),
+    [
+        (0.05, 1.5, 9.0, True), (0.22, 1.5, 9.0, True), (0.22, 1.5, 4.0, False), (0.05, 8.0, 9.0, False),
+        (0.3, 1.5, 9.0, False),
+    ],
+)  # fmt: skip
+def test_a_sealed_gap_that_surely_closes_says_that_an_effect_is_there(spread, after, margin, there):
+    """What is left of the open presses may be more: it is not in the sealed ones. Then its size may differ a little."""
+    shown = Gap(np.full(5, 10.0), np.full(5, after), np.ones(5), tuple("abcde"))
+    one = replace(ONE, bought=20.0, margins={"creep": margin})
+    assert stands(leaving(30.0), one, BesideRemainder(0.0, {}, {"rate": spread}), shown) == there
+
+
+def test_a_rival_that_needs_an_unphysical_size_leaves_the_family_beside_a_remainder():
+    """What is left lends it what it explains. Without much left, it stays a rival."""
+    beside = BesideRemainder(0.0, {}, {"rate": 0.05})
+    alike = replace(ONE, rivals=("backlash",), unphysical=("backlash",), bought=100.0)
+    assert beside_much(leaving(30.0), alike, beside) is Level.FAMILY and finest(alike) is None
+    both = replace(alike, rivals=("backlash", "latency"))
+    assert beside_much(leaving(30.0), both, beside) is None, "a delay does as well, of a size that may be"
+
+
+def test_a_shape_at_its_bound_leaves_the_family():
+    """A bound of an exponent says that the form is another one; a bound of an amplitude, that it is another thing."""
+    beside, read = BesideRemainder(0.0, {}, {"rate": 0.05}), Placed(load("relaxation_read"), {})
+    bent = replace(ONE, placed=read, bought=100.0, at_bound=("m",))
+    assert beside_much(leaving(30.0), bent, beside) is Level.FAMILY
+    assert beside_much(leaving(30.0), replace(bent, at_bound=("f",)), beside) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "t", "lent"),
+    [("low_pass_filter", 0.11, 5.0, True), ("latency", 0.11, 5.0, True), ("low_pass_filter", 0.02, 5.0, False),
+     ("low_pass_filter", 0.11, 1.0, False), ("relaxation", 0.11, 5.0, False)],
+)  # fmt: skip
+def test_the_form_of_a_lag_is_no_name_where_much_is_left(name, share, t, lent):
+    found = cast(Any, SimpleNamespace(left=SimpleNamespace(t=t), share_left=share))
+    one = replace(ONE, placed=Placed(load(name), {}))
+    assert lends_form(found, [one]) is lent and not lends_form(found, [one, ONE])
+
+
+def test_readings_that_come_early_beside_a_memory_are_its_form():
+    """Without a memory they say that two clocks are not one."""
+    early, late = (replace(ONE, placed=Placed(load("latency"), {"L": np.array(lag)})) for lag in (-0.06, 0.06))
+    assert seems_early(early, [ONE, early]) and not seems_early(late, [ONE, late])
+    assert not seems_early(early, [early]) and not seems_early(ONE, [ONE, early])
+
+
+def test_the_effect_that_explains_most_leads():
+    calibrated = replace(ONE, corrected_p=None, bought=float("inf"))
+    assert leading([replace(ONE, bought=10.0), replace(ONE, bought=20.0), calibrated]) == 1
+    assert leading([calibrated]) is None
 
 
 def leaving(gain, *names):

@@ -81,6 +81,7 @@ def test_a_gauges_scale_is_known_so_well_and_no_better(scale):
     assert float(value) == pytest.approx(scale, rel=0.05)
 
 
+@pytest.mark.long("tacdata/discrepancy", reason="a verdict among scales that are nearly alike")
 def test_compliance_is_named_beside_a_gauge_of_slightly_wrong_scale():
     made = gauged(0.05)
     seen = made.tag.copy()

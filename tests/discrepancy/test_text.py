@@ -4,11 +4,14 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pytest
+from pressing import course
 
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason
+from tacdata.discrepancy.verdict.document import following
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import in_text
@@ -112,6 +115,45 @@ def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
     assert said("ambiguous", pair).endswith("and hysteresis together fit best, but one may stand in for another")
 
 
+def test_many_that_may_stand_in_are_told_by_family_and_listed_below():
+    rates = ("low_pass_filter", "viscosity", "backlash", "hysteresis", "creep")
+    assert said("ambiguous", [finding("latency", *rates)]).endswith(
+        "latency fits best, but 5 others (delay and filtering, memory of the skin or friction and play) may stand in "
+        "for it"
+    )
+    text = in_text(document("ambiguous", [effect("latency", rates) | {"parameters": {}}]))
+    assert line(text, "these presses leave open") == f"    these presses leave open whether it is: {', '.join(rates)}"
+
+
+def test_what_may_stand_in_is_not_called_worse_in_the_same_breath():
+    """It is behind, but what is left may turn that around; and a size that cannot be is said to be that."""
+    entry = effect("low_pass_filter", ("creep",), {"creep": 4.5, "backlash": 9.0, "nonlinear_relaxation": -2.9})
+    text = in_text(document("ambiguous", [entry | {"parameters": {}, "unphysical": ["relaxation"]}]))
+    assert line(text, "better, in").endswith("than: backlash 9.0") and "worse, in" not in text
+    assert line(text, "does as well").endswith("only with an unphysical size: relaxation")
+
+
+@pytest.mark.parametrize(
+    ("status", "reason", "begins"),
+    [
+        ("named", Reason.NAMED, "give it to the model"), ("none", Reason.QUIET, "nothing: below the limits"),
+        ("unknown", Reason.TOO_FEW, "the diagnostic plan"), ("unknown", Reason.UNEXPLAINED, "the diagnostic plan"),
+        ("ambiguous", Reason.RIVALS, "the same presses at three rates"),
+    ],
+)  # fmt: skip
+def test_every_status_says_what_to_do_next(status, reason, begins):
+    answer = [] if status in ("none", "unknown") else [finding("latency", *(["backlash"] * (status == "ambiguous")))]
+    decision = Decision(status, reason, tuple(Decided(f, status, {}, None) for f in answer))
+    assert following(decision, course(rates=(1.0,), episodes=4))[0].startswith(begins)
+
+
+def test_where_two_effects_close_the_gap_each_has_its_share():
+    shares = {"power_creep": 0.6, "bouc_wen": 0.3}
+    closed = {"after": 2.0, "closed": 0.9, "interval": [0.8, 1.0], "certain": True, "shares": shares}
+    told = line(in_text(document("named", [effect("power_creep")], sealed=closed)), "4 sealed")
+    assert told.endswith("90 % of the gap closed (90 %: 80 to 100 %): relaxation 60, hysteresis 30")
+
+
 def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
     assert said("unknown", [finding("power_creep")], 18.489, 20.374) == (
         "something is missing; relaxation comes closest and leaves 10 % of what could be explained, but sealed "
@@ -142,3 +184,16 @@ def test_what_stays_named_is_told_from_what_stands_in():
         "relaxation is there and closes 79 % of the gap on sealed presses; hysteresis may be there, too; "
         "1 % of what could be explained has no name yet"
     )
+
+
+def test_a_family_that_is_named_is_told_from_a_mechanism_that_is():
+    """What fits best is no name, and a pure number has no unit."""
+    entry = effect("power_creep") | {"family": "memory of the skin", "level": "family"}
+    entry["parameters"] = {"f": {"value": 0.2, "unit": "1", "error": 0.01}}
+    text = in_text(document("named, incomplete", [entry]))
+    assert line(text, "relaxation:") == "  relaxation: fits best; memory of the skin is named"
+    assert line(text, "f =") == "    f = 0.2 +- 0.01 (relaxed share over the decades)"
+    open_one = in_text(document("ambiguous", [entry | {"status": "ambiguous"}]))
+    assert line(open_one, "relaxation:") == "  relaxation: ambiguous; either way it is memory of the skin"
+    sure = in_text(document("named", [effect("softening") | {"confidence": 0.931}]))
+    assert line(sure, "softening:") == "  softening: named, 93 % sure"

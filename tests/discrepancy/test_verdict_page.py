@@ -48,6 +48,7 @@ def test_a_page_holds_all_of_itself_and_its_pictures_are_sound(judged):
     reader = Outside()
     reader.feed(page)
     assert not reader.loaded
+    assert "`" not in page, "commands are set as code"
     pictures = re.findall(r"<svg.*?</svg>", page, re.S)
     assert len(pictures) >= 5
     for picture in pictures:

@@ -35,6 +35,12 @@ def test_hum_is_told_of_with_its_frequency():
     assert hertz == pytest.approx(9, abs=1.1), "as fine as short stretches in the air allow"
 
 
+def test_a_slow_recovery_is_no_hum():
+    """After each press readings come back over half a second: a spectrum that falls from its lowest frequency on."""
+    late = course(recovery=0.5, hold=3.0, relaxed=0.3, noise=0.5)
+    assert idle_lines(late) == []
+
+
 def test_a_channel_that_drops_by_a_quarter_and_heals_is_told_of():
     fallen = with_readings(course(), lambda t, e, r: r * np.where((e >= 8) & (e < 14), [1, 0.75, 1], 1.0))
     [words] = odd_channels(fallen, FittedResponse(fallen))

@@ -31,7 +31,7 @@ def fill(folder):
 
 
 def dent(episode):
-    """Return a label by geometry alone: the ball's own shape, as deep as it was pressed."""
+    """Return a label by geometry alone: the ball's own shape, as deep as it was pressed; pressure like depth."""
     times, count = episode.taxels.sample_ns, len(episode.taxels.sample_ns)
     tip, grid = episode.tip_at(times), episode.sensor.map
     aside = np.hypot(*np.meshgrid(grid.x - episode.press.x, grid.y - episode.press.y, indexing="ij"))
@@ -43,7 +43,9 @@ def dent(episode):
         episode=episode.number, time_ns=times, tip=tip, signed=signed, error=zero, force_error=zero,
         taxel_force=np.zeros(taxels, np.float32), taxel_closure=np.zeros(taxels, np.float32),
         taxel_area=np.zeros(taxels, np.float32), force=np.zeros((count, 3), np.float32),
-        error_map=np.zeros(signed.shape, np.float16), provenance=provenance.stamp("example", parents, {}),
+        error_map=np.zeros(signed.shape, np.float16),
+        traction=np.float16(0.1 * signed[:, None] * np.array([0.2, 0.0, 1.0])[:, None, None]),
+        provenance=provenance.stamp("example", parents, {}),
     )  # fmt: skip
 
 

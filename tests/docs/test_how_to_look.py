@@ -153,6 +153,7 @@ def edited(root):
         (root / "edited" / name).unlink()
 
 
+@pytest.mark.long("tacdata/commands", "docs/how_to/look.md", reason="a page typed from beginning to end")
 def test_every_command_of_the_page_runs(folder, looked_at):
     said, shown = {}, folder / "shown.rrd"
     edited(folder)

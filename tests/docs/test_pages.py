@@ -20,8 +20,12 @@ def name(page):
     return str(page.relative_to(ROOT))
 
 
+ELSEWHERE = "import fiftyone"
+"""Blocks with this line run in an environment of their own, beside a server of a database: not here."""
+
+
 def blocks(page, language):
-    return [body for kind, body in BLOCK.findall(page.read_text()) if kind == language]
+    return [body for kind, body in BLOCK.findall(page.read_text()) if kind == language and ELSEWHERE not in body]
 
 
 GUIDES = [page for page in PAGES if page.parent == ROOT or page.is_relative_to(ROOT / "docs")]

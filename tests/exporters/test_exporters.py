@@ -129,8 +129,11 @@ def test_compensated_targets_move_along_the_pads_normals():
         wanted = GAINS[name] * np.nan_to_num(targets.depth[:, k])[:, None] * normal
         assert np.allclose(targets.position[:, k] - targets.seen[:, k], wanted, atol=1e-12)
         assert np.nanmax(targets.depth[:, k]) > 0.9
-    assert any("not moved at 1 times" in words for words in targets.remarks)
+    assert any("not moved at 1 of 38 times" in words for words in targets.remarks)
     assert np.array_equal(targets_of(made, None).position, targets.seen)
+    far = targets_of(made, {"thumb": 0.004, "index": 0.1})
+    assert any(words.startswith("index: moved by up to") and "0.1 m/mm meant?" in words for words in far.remarks)
+    assert not any(words.startswith("thumb: moved") for words in far.remarks)
 
 
 def test_what_cannot_be_made_is_refused():
@@ -369,7 +372,7 @@ def test_a_urdf_is_read_in_the_encoding_that_it_names(tmp_path, encoding):
     (tmp_path / "two.urdf").write_bytes(text.encode(encoding))
     assert "Fühler" in read_robot(path).urdf
     (tmp_path / "two.urdf").write_bytes(text.replace(encoding, "utf-8").encode("iso-8859-1"))
-    with pytest.raises(FormatError, match="no XML"):
+    with pytest.raises(FormatError, match="not in the encoding that it names"):
         read_robot(path)
 
 

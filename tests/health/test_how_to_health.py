@@ -32,6 +32,7 @@ def bench(folder, tmp_path):
     return tmp_path
 
 
+@pytest.mark.long("tacdata/commands", "docs/how_to/health.md", reason="a page typed from beginning to end")
 def test_every_command_of_the_page_runs(bench):
     said = {}
     for words in commands(PAGE):

@@ -322,6 +322,20 @@ def test_a_load_cell_alone_is_the_sensor_and_a_second_length_a_gauge(tmp_path):
     assert found["measured"] == {"displacement": {"file": "log", "columns": ["lvdt_mm"], "unit": "mm"}}
 
 
+def test_speeds_with_decimals_in_names_are_one_kind_of_file_and_a_single_axis_is_what_presses(tmp_path):
+    for name in ("00_at-0.2mms", "01_at1mms", "02_at1.5mms"):
+        lines = ["t_s,x_mm,P_kPa", *[f"{0.1 * k:.1f},{0.1 * min(k, 20 - k)},{k}" for k in range(21)]]
+        (tmp_path / f"trial_{name}.csv").write_text("\n".join(lines))
+    tables, _ = described(tmp_path)
+    found = proposed_mapping(tmp_path, tables)
+    assert [file["path"] for file in found["files"].values()] == ["trial_{part0}_at{part1}mms.csv"]
+    assert found["position"]["depth"] == {"column": "x_mm"}
+    assert found["taxels"]["columns"] == ["P_kPa"]
+    proposal = tmp_path / "mapping.yaml"
+    proposal.write_text(yaml.safe_dump(found))
+    assert import_session(tmp_path, proposal, tmp_path / "session").recordings == 3
+
+
 @pytest.mark.parametrize(
     ("write", "zero"),
     [
@@ -556,7 +570,9 @@ def test_an_excel_sheet_is_read_like_a_text_file(tmp_path):
 @pytest.mark.parametrize(
     ("layout", "columns"),
     [
-        ("%d.%m.%Y;%H:%M:%S.%f", 2), ("%m/%d/%Y;%I:%M:%S.%f %p", 2), ("%Y%m%d;%H:%M:%S.%f", 2),
+        ("%d.%m.%Y;%H:%M:%S.%f", 2),
+        ("%m/%d/%Y;%I:%M:%S.%f %p", 2),
+        ("%Y%m%d;%H:%M:%S.%f", 2),
         ("%d-%b-%Y %H:%M:%S.%f", 1),
     ],
 )

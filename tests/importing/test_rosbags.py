@@ -116,3 +116,20 @@ def test_what_is_no_bag_is_said_in_words(tmp_path):
     cut.write_bytes(bag(tmp_path, "sqlite3").read_bytes()[:5000])
     with pytest.raises(FormatError):
         tables_in(cut)
+
+
+def test_parts_of_a_message_that_are_not_taken_are_counted(tmp_path):
+    """The transforms of one TF message, of a hand with 40 links."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    named = {name.rsplit("/", 1)[-1]: kind for name, kind in types.types.items()}
+    head = named["Header"](stamp=named["Time"](sec=1, nanosec=0), frame_id="hand")
+    pose = named["Transform"](translation=named["Vector3"](x=1.0, y=0.0, z=0.0),
+                              rotation=named["Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0))  # fmt: skip
+    links = [named["TransformStamped"](header=head, child_frame_id=f"link{k}", transform=pose) for k in range(40)]
+    message = named["TFMessage"](transforms=links)
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection("/tf", message.__msgtype__, typestore=types)
+        writer.write(topic, BEGIN, types.serialize_cdr(message, message.__msgtype__))
+    table = read_table(next((tmp_path / "bag").glob("*.mcap")), {"table": "/tf"})
+    assert "transforms[31].transform.translation.x" in table.columns
+    assert table.notes == ("bag.mcap: 1 messages of /tf have more than 32 parts in transforms: the first 32 are taken",)

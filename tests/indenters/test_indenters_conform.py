@@ -57,6 +57,18 @@ def lower_points(indenter, height=2.0, count=61):
     return points[points[:, 2] < height]
 
 
+def test_a_shape_ends_at_its_height(example):
+    """One without goes on upward, so that a press of any depth has a meaning. Of a pair it is the lower solid's."""
+    points = lower_points(example, height=1.0)
+    lowest = points[points[:, 2] < points[:, 2].min() + 0.02] * [1.0, 1.0, 0.0]
+    up = np.array([0.0, 0.0, 1.0])
+    if np.isinf(example.height):
+        assert (distance(example, lowest + 5.0 * up) < 0).all()
+    else:
+        below, above = (distance(example, lowest + (example.height + step) * up) for step in (-0.05, 0.05))
+        assert ((below < 0) & (above > 0)).any()
+
+
 def numbers(indenter):
     """Names of the parameters that are lengths, angles or factors."""
     return [f.name for f in dataclasses.fields(indenter) if isinstance(getattr(indenter, f.name), float)]

@@ -9,12 +9,15 @@ import warp as wp
 import yaml
 from test_indenters_conform import Parameters, compiled, distance, gradient
 
+from tacdata.cases.case import read_case
 from tacdata.errors import FormatError, UsageError
 from tacdata.indenters import from_document
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.mesh import Mesh
 from tacdata.indenters.sphere import Sphere
 from tacdata.plans import Plan, read_plan
+from tacdata.plans.beside_skin import tip_aside
+from tacdata.sensor import default_sensor
 
 
 def tessellated_punch(steps, sections):
@@ -32,6 +35,14 @@ def tessellated_ball(subdivisions):
 def indenter_of(mesh, folder, **more):
     mesh.export(folder / "shape.stl")
     return from_document({"shape": "mesh", "file": "shape.stl", **more}, "plan", folder)
+
+
+def plan_of(indenter):
+    motion = {"clearance": 2, "travel_speed": 10, "approach_speed": 5, "press_speed": 1, "hold": 1, "rest": 1}
+    return {
+        "version": "1.0", "name": "own", "indenters": {"thumb": indenter}, "motion": motion,
+        "presses": [{"indenter": "thumb", "x": 0, "y": 0, "depth": 0.5}],
+    }  # fmt: skip
 
 
 CASES = {
@@ -112,12 +123,7 @@ def test_without_the_file_it_can_be_named_but_not_used():
 
 def test_a_plan_names_its_shapes_by_content(tmp_path):
     tessellated_ball(2).export(tmp_path / "thumb.stl")
-    motion = {"clearance": 2, "travel_speed": 10, "approach_speed": 5, "press_speed": 1, "hold": 1, "rest": 1}
-    plan = {
-        "version": "1.0", "name": "own", "indenters": {"thumb": {"shape": "mesh", "file": "thumb.stl"}},
-        "motion": motion, "presses": [{"indenter": "thumb", "x": 0, "y": 0, "depth": 0.5}],
-    }  # fmt: skip
-    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(plan))
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(plan_of({"shape": "mesh", "file": "thumb.stl"})))
     read = read_plan(tmp_path / "plan.yaml")
     assert len(read.document["indenters"]["thumb"]["sha256"]) == 64
     (tmp_path / "thumb.stl").unlink()
@@ -186,7 +192,44 @@ def test_a_solid_beside_its_axis_is_refused_with_the_move_that_mends_it(place, t
     mesh.apply_translation([*place, 0.0])
     with pytest.raises(FormatError, match="passes beside it") as caught:
         indenter_of(mesh, tmp_path)
-    assert f"move it by ({-place[0]:.4g}, {-place[1]:.4g}) mm" in str(caught.value)
+    assert f"move it by ({0 - place[0]:.4g}, {0 - place[1]:.4g}) mm" in str(caught.value)
+
+
+def test_a_small_file_may_be_in_inches(tmp_path):
+    with pytest.raises(FormatError, match="with scale 1") as caught:
+        indenter_of(tessellated_ball(3).apply_scale(1 / 25.4), tmp_path)
+    assert "25.4 (inches)" in caught.value.remedy
+
+
+def tipped_aside(place):
+    """A holder around the axis whose tip stands aside."""
+    holder = trimesh.creation.box(bounds=[[-10.0, -10.0, 6.0], [45.0, 10.0, 12.0]])
+    tip = trimesh.creation.cylinder(radius=2.0, segment=[[place, 0, 0], [place, 0, 8.0]])
+    return trimesh.boolean.union([holder, tip], engine="manifold")
+
+
+@pytest.mark.parametrize(
+    ("solid", "aside"),
+    [(lambda: tipped_aside(35.0), 33.0), (lambda: trimesh.creation.annulus(r_min=55.0, r_max=60.0, height=4.0), 55.0)],
+    ids=["tip aside", "wide ring"],
+)
+def test_a_solid_that_would_never_touch_the_skin_is_refused_by_plans_and_cases(solid, aside, tmp_path):
+    """Its axis may pass through the solid's box, and its lowest part still lie beside the skin."""
+    part = indenter_of(solid(), tmp_path)
+    with pytest.raises(FormatError, match="does not touch the skin") as caught:
+        Plan.from_document(plan_of(part.document), "plan").check_against(default_sensor())
+    said = float(str(caught.value).split("part lies ")[1].split(" mm beside the press axis")[0])
+    assert said == pytest.approx(aside, abs=1.5)
+    case = {"version": "1.0", "name": "own", "indenter": part.document, "depths": [0.25, 0.5]}
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump(case))
+    with pytest.raises(FormatError, match="does not touch the skin"):
+        read_case(tmp_path / "case.yaml")
+
+
+def test_a_tip_beside_its_axis_is_said_with_its_place(tmp_path):
+    ball = tessellated_ball(3).apply_translation([1.5, 0.0, 0.0])
+    assert "1.5 mm beside the press axis" in tip_aside(indenter_of(ball, tmp_path))
+    assert tip_aside(Mesh.example()) == "" and tip_aside(Sphere(2.0)) == ""
 
 
 def test_two_tips_on_one_holder_may_leave_the_axis_free(tmp_path):

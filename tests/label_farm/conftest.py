@@ -4,6 +4,9 @@ from functools import partial
 
 import pytest
 from farm_examples import HERE, label_episodes
+from one_process import OneProcess, version
+
+from label_farm.presses import model
 
 
 @pytest.fixture
@@ -16,6 +19,18 @@ def solves(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def label_all(tmp_path, solves):
+def quick_version(monkeypatch):
+    """The version of a model is found in this process."""
+    monkeypatch.setattr(model, "version", version)
+
+
+@pytest.fixture
+def label_all(tmp_path, solves, quick_version):
     """Return a function that labels episodes with the fast model in ``tmp_path`` and returns the summary."""
+    return partial(label_episodes, tmp_path / "labels", engine=OneProcess)
+
+
+@pytest.fixture
+def label_by_workers(tmp_path, solves, quick_version):
+    """Return a function as `label_all`, whose workers are processes, as a user's are."""
     return partial(label_episodes, tmp_path / "labels")

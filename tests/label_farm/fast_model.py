@@ -75,6 +75,8 @@ def path(sensor, depths, answer, x=0.0, bad=False, numerical=0.0):
         numerical=np.abs(values)[:, None, None] * numerical * np.ones_like(bump),
         force_error=np.abs(values) * numerical,
         taxel_force_error=np.abs(values)[:, None] * numerical * taxels,
+        # As little of the map is in contact as of a real one.
+        traction=values[:, None, None, None] * np.maximum(bump - 0.8, 0.0) * np.array([0.1, 0.0, 1.0])[:, None, None],
         residual=np.zeros(len(depth)),
         penetration=np.zeros(len(depth)),
         provenance={"law": "bump"},

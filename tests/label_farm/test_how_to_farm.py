@@ -11,10 +11,10 @@ from contextlib import contextmanager
 import pytest
 from chaos import all_finished
 from farm_examples import HERE
+from free_port import free_port
 from running.in_process import tacdata
 from running.typed_pages import HOW_TO, blocks
 from session_examples import session
-from test_dask_pool import free_port
 
 from label_farm.remote.client import Client
 
@@ -137,6 +137,7 @@ def test_workers_of_more_computers(bench):
             assert all(row["owner"].startswith("remote:") for row in state["workers"])
 
 
+@pytest.mark.long("label_farm", "docs/how_to/label_farm.md", reason="a cluster of Dask and its workers, each a process")
 def test_workers_of_a_cluster(bench):
     scheduler, up, worker = PARTS[5]
     port = free_port()

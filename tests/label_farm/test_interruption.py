@@ -19,7 +19,8 @@ from farm_examples import label_episodes, press_episode
 folder = Path(sys.argv[1])
 episodes = [press_episode(folder, k, x=float(k)) for k in range(int(sys.argv[2]))]
 try:
-    summary = label_episodes(folder / "labels", episodes)
+    # A machine that stands still for seconds takes no press from a worker: who is dead is told by its process.
+    summary = label_episodes(folder / "labels", episodes, lease_seconds=60.0)
 except KeyboardInterrupt:
     sys.exit(130)
 print(len(summary.written), len(summary.failed))
@@ -70,6 +71,7 @@ def alive(process):
 
 def test_two_runs_on_one_store_share_the_work(tmp_path, solves, monkeypatch):
     monkeypatch.setenv("FAST_MODEL_SECONDS", "0.1")
+    episodes(tmp_path, 8)  # recorded before either run reads them
     runs = [start(tmp_path, 8), start(tmp_path, 8)]
     answers = [run.communicate(timeout=100) for run in runs]
     assert [run.returncode for run in runs] == [0, 0], answers

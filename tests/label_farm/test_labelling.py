@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from farm_examples import SENSOR, press_episode
+from farm_examples import SENSOR, label_episodes, press_episode
 
 from label_farm.labelling import FarmSettings, Labelling
 from label_farm.store.failure import Failure
@@ -14,16 +14,16 @@ from tacdata.errors import FormatError, SolveError, UsageError
 from tacdata.labels import read_label
 
 
-def test_equal_presses_share_one_solve_and_a_second_run_computes_nothing(tmp_path, label_all, solves):
+def test_equal_presses_share_one_solve_and_a_second_run_computes_nothing(tmp_path, label_by_workers, solves):
     episodes = [press_episode(tmp_path, k, x=float(k % 2)) for k in range(4)]
     stages = []
-    summary = label_all(episodes, progress=lambda *stage: stages.append(stage))
+    summary = label_by_workers(episodes, progress=lambda *stage: stages.append(stage))
     assert sorted(summary.written) == [0, 1, 2, 3] and not summary.failed
     assert sorted(x for _, x in solves()) == ["0", "1"]
     assert len(summary.seconds) == 2
     assert stages[-1] == ("solve", 2, 2)
     before = {p.name: p.read_bytes() for p in (tmp_path / "labels").glob("*.parquet")}
-    again = label_all(episodes)
+    again = label_by_workers(episodes)
     assert again.current == [0, 1, 2, 3] and not again.written and len(solves()) == 2
     assert before == {p.name: p.read_bytes() for p in (tmp_path / "labels").glob("*.parquet")}
 
@@ -49,19 +49,19 @@ def test_a_fly_over_has_a_zero_map_and_no_solve(tmp_path, label_all, solves):
     assert not read_label(tmp_path / "labels" / "episode-000000.parquet").signed.any()
 
 
-def test_a_failure_keeps_its_reason_and_is_no_label(tmp_path, label_all, solves, monkeypatch):
+def test_a_failure_keeps_its_reason_and_is_no_label(tmp_path, label_by_workers, solves, monkeypatch):
     monkeypatch.setenv("FAST_MODEL_FAILS", "1")
     episodes = [press_episode(tmp_path, k, x=float(k)) for k in range(3)]
-    summary = label_all(episodes)
+    summary = label_by_workers(episodes)
     assert sorted(summary.written) == [0, 2]
     assert "no equilibrium at state 3" in summary.failed[1]
     assert not (tmp_path / "labels" / "episode-000001.parquet").exists()
     failure = Failure.read(tmp_path / "labels" / "episode-000001.failure.json")
     assert failure.kind == "solve" and "SolveError" in failure.log
-    again = label_all(episodes)
+    again = label_by_workers(episodes)
     assert "no equilibrium" in again.failed[1] and len(solves()) == 3
     monkeypatch.delenv("FAST_MODEL_FAILS")
-    assert label_all(episodes, redo=True).written == [1]
+    assert label_by_workers(episodes, redo=True).written == [1]
     assert len(solves()) == 4 and not (tmp_path / "labels" / "episode-000001.failure.json").exists()
 
 
@@ -99,8 +99,8 @@ def test_a_recording_that_cannot_be_read_or_labelled_stops_no_other(tmp_path, so
     assert "broke off" in summary.failed[0] and "time_ns" in summary.failed[1]
 
 
-def test_a_model_that_cannot_be_built_is_said_in_words(tmp_path, label_all):
+def test_a_model_that_cannot_be_built_is_said_in_words(tmp_path, solves):
     with pytest.raises(UsageError, match="no model"):
-        label_all([press_episode(tmp_path)], factory="fast_model:Missing")
+        label_episodes(tmp_path / "labels", [press_episode(tmp_path)], factory="fast_model:Missing")
     with pytest.raises(SolveError, match="cannot be built"):
-        label_all([press_episode(tmp_path)], factory="fast_model:path")
+        label_episodes(tmp_path / "labels", [press_episode(tmp_path)], factory="fast_model:path")

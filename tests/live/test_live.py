@@ -193,6 +193,24 @@ def test_messages_reach_a_reader_as_the_schema_says():
         server.close()
 
 
+def test_a_reader_can_have_the_skin_tared_anew():
+    server = MessageServer(0)
+    try:
+        loop = loop_over([[frame(k, 3)] for k in range(10)], 10 * PERIOD, server=server)
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30) as reader:
+            reader.sendall(b"hello\n")
+            reader.sendall(b"tare\r\n")
+            until = time.monotonic() + 30
+            while not loop._tare_wanted and time.monotonic() < until:
+                time.sleep(0.01)
+        assert loop._tare_wanted and loop._stream.baseline is not None
+        said = []
+        loop.run(0.1, said.append)
+        assert said == ["index: taring anew, do not touch the skin"] and loop._stream.baseline is None
+    finally:
+        server.close()
+
+
 def test_an_estimate_from_readings_never_learnt_from_says_so():
     clock, said, shown = Frozen(10**12), [], []
     known = DepthStream(newest_of, (0,), SENSOR.map, StreamClock(), 3, novelty=lambda taxels: taxels[:, 0] / 10)

@@ -71,12 +71,12 @@ def claimed(recording):
 
 def test_a_fresh_memory_is_survived_and_everything_is_read(firmware):
     with Grbl(Clock.start(), firmware.path) as driver:
-        said = driver.settings()
+        said, cautions = driver.settings(), driver.cautions
         driver.move((0.5, 0.0, -0.5), 2.0)
         driver.wait_idle(60)
         np.testing.assert_allclose(driver.statuses()[-1].position, [0.5, 0, -0.5], atol=0.005)
     assert {"VER", "OPT", "GC", "G54", "G92", "$100", "$132", "banner"} <= set(said)
-    assert "touch off before moving" in driver.cautions[0] or said["reset_at_opening"] == "no"
+    assert "touch off before moving" in cautions[0] or said["reset_at_opening"] == "no"
 
 
 def test_a_dwell_is_answered_when_the_move_before_it_has_ended(ready):

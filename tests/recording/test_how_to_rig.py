@@ -83,7 +83,7 @@ def test_a_board_of_ones_own_records_by_the_page(tmp_path):
     assert "session: 2 recordings" in typed(tmp_path, look)
 
 
-@pytest.mark.long("tacdata/commands", "tacdata/virtual_rig", "tacdata/discrepancy", reason="a rig, and a verdict")
+@pytest.mark.long("tacdata/commands", "docs/how_to/own_sensor.md", reason="a rig, and a verdict")
 @pytest.mark.timeout(3600)
 def test_a_sensor_of_ones_own_by_the_page(tmp_path):
     (tmp_path / "examples").symlink_to(ROOT / "examples")

@@ -13,6 +13,7 @@ import pytest
 import yaml
 from recording_examples import SENSOR, plan, plan_document
 
+from tacdata import documents
 from tacdata.errors import DeviceError
 from tacdata.recording import read_session
 from tacdata.recording.check.report import check
@@ -20,6 +21,7 @@ from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.files.recover import recover
 from tacdata.recording.recorder import Recorder
+from tacdata.recording.session import resume_session
 from tacdata.rig import read_rig
 from tacdata.virtual_rig.rig import VirtualRig
 from tacdata.virtual_rig.world.mounting import mount
@@ -109,7 +111,12 @@ def bench(virtual, tmp_path):
     return [*TACDATA, "record", *common, "--yes"]
 
 
-@pytest.mark.parametrize("room", [3_000, 12_000, 30_000])
+AT_ANOTHER_TIME = pytest.mark.long("tacdata/commands", "tacdata/virtual_rig", reason="a disk full at another time")
+
+
+@pytest.mark.parametrize(
+    "room", [pytest.param(3_000, marks=AT_ANOTHER_TIME), 12_000, pytest.param(30_000, marks=AT_ANOTHER_TIME)]
+)
 def test_a_full_disk_is_said_and_the_session_goes_on(bench, virtual, tmp_path, room):
     out = tmp_path / "session"
     result = subprocess.run(
@@ -150,6 +157,19 @@ def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(be
     assert result.returncode == 0, result.stderr
     assert "2 of 2" in result.stdout
     assert len(file_names.unfinished(out)) == 1, "what the kill left is put aside, not overwritten"
+
+
+def test_a_recording_that_a_kill_left_whole_gets_its_name(virtual, tmp_path):
+    out = tmp_path / "session"
+    session = recorder(virtual, out).run(lambda summary: True)
+    document = {**session.document, "episodes": []}
+    for number, path in enumerate(session.episodes):
+        partial = path.rename(file_names.partial(path))
+        partial.write_bytes(partial.read_bytes()[: -5000 if number == 0 else None])
+    documents.write(out / "session.json", document, "session")
+    session = resume_session(out, session.plan, session.sensor, document["rig"])
+    assert session.done == {1}
+    assert [path.name for path in session.unfinished] == ["episode-000000.interrupted-0.mcap"]
 
 
 def test_a_computer_that_stood_still_in_mid_press_lifts_and_says_so(bench, virtual, tmp_path):

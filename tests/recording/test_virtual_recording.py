@@ -153,7 +153,7 @@ def test_solids_from_files_are_pressed_like_any_other(virtual, tmp_path):
 def test_an_alarm_in_mid_press_leaves_a_readable_file_and_a_session_to_resume(virtual, tmp_path):
     out = tmp_path / "session"
     with pytest.raises(DeviceError, match=r"(?i)alarm"):
-        recorder(virtual, out, progress=lambda *_: strike(virtual)).run(lambda summary: True)
+        recorder(virtual, out, progress=lambda *_: strike(virtual, out)).run(lambda summary: True)
     assert list(file_names.finished(out)) == [0]
     (broken,) = file_names.unfinished(out)
     episode = read_recording(broken).episode
@@ -163,9 +163,18 @@ def test_an_alarm_in_mid_press_leaves_a_readable_file_and_a_session_to_resume(vi
     assert len(episode.taxels.counter) > 5
 
 
-def strike(virtual):
+def height(virtual):
+    """Height of the tip 5 ms ago [mm]."""
+    return virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000)[2]
+
+
+def strike(virtual, out):
+    """Send an alarm when the second press is on the skin."""
+    surface = read_rig(virtual.path).registration.origin[2]
+
     def later():
-        time.sleep(2.0 / SPEED)
+        while not file_names.finished(out) or height(virtual) > surface - 0.2:
+            time.sleep(0.002)
         virtual.controller.inject_alarm(1)
 
     threading.Thread(target=later, daemon=True).start()
@@ -176,15 +185,14 @@ def test_ctrl_c_on_the_skin_lifts_the_indenter(virtual, tmp_path):
     surface = read_rig(virtual.path).registration.origin[2]
 
     def interrupt_on_the_skin():
-        while virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000)[2] > surface - 0.2:
+        while height(virtual) > surface - 0.2:
             time.sleep(0.002)
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=interrupt_on_the_skin, daemon=True).start()
     with pytest.raises(KeyboardInterrupt):
         recorder(virtual, out).run(lambda summary: True)
-    height = virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000)[2]
-    assert height == pytest.approx(surface + 3.0, abs=0.01)
+    assert height(virtual) == pytest.approx(surface + 3.0, abs=0.01)
     (broken,) = file_names.unfinished(out)
     episode = read_recording(broken).episode
     assert any("Ctrl-C" in note for note in episode.notes)

@@ -221,3 +221,27 @@ def test_a_board_that_was_reset_by_opening_is_not_moved_by_yes(virtual, monkeypa
     assert "the position is not known" in loud
     assert "motion: nothing was moved" in loud
     assert np.array_equal(before, virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000))
+
+
+def test_an_alarm_is_not_homed_away_without_a_persons_yes(virtual, monkeypatch, capfd):
+    document = yaml.safe_load(virtual.path.read_text())
+    document["cnc"]["home"] = True
+    virtual.path.write_text(yaml.safe_dump(document))
+    virtual.controller.inject_alarm(3)  # it was reset in motion: the tip may be in the skin
+    monkeypatch.setattr("builtins.input", lambda question: "n")
+    code, _, loud = run(monkeypatch, capfd, "register", "--rig", virtual.path, "--yes")
+    assert code != 0
+    assert "the machine was not homed: the controller is locked" in loud, loud
+    assert "motion: nothing was moved" in loud
+
+
+@pytest.mark.parametrize("verb", ["register", "record"])
+def test_a_ctrl_c_before_anything_is_opened_says_that_nothing_moved(verb, tmp_path, monkeypatch, capfd):
+    def interrupted(path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tacdata.rig.read_rig", interrupted)
+    more = ["--plan", "p.yaml", "--out", tmp_path / "s"] if verb == "record" else []
+    code, _, loud = run(monkeypatch, capfd, verb, "--rig", tmp_path / "rig.yaml", *more)
+    assert code == 130
+    assert "motion: nothing was moved\n  data:   nothing was written\n  then:   the same command" in loud

@@ -1,5 +1,6 @@
 """The smallest gain that holds an object again and again, found by trying."""
 
+import functools
 from dataclasses import replace
 
 import pytest
@@ -10,11 +11,14 @@ from tacdata.replay.gain_search import PRELIMINARY, GripDemand, GripSearch
 from tacdata.replay.outcome import replay_targets
 from tacdata.replay.scene import ReplayScene, drawn
 
-MADE = replay_targets(grasp(0.01)[0], ReplayScene(), grasp()[1])
+
+@functools.cache
+def replayed():
+    return replay_targets(grasp(0.01)[0], ReplayScene(), grasp()[1])
 
 
 def made(held=True, slip=0.001, force=2.0, grip=2.0):
-    return replace(MADE, held=held, slip=slip, force={"thumb": force, "index": force / 2}, grip=grip)
+    return replace(replayed(), held=held, slip=slip, force={"thumb": force, "index": force / 2}, grip=grip)
 
 
 def test_the_first_gain_that_holds_every_trial_is_taken():

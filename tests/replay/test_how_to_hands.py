@@ -1,4 +1,4 @@
-"""The commands of the pages on hands and robots run as they stand: what needs a rig in the long part, the rest here."""
+"""The commands of the pages on hands and robots run as they stand: all in the long part."""
 
 import re
 import shlex
@@ -47,7 +47,8 @@ def typed(words, folder):
     """Type a command of a page; return what it said."""
     (folder / "shown.rrd").unlink(missing_ok=True)
     words = ["live.rrd" if word == "window" else word for word in words]
-    done = tacdata(*words, *FASTER.get(words[0], []), folder=folder)
+    more = [] if "--video" in words and words[0] == "view" else FASTER.get(words[0], [])
+    done = tacdata(*words, *more, folder=folder)
     assert done.returncode == 0, f"tacdata {shlex.join(words)}: {done.stdout}{done.stderr}"
     return done.stdout
 
@@ -56,6 +57,18 @@ def test_every_command_is_typed_somewhere():
     assert {words[0] for words in ALL} == {*FILES, *RIG, *ELSEWHERE, "grasp-study"}
     for verb, place in ELSEWHERE.items():
         assert verb in (ROOT / "tests" / place).read_text(), f"{place} does not type {verb}"
+
+
+def test_the_page_plans_presses_as_wide_as_a_ball():
+    import yaml
+
+    from tacdata.plans import Plan
+    from tacdata.plans.recipe import write_out
+    from tacdata.sensor import default_sensor
+
+    (block,) = blocks(PAGES[0], "yaml")
+    plan = Plan.from_document(write_out(yaml.safe_load(block), default_sensor(), "hands.md"), "hands.md")
+    assert len(plan.presses) == 28 and {press.indenter_name for press in plan.presses} >= {"ball_35", "plate", "punch"}
 
 
 @pytest.fixture
@@ -73,6 +86,9 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.long(
+    "tacdata/commands", "docs/how_to/hands.md", "docs/how_to/own_robot.md", reason="pages typed from beginning to end"
+)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_what_needs_tracks_alone_runs(page, folder, monkeypatch):
     monkeypatch.setitem(replay_film.MOST, ".mp4", 4)
@@ -85,17 +101,9 @@ def test_what_needs_tracks_alone_runs(page, folder, monkeypatch):
     assert (folder / "joints").is_dir() and (folder / "targets").is_dir()
 
 
-@pytest.mark.long("tacdata/commands", "tacdata/virtual_rig", "tacdata/live", reason="a hand, in its own time")
+@pytest.mark.long("tacdata/commands", "docs/how_to/hands.md", reason="a hand, in its own time")
 @pytest.mark.timeout(900)
 def test_what_needs_a_rig_runs(tmp_path):
-    from training.settings import TrainingSettings
-    from training.train import train
-
-    sys.path.append(str(ROOT / "tests" / "training"))
-    from training_frames import build_frames
-
-    settings = TrainingSettings(arguments={"hidden": 16, "channels": 4}, epochs=1)
-    train(build_frames(), settings, tmp_path / "network", device="cpu", threads=1)
     wanted = [words for words in commands(PAGES[0]) if needs_rig(words)]
     assert wanted[0][0] == "virtual-rig"
     rig = subprocess.Popen([sys.executable, "-m", "tacdata.cli", *wanted[0]], cwd=tmp_path)
@@ -111,7 +119,7 @@ def test_what_needs_a_rig_runs(tmp_path):
     assert any("predicted depth up to" in words for words in said.values())
 
 
-@pytest.mark.long("tacdata/commands", "tacdata/grasping", "training", reason="a network is trained, and oranges lifted")
+@pytest.mark.long("tacdata/commands", "docs/how_to/hands.md", reason="a network is trained, and oranges lifted")
 @pytest.mark.timeout(1800)
 def test_the_study_of_grasps_runs(tmp_path):
     (study,) = (words for words in commands(PAGES[0]) if words[0] == "grasp-study")

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 
 import pytest
 from PIL import Image
@@ -10,7 +11,10 @@ from tracked_hand import tracks
 
 from tacdata import documents
 from tacdata.cli import main
+from tacdata.commands.replay import _other_network
+from tacdata.demonstrations.paths.tracks_file import read_tracks
 from tacdata.virtual_rig.world.hand import draw_hand
+from viewers.pictures import replay_film
 
 WILSON = [(0.0, 0.4899), (0.0456, 0.6994), (0.1500, 0.8500), (0.3006, 0.9544), (0.5101, 1.0)]
 """Wilson's 95 % interval [1] of k successes in 4 trials, from its quadratic with z^2 = 3.841459."""
@@ -32,7 +36,8 @@ def run(arguments):
     return 0
 
 
-def test_rates_come_with_wilson_intervals(tracked, tmp_path, capsys):
+def test_rates_come_with_wilson_intervals(tracked, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(replay_film.MOST, ".gif", 22)
     out, view, film = tmp_path / "result.json", tmp_path / "replay.rrd", tmp_path / "replay.gif"
     assert run(["replay", tracked, "--seeds", "4", "--out", out, "--view", view, "--video", film]) == 0
     said = capsys.readouterr().out
@@ -65,6 +70,14 @@ def test_bad_arguments_end_in_words(tracked, tmp_path, capsys):
         assert words in capsys.readouterr().err
 
 
+def test_a_gain_that_was_found_with_another_network_is_said(tracked):
+    made = read_tracks(tracked)
+    other = replace(made, network={**made.network, "hash": "e" * 64})
+    (words,) = _other_network(other, made)
+    assert "predicted by checkpoint ffffffffffff, the gain is found with eeeeeeeeeeee" in words
+    assert _other_network(made, made) == ()
+
+
 def wiping(tmp_path, seed):
     """The tracks of a hand that wipes."""
     folder = tmp_path / f"wipe{seed}"
@@ -72,6 +85,7 @@ def wiping(tmp_path, seed):
     return tracks(folder, draw_hand(seed, "wipe"), "wipe", f"{seed:x}" * 64)
 
 
+@pytest.mark.long("tacdata/commands/replay.py", "tacdata/virtual_rig", reason="a gain is looked for, then two strokes")
 def test_an_eraser_is_lost_without_compensation_and_a_gain_chosen_elsewhere_holds_it(tmp_path, capsys):
     training, first, second = (wiping(tmp_path, seed) for seed in (1, 2, 3))
     out, view = tmp_path / "wipe.json", tmp_path / "wipe.rrd"

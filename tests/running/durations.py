@@ -75,7 +75,8 @@ class Count:
             for total in (rooms[file.split("/")[1]], files[file]):
                 total[0] += spent[0]
                 total[1] += spent[1]
-        if self.config.option.record_durations:
+        # The long tests of a file have a record of their own.
+        if self.config.option.record_durations and not self.config.option.long:
             _record(files)
         if len(files) < 2:
             return

@@ -3,7 +3,8 @@
 A test says which rooms decide it and why it is long: `@pytest.mark.long("label_farm", reason="workers die at random")`.
 `pytest --long=all` runs these tests alone. `--long=changed` runs the files whose inputs differ from those at which they
 last passed. Inputs are the rooms named, what they import in turn, the test, its helpers and the pinned versions; no
-docstrings or comments. A run in which all long tests of a file pass writes a hash of its inputs to `long_runs.json`.
+docstrings or comments. Of a page that is named they are what it shows to type. A run in which all long tests of a file
+pass writes a hash of its inputs to `long_runs.json`.
 """
 
 import ast
@@ -66,6 +67,11 @@ def record():
     return json.loads(RECORD.read_text())
 
 
+def seconds():
+    """Return what the long tests of each file took when they last passed [s]."""
+    return {file: float(passed["seconds"]) for file, passed in record().items()}
+
+
 class Passed:
     """Collects what became of the long tests; writes down the files of which all passed."""
 
@@ -105,7 +111,8 @@ class Passed:
 @functools.cache
 def inputs(file, rooms):
     """Return a hash of all that decides the long tests of a file."""
-    beside = {path for path in _texts((ROOT / file).parent) if not path.name.startswith("test_")}
+    room = ROOT / "tests" / (ROOT / file).relative_to(ROOT / "tests").parts[0]
+    beside = {path for path in _texts(room) if not path.name.startswith("test_")}
     paths = {ROOT / ".dev" / "constraints.txt", ROOT / file, *beside}
     for room in sorted(closure(rooms)):
         paths |= _texts(ROOT / room)
@@ -156,7 +163,11 @@ def _room(words):
 
 @functools.cache
 def _content(path):
-    """Return what of a file can decide a test: of Python its syntax tree, without docstrings."""
+    """Return what of a file can decide a test: of Python its syntax tree without docstrings, of a page its blocks."""
+    if path.suffix == ".md":
+        from running.typed_pages import BLOCK  # not found where this file is run as a script
+
+        return "".join(block[0] for block in BLOCK.finditer(path.read_text())).encode()
     if path.suffix != ".py":
         return path.read_bytes()
     tree = ast.parse(path.read_text())

@@ -2,12 +2,13 @@
 
 `pytest --numprocesses 4 --waiting 2`: two of four processes take files that hold devices to the clock. The others stand
 back (nice): an emulated device is then seldom late. Whoever has no file of its kind left takes one of the other. Files
-that took longest go first (`durations.csv`).
+that took longest go first (`durations.csv`, of the long part `long_runs.json`).
 """
 
 import os
 from pathlib import Path
 
+from running import long_part
 from running.durations import recorded
 from running.real_time import in_real_time
 from xdist.scheduler import LoadFileScheduling
@@ -19,8 +20,8 @@ STAND_BACK = 3
 """How much computing processes are put back (nice): more would leave them next to nothing on a busy machine."""
 PORTS = 7
 """How far apart processes ask for a viewer's ports: two that begin at the same time would both find one free."""
-UNKNOWN = 60.0
-"""What a file counts that has not been timed yet [s]: it begins early, as a long one at the end would run alone."""
+UNKNOWN = 15.0
+"""What a file counts that has not been timed yet [s]: it begins before the many short ones, after the long."""
 
 
 def pytest_addoption(parser):
@@ -61,7 +62,7 @@ class ByKind(LoadFileScheduling):
 
     def _assign_work_unit(self, node):
         own = waits(node.gateway.id, self.config)
-        seconds = recorded()
+        seconds = long_part.seconds() if self.config.option.long else recorded()
 
         def order(file):
             return in_real_time(ROOT / file) != own, -seconds.get(file, UNKNOWN)

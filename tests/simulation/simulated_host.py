@@ -222,6 +222,11 @@ class SimulatedCondition(SimulatedLock):
         super().__init__(host)
         self._told = Waiters(host)
 
+    def __exit__(self, *raised):
+        # As `tacdata.host.Condition`: an interrupt may come while the lock is taken back.
+        if raised[0] is None or self._owner is self._host.schedule.task:
+            self.release()
+
     def wait(self, timeout=None):
         count = self.let_go()
         try:

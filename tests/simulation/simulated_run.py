@@ -174,7 +174,8 @@ def _frames(run, faults, path):
         return
     episode = recording.episode
     is_final = bool(file_names.EPISODE.fullmatch(path.name))
-    if is_final != episode.complete:
+    whole = run.killed and path.name.endswith(file_names.PARTIAL)  # killed before it got its name: --resume gives it
+    if is_final != episode.complete and not whole:
         yield f"{path.name} says complete: {episode.complete}"
     counter = episode.taxels.counter
     touched = {"damaged_frame", "board_stalls", "board_unplugged"} & set(faults.names)
@@ -214,8 +215,9 @@ def _play(world, faults):
     yield from (f"first run: {words}" for words in broken(run, faults))
     if run.hung or (run.error is None and not run.killed):
         return
-    lost = world.lost or world.controller.machine.alarm is not None
     world.reboot()
+    world.schedule.run_for(0.1, world.bench)  # what went wrong at the very end has its effect
+    lost = world.lost or world.controller.machine.alarm is not None
     calm = world.repair(lost)
     resume = world.folder.exists()
     before = world.path[-1][1:4] if world.path else None

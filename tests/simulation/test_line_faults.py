@@ -13,7 +13,9 @@ from simulated_rig import ORIGIN, World
 
 from tacdata.devices.device import OwesAnswer
 from tacdata.errors import DeviceError
+from tacdata.recording.check.report import check
 from tacdata.recording.files.mcap_records import read_records
+from tacdata.recording.files.reader import read_recording
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.registration.guarded_probe import guarded_probe
 
@@ -150,3 +152,32 @@ def test_what_an_earlier_program_left_is_neither_carried_out_nor_taken_for_an_an
     world.end()
     assert asked and len(session.done) == 1
     assert min(row[3] for row in world.path) > ORIGIN[2] - 0.81, "only the press went into the skin"
+
+
+def test_reports_that_cannot_be_read_are_counted_in_the_file_and_told_by_check(tmp_path):
+    world, seen = World(5, tmp_path / "session", presses=1), [0]
+
+    def broken(text):
+        if not text.startswith("<"):
+            return text
+        seen[0] += 1
+        return text.replace("MPos:", "MP") if seen[0] % 7 == 0 else text
+
+    world.schedule.at(round(2e9), lambda: world.controller.inject_wire(to_host=broken))
+    assert len(world.record().done) == 1
+    world.end()
+    counted = read_recording(world.folder / "episode-000000.mcap").counts["cnc"]["corrupt"]
+    assert 2 <= counted <= seen[0] // 7
+    assert f"{counted} status reports could not be read" in check(world.folder).text
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(0.05, False), (1.2, True)])
+def test_a_controller_that_stands_still_in_mid_press_is_told_by_check(tmp_path, seconds, told):
+    world = World(3, tmp_path / "session")
+    world.schedule.at(round(4.6e9), lambda: world.controller.inject_stall(seconds))
+    assert len(world.record().done) == 2
+    world.end()
+    report = check(world.folder)
+    found = [finding for finding in report.findings if "may have stood still" in finding.text]
+    assert bool(found) == told, report.text
+    assert report.usable != told

@@ -24,7 +24,10 @@ def test_without_an_answer_it_does_not_home(world):
     with pytest.raises(DeviceError, match="was not homed: the controller was reset in mid-stream") as error:
         world.record(resume=True, home=True)
     assert "its position is lost" in str(error.value)
-    assert "motion: nothing was moved" in "".join(error.value.__notes__)
+    last = "".join(error.value.__notes__)
+    assert "motion: nothing was moved" in last
+    assert "zero:   LOST: do not trust the position that the machine reports" in last, "the session remembers it"
+    assert "then:   find its zero again (home it, or touch off), then the same command with --resume" in last
     assert (world.position() == before).all()
 
 

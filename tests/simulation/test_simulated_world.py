@@ -119,6 +119,12 @@ def test_what_must_hold_of_every_run_holds(seed):
         (5381, ()),  # half a line was left in the controller's buffer: --resume was refused
         (5766, ()),  # the same, with echoes of lines
         (5968, ()),  # the same after a hold from outside, on a busy computer
+        (547, ()),  # one more Ctrl-C while a lock was taken back: an error about the lock hid it
+        (10586, ()),  # one more Ctrl-C while the signal handlers were put back: the last words were lost
+        (13703, ()),  # the same while they were being written, with the tip in the skin
+        (13745, ()),  # killed between the end of a file and its name: a whole recording was taken for a broken one
+        (15940, ()),  # a brown-out at the very end: the judge had not seen it yet
+        (18322, ()),  # an alarm that hears no line before a reset: 30 s in silence at opening
         (5582, ()),  # a board that freezes twice shows another reading once: no fault of the recorder
     ],
 )

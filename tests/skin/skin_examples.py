@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 import scipy.sparse as sp
 import torch
 import warp as wp
@@ -11,7 +12,7 @@ import warp as wp
 from tacdata.sensor import Material, Sensor, default_sensor
 from tacdata.sensor.sensor import ContactProperties, DepthMap, Skin, Taxels
 from tacdata.skin.contact.contact_surface import SUBDIVISIONS, face_quadrature
-from tacdata.skin.contact.mortar import Mortar, hats
+from tacdata.skin.contact.mortar import Mortar
 from tacdata.skin.linear.rest_stiffness import rest_stiffness
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.mesh import elements
@@ -21,6 +22,10 @@ from tacdata.skin.model import ModelSettings
 from tacdata.skin.solve.settings import SolverSettings
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
+
+NO_CARD = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
+DEVICES = ["cpu", pytest.param("cuda:0", marks=[pytest.mark.gpu, NO_CARD])]
+"""For tests that run on a card as they do without one."""
 
 PLAIN = ModelSettings(error_estimate=False)
 EXACT = ModelSettings(
@@ -106,7 +111,7 @@ class HeldSlab:
         self.held = np.setdiff1d(np.arange(3 * self.count), self.free)
         nodes, faces = torch.as_tensor(self.mesh.nodes), torch.as_tensor(self.mesh.outer)
         weights, shapes = face_quadrature(nodes, faces, SUBDIVISIONS)
-        at_points = hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
+        at_points = elements.triangle_hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
         mortar = Mortar(self.mesh.outer, weights.numpy(), shapes.numpy(), at_points, self.count, "cpu")
         self.rows = sp.csr_matrix(sp.kron(mortar.mean, np.eye(3)))
 

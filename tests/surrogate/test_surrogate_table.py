@@ -148,6 +148,7 @@ def test_presses_of_the_default_sensor_ship_so_that_its_table_costs_nothing():
     assert np.all(loads.sum(axis=1) < force), "the rim carries the rest"
 
 
+@pytest.mark.long("tacdata/skin", "tacdata/surrogate", reason="a press of the default skin on its own mesh")
 def test_a_shipped_press_is_what_the_model_of_today_says():
     from tacdata.skin.model import SkinModel
     from tacdata.skin.press import PressRequest

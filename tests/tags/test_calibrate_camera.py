@@ -109,24 +109,39 @@ def test_what_cannot_be_used_is_refused_in_words(folder, tmp_path, monkeypatch, 
     assert not (tmp_path / "c.yaml").exists()
 
 
+MIRROR, NEGATIVE, PLAIN = (lambda image: image[:, ::-1]), (lambda image: 255 - image), (lambda image: image)
+
+
 @pytest.mark.parametrize(
-    ("changes", "is_mirrored", "words"),
+    ("changes", "seen_as", "words"),
     [
-        ({"legacy": True}, False, "legacy: false"),
-        ({"columns": 6, "rows": 9}, False, "columns: 9 and rows: 6"),
-        ({"dictionary": "5X5_100"}, False, "dictionary: 4X4_50"),
-        ({}, True, "mirroring off"),
-        ({"columns": 6, "rows": 9}, True, "mirroring off, and write columns: 9"),
+        ({"legacy": True}, PLAIN, "legacy: false"),
+        ({"columns": 6, "rows": 9}, PLAIN, "columns: 9 and rows: 6"),
+        ({"dictionary": "5X5_100"}, PLAIN, "dictionary: 4X4_50"),
+        ({}, MIRROR, "mirroring off"),
+        ({"columns": 6, "rows": 9}, MIRROR, "mirroring off, and write columns: 9"),
+        ({}, NEGATIVE, "black on white"),
+        ({"columns": 8}, PLAIN, "columns: 9 and rows: 6"),
+        ({"columns": 10, "rows": 7}, PLAIN, "columns: 9 and rows: 6"),
     ],
 )
-def test_why_no_board_is_found_is_looked_for_and_named(changes, is_mirrored, words):
+def test_why_no_board_is_found_is_looked_for_and_named(changes, seen_as, words):
     pattern = replace(BOARD, **changes)
     picker = ViewPicker(pattern, still=False)
     for k, image in enumerate(images(2)):
-        assert not picker.take(np.ascontiguousarray(image[:, ::-1]) if is_mirrored else image, f"image {k}")
+        assert not picker.take(np.ascontiguousarray(seen_as(image)), f"image {k}")
     with pytest.raises(FormatError, match="in the others") as caught:
         picker.check_board()
     assert words in str(caught.value)
+
+
+def test_a_few_odd_images_are_remarked_upon_or_refused_if_too_few_are_left():
+    picker = ViewPicker(BOARD, still=False)
+    for k, image in enumerate(images(3)):
+        picker.take(np.ascontiguousarray(image[:, ::-1]) if k == 2 else image, f"image {k}")
+    assert "in 2 of 3 images; in the others the images are mirrored: switch" in picker.check_board()
+    with pytest.raises(FormatError, match="mirrored"):
+        picker.check_board(least=8)
 
 
 def test_images_of_no_board_are_not_explained():
@@ -138,14 +153,14 @@ def test_images_of_no_board_are_not_explained():
 
 def test_pixels_are_read_as_the_sensor_wrote_them(tmp_path):
     """Whatever turn a viewer is told by EXIF: the optical centre belongs to the sensor."""
-    from PIL import Image
-
     plain = np.random.default_rng(0).integers(0, 255, (48, 64), dtype=np.uint8)
-    for orientation in (1, 3, 6, 8):
+    endings = {"png": {}, "tif": {}, "webp": {"lossless": True}, "jpg": {"quality": 95}}
+    for orientation in range(1, 9):
         tag = Image.Exif()
         tag[0x0112] = orientation
-        Image.fromarray(plain).save(tmp_path / f"view_{orientation}.jpg", quality=95, exif=tag)
-    found = [image for _, image in images_of(tmp_path)]
-    assert len(found) == 4
-    for image in found:
-        np.testing.assert_array_equal(image, found[0])
+        for ending, options in endings.items():
+            Image.fromarray(plain).save(tmp_path / f"{ending}_{orientation}.{ending}", exif=tag, **options)
+    found = dict(images_of(tmp_path))
+    assert len(found) == 32
+    for name, image in found.items():
+        np.testing.assert_array_equal(image, found["jpg_1.jpg"] if name[0] == "j" else plain, err_msg=name)

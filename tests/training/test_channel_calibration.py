@@ -9,7 +9,7 @@ from training_frames import build_frames
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import default_sensor
-from training.frames.channel_calibration import SPREAD, ChannelCalibration, calibrate
+from training.frames.channel_calibration import SPREAD, ChannelCalibration, calibrate, doubts
 from training.networks.network import create
 
 
@@ -63,6 +63,29 @@ def test_a_channel_without_a_touch_takes_the_mean():
     assert found.gain_error[23] == pytest.approx(SPREAD * found.gain.mean())
 
 
+def test_one_press_tells_the_common_gain_alone():
+    frames = unit(np.random.default_rng(4).normal(1.0, 0.1, 24), episodes=6)
+    found = calibrate(frames, numbers(frames)[:1])
+    assert np.ptp(found.gain) < 1e-9 * found.gain.mean()
+    assert found.gain_error == pytest.approx(SPREAD * found.gain)
+
+
+def test_what_presses_cannot_tell_is_said_with_what_to_record():
+    frames = unit(np.ones(24), episodes=12)
+    chosen = numbers(frames)
+    assert doubts(calibrate(frames, chosen), frames, chosen) == []
+    few = doubts(calibrate(frames, chosen[:2]), frames, chosen[:2])[0]
+    assert "rest on 2 presses" in few and "record 3 presses or more" in few
+    force = np.array(frames.taxel_force)
+    force[:, [5, 11]] = 0.0
+    aside = replace(frames, taxel_force=force)
+    [untouched] = doubts(calibrate(frames, chosen), aside, chosen)
+    assert "hardly touched: 5, 11;" in untouched and "record presses over them" in untouched
+    unsure = replace(calibrate(frames, chosen), exponent_error=0.3)
+    [depths] = doubts(unsure, frames, chosen)
+    assert "± 0.30" in depths and "several depths" in depths
+
+
 def test_swapped_channels_are_refused():
     frames = unit(np.ones(24), episodes=20)
     taxels = np.array(frames.taxels)
@@ -75,6 +98,9 @@ def test_presses_into_the_air_and_missing_forces_are_refused():
     frames = build_frames()
     with pytest.raises(UsageError, match="none of 12 presses touches"):
         calibrate(replace(frames, taxel_force=np.zeros_like(frames.taxel_force)), numbers(frames))
+    flat = replace(frames.sensor, skin=replace(frames.sensor.skin, protrusion_radius=0.0))
+    with pytest.raises(UsageError, match="a flat skin: the model knows no force"):
+        calibrate(replace(frames, sensor=flat, taxel_force=np.zeros_like(frames.taxel_force)), numbers(frames))
     with pytest.raises(FormatError, match="does not say the forces"):
         calibrate(replace(frames, taxel_force=None), numbers(frames))
 

@@ -67,3 +67,10 @@ def test_too_little_to_calibrate_on():
         calibrate(*episodes(1, 0), PITCH, "a" * 64)
     nothing = [np.zeros((4, 35, 26), np.float32)] * 2
     assert calibrate(nothing, nothing, PITCH, "a" * 64).factors[0] == conformal_intervals.NOT_KNOWN
+
+
+def test_intervals_say_what_they_were_calibrated_on(tmp_path):
+    known = calibrate(*episodes(6, 0), PITCH, "a" * 64, "presses of another kind")
+    conformal_intervals.write(tmp_path, known)
+    again = conformal_intervals.read(tmp_path, "a" * 64)
+    assert again.source == "presses of another kind" and again.source in again.definition

@@ -149,3 +149,10 @@ def test_runs_are_reported_by_the_verb(outcomes, tmp_path, monkeypatch):
     scores = json.loads((tmp_path / "runs/direct-episode-0/scores/scores.json").read_text())
     assert next(entry["level"] for entry in scores["uncertainty"]["levels"]) == 0.5
     assert "direct" in run["title"] and run["uncertainty"] == scores["uncertainty"]
+
+
+def test_a_report_calls_networks_by_their_names_and_tells_their_recipes_once(outcomes):
+    first, second = (replace(run, name=f"pattern (hidden {k})") for k, run in enumerate(scored(outcomes)[:2]))
+    text = page([first, second])
+    assert "pattern 1: hidden 0." in text and "pattern 2: hidden 1." in text
+    assert text.count("hidden 0") == 1

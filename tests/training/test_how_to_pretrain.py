@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from running.in_process import tacdata
 from running.typed_pages import HOW_TO, commands
-from test_training_verbs import write_dataset
+from test_training_verbs import BALL, write_dataset
 from training_frames import build_frames
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
-from test_simulate import BumpSkin
+from bump_skin import BumpSkin
 
 from label_farm.simulated import solving
 from tacdata import documents
@@ -25,6 +25,10 @@ QUICK = {
     "simulate": ("--workers", 1, "--device", "cpu"),
 }
 """What makes a command short, by its verb."""
+SHAPES = (
+    BALL, {"shape": "flat_punch", "radius": 1.5, "edge_radius": 0.3},
+    {"shape": "ring", "ring_radius": 2.0, "tube_radius": 0.5},
+)
 
 
 @pytest.fixture
@@ -33,7 +37,7 @@ def typed(tmp_path, monkeypatch):
     monkeypatch.setattr(
         solving, "specimen_model", lambda simulation, number, device: BumpSkin(simulation.specimens[number], 99.0)
     )
-    write_dataset(tmp_path / "dataset", build_frames(16, length=12))
+    write_dataset(tmp_path / "dataset", build_frames(16, length=12), indenters=SHAPES)
     documents.write(tmp_path / "sensor.yaml", default_sensor().document, "sensor")
     said = {}
     for words in commands(PAGE):
@@ -43,6 +47,7 @@ def typed(tmp_path, monkeypatch):
     return said
 
 
+@pytest.mark.long("tacdata/commands", "docs/how_to/pretrain.md", reason="a page typed from beginning to end")
 def test_the_page_is_typed_from_its_first_command_to_its_last(typed, tmp_path):
     assert set(typed) == {"train", "evaluate", "learning-curve", "simulate"}
     fitted = checkpoint.load(tmp_path / "network")

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from torch.optim import AdamW
 from training_frames import build_frames
 
 from tacdata.errors import FormatError, UsageError
@@ -11,8 +12,8 @@ from training.inference import checkpoint
 from training.pretraining import curve_picture
 from training.pretraining.learning_curve import learning_curve
 from training.pretraining.recipe import FITTING, PULL, recipe
-from training.pretraining.shipped import pretrained
-from training.train import train
+from training.pretraining.shipped import pretrained, unfitted
+from training.train import _Run, train
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +36,7 @@ def known(many, tmp_path_factory):
     return train(many, settings, tmp_path_factory.mktemp("known") / "run", "cpu", threads=1)
 
 
+@pytest.mark.long("training", reason="two networks are trained to be compared")
 def test_few_presses_are_worth_more_from_a_pretrained_network(known, unit, tmp_path):
     points = learning_curve(
         unit, known, tmp_path / "curve", (0, 4), (0,), networks=("pattern",), device="cpu", threads=1
@@ -81,6 +83,16 @@ def test_the_pull_keeps_weights_near(known, unit, tmp_path):
     assert distance(10.0) < 0.5 * distance(0.0)
 
 
+def test_the_pull_weighs_less_beside_more_presses():
+    known = pretrained("shipped")
+    settings, pulls = recipe({}, known), {}
+    for presses in (3, 10, 100):
+        run = _Run(known.network, AdamW(known.network.parameters()), {"split": {"train": list(range(presses))}})
+        run.start(known, None, settings)
+        pulls[presses] = run.pull
+    assert pulls == {3: PULL, 10: PULL, 100: pytest.approx(0.1 * PULL)}
+
+
 def test_wishes_come_before_recipes(known):
     assert recipe({"network": None}).network == "paper"
     fitting = recipe({"seed": 3}, known)
@@ -116,3 +128,10 @@ def test_a_network_that_saw_the_presses_is_refused(known, many, tmp_path):
         train(seen, recipe({}, known), tmp_path / "run", "cpu", threads=1, pretrained=known)
     with pytest.raises(UsageError, match="was trained on synthetic itself"):
         learning_curve(seen, known, tmp_path / "curve", (0,), (0,))
+
+
+def test_a_network_of_simulated_presses_alone_says_that_it_is_fitted_to_no_unit(known, unit, tmp_path):
+    assert "fitted to no unit" in unfitted(pretrained("shipped"))
+    assert "tacdata train DATASET --from it" in unfitted(known)
+    fitted = train(unit, recipe({"epochs": 1}, known), tmp_path / "run", "cpu", threads=1, pretrained=known)
+    assert unfitted(fitted) == ""

@@ -15,13 +15,15 @@ from tacdata.indenters import from_document
 from tacdata.plans import Press
 from training.frames.data import read_frames
 
+BALL = {"shape": "sphere", "radius": 2.0}
 
-def write_dataset(root, frames, virtual=True):
-    """Write frames through the real writer."""
+
+def write_dataset(root, frames, virtual=True, indenters=(BALL,)):
+    """Write frames through the real writer, as presses of each of the indenters in turn."""
     writer = DatasetWriter.create(root, frames.sensor)
     for e in frames.episodes:
         here, n = slice(e.start, e.stop), e.stop - e.start
-        indenter = from_document({"shape": "sphere", "radius": 2.0})
+        indenter = from_document(indenters[e.number % len(indenters)])
         press = Press(e.number, indenter, f"ball {e.number % 2}", e.x, e.y, 0.0, e.depth, 1.0, 1.0)
         record = EpisodeRecord(
             sensor=frames.sensor.content_hash, recording=f"{e.number:064x}", recording_file="episode.mcap",

@@ -40,6 +40,24 @@ def test_work_offset_is_the_sum_of_what_is_active():
     assert GrblSettings({}).work_offset is None
 
 
+@pytest.mark.parametrize(
+    ("said", "bent"),
+    [
+        ("G0 G54 G17 G21 G90 G94 G49 G98 G50 M5 M9 T0 F0 S0.", ()),
+        ("G0 G54 G17 G21 G90 G94 G49 G98 G51:XZ M5 M9 T0 F0 S0.", ("G51",)),
+        ("G0 G54 G92 G7 G17 G20 G91 G93 G43.2 G98 G50 M3 M8 M53 T0 F0 S500.",
+         ("G92", "G7", "G20", "G91", "G93", "G43.2", "M3", "M53")),
+    ],
+)  # fmt: skip
+def test_what_bends_moves_or_lets_them_go_on_is_read_as_grblhal_writes_it(said, bent):
+    assert GrblSettings({"GC": said}).bent_by == bent
+
+
+def test_homing_is_one_bit_of_several():
+    assert GrblSettings({"$22": "7"}).homing
+    assert not GrblSettings({"$22": "6"}).homing
+
+
 def test_cautions():
     assert GrblSettings(TRAVEL).cautions == ()
     said = " ".join(GrblSettings({"$1": "25", "$20": "0", "$22": "0"}).cautions)

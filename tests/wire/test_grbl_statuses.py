@@ -87,3 +87,22 @@ def test_inches(statuses):
     status = statuses.take(parse_status("<Run|MPos:1,0,0|FS:2,0|WCO:0,0,0>"), 1)
     assert status.position[0] == pytest.approx(25.4)
     assert status.feed == pytest.approx(50.8)
+
+
+def test_a_report_that_cannot_be_read_answered_its_query(statuses):
+    assert statuses.ask()
+    statuses.spoilt()
+    assert statuses.asked_ns is None
+    assert statuses.ask()
+
+
+def test_an_offset_that_reports_never_tell_is_not_known_after_a_reset(statuses):
+    statuses.place(np.array([1.0, 1.0, 1.0]))
+    np.testing.assert_array_equal(statuses.take(WORK, 0).position, [2, 3, 4])
+    statuses.forget()
+    assert statuses.unplaced
+    assert statuses.take(WORK, 0) is None
+    statuses.take(parse_status("<Run|WPos:1,2,3|WCO:5,5,5>"), 0)
+    statuses.forget()
+    statuses.place(np.zeros(3))
+    np.testing.assert_array_equal(statuses.take(WORK, 0).position, [6, 7, 8])

@@ -25,6 +25,12 @@ SPREAD = 0.1
 """Standard deviation of a unit's gains about their mean that a stated error allows at least [1]."""
 EXPONENTS = np.linspace(0.4, 3.0, 53)
 """Exponents that are tried [1], shape (53,); the answer lies between two of them."""
+FEWEST = 3
+"""Presses below which gains are said to be unknown [count]."""
+UNSURE = 0.15
+"""Standard error of the exponent above which it is said [1]: pretraining varies the exponent by as much."""
+_TOUCHED = 0.1
+"""Least force on a channel that some press touched, over the largest force on the median channel [1]."""
 _GROUPS = 20
 """Groups of presses that the jackknife leaves out, one after the other, where there are more presses [1]."""
 _SWAPPED = 0.2
@@ -84,7 +90,7 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
 
     Raises:
         FormatError: If the dataset does not say the forces.
-        UsageError: If no press touches, or two channels are swapped.
+        UsageError: If no press touches, the skin is flat, or two channels are swapped.
     """
     if frames.taxel_force is None:
         raise FormatError(
@@ -98,6 +104,12 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
         kept = here[frames.valid[span.start : span.stop] & (np.abs(force).max(axis=1) > 0)]
         if len(kept):
             presses.append((np.asarray(frames.taxels[kept], float), np.asarray(frames.taxel_force[kept], float)))
+    if not presses and not frames.sensor.skin.protrusion_radius:
+        raise UsageError(
+            f"{frames.origin} is of {frames.sensor.name}, a flat skin: the model knows no force on its taxels",
+            "a skin with protrusions on a board, to turn readings into forces",
+            "add --no-calibrate, or train another network (--network paper)",
+        )  # fmt: skip
     if not presses:
         raise UsageError(
             f"{frames.origin}: none of {len(episodes)} presses touches the skin", "a press that loads taxels",
@@ -113,6 +125,36 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
     left_out = np.array([_fitted([part[..., group != k, :] for part in sums])[2] for k in range(groups)])
     exponent_error = np.sqrt((groups - 1) / groups * ((left_out - left_out.mean()) ** 2).sum())
     return ChannelCalibration(gain, exponent, error, float(exponent_error), len(presses))
+
+
+def doubts(calibration: ChannelCalibration, frames: Frames, episodes: tuple[int, ...]) -> list[str]:
+    """Return what the presses of a calibration cannot tell, and what to record, one sentence each.
+
+    Args:
+        calibration: What `calibrate` found.
+        frames: The dataset.
+        episodes: Numbers of the presses.
+    """
+    words, largest = [], np.zeros(len(calibration.gain))
+    for span in frames.spans(episodes):
+        if frames.taxel_force is not None:
+            largest = np.maximum(largest, np.abs(frames.taxel_force[span.start : span.stop]).max(axis=0, initial=0.0))
+    if calibration.presses < FEWEST:
+        words.append(
+            f"the channels' gains rest on {calibration.presses} press{'es' if calibration.presses > 1 else ''}: they "
+            f"cannot be told from what the model errs at one place; record {FEWEST} presses or more"
+        )
+    idle = np.flatnonzero(largest < _TOUCHED * np.median(largest[largest > 0]))
+    if len(idle):
+        words.append(
+            f"channels hardly touched: {', '.join(map(str, idle))}; they take the mean gain; record presses over them"
+        )
+    if calibration.exponent_error > UNSURE:
+        words.append(
+            f"the exponent is {calibration.exponent:.2f} ± {calibration.exponent_error:.2f}: depths of other presses "
+            "may be off; record presses of several depths, up to the deepest that you will meet"
+        )
+    return words
 
 
 def _power(counts: np.ndarray, exponent: float) -> np.ndarray:
@@ -172,13 +214,15 @@ def _shrunk(square: np.ndarray, product: np.ndarray) -> tuple[np.ndarray, np.nda
     gain = np.divide((square * own).sum(axis=0), weight, out=np.full(len(weight), mean), where=weight > 0)
     alone = np.divide((square**2).sum(axis=0), weight, out=np.zeros_like(weight), where=weight > 0)
     free = (weight - alone).sum()
-    within = (square * (own - gain) ** 2).sum() / free if free > 0 else 0.0
+    # Where each channel was touched by one press alone, nothing tells how far two presses disagree.
+    several = free > 1e-9 * weight.sum()
+    within = (square * (own - gain) ** 2).sum() / free if several else np.inf
     # Of how many equal presses a channel's estimate is worth, and how much they tell.
     count = np.divide(weight, alone, out=np.zeros_like(weight), where=alone > 0)
     precision = count / within if within > 0 else np.where(count > 0, 1e300, 0.0)
     sampling = np.divide(1.0, precision, out=np.zeros_like(weight), where=precision > 0)
     over = (weight * ((gain - mean) ** 2 - sampling)).sum() / weight.sum()
-    between = max(float(over), 0.0) if free > 0 else 0.0
+    between = max(float(over), 0.0) if several else 0.0
     kept = between * precision / (1.0 + between * precision)
     # The statement of the error allows a spread that few presses cannot tell.
     error = np.sqrt(1.0 / (1.0 / max(between, (SPREAD * mean) ** 2) + precision))

@@ -121,8 +121,8 @@ def load(path: Path, device: torch.device | str = "cpu") -> Checkpoint:
     if not path.is_file():
         raise UsageError(
             f"no checkpoint {path}",
-            "a folder that `tacdata train` wrote, or one of its .safetensors files",
-            "check the path, or train first",
+            "a folder that `tacdata train` wrote, one of its .safetensors files, or `shipped`",
+            "check the path, train first, or take `shipped`, which is fitted to no unit",
         )
     document, tensors = _read(path)
     documents.check(document, "checkpoint", str(path))

@@ -10,7 +10,7 @@ then takes two steps:
 
 Whole episodes are divided, because frames of one press have correlated errors. The intervals hold for presses like
 those of validation. `reliability` measures what share of the errors lies inside on the scored episodes; on unseen
-shapes it is less.
+shapes it is less. `training.pretraining.unseen_shapes` calibrates on shapes left out of training instead.
 """
 
 from __future__ import annotations
@@ -27,10 +27,8 @@ from tacdata.errors import FormatError, UsageError
 from training.metrics.depth_maps import CONTACT_THRESHOLD
 
 FILE = "spread.json"
-DEFINITION = (
-    "share of errors inside intervals calibrated on validation episodes, over pixels deeper than 0.1 mm in label or "
-    "prediction"
-)
+VALIDATION = "validation episodes"
+"""What intervals are calibrated on by default."""
 LEVELS = (0.5, 0.68, 0.8, 0.9, 0.95, 0.99)
 """Shares of errors for which intervals are calibrated [1]."""
 DEPTHS = (0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5)
@@ -55,6 +53,16 @@ class ConformalIntervals:
     """Deviations within which each share of `LEVELS` lies [1]."""
     checkpoint: str
     """SHA-256 of the checkpoint that it belongs to."""
+    source: str = VALIDATION
+    """What it was calibrated on, in words."""
+
+    @property
+    def definition(self) -> str:
+        """What `reliability` counts, in words."""
+        return (
+            f"share of errors inside intervals calibrated on {self.source}, over pixels deeper than 0.1 mm in label or "
+            "prediction"
+        )
 
     def sigma(self, depth: np.ndarray, pitch: float) -> np.ndarray:
         """Return the standard deviation of each pixel [mm], same shape as ``depth``.
@@ -81,6 +89,7 @@ class ConformalIntervals:
         return {
             "version": schemas.version("spread"),
             "checkpoint": self.checkpoint,
+            "calibrated_on": self.source,
             "depths": list(DEPTHS),
             "slopes": list(SLOPES),
             "deviation": self.deviation.tolist(),
@@ -96,7 +105,9 @@ def cells(depth: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
     return np.digitize(depth, DEPTHS), np.digitize(np.hypot(along_x, along_y), SLOPES)
 
 
-def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, checkpoint: str) -> ConformalIntervals:
+def calibrate(
+    maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, checkpoint: str, source: str = VALIDATION
+) -> ConformalIntervals:
     """Calibrate on episodes that the network did not learn from.
 
     Args:
@@ -104,6 +115,7 @@ def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, ch
         labels: Their labels [mm], same shapes.
         pitch: Distance of pixels [mm].
         checkpoint: SHA-256 of the checkpoint.
+        source: What the episodes are, in words.
 
     Raises:
         UsageError: If there are fewer than two episodes.
@@ -126,8 +138,8 @@ def calibrate(maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, ch
     together = np.concatenate(ratios)
     if not len(together):
         # Nothing touched: there is nothing to calibrate on, and the widest claim is the honest one.
-        return ConformalIntervals(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint)
-    return ConformalIntervals(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint)
+        return ConformalIntervals(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint, source)
+    return ConformalIntervals(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint, source)
 
 
 def reliability(
@@ -182,7 +194,9 @@ def read(run: Path, checkpoint: str) -> ConformalIntervals | None:
         raise FormatError(f"{path}: cells of another release", "cells of this release", "remove it and train again")
     if document["checkpoint"] != checkpoint:
         return None
-    return ConformalIntervals(deviation, tuple(document["factors"]), checkpoint)
+    return ConformalIntervals(
+        deviation, tuple(document["factors"]), checkpoint, document.get("calibrated_on", VALIDATION)
+    )
 
 
 def _interesting(depth: np.ndarray, label: np.ndarray) -> np.ndarray:

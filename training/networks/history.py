@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import torch
 from torch import nn
 
+from training.networks.network import ResidualLayers
 from training.networks.paper import Paper
 
 OFFSETS = (-64, -32, -16, -8, -4, -3, -2, -1, 0)
@@ -43,14 +44,8 @@ class History(Paper):
         self.offsets = tuple(offsets)
         self.arguments = {"hidden": hidden, "channels": channels, "layers": layers, "offsets": list(offsets)}
         self.encoder = nn.Linear(taxels * len(self.offsets), hidden)
-        self.layers = nn.ModuleList(
-            nn.Sequential(nn.LayerNorm(hidden), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, hidden))
-            for _ in range(layers)
-        )
+        self.layers = ResidualLayers(hidden, layers)
 
     def encode(self, signals: torch.Tensor) -> torch.Tensor:
         """Return features of standardized windows; (b, T, taxels) -> (b, hidden)."""
-        features = self.encoder(signals.flatten(1))
-        for layer in self.layers:
-            features = features + layer(features)
-        return features
+        return self.layers(self.encoder(signals.flatten(1)))

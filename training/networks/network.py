@@ -84,6 +84,23 @@ class Network(nn.Module, ABC):
         """Return maps over D_max from standardized windows; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
 
 
+class ResidualLayers(nn.ModuleList):
+    """Perceptrons one after the other, each added to what it takes."""
+
+    def __init__(self, width: int, count: int) -> None:
+        """Build ``count`` layers of a width."""
+        super().__init__(
+            nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.SiLU(), nn.Linear(width, width))
+            for _ in range(count)
+        )
+
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
+        """Return features of the same shape (b, width)."""
+        for layer in self:
+            features = features + layer(features)
+        return features
+
+
 def create(name: str, sensor: Sensor, arguments: dict[str, Any] | None = None) -> Network:
     """Build a network for a sensor.
 

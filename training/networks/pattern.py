@@ -17,7 +17,7 @@ from torch import nn
 
 from training.loss import WeightedLoss
 from training.networks.history import OFFSETS
-from training.networks.network import Network
+from training.networks.network import Network, ResidualLayers
 
 _LEAST = 0.01
 """Scale below which a window counts as noise, over the training frames' own [1]."""
@@ -53,10 +53,7 @@ class Pattern(Network):
         super().__init__(taxels, map_shape, {"hidden": hidden, "layers": layers, "offsets": list(offsets)})
         self.offsets = tuple(offsets)
         self.encoder = nn.Linear(taxels * len(self.offsets) + 2, hidden)
-        self.layers = nn.ModuleList(
-            nn.Sequential(nn.LayerNorm(hidden), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, hidden))
-            for _ in range(layers)
-        )
+        self.layers = ResidualLayers(hidden, layers)
         self.decoder = nn.Sequential(nn.LayerNorm(hidden), nn.Linear(hidden, prod(map_shape)))
 
     def respond(self, signals: torch.Tensor) -> torch.Tensor:
@@ -72,6 +69,4 @@ class Pattern(Network):
         newest = (signals[:, -1].square().mean(dim=1) + _LEAST**2).sqrt()
         pattern = (signals / window[:, None, None]).flatten(1)
         features = self.encoder(torch.cat([pattern, window.log()[:, None], newest.log()[:, None]], dim=1))
-        for layer in self.layers:
-            features = features + layer(features)
-        return self.decoder(features).reshape(-1, *self.map_shape)
+        return self.decoder(self.layers(features)).reshape(-1, *self.map_shape)

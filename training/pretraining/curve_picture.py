@@ -55,6 +55,11 @@ def draw(path: Path, document: dict[str, Any]) -> None:
         axes.set_ylabel(words)
         axes.set_ylim(bottom=0, top=1 if metric == "iou_deep" else None)
         axes.grid(alpha=0.3)
+    seeds = len({point["seed"] for point in document["points"]})
+    figure.suptitle(
+        f"{len(document['held_out'])} presses held out"
+        + (f"; mean and standard deviation over {seeds} seeds" if seeds > 1 else "; one seed")
+    )
     figure.axes[0].legend()
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)

@@ -19,6 +19,7 @@ from tacdata.errors import FormatError, UsageError
 from training.frames.frames import Frames
 from training.frames.windows import Windows
 from training.inference.checkpoint import Checkpoint
+from training.inference.compute import reproducible
 from training.inference.predictor import predict
 from training.metrics.depth_maps import score_frames
 from training.pretraining.recipe import recipe
@@ -130,7 +131,8 @@ def learning_curve(
                         frames, settings, run, device, (run / "last.safetensors").is_file(), threads, listener,
                         pretrained=from_start, simulated=mixed, split=division,
                     ).network  # fmt: skip
-                point = _scored(network, frames, held.test, start, count, seed)
+                with reproducible(threads):
+                    point = _scored(network, frames, held.test, start, count, seed)
                 document["points"].append(asdict(point))
                 documents.write(out / FILE, document, "learning_curve")
                 told(point)

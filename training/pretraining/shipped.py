@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tacdata import provenance
 from training.inference import checkpoint
 from training.inference.checkpoint import Checkpoint
 
@@ -25,3 +26,14 @@ def pretrained(model: str) -> Checkpoint:
         'pattern'
     """
     return checkpoint.load(PATH if model == NAME else Path(model))
+
+
+def unfitted(trained: Checkpoint) -> str:
+    """Describe a network that was trained on simulated presses alone; empty if it is fitted to a unit."""
+    simulated = trained.document["dataset"].get("simulated", trained.content_hash == provenance.file_hash(PATH))
+    if not simulated:
+        return ""
+    return (
+        f"the network {trained.path.name} learnt from simulated presses alone and is fitted to no unit: its depths are "
+        "off by what gains and skin differ; record presses of this fingertip, and tacdata train DATASET --from it"
+    )

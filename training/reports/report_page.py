@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -37,9 +37,12 @@ def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None
         impossible: Split -> why it could not be made.
     """
     result = HtmlPage("Scores by split")
+    runs, settings = _briefly(runs)
     found = groups((run.name, run.evaluation.document) for run in runs)
     result.paragraph(runs[0].evaluation.document["statement"])
     _overview(result, found, impossible or {})
+    for sentence in settings:
+        result.paragraph(sentence, note=True)
     _data(result, runs[0].frames)
     if any(group.reliability for group in found):
         result.heading("Reliability of the pixels' uncertainty")
@@ -59,6 +62,18 @@ def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None
         seen.add(key)
         _run(result, run, document)
     return result.text
+
+
+def _briefly(runs: list[Scored]) -> tuple[list[Scored], list[str]]:
+    """Return the runs by the names of their networks, numbered where several recipes share one, and the recipes."""
+    names = list(dict.fromkeys(run.name for run in runs))
+    bare = [name.partition(" (")[0] for name in names]
+    short = {
+        name: own if bare.count(own) == 1 else f"{own} {bare[: k + 1].count(own)}"
+        for k, (name, own) in enumerate(zip(names, bare, strict=True))
+    }
+    recipes = [f"{short[name]}: {name.partition(' (')[2].removesuffix(')')}." for name in names if " (" in name]
+    return [replace(run, name=short[run.name]) for run in runs], recipes
 
 
 def _overview(result: HtmlPage, found: list[Group], impossible: dict[str, str]) -> None:

@@ -51,6 +51,7 @@ def markdown(document: dict[str, Any]) -> str:
         "",
         *_depths(document.get("depths", [])),
         "",
+        *_contacts(document.get("contacts")),
         "## Against the prescribed contact, one value a press at full depth (mean ± SD)",
         "",
         *_prescribed(document["prescribed"]),
@@ -152,6 +153,28 @@ def _depths(rows: list[dict[str, Any]]) -> list[str]:
         values = [number(entry["metrics"][m]["mean"]) for m in METRICS]
         lines.append(row([f"{entry['above_mm']:g}{upper}", str(entry["frames"]), *values]))
     return lines
+
+
+def _contacts(known: dict[str, Any] | None) -> list[str]:
+    if known is None:
+        return []
+    heads = ["Contacts at once", "Presses", "All found (%)", "Missed", "Invented", "Centroid error (px): median", "P90"]
+    lines = ["## Single contacts, one value a press at full depth", "", row(heads), rule(len(heads), 1)]
+    for entry in known["presses"]:
+        words = "one"
+        if entry["contacts"] == "several":
+            upper = f" to {entry['up_to_mm']:g}" if entry["up_to_mm"] is not None else " or more"
+            words = f"several, {entry['above_mm']:g}{upper} mm apart"
+        found, error = entry["all_found"], entry["centroid_error"]
+        values = [f"{100 * found['count'] / found['of']:.1f}", str(entry["missed"]), str(entry["invented"])]
+        lines.append(row([words, str(entry["presses"]), *values, number(error["median"], 2), number(error["p90"], 2)]))
+    return [
+        *lines,
+        "",
+        f"A contact is a hill of depth that stands out by {100 * known['prominence']:g} % of its depth. Distances are "
+        f"between labelled centroids. Contacts more than {known['reach_mm']:g} mm apart are not matched.",
+        "",
+    ]
 
 
 def _prescribed(table: dict[str, Any]) -> list[str]:

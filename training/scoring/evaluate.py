@@ -21,7 +21,7 @@ from training.inference.predictor import milliseconds_per_frame, predict
 from training.metrics import conformal_intervals, depth_maps, physical
 from training.metrics.depth_maps import FrameScores
 from training.metrics.physical import PressScore
-from training.scoring import baselines, published
+from training.scoring import baselines, contact_scores, published
 
 DEPTHS = (0.2, 0.3, 0.5, 0.8)
 """Borders of the largest labelled depth by which frames are told apart [mm]."""
@@ -113,6 +113,7 @@ def evaluate(
         **_agreement(episodes),
         "baselines": _baselines(trained, frames, episodes) if own else {},
         **_prescribed(episodes, frames),
+        "contacts": contact_scores.scored(_at_full_depth(episodes), frames.sensor.map.pixel_pitch),
         **_uncertainty(trained, identity, episodes, frames),
         "inference_ms_per_frame": pace,
         "provenance": provenance.stamp(
@@ -250,6 +251,11 @@ def _prescribed(episodes: tuple[EpisodeResult, ...], frames: Frames) -> dict[str
     }
 
 
+def _at_full_depth(episodes: tuple[EpisodeResult, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return mean prediction and label [mm] at full depth of each press that has such frames."""
+    return [(e.depth[e.full].mean(axis=0), e.label[e.full].mean(axis=0)) for e in episodes if e.full.any()]
+
+
 def _uncertainty(
     trained: Checkpoint, identity: str, episodes: tuple[EpisodeResult, ...], frames: Frames
 ) -> dict[str, Any]:
@@ -259,7 +265,7 @@ def _uncertainty(
         return {}
     maps, labels = ([getattr(e, name)[e.valid] for e in episodes] for name in ("depth", "label"))
     levels = conformal_intervals.reliability(known, maps, labels, frames.sensor.map.pixel_pitch)
-    return {"uncertainty": {"definition": conformal_intervals.DEFINITION, "levels": levels}}
+    return {"uncertainty": {"definition": known.definition, "levels": levels}}
 
 
 def _press_table(scores: list[PressScore]) -> dict[str, Any]:

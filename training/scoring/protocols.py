@@ -21,6 +21,7 @@ from training.frames.frames import Frames
 from training.frames.trials import DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL, PressTrial, trials
 from training.frames.windows import Windows
 from training.inference.checkpoint import Checkpoint
+from training.inference.compute import reproducible
 from training.inference.predictor import predict
 from training.metrics.overlap import aligned_iou
 from training.metrics.physical import REGION_THRESHOLD, score_press
@@ -103,7 +104,8 @@ def _predicted(frames: Frames, trained: Checkpoint, kinds: dict[str, tuple[Press
     def mapped(trial: PressTrial) -> np.ndarray:
         return predict(network, windows, trial.full, frames.sensor.map.depth_max).mean(axis=0)
 
-    known = {t.span.number: mapped(t) for found in kinds.values() for t in found}
+    with reproducible():
+        known = {t.span.number: mapped(t) for found in kinds.values() for t in found}
 
     def of(trial: PressTrial) -> np.ndarray:
         return known[trial.span.number]

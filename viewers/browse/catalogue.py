@@ -15,8 +15,8 @@ from urllib.parse import quote
 
 from tacdata.errors import UsageError
 from viewers.browse.episode_list import EpisodeList
-from viewers.rerun.columns import HOST
 from viewers.rerun.shield import LOOPBACK, shielded
+from viewers.rerun.timelines import HOST
 from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
 from viewers.scene.moments import moments
 

@@ -7,7 +7,7 @@ import socket
 import tempfile
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from http import HTTPStatus
 from importlib.resources import files
 from pathlib import Path
@@ -59,6 +59,17 @@ def browse_server(listed: EpisodeList, labels: Path | None, predictions: Path | 
                 yield f"{pages.address}/"
 
 
+@dataclass(frozen=True)
+class Times:
+    """Which times of an episode a page may point to."""
+
+    timeline: str
+    begin: int
+    """Its first reading [ns]."""
+    deepest: int
+    """Its deepest moment [ns]."""
+
+
 class Pages:
     """What is served: the page, the list, an episode's Rerun file, and setting flags."""
 
@@ -76,6 +87,7 @@ class Pages:
         """
         self.listed, self.viewer, self.token, self.address = listed, viewer, secrets.token_urlsafe(16), ""
         self._labels, self._predictions, self._folder, self._drawing = labels, predictions, folder, Lock()
+        self._times: dict[int, Times | None] = {}
 
     def page(self) -> str:
         """Return the page."""
@@ -97,17 +109,22 @@ class Pages:
     def _marked(self, flags: dict[str, Flag]) -> tuple[Entry, ...]:
         return with_notes(with_flags(self.listed.entries, flags), read_notes(self.listed.root))
 
-    def episode(self, number: int) -> Path:
-        """Return an episode's Rerun file, drawn when it is first asked for. Raises as `viewers.source.scene_at`."""
+    def episode(self, number: int) -> tuple[Path, Times | None]:
+        """Return an episode's Rerun file and times, drawn when first asked for. Raises as `viewers.source.scene_at`."""
         from viewers.rerun.backend import RerunBackend
+        from viewers.rerun.steering import deepest_moment
         from viewers.source import scene_at
 
         self.listed.numbered(number)
         file = self._folder / f"{number}.rrd"
         with self._drawing:
             if not file.is_file():
-                RerunBackend(file).draw(scene_at(self.listed.root, self._labels, self._predictions, number))
-        return file
+                scene = scene_at(self.listed.root, self._labels, self._predictions, number)
+                RerunBackend(file).draw(scene)
+                moment = deepest_moment(scene)
+                begin = int(scene.taxels.time_ns[0])
+                self._times[number] = Times(moment.timeline, begin, moment.ns) if moment else None
+            return file, self._times.get(number)
 
     def flag(self, number: int, reason: str) -> str:
         """Set an episode aside for a reason, or take it back where there is none; return what was done."""
@@ -190,7 +207,9 @@ def application(pages: Pages) -> FastAPI:
 
     @routes.get("/episode/{number}.rrd")
     def episode(number: int) -> FileResponse:
-        return FileResponse(pages.episode(number), media_type="application/octet-stream")
+        file, times = pages.episode(number)
+        headers = {"X-Times": f"{times.timeline} {times.begin} {times.deepest}"} if times else {}
+        return FileResponse(file, media_type="application/octet-stream", headers=headers)
 
     @routes.post("/flag")
     def flag(asked: FlagRequest) -> dict[str, str]:

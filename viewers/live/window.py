@@ -54,7 +54,7 @@ def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
         except Empty:
             said = "error: the viewer did not start"
         if said.startswith("error: "):
-            raise UsageError(said.removeprefix("error: "), "window, web or FILE.rrd", "record without --live")
+            raise UsageError(said.removeprefix("error: "), "window, web or FILE.rrd", "name another, or leave it out")
         if said:
             print(f"live view: {said}", flush=True)
 
@@ -77,7 +77,7 @@ def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
 
 def _refuse(where: str) -> None:
     if where == "window":
-        require_display()
+        require_display("name web, or a file that ends in .rrd, in place of window")
     elif where != "web":
         path = Path(where)
         if path.suffix != ".rrd":

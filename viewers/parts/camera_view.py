@@ -69,5 +69,8 @@ def hand_views(recorded: DemoRecording, images: Iterable[tuple[str, int, bytes]]
     for name, camera in recorded.rig.cameras.items():
         seen = [stream for stream in recorded.views if stream.camera == name]
         fingers = tuple(_view(f"{s.finger}", camera, [], s, FINGER_AXES) for s in seen)
-        views.append(replace(_view(name, camera, sorted(taken.get(name, [])), None), fingers=fingers))
+        pose = recorded.rig.camera_pose(name)
+        if pose is not None:
+            pose = np.block([[pose[:3, :3], 1000 * pose[:3, 3:]], [pose[3:]]])
+        views.append(replace(_view(name, camera, sorted(taken.get(name, [])), None), fingers=fingers, pose=pose))
     return tuple(views)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.demonstrations.compensation import contact_depth
-from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
+from tacdata.demonstrations.demonstration import GUESS, Demonstration, FingerTrack
 from tacdata.demonstrations.recording.reader import DemoRecording
-from tacdata.replay.targets import GUESS, FingertipTargets
+from tacdata.replay.targets import FingertipTargets
 
 
 def of_demonstration(

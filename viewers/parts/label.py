@@ -28,11 +28,13 @@ class ShownLabel:
     """Rows whose maps are here [frames], shape (k,), ascending."""
     signed: np.ndarray
     """Their maps: undeformed minus deformed height of the outer face [mm], shape (k, pixels_x, pixels_y), float32."""
+    traction: np.ndarray | None = None
+    """Their contact force on the indenter by area [MPa], shape (k, 3, pixels_x, pixels_y), float16, if known."""
 
     @classmethod
     def of(cls, label: Label) -> ShownLabel:
         """Return all of a label's maps."""
-        return cls(label.time_ns, label.force, label.error, np.arange(len(label.time_ns)), label.signed)
+        return cls(label.time_ns, label.force, label.error, np.arange(len(label.time_ns)), label.signed, label.traction)
 
     @property
     def map_ns(self) -> np.ndarray:
@@ -54,7 +56,7 @@ def shown_label(path: Path, most: int | None = None) -> ShownLabel:
     small = read_label_columns(path, ("time_ns", "force", "error"))
     count = len(small["time_ns"])
     if most is None or count <= most:
-        return ShownLabel(**small, kept=np.arange(count), **read_label_columns(path, ("signed",)))
+        return ShownLabel(**small, kept=np.arange(count), **read_label_columns(path, ("signed", "traction")))
     starts = thinning.stretches(count, most)
     best, row, shown = np.full(most, -np.inf), np.zeros(most, int), {}
     begin = 0
@@ -67,4 +69,6 @@ def shown_label(path: Path, most: int | None = None) -> ShownLabel:
             if depth[deepest] > best[stretch]:
                 best[stretch], row[stretch], shown[stretch] = depth[deepest], begin + deepest, maps[deepest].copy()
         begin += len(maps)
-    return ShownLabel(**small, kept=row, signed=np.stack([shown[k] for k in range(most)]))
+    traction = read_label_columns(path, ("traction",)).get("traction")
+    signed = np.stack([shown[k] for k in range(most)])
+    return ShownLabel(**small, kept=row, signed=signed, traction=None if traction is None else traction[row])

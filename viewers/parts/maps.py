@@ -1,4 +1,4 @@
-"""Depth maps of an episode: label, prediction, and their difference, with the depths on one scale."""
+"""Maps of an episode: depth by label and prediction on one scale, their difference, pressure and shear."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ DEPTH_FLOOR = 0.1
 """Least end of the depth scale [mm]: below the paper's contact threshold there is nothing to see."""
 ERROR_FLOOR = 0.05
 """Least end of the error scale [mm]."""
+
+CONTACT_FLOOR = 1.0
+"""Least end of the scales of pressure and shear [kPa]: without friction there is nothing to see."""
 
 
 def depth_maps(
@@ -41,6 +44,21 @@ def depth_maps(
             error = (prediction[1][theirs] - label[1][ours]).astype(np.float32)
             maps.append(DepthMaps("error", x, y, time, error, scale_of(error, "mm", signed=True, floor=ERROR_FLOOR)))
     return tuple(maps)
+
+
+def contact_maps(sensor: Sensor, time_ns: np.ndarray, traction: np.ndarray) -> tuple[DepthMaps, ...]:
+    """Return maps called "pressure" and "shear" [kPa], on a scale each.
+
+    Args:
+        sensor: Gives the pixel grid.
+        time_ns: Times [ns], shape (n,).
+        traction: Contact force on the indenter by area of the map [MPa], shape (n, 3, pixels_x, pixels_y).
+    """
+    pressure, shear = traction[:, 2].astype(np.float32), np.linalg.norm(traction[:, :2].astype(np.float32), axis=1)
+    return tuple(
+        DepthMaps(name, sensor.map.x, sensor.map.y, time_ns, values, scale_of(values, "kPa", floor=CONTACT_FLOOR))
+        for name, values in (("pressure", 1e3 * pressure), ("shear", 1e3 * shear))
+    )
 
 
 def error_curves(maps: tuple[DepthMaps, ...]) -> tuple[Curves, ...]:

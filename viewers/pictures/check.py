@@ -87,8 +87,10 @@ def _lag(axes, report: Report) -> None:
     lag = np.concatenate([entry.lag for entry in report.episodes])
     if is_imported(report.episodes[0].recording.episode):  # a source has one time: when it says it read
         every = [np.diff(entry.recording.episode.taxels.sample_ns) / 1e6 for entry in report.episodes]
-        axes.hist(np.concatenate(every), bins=60, color="tab:blue")
-        axes.set(yscale="log", xlabel="between two readings [ms]", ylabel="rows", title="times of the taxel stream")
+        spans = np.concatenate(every)
+        axes.hist(spans, bins=60, color="tab:blue")
+        axes.set(xlabel="between two readings [ms]", ylabel="rows", title="times of the taxel stream")
+        axes.set_yscale("log" if len(spans) else "linear")
         return
     if len(lag):
         axes.hist(lag, bins=60, color="tab:blue")

@@ -17,6 +17,7 @@ from viewers.backend import Backend
 from viewers.output_file import FILMS, new_file, written_beside
 from viewers.pictures import panels as panels
 from viewers.pictures.backend import STYLE
+from viewers.pictures.hand_film import hand_frames, hand_times
 from viewers.pictures.skin import skin
 from viewers.scene.moments import nearest
 from viewers.scene.scene import Scene
@@ -44,12 +45,17 @@ class FilmBackend(Backend):
         """Write the film; a crash leaves none rather than half of one.
 
         Raises:
-            UsageError: If the scene has nothing that moves on a skin.
+            UsageError: If the scene has neither a skin nor fingertips that move.
         """
+        kind = self._path.suffix
+        if scene.kind == "hand" and scene.bodies:
+            with rc_context(STYLE):
+                write_film(self._path, hand_frames(scene, hand_times(scene, RATE[kind], MOST[kind])))
+            return
         if scene.kind != "episode":
             given = f"a film of {scene.title}"
-            raise UsageError(given, "an episode of a recording, session or dataset", "use --picture or --save")
-        kind = self._path.suffix
+            allowed = "an episode of a recording, session or dataset, or a tracked demonstration"
+            raise UsageError(given, allowed, "use --picture or --save")
         times = film_times(scene, RATE[kind], MOST[kind])
         with rc_context(STYLE):
             write_film(self._path, self._frames(scene, times))
@@ -86,7 +92,7 @@ def frame(scene: Scene, time_ns: int) -> Figure:
     parts: Any = figure.subfigures(1, 2, width_ratios=[1.25, 1])
     left, right = parts
     skin(left, scene, chosen, bar=False)
-    shown = [m for m in scene.maps if not m.scale.signed][:2]
+    shown = [m for m in scene.maps if m.scale.unit == "mm" and not m.scale.signed][:2]
     axes = right.subplots(1 + len(shown) + 1, 1, height_ratios=[1.0] * (1 + len(shown)) + [0.9])
     right.subplots_adjust(left=0.16, right=0.97, top=0.94, bottom=0.1, hspace=0.55)
     taxels = scene.taxels

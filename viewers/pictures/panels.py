@@ -14,7 +14,10 @@ from viewers.scene.moments import nearest, picture_at
 from viewers.scene.scene import Scene
 
 Moments = tuple[tuple[str, int], ...]
-TITLES = {"label": "Label", "prediction": "Prediction", "error": "Prediction − label"}
+TITLES = {
+    "label": "Label", "prediction": "Prediction", "error": "Prediction − label",
+    "pressure": "Pressure", "shear": "Shear",
+}
 INK, SHADES = "0.25", ("0.97", "0.91")
 
 
@@ -120,15 +123,20 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
         axes.set_title(TITLES.get(shown.name, shown.name))
     for axes in grid[-1]:
         axes.set_xlabel("x [mm]")
-    depths = [k for k, m in enumerate(scene.maps) if not m.scale.signed]
-    bar = figure.colorbar(mappable(scene.maps[0].scale), ax=grid[:, depths], location="bottom", shrink=0.7, aspect=40)
-    bar.set_label("depth [mm]")
-    signed = [k for k, m in enumerate(scene.maps) if m.scale.signed]
-    if signed:
-        scale = scene.maps[signed[0]].scale
-        bar = figure.colorbar(mappable(scale), ax=grid[:, signed], location="bottom", shrink=0.9, aspect=25)
-        single = len(signed) == 1 and scene.maps[signed[0]].name == "error"
-        bar.set_label("predicted minus labelled depth [mm]" if single else "difference of depth [mm]")
+    for scale in dict.fromkeys(m.scale for m in scene.maps):
+        own = [k for k, m in enumerate(scene.maps) if m.scale == scale]
+        # One map alone keeps its proportions, and is narrower than its column.
+        part = 0.9 if len(scene.maps) > 1 else 0.3
+        bar = figure.colorbar(mappable(scale), ax=grid[:, own], location="bottom", shrink=part, aspect=20 * len(own))
+        bar.set_label(_bar_label(scale, [scene.maps[k].name for k in own]))
+
+
+def _bar_label(scale: ColorScale, names: list[str]) -> str:
+    if scale.unit == "kPa":
+        return f"{' and '.join(names)} [kPa]"
+    if not scale.signed:
+        return "depth [mm]"
+    return "error of depth [mm]" if names == ["error"] else "difference of depth [mm]"
 
 
 def image(axes: Axes, values: np.ndarray, centers: tuple[np.ndarray, np.ndarray], scale: ColorScale) -> None:

@@ -91,4 +91,4 @@ def _course(axes, plan: Plan, press_seconds: tuple[float, ...], names: list[str]
         last = press.mounting
     axes.axhline(0.0, color="0.6", linewidth=0.6)
     axes.set(xlabel="time [min], mounting not counted", ylabel="depth [mm]")
-    axes.legend(fontsize=8, frameon=False)
+    axes.legend(fontsize=8)

@@ -12,12 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 
 from tacdata.replay.outcome import ReplayOutcome
 from tacdata.replay.targets import FingertipTargets
 from viewers.output_file import FILMS, new_file
 from viewers.pictures.felt_maps import FeltMaps
 from viewers.pictures.film import MOST, RATE, write_film
+from viewers.pictures.hand_film import apart
 from viewers.pictures.replay_object import ReplayObjectShape
 from viewers.scene.color_scale import HUES
 
@@ -31,6 +33,8 @@ PAD = 9.0
 """Radius at which pads are drawn [mm]."""
 MOST_SLIP = 5.0
 """Upper end of the slip's axis [mm]; an object that is lost slides farther."""
+NAME = 0.46, 0.14
+"""Width and height of a finger's name [inch]."""
 LETTERS = 62
 """Letters of a line of the verdict."""
 NAMES = {"direct": "direct", "compensated": "compensated, gains as given", "chosen": "compensated, gain found"}
@@ -75,14 +79,17 @@ class ReplayPage:
         """Draw the beginning; arguments as in `film_replays`."""
         self._replays, self._gap = replays, seen.gap
         count = len(replays)
-        self.figure = Figure(figsize=(WIDTH * count + MAPS, HEIGHT), dpi=RESOLUTION, layout="constrained")
+        self.figure = Figure(figsize=(WIDTH * count + MAPS, HEIGHT), dpi=RESOLUTION)
+        self.figure.set_layout_engine("constrained", rect=(0.0, 0.0, 0.995, 1.0))  # a margin at the right
         parts: Any = self.figure.subfigures(1, 2, width_ratios=[WIDTH * count, MAPS])
         ends = _ends(replays)
+        inch = float(np.ptp(ends[:, 0])) / (WIDTH - 0.8)
+        self._letters = NAME[0] * inch, NAME[1] * inch
         heights = [*(np.ptp(ends[:, up]) / np.ptp(ends[:, 0]) * 3.0 for up in (2, 1)), 1.2, 1.2]
         self._axes = parts[0].subplots(4, count, squeeze=False, height_ratios=heights)
         self._objects: dict[tuple[str, int], ReplayObjectShape] = {}
         self._pads: dict[tuple[str, int], list[tuple[Circle, Any]]] = {}
-        self._lines: list[Any] = []
+        self._curves: list[ReplayCurves] = []
         most = 1.3 * max(_strongest(replay) for replay in replays.values()) + 0.1
         for column, (kind, replay) in enumerate(replays.items()):
             for row, up in enumerate((2, 1)):
@@ -96,7 +103,8 @@ class ReplayPage:
                 (2, "normal force [N]", replay.path.force, most),
                 (3, "slip [mm]", 1000 * replay.path.slip, MOST_SLIP),
             ):
-                self._lines.append(_curves(self._axes[row, column], replay, name, values, top, self._gap))
+                curves = ReplayCurves(self._axes[row, column], replay, name, values, top, self._gap)
+                self._curves.append(curves)
             self._axes[2, column].legend(loc="upper left", fontsize=7, ncols=4, frameon=False)
             self._axes[3, column].set_xlabel("time [s]", fontsize=8)
             for axes in self._axes[:, column]:
@@ -106,21 +114,20 @@ class ReplayPage:
 
     def show(self, time: float) -> None:
         """Move everything to where it was at a time since the beginning [s]."""
-        for line in self._lines:
-            line.set_xdata([time, time])
+        for curves in self._curves:
+            curves.show(time)
         for column, (kind, replay) in enumerate(self._replays.items()):
             row = min(int(np.searchsorted(replay.time, time)), len(replay.time) - 1)
             for up in (2, 1):
                 self._objects[kind, up].show(row)
+                places = 1000 * replay.path.tips[row][:, [0, up]]
+                names = apart(places + np.array([0.0, 0.5 * PAD]), *self._letters)
                 for k, (circle, name) in enumerate(self._pads[kind, up]):
-                    place = 1000 * replay.path.tips[row, k]
-                    circle.center = place[0], place[up]
+                    circle.center = tuple(places[k])
                     circle.set_fill(not self._gap[row, k])
-                    below = k % 3 == 2  # the middle finger often hides the index finger
-                    name.set_position((place[0], place[up] - 2.2 * PAD if below else place[up] + PAD))
-            height = 1000 * float(replay.path.centre[row, 2] - replay.path.centre[0, 2])
+                    name.set_position(tuple(names[k]))
             verdict = replay.reason if time >= replay.decided else ""
-            title = f"{NAMES.get(kind, kind)}\n{time:.1f} s, object at {height:+.0f} mm\n"
+            title = f"{NAMES.get(kind, kind)}\n{time:.1f} s, {_moved(replay, row)}\n"
             self._axes[0, column].set_title(title + _two_lines(verdict), fontsize=9, loc="left")
         self._maps.show(min(int(np.searchsorted(replay.time, time)), len(replay.time) - 1))
 
@@ -139,23 +146,55 @@ def _pad(axes: Axes, finger: str, number: int) -> tuple[Circle, Any]:
     color = tuple(channel / 255 for channel in HUES[number % len(HUES)])
     circle = Circle((0, 0), PAD, facecolor=color, edgecolor=color, alpha=0.8)
     axes.add_patch(circle)
-    return circle, axes.text(0, 0, finger, fontsize=7, ha="center", va="bottom", color=color)
+    # A white rim keeps a name readable where it lies on the object or on another pad.
+    rim = [withStroke(linewidth=2.0, foreground="white")]
+    name = axes.text(0, 0, finger, fontsize=7, ha="center", va="bottom", color=color, path_effects=rim)
+    return circle, name
 
 
-def _curves(axes: Axes, replay: ReplayOutcome, name: str, values: np.ndarray, most: float, gap: np.ndarray) -> Any:
-    """Draw a quantity of every pad over time, grey where a path is bridged; return the line at the time."""
-    for k, finger in enumerate(replay.fingers):
-        color = tuple(channel / 255 for channel in HUES[k % len(HUES)])
-        axes.plot(replay.time, values[:, k], color=color, linewidth=1.2, label=finger)
-    if gap.any():
-        bridged = gap.any(axis=1).tolist()
-        axes.fill_between(
-            replay.time, 0, 1, where=bridged, transform=axes.get_xaxis_transform(), color="0.85", zorder=0,
-            label="path bridged",
-        )  # fmt: skip
-    axes.set(xlim=(replay.time[0], replay.time[-1]), ylim=(0, most))
-    axes.set_ylabel(name, fontsize=8)
-    return axes.axvline(0.0, color="black", linewidth=1)
+def _moved(replay: ReplayOutcome, row: int) -> str:
+    """Say how far the object has come: upwards, or over the board."""
+    way = 1000 * (replay.path.centre[row] - replay.path.centre[0])
+    if replay.scene.task == "wipe":
+        return f"{replay.scene.name} moved by {np.linalg.norm(way[:2]):.0f} mm"
+    return f"{replay.scene.name} lifted by {max(round(float(way[2])), 0)} mm"
+
+
+class ReplayCurves:
+    """A quantity of every pad over time, drawn up to now: what is to come must not tell the end."""
+
+    def __init__(
+        self, axes: Axes, replay: ReplayOutcome, name: str, values: np.ndarray, most: float, gap: np.ndarray
+    ) -> None:
+        """Draw the axes, grey where a path is bridged."""
+        self._replay, self._values = replay, values
+        self._lines = [
+            axes.plot([], [], color=tuple(c / 255 for c in HUES[k % len(HUES)]), linewidth=1.2, label=finger)[0]
+            for k, finger in enumerate(replay.fingers)
+        ]
+        if gap.any():
+            bridged = gap.any(axis=1).tolist()
+            axes.fill_between(
+                replay.time, 0, 1, where=bridged, transform=axes.get_xaxis_transform(), color="0.85", zorder=0,
+                label="path bridged",
+            )  # fmt: skip
+        axes.set(xlim=(replay.time[0], replay.time[-1]), ylim=(0, most))
+        axes.set_ylabel(name, fontsize=8)
+        self._now = axes.axvline(0.0, color="black", linewidth=1)
+        self._lost = axes.axvspan(replay.decided, replay.time[-1], color="crimson", alpha=0.12, visible=False)
+        self._word = axes.text(
+            replay.decided, 0.8 * most, " lost", fontsize=8, color="crimson", visible=False, clip_on=True
+        )
+
+    def show(self, time: float) -> None:
+        """Draw up to a time since the beginning [s]."""
+        rows = self._replay.time <= time
+        for line, values in zip(self._lines, self._values.T, strict=True):
+            line.set_data(self._replay.time[rows], values[rows])
+        self._now.set_xdata([time, time])
+        is_lost = not self._replay.held and time >= self._replay.decided
+        self._lost.set_visible(is_lost)
+        self._word.set_visible(is_lost)
 
 
 def _ends(replays: Mapping[str, ReplayOutcome]) -> np.ndarray:

@@ -8,8 +8,8 @@ from matplotlib.patches import Circle, Rectangle
 
 from tacdata.replay.outcome import ReplayOutcome
 
-COLOR, SUPPORT = (0.87, 0.67, 0.24), "0.88"
-"""Colours of the object and of what it lies on."""
+COLOR, SUPPORT = (0.70, 0.63, 0.56), "0.88"
+"""Colours of the object, unlike those of fingers, and of what it lies on."""
 
 
 class ReplayObjectShape:

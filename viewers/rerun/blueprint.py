@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from viewers.rerun.columns import HOST, entity
+from viewers.rerun.columns import entity
+from viewers.rerun.timelines import HOST
 from viewers.scene.scene import Scene
 
 MAP_TITLES = {
     "label": "Label: depth, 0 to {high:g} mm",
     "prediction": "Prediction: depth, 0 to {high:g} mm",
     "error": "Prediction − label, ±{high:g} mm",
+    "pressure": "Pressure, 0 to {high:g} kPa",
+    "shear": "Shear, 0 to {high:g} kPa",
 }
 SKIN_TITLES = {
     "label": "Skin by the label [mm]",

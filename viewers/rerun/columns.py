@@ -13,6 +13,7 @@ import numpy as np
 import rerun as rr
 
 from viewers.rerun.bar_table import bar_table
+from viewers.rerun.timelines import DEVICE, DEVICE_TIME, ELAPSED, HOST
 from viewers.scene.color_scale import HUES, ColorScale, taxel_colors
 from viewers.scene.scene import (
     Bars,
@@ -29,9 +30,6 @@ from viewers.scene.scene import (
 )
 from viewers.scene.shading import body_normals, cube_axes, normals
 
-HOST, DEVICE, DEVICE_TIME = "host_time", "device_frame", "device_time"
-ELAPSED = "time"
-"""Timeline of scenes whose times count from a beginning of their own."""
 # PuOr is not among Rerun's colour maps; this one has a middle too and was made for any colour vision.
 COLORMAPS = {"viridis": rr.components.Colormap.Viridis, "PuOr": rr.components.Colormap.CyanToYellow}
 AXIS_COLORS = (HUES[5], HUES[2], HUES[4])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import rerun.blueprint as rrb
 
 from viewers.rerun.blueprint import skin_view
-from viewers.rerun.columns import ELAPSED, HOST, entity, heat_map_of
+from viewers.rerun.columns import entity, heat_map_of
+from viewers.rerun.timelines import ELAPSED, HOST
 from viewers.scene.scene import Scene
 
 

@@ -16,6 +16,8 @@ from threading import Thread
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
+from viewers.rerun.steering import script
+
 LOOPBACK = "127.0.0.1"
 HERE = f"'self' http://{LOOPBACK}:* http://localhost:*"
 POLICY = (
@@ -52,7 +54,10 @@ def shielded(inner: int, port: int) -> Iterator[str]:
                             self.send_header(name, value)
                     self.send_header("Content-Security-Policy", POLICY)
                     self.end_headers()
-                    shutil.copyfileobj(answer, self.wfile)
+                    if self.path.split("?")[0] == "/":
+                        self.wfile.write(answer.read().replace(b"</body>", script().encode() + b"</body>"))
+                    else:
+                        shutil.copyfileobj(answer, self.wfile)
             except HTTPError as error:
                 self.send_error(error.code)
             except (OSError, HTTPException):

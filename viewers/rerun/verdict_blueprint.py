@@ -5,7 +5,8 @@ from __future__ import annotations
 import rerun.blueprint as rrb
 
 from viewers.parts.residual_curves import READINGS, RESIDUALS
-from viewers.rerun.columns import ELAPSED, entity
+from viewers.rerun.columns import entity
+from viewers.rerun.timelines import ELAPSED
 from viewers.scene.scene import Bars, Curves, Scene
 
 

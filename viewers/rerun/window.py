@@ -16,6 +16,7 @@ from pathlib import Path
 
 from tacdata.errors import UsageError
 from viewers.rerun.shield import LOOPBACK, shielded
+from viewers.rerun.steering import Moment, steer
 
 GRPC_PORT, WEB_PORT = 9876, 9090
 """Rerun's own ports; others are taken where these are in use."""
@@ -29,8 +30,11 @@ def has_display() -> bool:
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def require_display() -> None:
+def require_display(remedy: str = "add --save FILE.rrd, --picture FILE.png, or --web") -> None:
     """Refuse to open a window where there is none.
+
+    Args:
+        remedy: What a person can do instead.
 
     Raises:
         UsageError: Naming what can be done instead.
@@ -39,7 +43,7 @@ def require_display() -> None:
         raise UsageError(
             "no display to open a window on",
             "a display (DISPLAY or WAYLAND_DISPLAY is set), or an output that needs none",
-            "add --save FILE.rrd, --picture FILE.png, or --web",
+            remedy,
         )
 
 
@@ -90,16 +94,23 @@ def executable() -> str:
     )
 
 
-def window(file: Path) -> None:
+def window(file: Path, moment: Moment | None = None) -> None:
     """Show a file in a native window; returns when the window is closed.
+
+    Args:
+        file: The file.
+        moment: Where its time stands when it opens; else at the beginning.
 
     Raises:
         UsageError: If there is no display.
     """
     require_display()
     with quiet_environment() as environment:
-        command = [executable(), "--bind", LOOPBACK, "--port", str(free_port(GRPC_PORT)), str(file)]
+        port = free_port(GRPC_PORT)
+        command = [executable(), "--bind", LOOPBACK, "--port", str(port), str(file)]
         with _running(command, environment) as viewer:
+            if moment is not None:
+                threading.Thread(target=steer, args=(port, moment), daemon=True).start()
             wait_for(viewer)
 
 
@@ -118,8 +129,8 @@ def wait_for(viewer: subprocess.Popen) -> None:
 
 
 @contextmanager
-def web_server(file: Path) -> Iterator[tuple[subprocess.Popen, str]]:
-    """Serve a file with Rerun's web viewer on the loopback.
+def web_server(file: Path, moment: Moment | None = None) -> Iterator[tuple[subprocess.Popen, str]]:
+    """Serve a file with Rerun's web viewer on the loopback; its time stands at a moment, else at the beginning.
 
     Yields:
         The serving process and the address to open.
@@ -128,7 +139,8 @@ def web_server(file: Path) -> Iterator[tuple[subprocess.Popen, str]]:
     arguments = ["--serve-web", "--bind", LOOPBACK, "--port", str(grpc), "--web-viewer-port", str(web), str(file)]
     with quiet_environment() as environment, running(arguments, environment) as server:
         with shielded(web, free_port(WEB_PORT)) as page:
-            yield server, f"{page}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{grpc}%2Fproxy"
+            address = f"{page}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{grpc}%2Fproxy"
+            yield server, address + (moment.query if moment else "")
 
 
 @contextmanager

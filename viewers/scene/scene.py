@@ -81,7 +81,7 @@ class DepthMaps:
     """Maps on the label's pixel grid."""
 
     name: str
-    """"label", "prediction", "error", or what a comparison calls it."""
+    """"label", "prediction", "error", "pressure", "shear", or what a comparison calls it."""
     x: np.ndarray
     """Pixel centres along x [mm], shape (pixels_x,)."""
     y: np.ndarray
@@ -89,7 +89,7 @@ class DepthMaps:
     time_ns: np.ndarray
     """Times [ns], shape (n,), int64."""
     values: np.ndarray
-    """Depth, or predicted minus labelled depth [mm], shape (n, pixels_x, pixels_y), float32."""
+    """Depth, or predicted minus labelled depth [mm], or a traction [kPa], shape (n, pixels_x, pixels_y), float32."""
     scale: ColorScale
     title: str = ""
     """What stands above it; without one its name says it."""
@@ -158,6 +158,18 @@ class CameraView:
     """Side of the cube [mm], and length of the axes that are drawn."""
     fingers: tuple[CameraView, ...] = ()
     """Fingertips seen in the same images, as views without images of their own."""
+    pose: np.ndarray | None = None
+    """The camera in the scene, homogeneous, shape (4, 4) [mm]; None if unknown."""
+
+    def pixel(self, place: np.ndarray) -> np.ndarray | None:
+        """Return where a place in the scene [mm], shape (3,), lies in the image [px], shape (2,).
+
+        Without the lens's distortion. None if it lies behind the camera, or the camera's pose is not known.
+        """
+        if self.pose is None:
+            return None
+        x, y, z = self.matrix @ (self.pose[:3, :3].T @ (place - self.pose[:3, 3]))
+        return np.array([x / z, y / z]) if z > 0 else None
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,8 @@ def episode_scene(
     resting = episode.phase_at(time) == PHASES.index("rest")
     change = signals.signal_change(episode.taxels.counts, resting)
     shown = maps.depth_maps(sensor, label_pair, prediction_pair)
+    if label and label.traction is not None:
+        shown += maps.contact_maps(sensor, label.map_ns, label.traction)
     tip = episode.tip_at(time) if len(episode.tip_ns) else None
     cameras = camera_view.camera_views(episode, images)
     curves = signals.episode_curves(episode, unit) + (signals.label_curves(label) if label else ())

@@ -17,7 +17,7 @@ from tacdata.dataset.format.statistics import STATISTICS, Statistics, merge
 from tacdata.errors import FormatError, UsageError
 from tacdata.replacement import replacement
 
-CODEBASE_VERSION, OLDER = "v3.0", "v2.1"
+CODEBASE_VERSION, OLDER, OLDEST = "v3.0", "v2.1", "v2.0"
 FILES_PER_CHUNK = 1000
 INFO, STATS, TASKS = Path("meta/info.json"), Path("meta/stats.json"), Path("meta/tasks.parquet")
 
@@ -107,13 +107,20 @@ def read_info(root: Path) -> dict[str, Any]:
         raise FormatError(
             f"{root / INFO}: LeRobot format {version}" if complete else f"{root / INFO} lacks counts or features",
             f"LeRobot format {CODEBASE_VERSION}",
-            _converted(root) if complete and version == OLDER else "convert it with lerobot, or pack the session again",
+            _converted(root, version) if complete else "convert it with lerobot, or pack the session again",
         )
     return info
 
 
-def _converted(root: Path) -> str:
-    """Return the command of lerobot that brings a folder of the version before to the present one."""
+def _converted(root: Path, version: str) -> str:
+    """Return the commands of lerobot that bring a folder of a version before to the present one."""
+    if version == OLDEST:
+        return (
+            "first to v2.1 by lerobot 0.3, which has python -m lerobot.datasets.v21.convert_dataset_v20_to_v21, "
+            f"then {_converted(root, OLDER)}"
+        )
+    if version != OLDER:
+        return "convert it with lerobot, or pack the session again"
     name = quote(f"local/{root.resolve().name}")
     options = f"--repo-id={name} --root={quote(str(root))} --push-to-hub=false"
     return f"python -m lerobot.scripts.convert_dataset_v21_to_v30 {options}  (the extra learn brings it)"

@@ -35,14 +35,13 @@ def _cube(pair: dict[str, Any], document: dict[str, Any], folder: Path, origin: 
     """Return the cube in the camera, shape (4, 4) [m]; None if its image does not show it unambiguously."""
     if "cube" in pair:
         return pose_matrix(pair["cube"], f"{origin}/cube")
-    import cv2
-
     from tacdata.tags import detect_cube
+    from tacdata.tags.calibration.image_file import read_grey
 
     if "intrinsics" not in document or "tag_cube" not in document:
         raise FormatError(f"{origin} names an image", "intrinsics and tag_cube beside pairs", "add them to the file")
-    image = cv2.imread(str(folder / pair["image"]), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-    if image is None:
-        raise UsageError(f"{origin}: no image {folder / pair['image']}", "an image file", "correct its name")
-    pose = detect_cube(image, document["intrinsics"], document["tag_cube"])
+    file = folder / pair["image"]
+    if not file.is_file():
+        raise UsageError(f"{origin}: no image {file}", "an image file", "correct its name")
+    pose = detect_cube(read_grey(file), document["intrinsics"], document["tag_cube"])
     return None if pose is None or pose.ambiguous else pose.matrix

@@ -2,14 +2,16 @@
 
 A filter whose process noise is too small for a sudden motion rejects every sighting after it. Two criteria distinguish
 such a run of rejections from mirrored poses and exchanged tags. Its members fit one motion. And the likelihood of the
-whole track increases if the finger may have moved abruptly before the first of them.
+whole track increases if the finger may have moved abruptly before the first of them, or if the sightings that were
+accepted just before it are the wrong ones: after a gap a mirrored pose may be the first that fits.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from tacdata.demonstrations.paths.motion_filter import ProcessNoise, Smoothed, smooth
+from tacdata.demonstrations.paths.bridging import unseen_noise
+from tacdata.demonstrations.paths.motion_filter import GAP, NS, ProcessNoise, Smoothed, smooth
 from tacdata.demonstrations.paths.sightings import Sightings
 
 LEAST_RUN = 4
@@ -22,6 +24,8 @@ PRIOR = 10.0
 """Minimum gain in log-likelihood of the track [nats]: abrupt motions are rare a priori."""
 MOST = 20
 """Largest number of places at which a track is resumed."""
+SUSPECT = 3
+"""Largest number of sightings between a gap and a run that may be the wrong ones."""
 
 
 def acquire(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise) -> Smoothed:
@@ -34,20 +38,26 @@ def acquire(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise) -> Smoo
     """
     nothing = np.zeros(0, np.int64)
     taken: list[int] = []
+    wrong: list[int] = []
+    wander = unseen_noise(seen, wander)
     best = smooth(seen, nothing, wander, back=False)
     refused: set[int] = set()
-    while len(taken) < MOST:
+    while len(taken) + len(wrong) < MOST:
         run = next((r for r in _runs(best.accepted) if r[0] not in refused), None)
         if run is None:
             break
         refused.add(run[0])
         if not _agree(seen, run, wander):
             continue
-        tried = smooth(seen, nothing, wander, back=False, reacquired=[*taken, run[0]])
-        if tried.log_likelihood > best.log_likelihood + PRIOR:
-            taken.append(run[0])
-            best = tried
-    return smooth(seen, times_ns, wander, reacquired=taken)
+        tries = [([*taken, run[0]], wrong)]
+        suspects = _first_after_gap(seen, np.flatnonzero(best.accepted[: run[0]]))
+        if suspects:
+            tries.append((taken, [*wrong, *suspects]))
+        for resumed, doubted in tries:
+            tried = smooth(seen, nothing, wander, back=False, reacquired=resumed, left_out=doubted)
+            if tried.log_likelihood > best.log_likelihood + PRIOR:
+                taken, wrong, best = resumed, doubted, tried
+    return smooth(seen, times_ns, wander, reacquired=taken, left_out=wrong)
 
 
 def _runs(accepted: np.ndarray) -> list[tuple[int, int]]:
@@ -64,6 +74,18 @@ def _runs(accepted: np.ndarray) -> list[tuple[int, int]]:
         else:
             runs.append((int(first), int(first) + 1))
     return [run for run in runs if (~accepted[run[0] : run[1]]).sum() >= LEAST_RUN]
+
+
+def _first_after_gap(seen: Sightings, accepted: np.ndarray) -> list[int]:
+    """Return the last accepted sightings, if a gap is right before them and they are few; else none.
+
+    Args:
+        seen: The finger's sightings.
+        accepted: Those that were accepted before a run of rejections, ascending.
+    """
+    breaks = np.flatnonzero(np.diff(seen.time_ns[accepted]) > GAP / NS) + 1
+    last = accepted[breaks[-1] :] if len(breaks) else accepted[:0]
+    return last.tolist() if len(last) <= SUSPECT else []
 
 
 def _agree(seen: Sightings, run: tuple[int, int], wander: ProcessNoise) -> bool:

@@ -24,6 +24,8 @@ GATE = 27.9
 """Gate: squared Mahalanobis distance in six dimensions beyond which a sighting is an outlier (chi-squared, 0.9999)."""
 FIRST_SPEED = 1.0, 10.0
 """Prior standard deviation of the velocity [m/s] and angular velocity [rad/s]."""
+GAP = 0.25
+"""Time without a sighting that counts as a gap [s]."""
 MOTION = 12
 """States of the motion itself; those of the cameras follow [1]."""
 NS = 1e-9
@@ -37,6 +39,8 @@ class ProcessNoise:
     """Spectral density of the white acceleration [(m/s^2)^2 s]."""
     turning: float
     """Spectral density of the white angular acceleration [(rad/s^2)^2 s]."""
+    unseen: ProcessNoise | None = None
+    """The same over a gap, where a fast motion goes unnoticed; None for no other."""
 
 
 MANOEUVRE = ProcessNoise(100.0, 10_000.0)
@@ -74,6 +78,9 @@ class _Node:
     known: np.ndarray
 
 
+_EYE, _EYE6 = np.eye(3), np.eye(6)  # made once: a step takes a dozen
+
+
 @dataclass(frozen=True, eq=False)
 class _State:
     rotation: np.ndarray
@@ -96,8 +103,9 @@ class _State:
 
 
 def smooth(
-    seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise, back: bool = True, reacquired: Sequence[int] = ()
-) -> Smoothed:
+    seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise, back: bool = True, reacquired: Sequence[int] = (),
+    left_out: Sequence[int] = (),
+) -> Smoothed:  # fmt: skip
     """Return the pose at given times.
 
     Args:
@@ -106,11 +114,12 @@ def smooth(
         wander: Process noise: how freely the finger moves.
         back: Whether to smooth backward; without it poses depend on the past only.
         reacquired: Sightings before which the finger may have moved as in `MANOEUVRE`.
+        left_out: Sightings that are outliers however well they fit.
 
     Returns:
         Poses, and which sightings were used.
     """
-    again = set(reacquired)
+    again, wrong = set(reacquired), set(left_out)
     first = _beginning(seen)
     inside = (times_ns >= seen.time_ns[first]) & (times_ns <= seen.time_ns[-1])
     moments = np.concatenate([seen.time_ns[first:], times_ns[inside]])
@@ -118,20 +127,27 @@ def smooth(
     order = np.lexsort((which < 0, moments))
     accepted, distance, likelihood, nodes = np.zeros(len(seen), bool), np.full(len(seen), np.nan), 0.0, []
     state, known, now = _first(seen, first)
+    unseen = _over_gaps(seen, moments)
     for k in order:
-        freely = MANOEUVRE if int(which[k]) in again else wander
+        freely = MANOEUVRE if int(which[k]) in again else (wander.unseen or wander) if unseen[k] else wander
         expected, spread, step = _predicted(state, known, float(moments[k] - now) * NS, freely)
         state, known, now = expected, spread, moments[k]
         if which[k] >= 0:
             n = int(which[k])
-            state, known, distance[n], gained = _updated(expected, spread, seen, n)
-            accepted[n] = distance[n] < GATE
+            state, known, distance[n], gained = _updated(expected, spread, seen, n, n in wrong)
+            accepted[n] = distance[n] < GATE and n not in wrong
             likelihood += gained
         nodes.append(_Node(expected, spread, step, state, known))
     if back:
         _go_back(nodes)
     poses = [node for node, k in zip(nodes, order, strict=True) if which[k] < 0]
     return _collected(poses, inside, accepted, distance, likelihood)
+
+
+def _over_gaps(seen: Sightings, moments: np.ndarray) -> np.ndarray:
+    """Return which moments [ns] lie in a gap between sightings, or at its end, shape (n,), bool."""
+    after = np.clip(np.searchsorted(seen.time_ns, moments), 1, len(seen) - 1)
+    return seen.time_ns[after] - seen.time_ns[after - 1] > GAP / NS
 
 
 def _collected(
@@ -166,11 +182,11 @@ def _first(seen: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
     size = MOTION + 6 * len(errors)
     known = np.zeros((size, size))
     known[:6, :6] = 100 * seen.covariance[k]  # its own sighting comes next and must not count twice
-    known[6:9, 6:9], known[9:MOTION, 9:MOTION] = FIRST_SPEED[1] ** 2 * np.eye(3), FIRST_SPEED[0] ** 2 * np.eye(3)
+    known[6:9, 6:9], known[9:MOTION, 9:MOTION] = FIRST_SPEED[1] ** 2 * _EYE, FIRST_SPEED[0] ** 2 * _EYE
     for number, (position, rotation) in enumerate(errors):
         at = MOTION + 6 * number
-        known[at : at + 3, at : at + 3] = rotation**2 * np.eye(3)
-        known[at + 3 : at + 6, at + 3 : at + 6] = position**2 * np.eye(3)
+        known[at : at + 3, at : at + 3] = rotation**2 * _EYE
+        known[at + 3 : at + 6, at + 3 : at + 6] = position**2 * _EYE
         # The first pose errs with the camera that saw it.
         known[:6, :6] += np.diag([rotation**2] * 3 + [position**2] * 3)
     first = _State(seen.rotation[k], seen.position[k], np.zeros(3), np.zeros(3), np.zeros(size - MOTION))
@@ -183,19 +199,21 @@ def _predicted(
     turn = exponential(state.turning * dt)
     step = np.eye(len(known))
     step[:3, :3] = turn
-    step[:3, 6:9] = step[3:6, 9:MOTION] = dt * np.eye(3)
+    step[:3, 6:9] = step[3:6, 9:MOTION] = dt * _EYE
     noise = np.zeros_like(known)
     for begin, density in ((0, wander.turning), (3, wander.velocity)):
         at, rate = slice(begin, begin + 3), slice(begin + 6, begin + 9)
-        noise[at, at] = density * dt**3 / 3 * np.eye(3)
-        noise[at, rate] = noise[rate, at] = density * dt**2 / 2 * np.eye(3)
-        noise[rate, rate] = density * dt * np.eye(3)
+        noise[at, at] = density * dt**3 / 3 * _EYE
+        noise[at, rate] = noise[rate, at] = density * dt**2 / 2 * _EYE
+        noise[rate, rate] = density * dt * _EYE
     place = state.position + state.velocity * dt
     expected = _State(turn @ state.rotation, place, state.turning, state.velocity, state.cameras)
     return expected, step @ known @ step.T + noise, step
 
 
-def _updated(expected: _State, spread: np.ndarray, seen: Sightings, n: int) -> tuple[_State, np.ndarray, float, float]:
+def _updated(
+    expected: _State, spread: np.ndarray, seen: Sightings, n: int, wrong: bool
+) -> tuple[_State, np.ndarray, float, float]:
     """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes neither."""
     seen_as = _observed(expected, seen, n)
     surprise = np.concatenate([
@@ -205,8 +223,8 @@ def _updated(expected: _State, spread: np.ndarray, seen: Sightings, n: int) -> t
     total = seen_as @ across + seen.covariance[n]
     inverse = np.linalg.inv(total)
     distance = float(surprise @ inverse @ surprise)
-    gained = -0.5 * (min(distance, GATE) + np.linalg.slogdet(total)[1])
-    if distance >= GATE:
+    gained = -0.5 * ((GATE if wrong else min(distance, GATE)) + np.linalg.slogdet(total)[1])
+    if wrong or distance >= GATE:
         return expected, spread, distance, gained
     gain = across @ inverse
     known = spread - gain @ across.T
@@ -216,11 +234,11 @@ def _updated(expected: _State, spread: np.ndarray, seen: Sightings, n: int) -> t
 def _observed(expected: _State, seen: Sightings, n: int) -> np.ndarray:
     """Return the derivatives of a sighting's rotation and position by the state's errors, shape (6, 12 + 6 k)."""
     result = np.zeros((6, MOTION + 6 * len(seen.cameras)))
-    result[:, :6] = np.eye(6)
+    result[:, :6] = _EYE6
     if seen.camera[n] in seen.cameras:
         at = MOTION + 6 * list(seen.cameras).index(seen.camera[n])
         x, y, z = expected.position - seen.cameras[seen.camera[n]].place
-        result[:, at : at + 6] = np.eye(6)
+        result[:, at : at + 6] = _EYE6
         # A turn of the camera by e moves what it sees by e x r.
         result[3:, at : at + 3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     return result
@@ -241,8 +259,8 @@ def exponential(vector: np.ndarray) -> np.ndarray:
     x, y, z = vector
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     if angle < 1e-8:
-        return np.eye(3) + cross + cross @ cross / 2
-    return np.eye(3) + np.sin(angle) / angle * cross + (1 - np.cos(angle)) / angle**2 * cross @ cross
+        return _EYE + cross + cross @ cross / 2
+    return _EYE + np.sin(angle) / angle * cross + (1 - np.cos(angle)) / angle**2 * cross @ cross
 
 
 def logarithm(matrix: np.ndarray) -> np.ndarray:

@@ -8,14 +8,12 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from tacdata.demonstrations.paths.motion_filter import Smoothed, logarithm
+from tacdata.demonstrations.paths.motion_filter import GAP, Smoothed, logarithm
 from tacdata.demonstrations.paths.sightings import Sightings
 from tacdata.tags.cube.pose import CubePose
 from tacdata.tags.fingers import Finger
 from tacdata.tags.mixups import handedness
 
-GAP = 0.25
-"""Time without a sighting that counts as a gap [s]."""
 TURNED = np.radians(20.0)
 """Angle to the path, at the same position, from which a sighting is a flip [rad]."""
 LEAST = 5
@@ -24,6 +22,9 @@ NEAR = 0.5
 """Largest distance from another finger's path, over the distance of the two fingers, that counts as an exchange [1]."""
 STANDING = 0.2
 """Share of the time for which fingers must be arranged like the other hand's, for a warning [1]."""
+
+CONTRADICTING = 0.08
+"""Share of a finger's sightings that contradict the others, from which it is said [1]."""
 
 
 def gaps(time_ns: np.ndarray, begin_ns: int, end_ns: int) -> list[tuple[int, int]]:
@@ -154,3 +155,20 @@ def _stands(fingers: dict[str, Finger], paths: dict[str, Smoothed], k: int) -> s
         if np.isfinite(paths[name].position[k]).all()
     }
     return handedness(fingers, cubes)
+
+
+def contradictions(seen: Sightings, path: Smoothed, begin_ns: int) -> list[str]:
+    """Say how many sightings contradict the path, and of which camera, where they are more than `CONTRADICTING`."""
+    left_out = ~path.accepted
+    if left_out.mean() <= CONTRADICTING:
+        return []
+    each = {name: np.array([camera == name for camera in seen.camera]) for name in dict.fromkeys(seen.camera)}
+    shares = {name: left_out[rows].mean() for name, rows in each.items()}
+    worst = max(shares, key=lambda name: shares[name])
+    rows = np.flatnonzero(left_out & each[worst])
+    first, last = ((int(seen.time_ns[row]) - begin_ns) * 1e-9 for row in (rows[0], rows[-1]))
+    which = f", {shares[worst]:.0%} of those of camera {worst}" if len(each) > 1 else ""
+    return [
+        f"{seen.finger}: {left_out.mean():.0%} of its sightings contradict the others and are left out{which}, from "
+        f"{first:.1f} to {last:.1f} s: was a camera moved, or is a pose in the rig file old?"
+    ]

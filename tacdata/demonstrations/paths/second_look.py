@@ -67,25 +67,46 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
 
 def why_nothing_is_seen(recording: DemoRecording) -> Unread | None:
     """Return why the stored images of a demonstration show no tag that can be read; None if that is not known."""
-    kept: list[bytes] = []
-    stride, count = 1, 0
-
-    def sample(topic: str, message: bytes | memoryview) -> None:
-        nonlocal stride, count
-        if topic not in image_topics:
-            return
-        if count % stride == 0:
-            kept.append(bytes(message))
-        count += 1
-        if len(kept) == 2 * SAMPLE:
-            stride *= 2
-            kept[:] = kept[::2]
-
-    image_topics = {topics.image(name) for name in recording.rig.cameras}
+    kept: dict[str, list[tuple[int, np.ndarray]]] = {}
     with suppress(UsageError, FormatError):  # the file may be gone by now: then nothing more is known
-        read_records(recording.path, images=False, digests=False, seen=sample)
-    images = (_image(message) for message in kept[:: -(-len(kept) // SAMPLE) or 1])
-    return why_unread([image for image in images if image is not None])
+        kept = sampled(recording, SAMPLE)
+    return why_unread([image for images in kept.values() for _, image in images])
+
+
+def sampled(recording: DemoRecording, count: int) -> dict[str, list[tuple[int, np.ndarray]]]:
+    """Return up to ``count`` images of each camera, spread evenly, each with its time of exposure [ns].
+
+    Images are grey, uint8, shape (height, width).
+
+    Raises:
+        UsageError: If the file is gone.
+        FormatError: If it cannot be read at all.
+    """
+    named = {topics.image(name): name for name in recording.rig.cameras}
+    kept: dict[str, dict[int, bytes]] = {name: {} for name in named.values()}
+    passed = dict.fromkeys(kept, 0)
+    stride = dict.fromkeys(kept, 1)
+
+    def keep(topic: str, message: bytes | memoryview) -> None:
+        if topic not in named:
+            return
+        name = named[topic]
+        if passed[name] % stride[name] == 0:
+            kept[name][passed[name]] = bytes(message)
+        passed[name] += 1
+        if len(kept[name]) > 2 * count:
+            stride[name] *= 2
+            kept[name] = {k: own for k, own in kept[name].items() if k % stride[name] == 0}
+
+    records = read_records(recording.path, images=False, digests=False, seen=keep)
+    made: dict[str, list[tuple[int, np.ndarray]]] = {}
+    for name, messages in kept.items():
+        stored = records.metadata.get(f"clock_model/camera {name}")
+        times = image_times(records, name, ClockModel.from_document(stored) if stored else None).sample_ns
+        chosen = [k for k in list(messages)[:: -(-len(messages) // count) or 1] if k < len(times)]
+        opened = ((int(times[k]), _image(messages[k])) for k in chosen)
+        made[name] = [(time, image) for time, image in opened if image is not None]
+    return made
 
 
 def _image(message: bytes) -> np.ndarray | None:

@@ -13,7 +13,11 @@ from tacdata.recording.episode import TagStream
 FLOOR = 0.0002, float(np.radians(0.2))
 """Standard deviation [m], [rad] of every sighting beyond its image noise: print, mounting, calibration."""
 UNKNOWN = 0.002, float(np.radians(3.0))
-"""Standard deviation [m], [rad] of a sighting without a stored covariance."""
+"""Standard deviation [m], [rad] of a sighting without a stored covariance, or with an impossible one."""
+UNIT = 0.01
+"""Largest deviation of a quaternion's length from 1 [1]."""
+ROUNDING = 1e-12
+"""Largest negative eigenvalue of a covariance that is rounding [m^2, rad^2]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +113,8 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
 
     pose = rig.camera_pose(view.camera)
     seen = np.isfinite(view.position).all(axis=1) & (view.faces > 0)
+    # A rotation of no length or no number is no pose: one damaged message must not end the whole path.
+    seen &= np.abs(np.linalg.norm(view.quaternion, axis=1) - 1) < UNIT
     if pose is None:
         seen[:] = False
         pose = np.eye(4)
@@ -116,9 +122,10 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     count = len(chosen)
     covariance = np.full((count, 6, 6), np.nan) if view.covariance is None else view.covariance[seen].copy()
     both = np.kron(np.eye(2), turn)
-    covariance = both @ covariance @ both.T
+    covariance = both @ np.where(np.isfinite(covariance), covariance, np.nan) @ both.T
     lost = ~np.isfinite(covariance).all(axis=(1, 2))
     covariance[lost] = _diagonal(*UNKNOWN)
+    covariance[np.linalg.eigvalsh(covariance)[:, 0] < -ROUNDING] = _diagonal(*UNKNOWN)
     covariance = covariance + timing**2 * _motion(view.sample_ns[seen], view.position[seen] @ turn.T)
     ambiguous = np.zeros(len(seen), bool) if view.ambiguous is None else view.ambiguous
     ids: list[tuple[int, ...]] = list(view.ids) if view.ids else [()] * len(seen)

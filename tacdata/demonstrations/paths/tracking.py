@@ -2,67 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from tacdata import provenance
 from tacdata.demonstrations import touch
-from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
+from tacdata.demonstrations.demonstration import GUESS, Demonstration, FingerTrack
 from tacdata.demonstrations.paths import path_faults
 from tacdata.demonstrations.paths.acquisition import acquire
+from tacdata.demonstrations.paths.background import without_bumps
+from tacdata.demonstrations.paths.camera_bumps import unmoved
+from tacdata.demonstrations.paths.estimator import Estimator, by_finger, identity_of
 from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.motion_filter import GATE, Smoothed
 from tacdata.demonstrations.paths.second_look import why_nothing_is_seen
 from tacdata.demonstrations.paths.sightings import FLOOR, Sightings, sightings_of
+from tacdata.demonstrations.paths.stream_times import carried_through, check_together, in_step, late_words
 from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.errors import FormatError, UsageError
-from tacdata.sensor import Sensor
 
 RATE = 30.0
 """Default rate of the grid [Hz]."""
 UNSEARCHED = "no image was searched for tags"
 """Beginning of a remark on a stretch without images."""
+FEW = 3
+"""Maximum number of unsearched stretches that are named one by one."""
+ENOUGH = 50
+"""Searched images from which it is worth asking why no tag is seen."""
 FEWEST = 5
 """Minimum number of sightings for a path."""
 
 
-@dataclass(frozen=True)
-class Estimator:
-    """A trained network, as this room uses it."""
-
-    identity: dict[str, Any]
-    """Identity: hash, network, epoch, lookahead [frames], sensor hash."""
-    sensor: Sensor
-    maps: Callable[[np.ndarray], np.ndarray]
-    """Function from tared readings of successive frames [counts], shape (m, taxels), to depth [mm], shape (m, pixels_x,
-    pixels_y).
-    """
-    novelty: Callable[[np.ndarray], np.ndarray] | None = None
-    """Function from tared readings to their novelty [1], shape (m,); None if it is not known."""
-
-
-def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | None = None) -> Demonstration:
+def track(
+    recording: DemoRecording, rate: float = RATE, estimator: Estimator | Mapping[str, Estimator] | None = None
+) -> Demonstration:
     """Smooth every finger's path, put the readings beside it, and report what is wrong.
 
     Args:
         recording: A demonstration.
         rate: Of the grid [Hz].
-        estimator: A trained network, whose predicted depth is added for fingers with a board.
+        estimator: A trained network, or finger -> network, whose predicted depth is added for fingers with a board.
 
     Raises:
-        UsageError: If the rate is not positive.
-        FormatError: If no finger was seen often enough for a path, or the network is of another sensor.
+        UsageError: If the rate is not positive, or a network is for a finger without board.
+        FormatError: If no finger was seen often enough for a path, streams share no time, or the network is of another
+            sensor.
     """
     if not 1.0 <= rate <= 1000.0:
         raise UsageError(f"a grid of {rate:g} Hz", "1 to 1000 Hz", "choose another rate")
-    begin, end = recording.span_ns
-    times = begin + np.rint(np.arange(int((end - begin) * 1e-9 * rate) + 1) * (1e9 / rate)).astype(np.int64)
+    check_together(recording)
     rig = recording.rig
     seen = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
-    remarks = [f"while recording: {note}" for note in recording.notes]
+    recording, delays, moved = in_step(recording, seen)
+    if moved:
+        seen = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
+    begin, end = recording.span_ns
+    whole = seen
+    seen, bumps = without_bumps(seen, recording, delays)
+    times = begin + np.rint(np.arange(int((end - begin) * 1e-9 * rate) + 1) * (1e9 / rate)).astype(np.int64)
+    remarks = [*moved, *bumps, *(f"while recording: {note}" for note in recording.notes)]
     remarks += [f"{n}: seen in {len(s)} images, too few for a path" for n, s in seen.items() if len(s) < FEWEST]
     seen = {name: found for name, found in seen.items() if len(found) >= FEWEST}
     if not seen or len(times) < 2:
@@ -70,38 +70,59 @@ def track(recording: DemoRecording, rate: float = RATE, estimator: Estimator | N
     paths, settings = {}, {}
     # A finger can only be missing where an image was searched: these are the images' times.
     looked = np.unique(np.concatenate([view.sample_ns for view in recording.views]))
+    unsearched: set[tuple[float, float]] = set()
     for name, found in seen.items():
-        seen[name], paths[name], settings[name], words = _path(found, times, looked)
+        seen[name], paths[name], settings[name], words = _path(found, times)
         remarks += words
-    if not recording.searched.startswith("all") and any(words.startswith(UNSEARCHED) for words in remarks):
+        remarks += path_faults.contradictions(seen[name], paths[name], begin)
+        known = min((recording.timing.get(camera.partition(" (")[0], 0.0) for camera in set(found.camera)), default=0.0)
+        paths[name] = carried_through(paths[name], times, known)
+        # The sentence about a bump says why its moment is left out.
+        doubted = np.setdiff1d(whole[name].time_ns, found.time_ns)
+        words, passed_over = _gaps(seen[name], paths[name], times, looked, doubted)
+        remarks += words
+        unsearched |= passed_over
+    remarks += late_words(recording.timing, paths)
+    remarks += _unsearched_words(sorted(unsearched))
+    if not recording.searched.startswith("all") and unsearched:
         remarks.append("all images are stored: tacdata track --every-image searches those that were passed over")
     # These faults show between fingers, so all paths must be known first.
     remarks += path_faults.exchanges(seen, paths, times, begin)
     remarks += path_faults.other_hand(paths, recording.rig.fingers, rate)
     for name, stream in recording.taxels.items():
         remarks += touch.faults(name, stream, begin, end)
-    tracks = {}
+    tracks, estimators = {}, by_finger(estimator, tuple(recording.taxels))
     for name, path in paths.items():
-        tracks[name], words = _track(name, path, seen[name], recording, times, estimator)
+        tracks[name], words = _track(name, path, seen[name], recording, times, estimators.get(name))
         remarks += words
     parents = {"recording": provenance.file_hash(recording.path)}
-    if estimator:
-        parents["checkpoint"] = estimator.identity["hash"]
-        if estimator.novelty is None:
+    network = identity_of(estimators)
+    if network:
+        parents["checkpoint"] = network["hash"]
+        remarks += [f"{name}: no network, so no predicted depth" for name in recording.taxels if name not in estimators]
+        remarks += [one.identity["unfitted"] for one in estimators.values() if "unfitted" in one.identity]
+        # A network that is fitted to no unit learnt from no readings: its own remark says what to do.
+        if any(one.novelty is None and "unfitted" not in one.identity for one in estimators.values()):
             remarks.append(
-                "whether these readings are like those that the network learnt from is not known: its run holds no "
-                "seen.json of this checkpoint (tacdata train --resume on it writes one)"
+                "whether these readings are like those that the network learnt from is not known: no seen.json of "
+                "this checkpoint lies beside it; tacdata train writes one, unless validation presses hardly touch"
             )
     return Demonstration(
         recording.path.name, parents["recording"], recording.task, recording.rig.frame, rate, times, tracks,
         recording.rig.sensors,
         {"gate": GATE, "floor": list(FLOOR), "fingers": settings, "searched": recording.searched},
-        estimator.identity if estimator else None, tuple(dict.fromkeys(remarks)),
+        network, tuple(dict.fromkeys(remarks)),
         provenance.stamp("tacdata track", parents, {"rate": rate}),
     )  # fmt: skip
 
 
 def _nothing_seen(recording: DemoRecording) -> FormatError:
+    looked = len({(view.camera, int(time)) for view in recording.views for time in view.sample_ns})
+    if looked < ENOUGH and not recording.searched.startswith("all"):
+        return FormatError(
+            f"{recording.path}: no finger was seen in {FEWEST} images, as only {looked} were searched for tags while "
+            "recording", f"{ENOUGH} images or more", "all images are stored: add --every-image to tacdata track",
+        )  # fmt: skip
     why = why_nothing_is_seen(recording)
     return FormatError(
         f"{recording.path}: no finger was seen in {FEWEST} images" + (f"; {why.found}" if why else ""),
@@ -110,10 +131,8 @@ def _nothing_seen(recording: DemoRecording) -> FormatError:
     )
 
 
-def _path(
-    seen: Sightings, times: np.ndarray, looked: np.ndarray
-) -> tuple[Sightings, Smoothed, dict[str, Any], list[str]]:
-    """Smooth one finger, given the times of all searched images [ns], shape (p,).
+def _path(seen: Sightings, times: np.ndarray) -> tuple[Sightings, Smoothed, dict[str, Any], list[str]]:
+    """Smooth one finger; return its sightings, path, settings, and what is wrong.
 
     A tag that contradicts the others whenever it is seen alone is left out and named.
     """
@@ -130,16 +149,45 @@ def _path(
             path = acquire(seen, times, wander)
     angle = path_faults.turn_against(seen, path, times)
     words += path_faults.flips(seen, path.accepted, angle, seen.finger)
-    begin = int(times[0])
-    for a, b in path_faults.gaps(seen.time_ns[path.accepted], begin, int(times[-1])):
-        first, last = (a - begin) * 1e-9, (b - begin) * 1e-9
-        when = f"from {first:.1f} to {last:.1f} s ({last - first:.1f} s)"
-        if ((looked > a) & (looked < b)).any():
-            words.append(f"{seen.finger}: no tag that fits {when}")
-        else:  # the recording person need not look for a hidden tag
-            words.append(f"{UNSEARCHED} {when}: a camera or the host did not keep up")
     chosen = {"velocity_density": wander.velocity, "turning_density": wander.turning}
     return seen, path, {**chosen, "left_out_tags": list(wrong)}, words
+
+
+def _gaps(
+    seen: Sightings, path: Smoothed, times: np.ndarray, looked: np.ndarray, doubted: np.ndarray
+) -> tuple[list[str], set[tuple[float, float]]]:
+    """Describe a finger's gaps; return those in which no image was searched apart, as begin and end [s].
+
+    Args:
+        seen: Its sightings.
+        path: Its path.
+        times: The grid [ns], shape (n,).
+        looked: Times of all searched images [ns], shape (p,).
+        doubted: Times of sightings that are left out as a camera was just being moved [ns], shape (m,).
+    """
+    words, unsearched, begin = [], set(), int(times[0])
+    for a, b in path_faults.gaps(seen.time_ns[path.accepted], begin, int(times[-1])):
+        if ((doubted > a) & (doubted < b)).any():
+            continue
+        first, last = (a - begin) * 1e-9, (b - begin) * 1e-9
+        if ((looked > a) & (looked < b)).any():
+            words.append(f"{seen.finger}: no tag that fits from {first:.1f} to {last:.1f} s ({last - first:.1f} s)")
+        else:  # the recording person need not look for a hidden tag
+            unsearched.add((round(first, 1), round(last, 1)))
+    return words, unsearched
+
+
+def _unsearched_words(stretches: list[tuple[float, float]]) -> list[str]:
+    """Describe stretches without a searched image [s]: a few one by one, many in one sentence."""
+    why = "a camera or the host did not keep up"
+    if len(stretches) <= FEW:
+        return [f"{UNSEARCHED} from {a:.1f} to {b:.1f} s ({b - a:.1f} s): {why}" for a, b in stretches]
+    longest = max(stretches, key=lambda ends: ends[1] - ends[0])
+    total, longest_for = sum(b - a for a, b in stretches), longest[1] - longest[0]
+    return [
+        f"{UNSEARCHED} in {len(stretches)} stretches of {total:.1f} s in all, the longest {longest_for:.1f} s from "
+        f"{longest[0]:.1f} s on: {why}"
+    ]
 
 
 def _wrong_words(seen: Sightings, wrong: dict[int, float], rivals: tuple[int, ...]) -> list[str]:
@@ -162,6 +210,18 @@ def _wrong_words(seen: Sightings, wrong: dict[int, float], rivals: tuple[int, ..
     return words
 
 
+def _misplaced(seen: Sightings, path: Smoothed, times: np.ndarray) -> np.ndarray:
+    """Return where only cameras that were moved saw the finger, and its place is a guess, shape (n,), bool."""
+    steady = unmoved(seen)
+    if steady.all():
+        return np.zeros(len(times), bool)
+    lost = np.zeros(len(times), bool)
+    for a, b in path_faults.gaps(seen.time_ns[path.accepted & steady], int(times[0]), int(times[-1])):
+        lost |= (times > a) & (times < b)
+    spread = np.sqrt(np.max(np.diagonal(path.covariance[:, 3:, 3:], axis1=1, axis2=2), axis=1))
+    return lost & ~(spread <= GUESS)
+
+
 def _track(
     name: str, path: Smoothed, seen: Sightings, recording: DemoRecording, times: np.ndarray,
     estimator: Estimator | None,
@@ -175,13 +235,14 @@ def _track(
     gap = np.logical_not(inside)
     for a, b in path_faults.gaps(seen.time_ns[path.accepted], int(times[0]), int(times[-1])):
         gap = gap | np.asarray((times > a) & (times < b))
+    gap = gap | _misplaced(seen, path, times)
     signals, depth, novelty, words = None, None, None, []
     stream = recording.taxels.get(name)
     if stream is not None and len(stream.counts) > 1:
         tared = stream.counts - touch.baseline(stream)
         signals = touch.on_grid(stream, tared.astype(np.float32), times)
         if estimator is not None:
-            _same_sensor(name, recording.rig.sensors[name], estimator)
+            estimator.check_sensor(name, recording.rig.sensors[name])
             depth = touch.on_grid(stream, estimator.maps(tared), times)
             if estimator.novelty is not None:
                 novelty = touch.on_grid(stream, estimator.novelty(tared), times)
@@ -194,12 +255,3 @@ def _track(
         int((~path.accepted).sum()), signals, depth, novelty,
     )  # fmt: skip
     return made, words
-
-
-def _same_sensor(name: str, sensor: Sensor, estimator: Estimator) -> None:
-    if sensor.content_hash != estimator.sensor.content_hash:
-        raise FormatError(
-            f"{name} wears sensor {sensor.name} ({sensor.content_hash[:12]}), the network was trained for "
-            f"{estimator.sensor.name} ({estimator.sensor.content_hash[:12]})",
-            "a network of the sensor that the fingers wear", "name the right sensor in the demo rig, or train anew",
-        )  # fmt: skip

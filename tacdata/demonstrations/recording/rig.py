@@ -10,10 +10,11 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.clock import Clock
-from tacdata.demonstrations.camera_world import CameraWorld
+from tacdata.demonstrations.camera_world import CameraWorld, check_worlds
 from tacdata.errors import FormatError
 from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.sensor import Sensor, default_sensor
+from tacdata.tags.camera import PinholeCamera
 from tacdata.tags.fingers import Finger, fingers_of
 
 CAMERA_FRAME = "camera "
@@ -68,6 +69,7 @@ def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
     }
     cameras, worlds = {}, {}
     for name, entry in document["cameras"].items():
+        PinholeCamera.from_document(entry["intrinsics"], f"{origin}: cameras/{name}/intrinsics")
         cameras[name] = {key: value for key, value in entry.items() if key != "world"}
         if "world" in entry:
             where = _inside(entry["world"], "camera_world", folder, f"{origin}: cameras/{name}/world")
@@ -114,6 +116,7 @@ def _agree(document: dict[str, Any], fingers: dict[str, Finger], worlds: dict[st
     if boardless:
         given = f"{origin}: a sensor but no board for {', '.join(boardless)}"
         raise FormatError(given, "sensors of fingers that have a board", "add the board, or leave the sensor out")
+    check_worlds(worlds, origin)
     frames = sorted({world.frame for world in worlds.values()})
     if len(frames) > 1:
         raise FormatError(

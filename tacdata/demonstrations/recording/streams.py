@@ -1,16 +1,21 @@
-"""Streams of a demonstration: a silent one is reported and does not stop the others."""
+"""Streams of a demonstration: one that is silent, or cannot be right, is reported and does not stop the others."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from tacdata.devices.device import Camera, TaxelBoard
+from tacdata.devices.device import Camera, TaxelBoard, TaxelFrame
 from tacdata.errors import TacdataError
+from tacdata.recording.check.channel_health import reading_limits
 from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.detection_process import Detect
 from tacdata.recording.live.device_streams import DeviceStreams
+from tacdata.recording.live.reading_health import ReadingHealth
+
+AGAIN_NS = 60_000_000_000
+"""Readings that cannot be right are said again after this time [ns of the host's clock]."""
 
 
 class DemoStreams(DeviceStreams):
@@ -38,6 +43,8 @@ class DemoStreams(DeviceStreams):
         self._say = say
         self._why: dict[str, str] = {}
         self._heard: set[str] = set()
+        self._health = {name: _health_of(board) for name, board in self._boards.items()}
+        self._quiet_until_ns = dict.fromkeys(self._boards, 0)
         self.set_latencies(latencies or {})
 
     def __enter__(self) -> DemoStreams:
@@ -67,6 +74,16 @@ class DemoStreams(DeviceStreams):
         if self._why.pop(name, None):
             self._tell(f"{name} speaks again", "warning")
 
+    def _read(self, stream: str, frames: list[TaxelFrame]) -> None:
+        for frame in frames:
+            words = self._health[stream].take(frame.arrival_ns, frame.counts)
+            if not words:
+                continue
+            self._health[stream] = _health_of(self._boards[stream])
+            if frame.arrival_ns >= self._quiet_until_ns[stream]:
+                self._quiet_until_ns[stream] = frame.arrival_ns + AGAIN_NS
+                self._tell(f"{stream}: {words}; check its supply, cable and firmware", "error")
+
     def _silent(self, name: str) -> None:
         if name not in self._why:
             self._fall_silent(name, f"nothing received for {self.silence:g} s; check cable and power")
@@ -83,3 +100,8 @@ class DemoStreams(DeviceStreams):
         with self._lock:
             if self._sink:
                 self._sink.note(words, level)
+
+
+def _health_of(board: TaxelBoard) -> ReadingHealth:
+    described = board.describe()
+    return ReadingHealth(reading_limits(described), described.get("rate", {}).get("nominal"), board.clock.rate)

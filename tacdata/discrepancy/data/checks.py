@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tacdata.discrepancy.data.clocks import shifted
 from tacdata.discrepancy.data.idle_lines import idle_lines
 from tacdata.discrepancy.data.single_channels import odd_channels
 from tacdata.discrepancy.data.sufficiency import FEWEST_EPISODES, shortcomings
 from tacdata.discrepancy.data.wiring import miswired
+from tacdata.discrepancy.model.response_curve import response_curve
 from tacdata.discrepancy.model.setting import Setting
 
 FITTED = (
@@ -30,6 +32,8 @@ class DataChecks:
     """What the model that they are held against leaves open."""
     watched: tuple[str, ...] = ()
     """What idle stretches and single channels show that no effect of the library does."""
+    clocks: tuple[str, ...] = ()
+    """By how much readings follow the path late: said unless the verdict speaks of a delay."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -48,5 +52,13 @@ def check(setting: Setting) -> DataChecks:
     wiring = () if setting.given else tuple(miswired(course, response))
     return DataChecks(
         course.episodes, wiring, tuple(shortcomings(course)),
-        (FITTED,) if response.fitted else (), (*idle_lines(course), *odd_channels(course, response)),
+        _base(setting), (*idle_lines(course), *odd_channels(course, response)), tuple(shifted(course)),
     )  # fmt: skip
+
+
+def _base(setting: Setting) -> tuple[str, ...]:
+    """Return what the base leaves open, and which contact law it is like; nothing of one that was not fitted."""
+    if not setting.response.fitted:
+        return ()
+    curve = response_curve(setting.course)
+    return (FITTED,) if curve is None else (FITTED, str(curve))

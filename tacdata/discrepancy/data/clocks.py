@@ -1,34 +1,55 @@
-"""Whether readings and path were recorded on one clock."""
+"""Whether readings and path were recorded on one clock, and how late readings are on either way."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+from scipy.interpolate import BSpline
 
 from tacdata.chain import Course
+from tacdata.chain.memory import low_pass
 
 LEAST_SHIFT = 0.25
 """A smaller shift is a sensor's delay, no error of clocks [s]."""
 WIDEST, LAGS = 5.0, 101
 """Largest delay that is tried [s], and how many."""
+SCANS = ((0.5, 0.05), (0.5, 0.05), (0.06, 0.01), (0.06, 0.01))
+"""Edges: reach and step of each scan for the onset's and the recovery's delay, in turn [s]."""
+TOP = 0.9
+"""Edges: a press turns in the middle of the time for which it is deeper than this share of its depth [1]."""
+KNOTS = 10
+"""Edges: intervals of the splines that say what is read at a depth."""
+CREEPS = (1.0, 8.0)
+"""Edges: time constants of a skin that creeps or relaxes beside: without them its recovery looks late [s]."""
+MOST_ROWS = 6000
+"""Edges: rows that are looked at, at most."""
 CLEARER = 0.3
 """Largest share of the unexplained variance that may be left at the best delay [1]."""
 
 
 def shifted(course: Course) -> list[str]:
     """Return in words whether the readings follow the path at another time: their clocks were not one."""
-    reduced = course.reduced
-    size = np.nan_to_num(reduced.readings - np.nanmedian(reduced.readings, axis=0))
-    main = size @ np.linalg.svd(size[:: max(len(size) // 4000, 1)], full_matrices=False)[2][0]
-    lags = np.linspace(-WIDEST, WIDEST, LAGS)
-    left = np.array([_left_at(course, main, lag) for lag in lags])
-    best, none = int(np.argmin(left)), float(left[LAGS // 2])
-    if abs(lags[best]) <= LEAST_SHIFT or left[best] > CLEARER * none:
+    lag, left, none = shift(course)
+    if abs(lag) <= LEAST_SHIFT or left > CLEARER * none:
         return []
     return [
-        f"readings follow the path about {abs(lags[best]):.1f} s {'later' if lags[best] > 0 else 'earlier'} than their "
-        f"times say ({100 * left[best]:.0f} % of their change is left then, {100 * none:.0f} % as they are): were the "
+        f"readings follow the path about {abs(lag):.1f} s {'later' if lag > 0 else 'earlier'} than their "
+        f"times say ({100 * left:.0f} % of their change is left then, {100 * none:.0f} % as they are): were the "
         "clocks one? Record both on one clock, or give the offset of one in the import's mapping"
     ]
+
+
+def shift(course: Course) -> tuple[float, float, float]:
+    """Return by how much readings follow the path later than their times say [s].
+
+    Beside it the shares of their variance that depth does not explain then, and as they are [1].
+    """
+    main = _main(course)
+    lags = np.linspace(-WIDEST, WIDEST, LAGS)
+    left = np.array([_left_at(course, main, lag) for lag in lags])
+    best = int(np.argmin(left))
+    return float(lags[best]), float(left[best]), float(left[LAGS // 2])
 
 
 def _left_at(course: Course, reading: np.ndarray, lag: float) -> float:
@@ -43,3 +64,66 @@ def _left_at(course: Course, reading: np.ndarray, lag: float) -> float:
         whole += own_power
         left += own_power - (float(own @ depth) ** 2 / power if power > 0 else 0.0)
     return left / max(whole, 1e-30)
+
+
+def edges(course: Course, about: float) -> tuple[float, float]:
+    """Return by how much readings are late while the tip presses, and while it leaves [s].
+
+    On both ways a reading is the same smooth function of the depth so long before, beside slow memory. The two delays
+    are those that such splines follow best.
+
+    Args:
+        course: The recordings.
+        about: By how much readings are late on the whole [s].
+    """
+    reduced, late = course.reduced, [about, about]
+    kept = np.arange(0, len(reduced.time), max(len(reduced.time) // MOST_ROWS, 1))
+    leaves = np.concatenate([time > turn + about for _, turn, time in _turns(course)])[kept]
+    main, episode = _main(course)[kept], reduced.episode[kept]
+    offsets = (episode[:, None] == np.unique(episode)).astype(float)
+    place = course.row_site[course.read][kept]
+
+    gap = np.diff(reduced.time[kept], prepend=reduced.time[kept][:1])
+
+    def left(times: list[float]) -> float:
+        depth = _depth_before(course, np.where(leaves, times[1], times[0]), kept)
+        inner = np.linspace(0.0, max(float(depth.max()), 1e-9), KNOTS + 1)
+        design = BSpline.design_matrix(depth, np.r_[[inner[0]] * 3, inner, [inner[-1]] * 3], 3).toarray()
+        slow = np.stack([low_pass(depth, gap, tau) for tau in CREEPS], axis=1)
+        design = np.concatenate([design, slow], axis=1)
+        each = [design * (place == p)[:, None] for p in np.unique(place)]
+        columns = np.concatenate([*each, offsets], axis=1)
+        return float(np.square(main - columns @ np.linalg.lstsq(columns, main, rcond=1e-9)[0]).sum())
+
+    for reach, step in SCANS:
+        for way in (0, 1):
+            tried = late[way] + np.arange(-reach, reach + step / 2, step)
+            own = [left([t, late[1]] if way == 0 else [late[0], t]) for t in tried]
+            late[way] = float(tried[int(np.argmin(own))])
+    return late[0], late[1]
+
+
+def _main(course: Course) -> np.ndarray:
+    """Return the first principal component of all channels, shape (m,)."""
+    readings = course.reduced.readings
+    size = np.nan_to_num(readings - np.nanmedian(readings, axis=0))
+    return size @ np.linalg.svd(size[:: max(len(size) // 4000, 1)], full_matrices=False)[2][0]
+
+
+def _turns(course: Course) -> Iterator[tuple[int, float, np.ndarray]]:
+    """Give each episode that was read, when its tip turns [s], and the times of its readings."""
+    for e in np.unique(course.reduced.episode):
+        path = course.episode == e
+        depth, time = course.tip[path, 2], course.time[path]
+        deep = time[depth >= TOP * depth.max()]
+        yield int(e), float(0.5 * (deep[0] + deep[-1])), course.reduced.time[course.reduced.episode == e]
+
+
+def _depth_before(course: Course, late: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Return the depth so long before each reading, never below 0, shape as ``late``."""
+    reduced, result = course.reduced, np.empty(len(kept))
+    for e in np.unique(reduced.episode[kept]):
+        rows, path = reduced.episode[kept] == e, course.episode == e
+        wanted = reduced.time[kept][rows] - late[rows]
+        result[rows] = np.interp(wanted, course.time[path], np.maximum(course.tip[path, 2], 0.0))
+    return result

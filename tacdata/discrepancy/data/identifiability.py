@@ -12,9 +12,11 @@ import numpy as np
 
 from tacdata.chain import Course
 from tacdata.discrepancy.data.sufficiency import one_rate
-from tacdata.discrepancy.data.tip_motion import HOLD, longest_hold, stairs
+from tacdata.discrepancy.data.tip_motion import HOLD, longest_hold, pressing_time, stairs
 from tacdata.effects import AtRest, Effect, library
 
+QUICK = 0.2
+"""Relaxation so much shorter than a press takes is a lag of the other sign: one rate does not split them [1]."""
 SAME_CLOCK = 0.995
 """Presses are evenly spaced from this correlation of their number at a place with the clock on [1]."""
 
@@ -43,7 +45,8 @@ def _at_one_rate(course: Course, effect: Effect, values: Mapping[str, np.ndarray
     known = {p.name: np.asarray(values.get(p.name, 0.0)) for p in effect.parameters}
     held = longest_hold(course) >= max(HOLD, effect.time_constant(known))
     if not stairs(course):
-        slow = (AtRest.GOES_ON,) if held else (AtRest.GOES_ON, AtRest.RELAXES)
+        quick = effect.at_rest is AtRest.RELAXES and 0 < effect.time_constant(known) < QUICK * pressing_time(course)
+        slow = (AtRest.GOES_ON,) if held and not quick else (AtRest.GOES_ON, AtRest.RELAXES)
         return _that(AtRest.CATCHES_UP) + _that(AtRest.STAYS) + _that(*slow)
     if effect.at_rest is AtRest.CATCHES_UP:
         return _that(AtRest.CATCHES_UP)

@@ -49,7 +49,9 @@ def idle_lines(course: Course) -> list[str]:
         top = int(np.argmax(own))
         beside = np.concatenate([own[max(top - NEAR, 0) : max(top - 1, 0)], own[top + 2 : top + 1 + NEAR]])
         strong = amplitude[first + top, channel]
-        if len(beside) >= 3 and own[top] > most * np.median(beside) and strong > LEAST * rise:
+        # What comes back slowly after a press falls from the lowest frequency on: a line rises above it.
+        peak = top > 0 and len(beside) >= 3 and own[top] > most * np.median(beside)
+        if peak and strong > LEAST * rise:
             found.setdefault(float(frequency[first + top]), []).append((channel, float(strong)))
     return [_said(course, hertz, lines, rise) for hertz, lines in sorted(found.items(), key=lambda one: -len(one[1]))][
         :MOST_LISTED

@@ -11,6 +11,7 @@ from tacdata.chain import Course, Tool
 from tacdata.chain.rows import Rows, rows_of
 from tacdata.discrepancy.data.channels import in_source, readings, usable
 from tacdata.discrepancy.data.path_noise import resolved, without_dropouts, without_noise
+from tacdata.discrepancy.data.specimens import specimens
 from tacdata.discrepancy.data.strokes import strokes
 from tacdata.discrepancy.data.tip_observation import Views, second_views
 from tacdata.errors import FormatError, UsageError
@@ -39,6 +40,8 @@ class _Stroke:
     rows: Rows
     tool: Tool
     place: np.ndarray
+    specimen: str
+    """What the source calls what was pressed; empty where it says nothing."""
 
 
 def course_of(paths: list[Path]) -> Course:
@@ -168,7 +171,7 @@ def _strokes_of(
     if len(time_ns) < FEW_ROWS or len(episode.tip_ns) < 2:
         return []
     tool = _tool(episode)
-    made = []
+    made, specimen = [], str(episode.rig.get("imported", {}).get("specimen", ""))
     tip, _ = without_noise(episode.tip_ns, without_dropouts(episode.tip_ns, episode.tip)[0])
     known = resolved(episode.tip_ns, tip[:, 2], time_ns)
     spans = _to_the_end(strokes(episode.tip_ns, tip[:, 2]), tip[:, 2], time_ns)
@@ -181,7 +184,7 @@ def _strokes_of(
         laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, tip, len(kept))
         deepest = laid.tip[np.argmax(laid.tip[:, 2])]
         name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
-        made.append(_Stroke(name, *of, float(origin) * 1e-9, laid, tool, deepest[:2]))
+        made.append(_Stroke(name, *of, float(origin) * 1e-9, laid, tool, deepest[:2], specimen))
     return made
 
 
@@ -223,19 +226,31 @@ def _joined(
     centers = example.sensor.taxels.centers
     numbers = {s: k for k, s in enumerate(dict.fromkeys(p.session for p in parts))}
     time = np.concatenate(clock)
+    site, told = _sites(parts, channels)
     recording = np.unique([p.recording for p in parts], return_inverse=True)[1]
     return Course(
         time=time - time[0], episode=episode, tip=np.concatenate([p.rows.tip for p in parts]),
         tool=np.array([tools.index(p.tool) for p in parts])[episode], readings=values[:, :channels],
         averaged=np.concatenate([p.rows.averaged for p in parts]),
-        session=np.array([numbers[p.session] for p in parts]), site=places(np.array([p.place for p in parts])),
+        session=np.array([numbers[p.session] for p in parts]), site=site,
         tools=tools, names=tuple(p.name for p in parts),
         centers=centers[kept] if len(centers) > int(kept.max()) else None,
         force=values[:, channels] if force else None,
-        temperature=_filled(values[:, channels + force]) if temperature else None, notes=tuple(notes),
+        temperature=_filled(values[:, channels + force]) if temperature else None, notes=(*notes, *told),
         tag=values[:, channels + force + temperature :] if tag else None,
         recording=recording if recording.max() + 1 < len(parts) else None, numbers=tuple(int(k) for k in kept),
     )  # fmt: skip
+
+
+def _sites(parts: list[_Stroke], channels: int) -> tuple[np.ndarray, list[str]]:
+    """Return a number for each press that presses of one place and one specimen share, and what to say of it."""
+    place, named = places(np.array([p.place for p in parts])), [p.specimen for p in parts]
+    if not any(named):
+        return specimens([p.rows for p in parts], place, channels)
+    numbers = {name: k for k, name in enumerate(dict.fromkeys(named))}
+    pairs = np.column_stack([place, [numbers[name] for name in named]])
+    site = np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1)
+    return site, [f"{len(numbers)} specimens by the source: each has a curve of its own"] if len(numbers) > 1 else []
 
 
 def _filled(values: np.ndarray) -> np.ndarray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.data.clocks import shifted
 from tacdata.discrepancy.data.tip_motion import HOLD, longest_hold, speeds
 
 FEWEST_EPISODES = 8
@@ -42,7 +41,6 @@ def shortcomings(course: Course) -> list[str]:
         remarks.append("an indenter without a known radius: what depends on it is not judged")
     if len(course.tools) < 2:
         remarks.append("one indenter: compliance, stiffening and poroelasticity need a second radius")
-    remarks += shifted(course)
     remarks += units(course)
     remarks += stuck(course)
     if course.force is None:

@@ -72,6 +72,15 @@ def _speed(time: np.ndarray, depth: np.ndarray, low: float, least: float) -> flo
     return float((levels[1] - levels[0]) / np.median(took)) if len(took) else np.nan
 
 
+def pressing_time(course: Course) -> float:
+    """Return how long a press takes from contact to its top, as the median [s]; 0 where none touches."""
+    loading, _ = speeds(course)
+    deepest = [float(course.tip[course.episode == e, 2].max()) for e in range(course.episodes)]
+    ways = np.array([way for way in deepest if way > TOUCHING * course.span])
+    took = ways / loading
+    return float(np.nanmedian(took)) if np.isfinite(took).any() else 0.0
+
+
 def longest_hold(course: Course) -> float:
     """Return the longest time that the tip stands at depth [s].
 

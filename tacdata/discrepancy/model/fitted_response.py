@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -32,7 +33,7 @@ REML_STEPS = 30
 """REML: steps to the weight of bending."""
 MOST_SMOOTHING = 1e9
 """REML: largest weight of bending [1]."""
-CACHED = 3
+CACHED = 6
 """Evaluations remembered: most effects leave the pose alone."""
 FORM_ERROR = 0.15
 """Model error of every effect through it: transducers and sampling are not known [1]."""
@@ -90,6 +91,7 @@ class FittedResponse(Response):
         other = copy.copy(self)
         other._bases, other._weights = [self._bases[context]], [self._weights[context]]
         other._air = [self._air[context]]
+        vars(other).pop("air", None)  # that of all places
         other.context, other._rows = np.zeros(course.rows, dtype=np.int64), [np.arange(course.rows)]
         other._course, other._read, other._designs, other._answers = course, np.arange(course.rows), [], []
         return other
@@ -121,15 +123,16 @@ class FittedResponse(Response):
         """Return the splines at poses of all rows of the course, shape (n, most splines of a place)."""
         result = np.zeros((len(pose), self.width))
         for k, design in enumerate(self._designs_at(pose)):
-            result[np.ix_(self._rows[k], np.arange(design.shape[1]))] = design
+            result[self._rows[k], : design.shape[1]] = design
         return result
 
-    @property
+    @cached_property
     def air(self) -> np.ndarray:
         """Each spline's value in the air, at all rows of the course, shape (n, most splines of a place)."""
         result = np.zeros((len(self.context), self.width))
         for rows, air in zip(self._rows, self._air, strict=True):
-            result[np.ix_(rows, np.arange(air.shape[1]))] = air
+            result[rows, : air.shape[1]] = air
+        result.flags.writeable = False  # copies share it
         return result
 
     @property
@@ -249,7 +252,7 @@ class FittedResponse(Response):
         ):  # fmt: skip
             result[rows] = design @ weights - air @ weights
         result.flags.writeable = False  # others are given the same
-        self._answers = [*self._answers[-CACHED:], (depth, result)]
+        self._answers = [*self._answers[1 - CACHED :], (depth, result)]
         return result
 
     def _designs_at(self, pose: np.ndarray) -> list[np.ndarray]:
@@ -260,7 +263,7 @@ class FittedResponse(Response):
                 self._designs.append(self._designs.pop(at))
                 return designs
         designs = [self._design(basis, depth[rows]) for basis, rows in zip(self._bases, self._rows, strict=True)]
-        self._designs = [*self._designs[-2:], (depth, designs)]
+        self._designs = [*self._designs[1 - CACHED :], (depth, designs)]
         return designs
 
     @staticmethod

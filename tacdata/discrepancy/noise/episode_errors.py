@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from tacdata.chain import Course
 from tacdata.discrepancy.noise import offset_random_walk, readings
 from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.offset_process import offset_process
+from tacdata.discrepancy.noise.repeats import repeats
 from tacdata.discrepancy.noise.variance_components import positive, spreads
 from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.statistics.gram_fit import solve
@@ -67,15 +69,15 @@ class EpisodeErrors:
         rest = residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
         process = offset_process(rest, course, known.scale, known.memory, kinds)
-        walk = offset_random_walk.modes(rest, course, known.scale, known.memory, self._places())
+        walk = offset_random_walk.modes(rest, course, known.scale, known.memory, self._repeats)
         return replace(known, offsets=process, random_walk=walk, tag=readings.tag_offset_spread(rest, course, known))
 
     def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> ErrorSizes:
         """Return the estimated size of episodes' own errors of pose.
 
         An episode's errors are estimated by generalized least squares as if they were free, all kinds together. The
-        other episodes' have the sizes estimated so far. Differences of successive episodes of the same place give the
-        sizes, as an offset that differs from place to place is no error of an episode's own. Where places are not
+        other episodes' have the sizes estimated so far. Differences of successive episodes that repeat one another
+        give the sizes: what goes with place, depth or rate is no error of an episode's own. Where places are not
         visited again, any successive episodes do.
 
         Args:
@@ -88,25 +90,26 @@ class EpisodeErrors:
         # Sealed episodes have no information.
         there = np.flatnonzero(np.diagonal(information, axis1=1, axis2=2).min(axis=1) > 0)
         place, score, information = self._places()[there], score[there], information[there]
-        order = np.argsort(place, kind="stable")
-        again = np.diff(place[order]) == 0
-        if again.sum() < readings.FEWEST_GAPS:
-            order, again = np.arange(len(place)), np.ones(max(len(place) - 1, 0), dtype=bool)
-        before, after = order[:-1][again], order[1:][again]
-        if len(before) < readings.FEWEST_GAPS:
+        if len(_successive(self._repeats[there])) < readings.FEWEST_GAPS:
             return ErrorSizes(np.ones(len(sizes)), np.zeros(0, dtype=np.int64))
         unsure = np.linalg.inv(information + UNINFORMED * np.eye(len(sizes)))
         found = np.einsum("ekl,el->ek", unsure, score)
         unsure = positive(unsure - np.diag(np.square(sizes)))
-        estimated = spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST_SIZE, MOST_SIZE)
-        middle = np.stack([np.median(found[place == p], axis=0) for p in place])
-        deviation = found - middle
-        spread = unsure + np.diag(np.square(estimated))
+
+        def size(group: np.ndarray) -> np.ndarray:
+            before, after = _successive(group).T
+            return spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST_SIZE, MOST_SIZE)
+
+        estimated = size(self._repeats[there])
+        deviation = found - np.stack([np.median(found[place == p], axis=0) for p in place])
+        # Few pairs repeat one another: an odd episode among them makes the spread that hides it. A place has more.
+        usual = np.minimum(estimated, size(place))
+        spread = unsure + np.diag(np.square(usual))
         far = np.einsum("ek,ek->e", deviation, np.linalg.solve(spread, deviation[:, :, None])[:, :, 0])
         return ErrorSizes(estimated, there[far > ODD_Z**2])
 
     def gains(self, known: Noise, errors: np.ndarray) -> float:
-        """Return how far an episode's gain of a stream is off the next one's at its place [1].
+        """Return how far an episode's gain of a stream is off the next one's that repeats it [1].
 
         Args:
             known: Noise without own gains.
@@ -114,7 +117,11 @@ class EpisodeErrors:
         """
         whitener = Whitener(self.course, known, self.context, self.features, errors)
         score, information = whitener.stream_scores(self._left(whitener), self.rise)
-        return readings.gain_spread(score, information, self._places())
+        return readings.gain_spread(score, information, self._repeats)
+
+    @cached_property
+    def _repeats(self) -> np.ndarray:
+        return repeats(self.course, self._places())
 
     def _places(self) -> np.ndarray:
         place = np.zeros(self.course.episodes, dtype=np.int64)
@@ -142,3 +149,12 @@ def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray
     place = np.zeros(course.episodes, dtype=np.int64)
     place[course.episode] = context
     return [course.session, place] if fitted else [course.session]
+
+
+def _successive(group: np.ndarray) -> np.ndarray:
+    """Return pairs of successive episodes of one group, shape (pairs, 2); of any, where groups make too few."""
+    order = np.argsort(group, kind="stable")
+    pairs = np.stack([order[:-1], order[1:]], axis=1)
+    again = np.diff(group[order]) == 0
+    every = np.arange(max(len(group) - 1, 0))
+    return pairs[again] if again.sum() >= readings.FEWEST_GAPS else np.stack([every, every + 1], axis=1)

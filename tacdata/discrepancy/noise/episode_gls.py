@@ -40,8 +40,16 @@ class EpisodeErrorModel:
 class FactoredErrors:
     """What the episodes of one place err by, factored: takes it out of any columns."""
 
-    def __init__(self, spans: Sequence[np.ndarray], own: EpisodeErrorModel) -> None:
-        """Factor what episodes, each given by its rows, err by."""
+    def __init__(
+        self, spans: Sequence[np.ndarray], own: EpisodeErrorModel, like: FactoredErrors | None = None
+    ) -> None:  # fmt: skip
+        """Factor what episodes, each given by its rows, err by.
+
+        Args:
+            spans: Rows of each episode.
+            own: What they err by.
+            like: Errors with the same offsets and random walks, which are not factored again.
+        """
         gain_error = None if own.gain_error is None else own.gain_error[:, :, None]
         parts = {"pose": own.pose_errors, "gain": gain_error, "free": own.features}
         given = {name: value for name, value in parts.items() if value is not None}
@@ -49,9 +57,10 @@ class FactoredErrors:
         stacked = np.concatenate([*given.values()], axis=2) if given else None
         self._free = None if own.features is None else _Free(len(own.offset), own.features.shape[2])
         self._episodes: list[tuple[np.ndarray, _Offsets, _Errors]] = []
-        for rows, prior in zip(spans, own.prior, strict=True):
+        known = [None] * len(spans) if like is None else [offsets for _, offsets, _ in like._episodes]
+        for rows, prior, before in zip(spans, own.prior, known, strict=True):
             modes = None if own.random_walk is None else own.random_walk[:, rows]
-            offsets, rest = _Offsets(own.offset[:, rows, None], float(prior), modes), {}
+            offsets, rest = before or _Offsets(own.offset[:, rows, None], float(prior), modes), {}
             if stacked is not None:
                 rest = dict(zip(given, np.split(offsets.rooted(stacked[:, rows]), edges, axis=2), strict=True))
             errors = _Errors(len(own.offset), len(rows), rest.get("pose"), rest.get("gain"))

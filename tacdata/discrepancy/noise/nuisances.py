@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tacdata.chain import predict
+from tacdata.chain import Prediction, predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.regressors.candidates import build
@@ -68,13 +68,19 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
     return columns, np.ones(columns.shape[2])
 
 
-def pose_errors(setting: Setting, placed: Sequence[Placed]) -> np.ndarray:
-    """Return what an episode's own errors of pose change, at one standard deviation, shape (n, streams, kinds)."""
+def pose_errors(setting: Setting, placed: Sequence[Placed], predicted: Prediction | None = None) -> np.ndarray:
+    """Return what an episode's own errors of pose change, at one standard deviation, shape (n, streams, kinds).
+
+    Args:
+        setting: With the model's response.
+        placed: Its effects.
+        predicted: What it predicts, where that is known already.
+    """
     course, response = setting.course, setting.response
     slope = depth_slope(course, response, list(placed))
     if response.fitted:
         # Where the response follows what was read, gains are as much each episode's own as depths.
-        rise = Streams.of(course).rise(predict(course, response, list(placed)), response)
+        rise = Streams.of(course).rise(predicted or predict(course, response, list(placed)), response)
         rise[:, course.channels :] = 0.0
         return np.stack([slope * FITTED_DEPTH_PRIOR * course.stroke, rise * FITTED_GAIN_PRIOR], axis=2)
     parts = [slope[:, :, None] * POSE_PRIOR[2]]

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tacdata.chain import Course, predict
+from tacdata.chain import Course, Prediction, predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.fitted_response import contexts
 from tacdata.discrepancy.model.response_splines import taken_up
@@ -82,7 +82,9 @@ class NullModel:
             white, sizes, spread,
         )  # fmt: skip
 
-    def whitener_for(self, setting: Setting, placed: Sequence[Placed]) -> Whitener:
+    def whitener_for(
+        self, setting: Setting, placed: Sequence[Placed], predicted: Prediction | None = None
+    ) -> Whitener:  # fmt: skip
         """Return what takes nuisances out of columns beside a model's response.
 
         What the response takes up, and an episode's own errors of pose and gain, go through the model's effects: those
@@ -92,6 +94,7 @@ class NullModel:
         Args:
             setting: With the model's response.
             placed: Its effects, given ones first.
+            predicted: What it predicts, where that is known already.
         """
         course, before = setting.course, self.whitener.features
         features = taken_up(course, setting.response, placed)
@@ -100,10 +103,11 @@ class NullModel:
         errors, noise = self.errors, self.noise
         if self.sizes is not None and noise.gain_error is not None:
             episode, streams = course.reduced.episode, Streams.of(course)
-            errors = as_large(pose_errors(setting, placed), errors, episode)
-            rise = streams.rise(predict(course, setting.response, list(placed)), setting.response)
+            said = predicted or predict(course, setting.response, list(placed))
+            errors = as_large(pose_errors(setting, placed, said), errors, episode)
+            rise = streams.rise(said, setting.response)
             noise = replace(noise, gain_error=as_large(rise, noise.gain_error, episode))
-        return Whitener(course.reduced, noise, self.context, features, errors)
+        return Whitener(course.reduced, noise, self.context, features, errors, self.whitener)
 
     def projected_draws(self, whitener: Whitener) -> np.ndarray:
         """Return what a cleaner leaves of the draws [noise scales], shape (m, streams, draws), float32."""

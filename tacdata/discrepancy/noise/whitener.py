@@ -68,7 +68,8 @@ class Whitener:
     """Whitens columns, and projects out what the response may take up, place by place."""
 
     def __init__(
-        self, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None, pose_errors: np.ndarray
+        self, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None, pose_errors: np.ndarray,
+        like: Whitener | None = None,
     ) -> None:  # fmt: skip
         """Factor what is the same for all columns.
 
@@ -78,6 +79,7 @@ class Whitener:
             context: Group of rows that share features, shape (n,); an episode lies in one.
             features: What the response may take up, shape (n, k); None for nothing but offsets.
             pose_errors: Change by an episode's pose errors of one standard deviation, shape (n, streams, kinds).
+            like: Of the same course, context and noise, but for gains: its offsets are not factored again.
         """
         self.features = features
         self._course, self._noise, offsets = course, noise, noise.offsets
@@ -88,7 +90,7 @@ class Whitener:
         offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
         moved = whiten(pose_errors, course, noise)
         random_walk = None
-        if noise.random_walk is not None:
+        if noise.random_walk is not None and like is None:
             each = np.broadcast_to(noise.random_walk[:, None, :], (course.rows, streams, noise.random_walk.shape[1]))
             random_walk = whiten(each, course, flat)
         swung = None if noise.gain_error is None else whiten(noise.gain_error[:, :, None], course, noise)[:, :, 0]
@@ -98,7 +100,7 @@ class Whitener:
         order = np.argsort(context, kind="stable")
         self._places: list[_Place] = []
         # A place at a time: columns of all rows together would not stay in a processor's cache.
-        for group in np.split(order, np.flatnonzero(np.diff(context[order])) + 1):
+        for number, group in enumerate(np.split(order, np.flatnonzero(np.diff(context[order])) + 1)):
             local = course.episode[group]
             rows = np.argsort(local, kind="stable")
             spans = np.split(rows, np.flatnonzero(np.diff(local[rows])) + 1)
@@ -126,7 +128,8 @@ class Whitener:
                 free_offset = _turned(offset[group, seen:, None])
                 tag_errors = EpisodeErrorModel(_turned(offset[group, seen:]), prior, features=free_offset)
                 tag = FactoredErrors(spans, tag_errors)
-            self._places.append(_Place(group, local, offset[group], FactoredErrors(spans, own), tag))
+            before = None if like is None else like._places[number].seen
+            self._places.append(_Place(group, local, offset[group], FactoredErrors(spans, own, before), tag))
 
     @property
     def freedom(self) -> float:

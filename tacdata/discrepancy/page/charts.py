@@ -74,11 +74,11 @@ def map_of(title: str, rows: Sequence[str], columns: Sequence[str], values: np.n
             if not np.isfinite(value):
                 continue
             strength = float(np.clip(np.log(max(value, 1.0)) / np.log(most), 0, 1))
-            x, y = first + wide * k, 20 + high * i
+            x, y, ink = first + wide * k, 20 + high * i, "#fff" if strength > 0.5 else "#222"
             parts.append(
                 f'<rect x="{x}" y="{y}" width="{wide - 2}" height="{high - 2}" class="heat" '
                 f'style="fill-opacity:{0.08 + 0.8 * strength:.2f}"/>'
-                f'<text x="{x + wide / 2:.0f}" y="{y + 15}" class="middle">{value:.3g}</text>'
+                f'<text x="{x + wide / 2:.0f}" y="{y + 15}" class="middle" style="fill:{ink}">{value:.3g}</text>'
             )
     size = f"0 0 {first + wide * len(columns)} {24 + high * len(rows)}"
     return _figure(title, size, "".join(parts))

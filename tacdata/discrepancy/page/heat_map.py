@@ -50,7 +50,8 @@ def heat_map(found: Residuals) -> HeatMap:
             rows.append(f"{phase}, {name}")
             fields.append(part)
     maps = [np.array([[_mean(each, row & column) for column in within] for row in fields]) for each in (first, last)]
-    return HeatMap(tuple(rows), columns, *maps)
+    read = np.flatnonzero(np.isfinite(maps[0]).any(axis=1))
+    return HeatMap(tuple(rows[k] for k in read), columns, *(each[read] for each in maps))
 
 
 def _mean(each: np.ndarray, rows: np.ndarray) -> float:

@@ -120,7 +120,9 @@ def _where(verdict: dict[str, Any], found: Residuals) -> Part:
     if verdict["effects"]:
         pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after))
     rest = [f"without a name yet: {words}" for words in verdict.get("located_after", ())]
-    return Part("Where the gap lives", tuple(pictures), (*verdict["located"], *rest))
+    beside = "the map holds what differs from press to press, too; the figures below leave that out"
+    located = (beside, *verdict["located"]) if verdict["located"] else ()
+    return Part("Where the gap lives", tuple(pictures), (*located, *rest))
 
 
 def _path(verdict: dict[str, Any]) -> Part:
@@ -140,7 +142,9 @@ def _rivals(verdict: dict[str, Any]) -> Part:
         for name, by in sorted(e["margins"].items(), key=lambda item: item[1]):
             least.setdefault(load(name).called, by)
         for called, by in list(least.items())[:MOST_RIVALS]:
-            if called in near:
+            if called in e.get("unphysical", ()):
+                lines.append(f"not {called}: it would need an unphysical size")
+            elif called in near:
                 lines.append(f"{called} may stand in for {e['mechanism']}: {_apart(by)}")
             else:
                 lines.append(f"not {called}: {_apart(by)} than {e['mechanism']}")

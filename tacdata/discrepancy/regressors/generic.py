@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.chain import Course, Response, predict
+from tacdata.chain.course import NUDGE
 from tacdata.chain.memory import low_pass, play, running_max
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.effects import Placed
@@ -68,15 +69,11 @@ def histories(course: Course) -> np.ndarray:
 
 def depth_slope(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
     """Return the change of every stream with depth [1/mm], shape (n, streams); 0 for the tag's."""
-    from dataclasses import replace
-
-    streams, step = Streams.of(course), 0.005 * course.stroke
-    down = np.array([0.0, 0.0, step])
-    deeper, higher = replace(course, tip=course.tip + down), replace(course, tip=course.tip - down)
+    streams, (deeper, higher) = Streams.of(course), course.nudged
     change = streams.predicted(predict(deeper, response, placed)) - streams.predicted(predict(higher, response, placed))
     if streams.tag:
         change[:, -3:] = 0.0
-    return change / (2 * step)
+    return change / (2 * NUDGE * course.stroke)
 
 
 def _since_start(course: Course, values: np.ndarray) -> np.ndarray:

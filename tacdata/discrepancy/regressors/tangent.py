@@ -80,13 +80,23 @@ def knobs_of(placed: Sequence[Placed], channels: int) -> list[Knob]:
     return result
 
 
-def tangents(course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()) -> Tangent:
-    """Differentiate the chain by all numbers of the placed effects, those given beside them kept."""
+def tangents(
+    course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = (), run: Chain | None = None
+) -> Tangent:  # fmt: skip
+    """Differentiate the chain by all numbers of the placed effects, those given beside them kept.
+
+    Args:
+        course: The recordings.
+        response: What the chain starts from.
+        placed: Effects whose numbers move.
+        given: Effects whose numbers stay.
+        run: The chain of those given, then those placed, where it was run already.
+    """
     streams = Streams.of(course)
     knobs = knobs_of(placed, course.channels)
     if not knobs:
         return Tangent([], np.zeros((len(course.read), streams.count, 0), dtype=np.float32), np.zeros(0, dtype=int))
-    chain = Chain(course, response, [*given, *placed])
+    chain = run or Chain(course, response, [*given, *placed])
     now = streams.predicted(chain.prediction)
     values = np.zeros((*now.shape, len(knobs)), dtype=np.float32)
     for group in _groups(knobs, placed, given):

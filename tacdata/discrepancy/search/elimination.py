@@ -16,7 +16,7 @@ from tacdata.discrepancy.search.rivals import try_rivals
 from tacdata.discrepancy.search.score_tests import score_tests
 from tacdata.discrepancy.search.shortlist import ALPHA
 
-SWAPS = 2
+SWAPS = 4
 """How often a rival may take the place of an effect."""
 LARGEST_P = 0.05
 """Corrected p-value from which on an effect is dropped beside others [1]."""
@@ -70,7 +70,7 @@ def _needed(setting: Setting, selection: Selection, model: Refined, problem: Pro
         without = {0: refine(setting, [], null)}
     made, compared = [], []
     for k in range(len(placed)):
-        tried = try_rivals(setting, model, without[k], k, problem, pooled)
+        tried = try_rivals(setting, model, without[k], k, problem, pooled, selection.late)
         if tried.better is not None and swaps > 0:
             # A rival that was behind to first order is ahead on the chain: it takes the place.
             return _needed(setting, selection, tried.better, problem, swaps - 1)

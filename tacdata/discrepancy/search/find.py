@@ -37,7 +37,7 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
     if until != "decide":
         return _findings(given, selection, given.problem, selection.problem, _fitted(selection), until)
     note("rivals and leftovers")
-    problem = prepare(setting, selection.null) if selection.model.placed else given.problem
+    problem = prepare(setting, selection.null, tested=False) if selection.model.placed else given.problem
     answer, final = eliminate(setting, selection, problem), selection.problem
     if answer.findings and _names(answer.model) != _names(selection.model):
         final = prepare(replace(setting, response=answer.model.response), selection.null, answer.model.placed)

@@ -56,6 +56,8 @@ class FoundEffect:
     """As ``selected``, for its family [1]."""
     bought: float = float("inf")
     """By how much half the whitened sum of squares is larger without it [1]."""
+    unphysical: tuple[str, ...] = ()
+    """Those of its rivals that need an amplitude at a physical bound."""
     forms: dict[str, float] = field(default_factory=dict)
     """Other form of its mechanism -> by how many standard errors over episodes this one is better (J test)."""
 

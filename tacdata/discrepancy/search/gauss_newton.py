@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from tacdata.chain import Response, predict
+from tacdata.chain import Chain, Response, predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.response_splines import taken_up
@@ -24,6 +24,8 @@ MOST_STEPS = 5
 """Gauss-Newton: most steps."""
 SMALL_GAIN = 0.2
 """Gauss-Newton: it ends when half the sum of squares falls by less [1]."""
+HOPELESS = 0.01
+"""Gauss-Newton: a step is not tried if to first order half the sum of squares falls by less [1]."""
 
 LARGEST_LEVERAGE = 0.9
 """CR3: largest leverage of an episode [1]."""
@@ -99,6 +101,8 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
     for _ in range(steps):
         best = None
         for share in (1.0, 0.3):
+            if state.fall * share * (2 - share) < HOPELESS:
+                continue
             there = now
             for knob, by in zip(state.tangent.knobs, share * state.move, strict=True):
                 there = knob.moved(there, float(np.clip(by, -1.5, 1.5) if knob.shape else by))
@@ -146,6 +150,8 @@ class _View:
     """What took nuisances out of it."""
     energy: np.ndarray
     left: np.ndarray
+    chain: Chain
+    """The run that predicts it."""
 
 
 @dataclass(frozen=True)
@@ -155,22 +161,26 @@ class _State:
     tangent: Tangent
     move: np.ndarray
     covariance: np.ndarray
+    fall: float = 0.0
+    """Of half the sum of squares by the move, to first order [1]."""
 
 
 def _looked(setting: Setting, response: Response, placed: list[Placed], null: NullModel) -> _View:
     course, streams = setting.course, Streams.of(setting.course)
-    predicted = predict(course, response, [*setting.given, *placed])
+    chain = Chain(course, response, [*setting.given, *placed])
+    predicted = chain.prediction
     residual = (streams.measured(course) - streams.predicted(predicted))[:, :, None].astype(np.float32)
-    whitener = null.whitener_for(replace(setting, response=response), [*setting.given, *placed])
+    whitener = null.whitener_for(replace(setting, response=response), [*setting.given, *placed], predicted)
     clean = whitener.whitened(residual)
     found = episode_grams(clean, course.reduced, null.nuisances, null.inner)
     still = _without(found.gram.sum(axis=0), np.arange(len(null.ridge)), null.ridge)
-    return _View(clean, whitener, _energy(found, still), clean[:, :, 0] - null.nuisances @ still.astype(np.float32))
+    left = clean[:, :, 0] - null.nuisances @ still.astype(np.float32)
+    return _View(clean, whitener, _energy(found, still), left, chain)
 
 
 def _state(setting: Setting, response: Response, placed: list[Placed], null: NullModel, view: _View) -> _State:
     course, ridge = setting.course, null.ridge
-    moving = tangents(course, response, placed, setting.given)
+    moving = tangents(course, response, placed, setting.given, view.chain)
     if not moving.knobs:
         return _State(moving, np.zeros(0), np.zeros((0, 0)))
     clean = view.whitener.whitened(moving.values)
@@ -183,7 +193,8 @@ def _state(setting: Setting, response: Response, placed: list[Placed], null: Nul
     low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -free])
     high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), free])
     best = solve(found.gram.sum(axis=0), np.arange(k + len(ridge)), weight, low, high)
-    return _State(moving, best[:k], _covariance(found, best, weight, k))
+    fall = float(view.energy.sum() - _energy(found, best).sum())
+    return _State(moving, best[:k], _covariance(found, best, weight, k), fall)
 
 
 def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:
@@ -229,9 +240,10 @@ def _correct(response: FittedResponse, setting: Setting, placed: Sequence[Placed
     """Let a fitted response take up what the effects leave to it, twice: they act on it."""
     course, streams = setting.course, Streams.of(setting.course)
     keep = streams.channels + streams.force
+    features = taken_up(course, response, [*setting.given, *placed])
+    if features is None:
+        return
     for _ in range(2):
         predicted = predict(course, response, [*setting.given, *placed])
         residual = streams.measured(course) - streams.predicted(predicted)
-        features = taken_up(course, response, [*setting.given, *placed])
-        if features is not None:
-            response.correct(residual[:, :keep], features)
+        response.correct(residual[:, :keep], features)

@@ -66,28 +66,30 @@ class Problem:
         return self.null.folds
 
 
-def prepare(setting: Setting, null: NullModel, placed: Sequence[Placed] = ()) -> Problem:
+def prepare(setting: Setting, null: NullModel, placed: Sequence[Placed] = (), tested: bool = True) -> Problem:
     """Build columns beside what is placed and reduce them.
 
     Args:
         setting: What is judged.
         null: Its nuisances and noise.
         placed: Effects that the model has.
+        tested: Whether it will be tested: what belongs to no effect and the response's own error are for tests alone.
     """
     course, response = setting.course, setting.response
     board = build(course, response, [*setting.given, *placed], setting.effects, setting.absorbed)
     moving = tangents(course, response, placed, setting.given)
     errors = model_error_columns(course, response, placed, setting.given)
     count = len(board.columns) - 1
-    numerics = _numerics(setting, placed)
+    numerics = _numerics(setting, placed) if tested else None
+    beside = null.beside if tested else null.nuisances
     slack = count + moving.values.shape[2]
     last = slack + errors.shape[2]
     first = last + (numerics is not None)
     more = [moving.values, errors, *([] if numerics is None else [numerics])]
     values = side_by_side([*board.columns, *(column for each in more for column in apart(each))])
-    found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, null.beside)
+    found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, beside)
     second = first + len(null.ridge)
-    nuisances, rich = np.arange(first, second), np.arange(second, first + null.beside.shape[2])
+    nuisances, rich = np.arange(first, second), np.arange(second, first + beside.shape[2])
     board = replace(board, columns=board.columns[:1])
     return Problem(
         setting, null, tuple(placed), board, found, moving.at(count), np.arange(slack, last), nuisances, rich,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from tacdata.chain import Response
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import NullModel, null_model
 from tacdata.discrepancy.regressors.candidates import Candidate
+from tacdata.discrepancy.regressors.delays import delays
 from tacdata.discrepancy.regressors.model_error import OTHER_FORMS
 from tacdata.discrepancy.search.fits import fitted
 from tacdata.discrepancy.search.gate import Gate
@@ -20,7 +21,7 @@ from tacdata.discrepancy.search.overlap import overlap
 from tacdata.discrepancy.search.problem import Problem, prepare
 from tacdata.discrepancy.search.score_tests import ScoreTests, score_tests
 from tacdata.discrepancy.search.shortlist import shortlist
-from tacdata.effects import Effect
+from tacdata.effects import Effect, Placed
 
 MOST_EFFECTS = 4
 """Forward selection: most effects in one verdict."""
@@ -53,6 +54,8 @@ class Selection:
     """Each effect with the fall of half the sum of squares by it [1]."""
     least_p: tuple[tuple[str, float], ...] = ()
     """Mechanism -> least corrected p-value so far [1]."""
+    late: tuple[Placed, ...] = ()
+    """Delays and filters of about the size that readings and path show by themselves."""
 
 
 def start(setting: Setting, gate: Gate) -> Selection:
@@ -64,6 +67,7 @@ def start(setting: Setting, gate: Gate) -> Selection:
 
 def race(setting: Setting, selection: Selection, note: Note) -> Selection:
     """Add effects, or pairs of them, as long as episodes ask for them."""
+    selection = replace(selection, late=tuple(delays(setting)))
     while len(selection.model.placed) < MOST_EFFECTS:
         chosen = shortlist(selection.problem, selection.tests)
         if not chosen:
@@ -78,7 +82,13 @@ def race(setting: Setting, selection: Selection, note: Note) -> Selection:
 
 
 def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None:
-    """Refine each set on the chain; return the best if it is needed, None if none is."""
+    """Refine each set on the chain; return the best if it is needed, None if none is.
+
+    Args:
+        selection: So far; what is late is tried beside the first effect, or alone.
+        sets: Effects to add.
+    """
+    late = selection.late
     problem, everything = selection.problem, np.arange(len(selection.problem.folds))
     tried = []
     for chosen in sets:
@@ -89,6 +99,10 @@ def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None
             first.append(candidate.placed(own, problem.setting.course.channels))
             at += len(candidate.columns)
         tried.append(refine(problem.setting, [*problem.placed, *first], problem.null))
+    if not problem.placed and sets:
+        best = [p for p in min(tried, key=lambda model: model.half_bic).placed if p.effect.called not in _called(late)]
+        starts = [[p] for p in late] + [[p, *best[:1]] for p in late if best]
+        tried += [refine(problem.setting, start, problem.null) for start in starts]
     if not tried:
         return None
     tried = physical_first(tried, selection.model)
@@ -96,6 +110,10 @@ def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None
         if necessity(problem.setting, model, selection.model, problem.null, selection.tests.pooled) >= NEEDED_Z:
             return model
     return None
+
+
+def _called(placed: Sequence[Placed]) -> set[str]:
+    return {p.effect.called for p in placed}
 
 
 def physical_first(tried: list[Refined], current: Refined) -> list[Refined]:
@@ -140,7 +158,7 @@ def _added(setting: Setting, selection: Selection, best: Refined) -> Selection:
     problem = prepare(replace(setting, response=model.response), null, model.placed)
     tests = score_tests(problem, seed=len(best.placed))
     least = least_p_values(problem, tests, selection.least_p)
-    return Selection(null, nothing, model, problem, tests, (*selection.explained, *added), least)
+    return Selection(null, nothing, model, problem, tests, (*selection.explained, *added), least, selection.late)
 
 
 def least_p_values(

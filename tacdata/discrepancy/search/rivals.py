@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,11 +12,11 @@ from tacdata.discrepancy.regressors.candidates import Candidate
 from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.fits import best_shapes, fitted
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
-from tacdata.discrepancy.search.j_test import ModelError, Pooled, j_statistic, necessity
+from tacdata.discrepancy.search.j_test import NEEDED_Z, ModelError, Pooled, j_statistic, necessity
 from tacdata.discrepancy.search.problem import Problem, prepare
 from tacdata.discrepancy.search.shortlist import RIVAL_Z, TOP
 from tacdata.discrepancy.statistics.gram_fit import clipped_t, gains
-from tacdata.effects import Effect
+from tacdata.effects import Effect, Placed
 
 LEAST_MARGIN = 1.0
 """Rivals: least margin by which one is out, however rare it is [standard errors]."""
@@ -46,7 +46,8 @@ class Tried:
 
 
 def try_rivals(
-    setting: Setting, current: Refined, without: Refined, at: int, problem: Problem, pooled: Pooled
+    setting: Setting, current: Refined, without: Refined, at: int, problem: Problem, pooled: Pooled,
+    late: Sequence[Placed] = (),
 ) -> Tried:  # fmt: skip
     """Try other effects in the place of one.
 
@@ -57,9 +58,10 @@ def try_rivals(
         at: Its number.
         problem: The model without any effect, the same noise.
         pooled: Shrinkage priors.
+        late: Delays and filters to begin with: to first order long ones are not seen.
     """
     begin = replace(setting, response=without.response)
-    bare = problem if not without.placed else prepare(begin, problem.null, without.placed)
+    bare = prepare(begin, problem.null, without.placed, tested=False) if without.placed else problem
     mine, best = current.placed[at], best_shapes(bare)
     each = _first_order_gains(bare, best)
     need = necessity(setting, current, without, problem.null, pooled)
@@ -70,9 +72,13 @@ def try_rivals(
     def in_its_place(name: str) -> Refined:
         _, values = fitted(bare, [best[name]], everything)
         first = best[name].placed(values[: len(best[name].columns)], setting.course.channels)
-        return refine(begin, [*without.placed, first], problem.null)
+        starts = [first, *(p for p in late if p.effect.name == name)]
+        made = [refine(begin, [*without.placed, start], problem.null) for start in starts]
+        return min(made, key=lambda model: model.half_bic)
 
-    for name in _close(current, best, each):
+    taken = {p.effect.called for p in current.placed}
+    long = [p.effect.name for p in late if p.effect.called not in taken and p.effect.name in best]
+    for name in dict.fromkeys([*_close(current, best, each), *long]):
         other = models[name] = in_its_place(name)
         level = required_margin(mine.effect, best[name].effect)
         margins[name] = j_statistic(current, other, pooled)
@@ -82,9 +88,10 @@ def try_rivals(
             margins[name] = j_statistic(current, other, pooled, error)
         if (
             margins[name] < -AHEAD
+            and not _unphysical(other, current)
             and (better is None or other.half_bic < better.half_bic)
             and other.half_bic < current.half_bic
-            and j_statistic(other, without, pooled) > need
+            and j_statistic(other, without, pooled) > (need if margins[name] > -RIVAL_Z else min(need, NEEDED_Z))
         ):
             better = other
         losses[name] = other.loss - current.loss
@@ -95,7 +102,8 @@ def try_rivals(
     for name in _forms(mine.effect, best, each):
         other = in_its_place(name)
         forms[name] = j_statistic(current, other, pooled)
-        if better is None and forms[name] < -AHEAD and other.half_bic < current.half_bic:
+        ahead = forms[name] < -AHEAD and other.half_bic < current.half_bic
+        if better is None and ahead and not _unphysical(other, current):
             better = other
     error, bounds = current.errors(at)
     chosen = _chosen(bare, best, each)
@@ -103,7 +111,7 @@ def try_rivals(
         mine, error, bounds, tuple(dict.fromkeys(rivals)), margins, need, losses,
         _share(chosen, lambda e: e.called == mine.effect.called),
         selected_family=_share(chosen, lambda e: e.family is mine.effect.family), forms=forms,
-        bought=without.loss - current.loss,
+        bought=without.loss - current.loss, unphysical=_only_unphysical(current, best, models),
     )  # fmt: skip
     return Tried(found, better, RivalModels(begin, current, without, models, pooled))
 
@@ -115,6 +123,26 @@ def required_margin(mine: Effect, rival: Effect) -> float:
     standard score is a log-likelihood). Nothing is so much likelier that the episodes need not support it.
     """
     return float(np.sqrt(max(RIVAL_Z**2 + 2 * np.log(rival.odds / mine.odds), LEAST_MARGIN**2)))
+
+
+def _unphysical(other: Refined, current: Refined) -> bool:
+    """Return whether only the other model needs an amplitude at a physical bound: it takes no place then."""
+    return _bound(other) and not _bound(current)
+
+
+def _only_unphysical(current: Refined, best: dict[str, Candidate], models: dict[str, Refined]) -> tuple[str, ...]:
+    """Return the mechanisms of which every form that was tried needs an unphysical size."""
+    sizes: dict[str, list[bool]] = {}
+    for name, other in models.items():
+        sizes.setdefault(best[name].called, []).append(_unphysical(other, current))
+    return tuple(called for called, each in sizes.items() if all(each))
+
+
+def _bound(model: Refined) -> bool:
+    """Return whether an amplitude is at its bound. A shape at its own says that the form is another one."""
+    return any(
+        set(model.errors(k)[1]) - {p.name for p in placed.effect.shapes} for k, placed in enumerate(model.placed)
+    )
 
 
 def _first_order_gains(problem: Problem, best: dict[str, Candidate]) -> dict[str, np.ndarray]:

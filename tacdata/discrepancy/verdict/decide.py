@@ -16,8 +16,9 @@ from tacdata.discrepancy.search.gate import GATE
 from tacdata.discrepancy.search.shortlist import RIVAL_Z
 from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
 from tacdata.discrepancy.verdict.confidence import confidence, features
+from tacdata.discrepancy.verdict.lone_press import LonePress, lone_press
 from tacdata.discrepancy.verdict.sealed import Gap
-from tacdata.effects import load
+from tacdata.effects import AtRest, Family, load
 
 SHARE_LEFT = 0.05
 """Leftovers: largest share of the explainable that an answer may leave [1]."""
@@ -31,6 +32,10 @@ SAME_SIZE = 0.1
 """Constancy: an effect whose size spreads by so little over all conditions is a mechanism, whatever is left [1]..."""
 ALIKE_SIZE = 0.2
 """...and by so little it is surely of its family. Stand-ins spread by more, but for those that look the same [1]."""
+FAR_SIZE = 0.25
+"""Constancy: ... or by so little, where no rival is within `SETTLED_Z` and the sealed gap surely closes [1]."""
+SURELY_CLOSED = 0.5
+"""Sealed episodes: the gap surely closes if the 90 % interval of the share that is closed begins above this [1]."""
 SETTLED_Z = 5.0
 """J test: a rival beaten by so many standard errors is out, whatever the answer leaves [1]."""
 LOUD = 2.0
@@ -105,6 +110,8 @@ class Decision:
     """named, "named, incomplete", ambiguous, unknown or none."""
     reason: Reason
     effects: tuple[Decided, ...] = field(default=())
+    lone: LonePress | None = None
+    """What one press alone shows, where nothing else has a name."""
 
 
 def decide(
@@ -123,15 +130,26 @@ def decide(
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
     levels = [finest(f) for f in answer]
     if reason is Reason.LEFTOVERS and (shown is None or not len(shown.names) or shown.shrinks):
-        levels = [beside_much(found, f, own.get(f.placed.effect.name)) for f in answer]
+        first = leading(answer)
+        levels = [beside_much(found, f, own.get(f.placed.effect.name), shown) for f in answer]
+        if first is None or levels[first] is None:
+            levels = [None for _ in answer]
+        levels = [None if k != first and stands_in(found, f) else levels[k] for k, f in enumerate(answer)]
         if any(levels):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
-        elif any(stands(found, f, own.get(f.placed.effect.name)) for f in answer):
+        elif first is not None and stands(found, answer[first], own.get(answer[first].placed.effect.name), shown):
             status, reason = "ambiguous", Reason.RIVALS
-    if status == "named" and any(stands_in(found, f) for f in answer):
+    if status == "named" and lends_form(found, answer):
+        levels, status, reason = [Level.FAMILY], INCOMPLETE, Reason.INCOMPLETE
+    early = [seems_early(f, answer) for f in answer]
+    open_ones = [e or (status == "named" and stands_in(found, f)) for e, f in zip(early, answer, strict=True)]
+    if status in ("named", INCOMPLETE) and any(open_ones):
         # One of several names may stand in for a part of what has none: only the others are sure.
-        levels = [None if stands_in(found, f) else level for f, level in zip(answer, levels, strict=True)]
+        levels = [None if doubt else level for doubt, level in zip(open_ones, levels, strict=True)]
         status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
+    if status == "named" and not found.gap and (shown is None or not len(shown.names)):
+        # Behind a closed gate, sealed episodes alone bear a gain out.
+        levels, status, reason = [None for _ in answer], "ambiguous", Reason.RIVALS
     if status in ("named", INCOMPLETE) and refuted(found, answer, shown):
         status, reason = "unknown", Reason.SEALED
     if checks.contradictions:
@@ -139,10 +157,21 @@ def decide(
     elif checks.too_few:
         status, reason = "unknown", Reason.TOO_FEW
     made = zip(answer, levels, strict=True)
+    lone = lone_press(found.problem) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
     return Decision(
-        status, reason, tuple(_decided(f, status, found, len(answer), level, own.get(f.placed.effect.name))
-                              for f, level in made),
+        status, reason, tuple(_decided(f, status, found, len(answer), level, own.get(f.placed.effect.name), shown)
+                              for f, level in made), lone,
     )  # fmt: skip
+
+
+def _of_one_family(finding: FoundEffect) -> bool:
+    """Return whether all that would do as well is of its family."""
+    return all(load(name).family is finding.placed.effect.family for name in finding.rivals)
+
+
+def _within_bounds(finding: FoundEffect) -> FoundEffect:
+    """Return an effect without the rivals that need an unphysical size: a remainder lends them what they explain."""
+    return replace(finding, rivals=tuple(name for name in finding.rivals if name not in finding.unphysical))
 
 
 def stands_in(found: Findings, finding: FoundEffect) -> bool:
@@ -153,6 +182,23 @@ def stands_in(found: Findings, finding: FoundEffect) -> bool:
     if len(found.effects) < 2 or found.left.t < LEFT_T or finding.corrected_p is None:
         return False
     return found.left.gain >= SHARE_LEFT_ALONE * (found.left.gain + max(finding.bought, 0.0))
+
+
+def lends_form(found: Findings, answer: list[FoundEffect]) -> bool:
+    """Return whether what a single lag leaves may lend it its form: only the edge's tells a filter from a delay."""
+    if len(answer) != 1 or found.left.t < LEFT_T or found.share_left < SHARE_LEFT:
+        return False
+    effect = answer[0].placed.effect
+    return effect.at_rest is AtRest.CATCHES_UP and effect.family is Family.DELAY_AND_FILTER
+
+
+def seems_early(finding: FoundEffect, answer: list[FoundEffect]) -> bool:
+    """Return whether readings come early beside a skin with memory: a sensor cannot, but what relaxes seems to.
+
+    It is another form of the memory before it is an error of clocks.
+    """
+    memory = any(f.placed.effect.family is Family.SKIN_MEMORY for f in answer)
+    return memory and finding.placed.effect.delay(finding.placed.values) < 0
 
 
 def refuted(found: Findings, answer: list[FoundEffect], shown: Gap | None) -> bool:
@@ -166,38 +212,55 @@ def refuted(found: Findings, answer: list[FoundEffect], shown: Gap | None) -> bo
 
 def finest(finding: FoundEffect) -> Level | None:
     """Return the finest level at which an effect may be named; None if none holds."""
-    if not _needed(finding) or finding.at_bound:
-        return None
-    mine = finding.placed.effect
-    if any(load(name).family is not mine.family for name in finding.rivals):
+    if not _needed(finding) or finding.at_bound or not _of_one_family(finding):
         return None
     if finding.rivals:
         return Level.FAMILY
     return Level.MECHANISM if any(by < RIVAL_Z for by in finding.forms.values()) else Level.FORM
 
 
-def stands(found: Findings, finding: FoundEffect, beside: BesideRemainder | None) -> bool:
+def leading(answer: list[FoundEffect]) -> int | None:
+    """Return which effect explains most beyond the others; what does not race has no such figure."""
+    raced = [k for k, f in enumerate(answer) if f.corrected_p is not None]
+    return max(raced, key=lambda k: answer[k].bought, default=None)
+
+
+def stands(found: Findings, finding: FoundEffect, beside: BesideRemainder | None, shown: Gap | None = None) -> bool:
     """Return whether an effect, or one that looks the same, is there beside much that has no name.
 
-    It is needed and explains more than is left. Its size is the same in all conditions: what it stands beside has no
-    reason to follow it there.
+    It is needed and explains more than is left, or surely most of the sealed gap. Its size is the same in all
+    conditions: what it stands beside has no reason to follow it there.
     """
-    if beside is None or not beside.spreads or not _needed(finding) or finding.at_bound:
+    if beside is None or not beside.spreads or not _needed(finding) or _unphysical(finding):
         return False
-    return finding.bought >= found.left.gain and max(beside.spreads.values()) <= ALIKE_SIZE
+    closes = shown is not None and shown.interval[0] >= SURELY_CLOSED and bool(len(shown.names))
+    far = closes and all(by >= SETTLED_Z for by in finding.margins.values())
+    most = FAR_SIZE if far else ALIKE_SIZE
+    return (closes or finding.bought >= found.left.gain) and max(beside.spreads.values()) <= most
 
 
-def beside_much(found: Findings, finding: FoundEffect, beside: BesideRemainder | None) -> Level | None:
+def beside_much(
+    found: Findings, finding: FoundEffect, beside: BesideRemainder | None, shown: Gap | None = None
+) -> Level | None:  # fmt: skip
     """Return the finest level of an effect beside much that has no name; None if none holds.
 
     How exactly its size is the same in all conditions says how fine the name may be.
     """
-    level = finest(finding)
-    if level is None or beside is None or not stands(found, finding, beside):
+    bare = _within_bounds(finding)
+    level = Level.FAMILY if finding.at_bound and _of_one_family(bare) else finest(bare)
+    if level is not None and bare.rivals != finding.rivals:
+        level = Level.FAMILY
+    if level is None or beside is None or not stands(found, finding, beside, shown):
         return None
     same = max(beside.spreads.values()) <= SAME_SIZE
     fine = level is not Level.FAMILY and same and not _untried_kin(found, finding)
     return Level.MECHANISM if fine else Level.FAMILY
+
+
+def _unphysical(finding: FoundEffect) -> bool:
+    """Return whether an amplitude is at its bound. A shape at its own says that the form is another one."""
+    shapes = {p.name for p in finding.placed.effect.shapes}
+    return bool(set(finding.at_bound) - shapes)
 
 
 def _untried_kin(found: Findings, finding: FoundEffect) -> set[str]:
@@ -248,8 +311,11 @@ def answer_of(found: Findings) -> list[FoundEffect]:
     course, own = found.problem.setting.course, []
     for f in found.effects:
         effect = f.placed.effect
-        rivals = [*f.rivals, *lookalikes(course, effect, f.placed.values), *_hidden(found, f)]
-        own.append(replace(f, rivals=tuple(name for name in dict.fromkeys(rivals) if name != effect.called)))
+        alike = lookalikes(course, effect, f.placed.values)
+        rivals = [name for name in dict.fromkeys([*f.rivals, *alike, *_hidden(found, f)]) if name != effect.called]
+        # A size says nothing against what these presses cannot split.
+        unphysical = tuple(name for name in f.unphysical if name in rivals and name not in alike)
+        own.append(replace(f, rivals=tuple(rivals), unphysical=unphysical))
     return [*(f for f in own if not calibration_error(f)), *gains_beyond_calibration(found)]
 
 
@@ -281,14 +347,16 @@ def _hidden(found: Findings, finding: FoundEffect) -> list[str]:
 
 def _decided(
     finding: FoundEffect, verdict: str, found: Findings, count: int, level: Level | None,
-    beside: BesideRemainder | None,
+    beside: BesideRemainder | None, shown: Gap | None,
 ) -> Decided:  # fmt: skip
     """Return an effect with its status; whoever reads it alone must not take it for a name that the verdict refuses."""
     values = features(found, finding, count)
+    if level is not None and not _of_one_family(finding):
+        finding = _within_bounds(finding)
     if verdict == INCOMPLETE:
         return Decided(finding, "suspected" if level is None else "named", values, None, level, beside)
     status = "suspected" if verdict == "unknown" else settled(finding) if level is not None else "ambiguous"
-    if beside is not None and not stands(found, finding, beside):
+    if beside is not None and not stands(found, finding, beside, shown):
         status = "suspected"
     sure = confidence(values) if status == "named" else None
     return Decided(finding, status, values, sure, None if status == "suspected" else level, beside)

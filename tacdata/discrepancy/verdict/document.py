@@ -12,16 +12,19 @@ import schemas
 from tacdata import provenance
 from tacdata.chain import Course
 from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.data.sufficiency import one_rate
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.score_tests import DRAWS
-from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.residual_slices import Slice, beside, in_words, outstanding
 from tacdata.discrepancy.verdict.sealed import Gap
-from tacdata.effects import load
+from tacdata.effects import Family, load
 
 Z90 = 1.645
 """Standard errors either way of a 90 % interval."""
+DIAGNOSTIC = "the diagnostic plan on this rig: `tacdata plan diagnostic --out diagnostic.yaml`"
+REVISE = "`tacdata revise VERDICT RECORDING... --out NEW`"
 LARGEST_LIMIT = 1e3
 """Detection limits beyond are not given [typical sizes]."""
 
@@ -42,7 +45,9 @@ def document(
     """
     course, placed = found.problem.setting.course, [e.finding.placed for e in decision.effects]
     told = [p.effect.remark(p.values) for p in placed]
-    remarks = [*checks.wiring, *checks.watched, *checks.shortcomings, *told, *checks.base]
+    late = any(p.effect.family is Family.DELAY_AND_FILTER for p in placed)
+    clocks = () if late else checks.clocks
+    remarks = [*checks.wiring, *checks.watched, *checks.shortcomings, *clocks, *told, *checks.base]
     tests, noise, values = found.tests, found.problem.null.noise, max(float(found.values.sum()), 1.0)
     return {
         "version": schemas.version("verdict"), "status": decision.status,
@@ -61,7 +66,7 @@ def document(
         "untested": untested([e.finding for e in decision.effects]),
         "data": {**data(course), "sealed": list(shown.names) if shown else []},
         "sealed": shown.document() if shown else {"episodes": 0, "share": 0.0, "rule": "none was sealed"},
-        "remarks": [words for words in remarks if words], "next": following(decision),
+        "remarks": [words for words in remarks if words], "next": following(decision, course, bool(checks.watched)),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": DRAWS}),
     }  # fmt: skip
 
@@ -103,6 +108,8 @@ def _effect(decided: Decided) -> dict[str, Any]:
         "forms": _bounded(finding.forms), "losses": finding.losses,
         "bought": float(min(finding.bought, 1e12)), "selected_family": finding.selected_family,
     }  # fmt: skip
+    if unphysical := [name for name in finding.unphysical if name not in finding.rivals]:
+        written["unphysical"] = unphysical
     if decided.beside is not None:
         written["beside_remainder"] = {
             "necessity": decided.beside.necessity, "margins": _bounded(decided.beside.margins),
@@ -124,13 +131,36 @@ def untested(answer: list[FoundEffect]) -> list[str]:
     return [f"{e['id']}: {e['title']}" for e in listed if not groups or e["group"] in groups]
 
 
-def following(decision: Decision) -> list[str]:
-    """Return experiments, the most useful first."""
+def following(decision: Decision, course: Course, watched: bool = False) -> list[str]:
+    """Return what to do next, the most useful first.
+
+    Args:
+        decision: What may be said.
+        course: The recordings.
+        watched: Whether single channels show what no effect does.
+    """
+    if decision.reason is Reason.TOO_FEW:
+        return [DIAGNOSTIC]
+    if decision.reason is Reason.QUIET and watched:
+        return ["mend what the remarks say of single channels, and record again"]
+    if decision.reason is Reason.QUIET:
+        return ["nothing: below the limits in verdict.json an effect would show in more or deeper presses alone"]
+    if decision.status == "named":
+        return [f"give it to the model, and see what that changes: {REVISE}"]
     answer = [e.finding for e in decision.effects]
     words = [f"{f.placed.effect.called}: {f.placed.effect.experiment}" for f in answer if f.rivals or f.at_bound]
+    if any(f.placed.effect.at_rest is not None and f.rivals for f in answer) and one_rate(course):
+        words.insert(0, "the same presses at three rates over a decade: one rate splits no delay from play or memory")
+    if decision.status == "ambiguous":
+        words.append(f"the presses that split them soonest: {REVISE} writes them as next.yaml")
+    if (lone := decision.lone) is not None:
+        words.append(
+            f"{lone.effect.called}: repeat that press, best on three more places or specimens that nobody pressed "
+            f"before; {lone.effect.experiment}"
+        )
     if decision.status in ("unknown", INCOMPLETE):
         words += [f"{f.placed.effect.called}: {f.placed.effect.experiment}" for f in answer]
-        words.append("the diagnostic plan on this rig: `tacdata plan diagnostic --out diagnostic.yaml`")
+        words.append(DIAGNOSTIC)
     return list(dict.fromkeys(words))
 
 

@@ -8,9 +8,14 @@ from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import LEFT_T, SHARE_LEFT_ALONE, Decided, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import worsened
+from tacdata.effects import load
 
+SPEAKS_FROM = 0.005
+"""Share of what could be explained from which on a form is worth a word [1]."""
 MOST_LISTED = 6
 """Episodes that are listed by name."""
+MOST_STAND_INS = 3
+"""What may stand in for an effect is listed by name up to so many; of more, their families are."""
 
 
 def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, shown: Gap | None = None) -> str:
@@ -38,8 +43,9 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
                 return f"no effect of the library shows, but {'; '.join(checks.watched)}"
             return "nothing is missing that these recordings would show; see the detection limits"
         case Reason.NAMED:
-            more = "" if found.left.t < LEFT_T else f"; {100 * found.share_left:.1f} % of it is another form"
-            return f"{names}: nothing else explains the episodes as well{more}"
+            little = found.left.t < LEFT_T or found.share_left < SPEAKS_FROM
+            more = "" if little else f"; {100 * found.share_left:.1f} % of it follows another law than this one"
+            return f"{names}. Nothing else explains the presses as well{more}"
         case Reason.RIVALS:
             closed = _closed(decision, shown)
             either_way = f"; either way {closed} is closed" if closed else ""
@@ -51,14 +57,24 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
         case Reason.LEFTOVERS:
             return f"something is missing; {_closest(answer, found.share_left, shown)}"
         case Reason.ODD:
-            return _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
+            odd = _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
+            return odd + _lone(decision, found, "; ")
         case Reason.LOUD:
-            return (
-                f"readings are off by {found.loudness:.1f} times the noise, but no effect shows in several episodes: "
-                "look at where it lives"
-            )
+            off = f"readings are off by {found.loudness:.1f} times the noise, but no effect shows in several presses"
+            return off + (_lone(decision, found, ": ") or ": look at where it lives")
         case Reason.UNEXPLAINED:
-            return "something is missing that no modelled effect explains"
+            return "something is missing that no modelled effect explains" + _lone(decision, found, "; ")
+
+
+def _lone(decision: Decision, found: Findings, before: str) -> str:
+    """Return what a single press shows; empty where there is none."""
+    if (lone := decision.lone) is None:
+        return ""
+    press = found.problem.setting.course.names[lone.episode]
+    return (
+        f"{before}{lone.effect.called} would explain {100 * lone.share:.0f} % of it, but {press} alone holds "
+        f"{100 * lone.leverage:.0f} % of what shows it, and one press carries no name"
+    )
 
 
 def _incomplete(decision: Decision, shown: Gap | None) -> str:
@@ -112,7 +128,8 @@ def _odd(names: list[str]) -> str:
     more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
     return (
         f"{listed}{more}: unlike all other presses of their place, and no effect explains them: was something touched "
-        "or moved? Look at them (`tacdata view`), leave them out or record them again"
+        "or moved, or is it another specimen (`press: {specimen: ...}` in an import's mapping)? Look at them "
+        "(`tacdata view`), leave them out or record them again"
     )
 
 
@@ -153,7 +170,10 @@ def _open(own: list[FoundEffect]) -> str:
     others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in names]
     words = f"{names[0]} fits best" if len(names) == 1 else f"{_listed(names, 'and')} together fit best"
     if others:
-        return f"{words}, but {_listed(others, 'or')} may stand in for {'it' if len(names) == 1 else 'any of them'}"
+        families = list(dict.fromkeys(load(name).family.value for name in others))
+        few = len(others) <= MOST_STAND_INS
+        instead = _listed(others, "or") if few else f"{len(others)} others ({_listed(families, 'or')})"
+        return f"{words}, but {instead} may stand in for {'it' if len(names) == 1 else 'any of them'}"
     return f"{words}, but one may stand in for another"
 
 

@@ -123,16 +123,19 @@ def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) ->
 
 def in_words(found: list[Slice], alone: list[str] | None = None) -> list[str]:
     """Return sentences on what stands out: ``alone`` first, then the slices, each kind of slice by itself."""
-    words = list(alone or [])
+    words, alike = list(alone or []), []
     for by in dict.fromkeys(s.by for s in found):
         own = [s for s in found if s.by == by]
         high = [s for s in own if s.mean_square > NOTABLE and s.t > NOTABLE_T]
         if not high:
             continue
         if len(high) == len(own) > 2 and max(s.mean_square for s in high) < 2 * min(s.mean_square for s in high):
-            usual = np.median([s.mean_square for s in high])
-            words.append(f"{by}: everywhere alike, {usual:.3g} times the noise floor")
+            alike.append((by, float(np.median([s.mean_square for s in high]))))
         else:
             high.sort(key=lambda s: -s.mean_square)
             words.append(f"{by}: " + ", ".join(f"{s.name} {s.mean_square:.3g}" for s in high[:4]) + " times the noise")
+    if alike:
+        usual = [level for _, level in alike]
+        much = f"{min(usual):.3g}" if len(usual) == 1 else f"{min(usual):.3g} to {max(usual):.3g}"
+        words.append(f"{', '.join(by for by, _ in alike)}: everywhere alike, {much} times the noise")
     return words or [NOWHERE]

@@ -84,15 +84,27 @@ class Gap:
         """Whether the effects make the gap smaller."""
         return bool(self.after.sum() < self.before.sum())
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """90 % interval of the share that is closed [1], by bootstrap over sealed episodes; of nothing, -inf to inf."""
+        if not len(self.before):
+            return -np.inf, np.inf
+        low, high = _between(_closed(*self._drawn()))
+        return low, high
+
+    def _drawn(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return bootstrap draws of both means [1], shape (draws,) each."""
+        pick = np.random.default_rng(0).integers(len(self.before), size=(BOOTSTRAPS, len(self.before)))
+        return self.before[pick].mean(axis=1), self.after[pick].mean(axis=1)
+
     def document(self) -> dict[str, Any]:
         """Return it as in the verdict."""
         if not len(self.before):
             return {"episodes": 0, "share": SEALED_SHARE, "rule": f"none of fewer than {FEWEST_TO_SEAL} episodes"}
         best = min(float(self.ceiling.mean()), float(self.after.mean()))
         worst = int(np.argmax(self.after))
-        pick = np.random.default_rng(0).integers(len(self.before), size=(BOOTSTRAPS, len(self.before)))
-        before, after = (v[pick].mean(axis=1) for v in (self.before, self.after))
-        closed, (low, high) = _closed(self.before.mean(), self.after.mean()), _between(_closed(before, after))
+        before, after = self._drawn()
+        closed, (low, high) = _closed(self.before.mean(), self.after.mean()), self.interval
         return {
             "episodes": len(self.before), "share": SEALED_SHARE,
             "rule": f"least SHA-256 of session/name, {LEAST_SEALED} at least",

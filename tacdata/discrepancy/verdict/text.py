@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from tacdata.effects import library
+from tacdata.discrepancy.search.gate import GATE
+from tacdata.effects import library, load
 
 MOST_RIVALS = 6
 """Most rivals that are listed."""
@@ -21,7 +22,10 @@ def in_text(verdict: dict[str, Any]) -> str:
         lines += _effect(e)
     gate = verdict["gate"]
     lines += [""] if verdict["effects"] else []
-    lines.append(f"gate: p = {gate['p']:.3f} over all effects, {gate['p_generic']:.3f} for patterns of no effect")
+    lines.append(
+        f"could it be chance? p = {gate['p']:.3f} over all effects, {gate['p_generic']:.3f} for patterns of no effect; "
+        f"a gap from {GATE:g} down"
+    )
     lines += _sizes(verdict)
     if verdict["located"]:
         lines += ["where it lives:", *(f"  {words}" for words in verdict["located"])]
@@ -39,7 +43,9 @@ def in_text(verdict: dict[str, Any]) -> str:
     if weak:
         lines.append("would be seen only at more than three times their usual size: " + ", ".join(sorted(weak)))
     if verdict["untested"]:
-        lines.append("known, not modelled: " + "; ".join(verdict["untested"][:12]))
+        titles = [words.split(": ", 1)[-1] for words in verdict["untested"]]
+        few = "; ".join(titles) if len(titles) <= MOST_UNJUDGED else f"{len(titles)} effects; verdict.html lists them"
+        lines.append(f"known, not modelled: {few}")
     return "\n".join(lines) + "\n"
 
 
@@ -53,19 +59,26 @@ def answered(verdict: dict[str, Any]) -> set[str]:
 
 
 def _effect(entry: dict[str, Any]) -> list[str]:
-    sure = entry["confidence"] if entry["status"] == "named" else None
-    words = "" if sure is None else f", {100 * sure:.0f} % sure"
-    status = entry["status"]
-    if entry.get("level") == "family":
-        status = f"{status}; its family is not: {entry['family']}"
-    lines = [f"  {entry['mechanism']} ({entry['effect']}, {entry['stage']}): {status}{words}"]
+    effect = load(entry["effect"])
+    lines = [f"  {entry['mechanism']}: {_standing(entry)}", f"    {effect.title}"]
+    meanings = {p.name: p.meaning for p in effect.parameters}
     for name, p in entry["parameters"].items():
+        unit = "" if p["unit"] == "1" else f" {p['unit']}"
+        meaning = f" ({meanings[name]})" if name in meanings else ""
         if isinstance(p["value"], list):
-            lines.append(f"    {name}: {min(p['value']):.4g} to {max(p['value']):.4g} {p['unit']} over the channels")
+            each = f"{min(p['value']):.4g} to {max(p['value']):.4g}{unit} over the channels"
+            lines.append(f"    {name}: {each}{meaning}")
         else:
             spread = f" +- {p['error']:.2g}" if p["error"] is not None else ""
-            lines.append(f"    {name} = {p['value']:.4g}{spread} {p['unit']}")
+            lines.append(f"    {name} = {p['value']:.4g}{spread}{unit}{meaning}")
+    if entry["alternatives"]:
+        lines.append(f"    these presses leave open whether it is: {', '.join(entry['alternatives'])}")
+    unphysical = entry.get("unphysical", [])
+    if unphysical:
+        lines.append(f"    does as well only with an unphysical size: {', '.join(unphysical)}")
+    spoken = {*entry["alternatives"], *unphysical}
     rivals = sorted(entry["margins"].items(), key=lambda item: item[1])
+    rivals = [(name, by) for name, by in rivals if load(name).called not in spoken]
     worse = [(name, by) for name, by in rivals if by > 0][:MOST_RIVALS]
     better = [(name, -by) for name, by in rivals if by <= 0][:MOST_RIVALS]
     if worse:
@@ -75,19 +88,28 @@ def _effect(entry: dict[str, Any]) -> list[str]:
     return lines
 
 
+def _standing(entry: dict[str, Any]) -> str:
+    """Return how sure an effect is, and of what: where only its family is, that it is the one that fits best."""
+    status, sure = entry["status"], entry["confidence"]
+    if entry.get("level") == "family":
+        family = entry["family"]
+        return f"fits best; {family} is named" if status == "named" else f"{status}; either way it is {family}"
+    return status if status != "named" or sure is None else f"named, {100 * sure:.0f} % sure"
+
+
 def _by(rivals: list[tuple[str, float]]) -> str:
     return ", ".join(f"{name} {by:.1f}" for name, by in rivals)
 
 
 def _sizes(verdict: dict[str, Any]) -> list[str]:
     """Return how large the residual is, with what each number is; before and after only where something was added."""
-    left, sealed, none = verdict["left"], verdict["sealed"], verdict["status"] == "none" and not verdict["effects"]
+    left, sealed, none = verdict["left"], verdict["sealed"], not verdict["effects"]
     if none:
         lines = [f"residual: {left['before']:.3f}; 1 is the noise floor"]
     else:
         lines = [f"residual: {left['before']:.3f} before, {left['after']:.3f} after; 1 is the noise floor"]
         lines.append(f"left of what could be explained: {100 * left['share']:.1f} % ({left['t']:.1f} standard errors)")
-    unit = "mean squares over the noise; the residual is without what differs from press to press"
+    unit = "mean squares over the noise; the residual leaves out what differs from press to press"
     if not sealed["episodes"]:
         return [*lines, f"  ({unit})"]
     head = f"{sealed['episodes']} sealed episodes: "
@@ -96,7 +118,7 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
         lines.append(f"{head}{sealed['before']:.3f}{by_path if sealed['ceiling'] < 0.9 * sealed['before'] else ''}")
     else:
         lines.append(f"{head}{sealed['before']:.3f} before, {sealed['after']:.3f} after{_closed(sealed)}")
-    return [*lines, f"  ({unit}, the sealed episodes with it: they do not compare)"]
+    return [*lines, f"  ({unit}, the sealed episodes do not: they do not compare)"]
 
 
 def _closed(sealed: dict[str, Any]) -> str:
@@ -107,7 +129,10 @@ def _closed(sealed: dict[str, Any]) -> str:
     if not sealed["certain"]:
         return f" (90 %: {sealed['after_interval'][0]:.3g} to {sealed['after_interval'][1]:.3g}){best}"
     low, high = sealed["interval"]
-    return f"{best}; {100 * sealed['closed']:.0f} % of the gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
+    each = {load(name).called: share for name, share in sealed.get("shares", {}).items() if share > 0}
+    parts = ", ".join(f"{name} {100 * share:.0f}" for name, share in each.items()) if len(each) > 1 else ""
+    closed = f"{best}; {100 * sealed['closed']:.0f} % of the gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
+    return f"{closed}: {parts}" if parts else closed
 
 
 def worsened(before: float, after: float) -> str:

@@ -10,11 +10,23 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable
-from tacdata.importing.text_layout import COMMENTS, MISSING, TextLayout, is_comment, is_number, text_layout
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable, kind_of_bytes
+from tacdata.importing.text_layout import (
+    COMMENTS,
+    MISSING,
+    THOUSANDS,
+    TextLayout,
+    is_comment,
+    is_number,
+    text_layout,
+)
 
-SNIFFED = 256 * 1024
-"""Bytes from which the layout is recognized."""
+SHOWN = 40
+"""Letters of a text that an error quotes."""
+SNIFFED, HEAD = 256 * 1024, 4096
+"""Bytes from which the layout is recognized; among which a header's cells may hold line breaks."""
+MARKS = {b"\xff\xfe\0\0": "utf-32", b"\0\0\xfe\xff": "utf-32", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+"""Byte order marks and what they announce; the longer ones first."""
 
 
 class Csv(SourceFormat):
@@ -42,9 +54,13 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
     """
     layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
     own = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
-    body, comments = _body(data, layout, own)
+    body, comments, headers = _body(data, layout, own)
     if comments:
         notes.append(f"{path.name}: {comments} comment lines among the rows are left out")
+    if headers:
+        notes.append(f"{path.name}: {headers} repeated header lines among the rows are left out")
+    if twice := [name for name in layout.names if name.endswith("'")]:
+        notes.append(f"{path.name}: names that are given twice; the later columns are called {', '.join(twice)}")
     if not body.strip():
         raise FormatError(f"{path} has a header and no row", "one row of data or more", "leave it out")
     columns, skipped = _parsed(body, layout, [*MISSING, *own], path)
@@ -55,34 +71,79 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
 
 def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
     """Return the file's text in UTF-8 with plain line ends."""
-    raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
-    if b"\0" in raw[:4096] and not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise FormatError(
-            f"{path} is not text", "a text file of columns", "name its format in the mapping (format: ...)"
-        )
+    raw = path.read_bytes()
+    if path.suffix == ".gz":
+        if raw and not raw.startswith(b"\x1f\x8b"):
+            plain = path.name.removesuffix(".gz")
+            raise FormatError(f"{path} is named .gz and is not compressed", "a gzip file", f"rename it to {plain}")
+        raw = gzip.decompress(raw)
     notes: list[str] = []
-    if encoding := options.get("encoding"):
+    encoding = options.get("encoding") or next((name for mark, name in MARKS.items() if raw.startswith(mark)), None)
+    if b"\0" in raw and not encoding:
+        raw = _without_zeros(path, raw, notes)
+    if encoding:
         try:
             raw = raw.decode(encoding).encode()
         except (UnicodeDecodeError, LookupError) as error:
             raise FormatError(f"{path}: {error}", "the file's encoding", "correct encoding in the mapping") from None
-    elif raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raw = raw.decode("utf-16").encode()
     else:
         try:
             raw.decode()
         except UnicodeDecodeError:
             raw = raw.decode("latin-1").encode()
             notes.append(f"{path.name}: not UTF-8, read as Latin-1")
-    return raw.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n"), notes
+    raw = raw.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return _whole_cells(raw[:HEAD]) + raw[HEAD:], notes
 
 
-def _body(data: bytes, layout: TextLayout, missing: tuple[str, ...]) -> tuple[bytes, int]:
-    """Return the rows without comments, and how many comments stood among them."""
-    start, comments = 0, 0
+def _whole_cells(head: bytes) -> bytes:
+    """Return a file's first lines without breaks inside quotes: a name and its unit, as a rule."""
+    lines = head.split(b"\n")
+    odd = [line.count(b'"') % 2 == 1 for line in lines]
+    for number in range(len(lines) - 1):
+        ends = next((k for k in range(number + 1, min(number + 4, len(lines))) if odd[k]), None)
+        if odd[number] and ends:
+            lines[number : ends + 1] = [b" ".join(lines[number : ends + 1])]
+            return _whole_cells(b"\n".join(lines))
+    return head
+
+
+def _without_zeros(path: Path, raw: bytes, notes: list[str]) -> bytes:
+    """Return text without the zero bytes that a logger without power leaves at a file's end.
+
+    Raises:
+        FormatError: If zero bytes stand elsewhere: it is another kind of file, or another encoding.
+    """
+    if other := kind_of_bytes(raw):
+        raise FormatError(f"{path} is {other}, no text", "a text file of columns", "give it the ending of what it is")
+    body = raw.rstrip(b"\0")
+    if body and b"\0" not in body:
+        notes.append(f"{path.name}: {len(raw) - len(body)} zero bytes at its end are left out")
+        return body
+    for start, name in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if raw[start:4096:2].count(0) > 0.9 * len(raw[start:4096:2]):
+            raise FormatError(
+                f"{path} is UTF-16 by all appearance, without its mark", "UTF-8, or an encoding that is given",
+                f"give encoding: {name} under files in the mapping",
+            )  # fmt: skip
+    line = raw.count(b"\n", 0, raw.index(b"\0")) + 1
+    raise FormatError(
+        f"{path} is not text: {raw.count(bytes(1))} zero bytes, the first in line {line}", "a text file of columns",
+        "cut them out, as a logger without power leaves them, or name another format in the mapping",
+    )  # fmt: skip
+
+
+def _body(data: bytes, layout: TextLayout, missing: tuple[str, ...]) -> tuple[bytes, int, int]:
+    """Return the rows without comments and repeated headers, and how many of each stood among them."""
+    start, comments, headers = 0, 0, 0
     for _ in range(layout.skip):
         start = data.index(b"\n", start) + 1
     body = data[start:]
+    head = data[:start].rstrip(b"\n").rsplit(b"\n", 1)[-1]
+    if head.strip() and not is_comment(head.decode("utf-8", "ignore"), missing) and b"\n" + head + b"\n" in body:
+        lines = body.split(b"\n")
+        body = b"\n".join(line for line in lines if line != head)
+        headers = lines.count(head)
     marks = tuple(mark.encode() for mark in COMMENTS)
     if any(mark in body for mark in marks):
         lines = body.split(b"\n")
@@ -90,7 +151,7 @@ def _body(data: bytes, layout: TextLayout, missing: tuple[str, ...]) -> tuple[by
         body, comments = b"\n".join(kept), len(lines) - len(kept)
     if layout.delimiter == " ":
         body = b"\n".join(b" ".join(line.split()) for line in body.split(b"\n"))
-    return body, comments
+    return body, comments, headers
 
 
 def _parsed(body: bytes, layout: TextLayout, missing: list[str], path: Path) -> tuple[dict[str, np.ndarray], int]:
@@ -147,11 +208,14 @@ def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path)
         if text is None:
             continue
         if not is_number(text.strip(), layout.decimal):
+            shown = repr(text.strip()[:SHOWN])
+            thousands = THOUSANDS.fullmatch(text.strip())
             raise FormatError(
-                f"{path}: column {name}, row {row + 1} of the data: {text!r}",
+                f"{path}: column {name}, row {row + 1} of the data: {shown}",
                 f"a number with a decimal {'comma' if layout.decimal == ',' else 'point'}",
-                f"add {text.strip()!r} to missing in the mapping if it stands for no value, else correct the file",
-            )
+                "save it again without a sign between thousands" if thousands
+                else f"add {shown} to missing in the mapping if it stands for no value, else correct the file",
+            )  # fmt: skip
         field = text.strip()
         values[row] = np.nan if field in MISSING else float(field.replace(",", ".") if layout.decimal == "," else field)
     return values

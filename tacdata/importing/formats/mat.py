@@ -45,33 +45,53 @@ class Mat(SourceFormat):
                 raise FormatError(f"{path}: no variable {wanted}", ", ".join(variables), "correct table in the mapping")
             variables = {wanted: variables[wanted]}
         arrays: dict[str, np.ndarray] = {}
+        lost: list[str] = []
         for name, value in variables.items():
-            arrays |= _flatten(name if len(variables) > 1 else "", value)
-        return rows_of(path, arrays, options)
+            arrays |= _flatten(name if len(variables) > 1 else "", value, lost)
+        table = rows_of(path, arrays, options)
+        notes = [f"{path.name}: neither numbers nor texts, left out: {', '.join(lost)}"] if lost else []
+        return SourceTable(path, table.columns, table.units, (*notes, *table.notes))
 
 
 def _readable(variables: dict[str, Any]) -> bool:
     """Return whether any variable holds numbers or texts."""
-    return any(_flatten(name, value) for name, value in variables.items())
+    return any(_flatten(name, value, []) for name, value in variables.items())
 
 
-def _flatten(name: str, value: Any) -> dict[str, np.ndarray]:
+def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
+    """Return the arrays of a variable by name; what holds neither numbers nor texts is added to ``lost``."""
     if isinstance(value, dict):
         found: dict[str, np.ndarray] = {}
         for key, inner in value.items():
-            found |= _flatten(f"{name}.{key}" if name else key, inner)
+            found |= _flatten(f"{name}.{key}" if name else key, inner, lost)
         return found
-    if isinstance(value, (list, np.ndarray)) and len(value) and all(isinstance(entry, dict) for entry in value):
-        return _stacked(name, list(value))
+    if isinstance(value, (list, np.ndarray)) and np.ndim(value) and len(value):
+        if all(isinstance(entry, dict) for entry in value):
+            return _stacked(name, list(value), lost)
+        if _are_columns(value):
+            return {name or "array": np.stack([np.asarray(entry, float) for entry in value], axis=1)}
     array = np.asarray(value)
-    return {name or "array": array} if array.dtype.kind in "biufMSU" else {}
+    if array.dtype.kind in "biufMSU":
+        return {name or "array": array}
+    lost.append(name or "array")
+    return {}
 
 
-def _stacked(name: str, elements: list[dict[str, Any]]) -> dict[str, np.ndarray]:
-    tables = [_flatten("", element) for element in elements]
+def _are_columns(value: Any) -> bool:
+    """Return whether a cell array holds columns of numbers of one length."""
+    shapes = {np.shape(entry) for entry in value}
+    if not (isinstance(value, np.ndarray) and value.dtype.hasobject) or [len(shape) for shape in shapes] != [1]:
+        return False
+    return all(isinstance(number, (int, float, np.number)) for entry in value for number in entry)
+
+
+def _stacked(name: str, elements: list[dict[str, Any]], lost: list[str]) -> dict[str, np.ndarray]:
+    tables = [_flatten("", element, lost) for element in elements]
     rows = [max((len(np.atleast_1d(a)) for a in table.values()), default=0) for table in tables]
     shared = [key for key in tables[0] if all(key in table for table in tables)]
     prefix = f"{name}." if name else ""
+    lost += [f"{prefix}{key} (not in all {len(tables)} elements)"
+             for key in dict.fromkeys(k for table in tables for k in table) if key not in shared]  # fmt: skip
     stacked = {}
     for key in shared:
         parts = []
@@ -81,4 +101,6 @@ def _stacked(name: str, elements: list[dict[str, Any]]) -> dict[str, np.ndarray]
             parts.append(np.repeat(part[None], count, axis=0) if part.ndim == 0 else part)
         if len({part.shape[1:] for part in parts}) == 1 and all(len(p) == n for p, n in zip(parts, rows, strict=True)):
             stacked[prefix + key] = np.concatenate(parts)
+        else:
+            lost.append(f"{prefix}{key} (of other rows than its element)")
     return {**stacked, f"{prefix}element": np.repeat(np.arange(len(elements)), rows)}

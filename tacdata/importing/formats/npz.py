@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,9 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+
+WHOLE = "array"
+"""Name of a file's only array."""
 
 
 class Npz(SourceFormat):
@@ -22,7 +27,7 @@ class Npz(SourceFormat):
         with path.open("rb") as stream:
             loaded = np.load(stream, allow_pickle=False)
             if isinstance(loaded, np.ndarray):
-                return rows_of(path, {"array": loaded}, options)
+                return rows_of(path, {WHOLE: loaded}, options)
             return rows_of(path, {name: loaded[name] for name in loaded.files}, options)
 
 
@@ -37,21 +42,53 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
     """
     if (axis := options.get("trial_axis")) is not None:
         arrays = _below_each_other(path, arrays, axis)
-    flat: dict[str, np.ndarray] = {}
-    for name, array in arrays.items():
-        if array.dtype.names:
-            flat |= {field: array[field] for field in array.dtype.names}
-        else:
-            flat[name] = array
+    flat = _flat(arrays)
     columns = {name: _column(array) for name, array in flat.items() if array.size > 1}
     if not columns:
         return SourceTable(path, {})
     lengths = [len(values) for values in columns.values()]
     rows = max(set(lengths), key=lambda length: (lengths.count(length), length))
+    notes = _shapes(path, arrays, options)
+    for name, values in columns.items():
+        if len(values) != rows and values.ndim == 2 and values.shape[1] == rows:
+            columns[name] = values.T
+            notes.append(f"{path.name}: {name} holds {values.shape[0]} x {rows} values; time is its second axis")
     kept = {name: values for name, values in columns.items() if len(values) == rows}
     dropped = [f"{name} ({len(values)} rows)" for name, values in columns.items() if name not in kept]
-    note = (f"{path.name}: not of {rows} rows, left out: {', '.join(dropped)}",) if dropped else ()
-    return SourceTable(path, kept, notes=note)
+    if dropped:
+        notes.append(f"{path.name}: not of {rows} rows, left out: {', '.join(dropped)}")
+    units = {name: "ns" for name, array in flat.items() if array.dtype.kind == "m"}
+    return SourceTable(path, kept, units, tuple(notes))
+
+
+def _flat(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return plain arrays by name. Fields of structured ones lose their array's name unless another has the same."""
+    found = [(name, inner, array) for name, whole in arrays.items() for inner, array in _fields(whole)]
+    count = Counter(inner or name for name, inner, _ in found)
+    return {
+        (inner if count[inner] == 1 else f"{name}.{inner}") if inner else name: array for name, inner, array in found
+    }
+
+
+def _fields(array: np.ndarray, inside: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the fields of a structured array, a plain one under "", fields inside fields as ``outer.inner``."""
+    if not array.dtype.names:
+        yield inside, array
+    for field in array.dtype.names or ():
+        yield from _fields(array[field], f"{inside}.{field}" if inside else field)
+
+
+def _shapes(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) -> list[str]:
+    """Return what is taken for granted of a file of one array: which of its axes is time."""
+    array = np.squeeze(next(iter(arrays.values())))
+    if len(arrays) > 1 or array.dtype.names or options.get("trial_axis") is not None:
+        return []
+    shape = " x ".join(map(str, array.shape))
+    if array.ndim > 2:
+        return [f"{path.name}: {shape} values; its first axis is taken for time (trial_axis says where trials lie)"]
+    if array.ndim == 2 and array.shape[0] < array.shape[1]:
+        return [f"{path.name}: {shape} values; its first axis is taken for time; if it is the second, turn it over"]
+    return []
 
 
 def _below_each_other(path: Path, arrays: dict[str, np.ndarray], axis: int) -> dict[str, np.ndarray]:
@@ -69,7 +106,7 @@ def _below_each_other(path: Path, arrays: dict[str, np.ndarray], axis: int) -> d
     trials, rows = max(blocks.values(), key=np.size).shape[:2]
     whole = {name: block for name, block in blocks.items() if block.shape[:2] == (trials, rows)}
     made: dict[str, np.ndarray] = {name: block.reshape(trials * rows, -1) for name, block in whole.items()}
-    for name, array in ((name, np.squeeze(array)) for name, array in arrays.items() if name not in blocks):
+    for name, array in ((name, np.squeeze(array)) for name, array in arrays.items() if name not in whole):
         if array.shape == (trials, rows):
             made[name] = array.ravel()
         elif array.shape == (rows, trials):
@@ -78,13 +115,18 @@ def _below_each_other(path: Path, arrays: dict[str, np.ndarray], axis: int) -> d
             made[name] = np.tile(array, trials)
         elif array.shape == (trials,):
             made[name] = np.repeat(array, rows)
+        else:
+            made[name] = array  # of another number of rows: left out and named with the others
     return {**made, "trial": np.repeat(np.arange(trials), rows)}
 
 
 def _column(array: np.ndarray) -> np.ndarray:
-    values = np.squeeze(array)
+    values = np.atleast_1d(np.squeeze(array))
     if values.ndim > 2:
         values = values.reshape(len(values), -1)
+    if values.dtype.kind == "m":
+        known = values.astype("timedelta64[ns]").astype(np.int64)
+        return np.where(np.isnat(values), np.nan, known) if np.isnat(values).any() else known
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]").astype(np.int64)
     if values.dtype.kind in "bui" and values.dtype.itemsize < 8:

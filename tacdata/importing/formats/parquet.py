@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
 
@@ -17,30 +18,49 @@ class Parquet(SourceFormat):
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read all columns; nulls become NaN. See the base."""
+        import pyarrow as pa
         from pyarrow import feather, parquet
 
-        table = feather.read_table(path) if path.suffix == ".feather" else parquet.read_table(path)
-        columns = {str(name): _column(table.column(k)) for k, name in enumerate(table.column_names)}
+        table = feather.read_table(path) if path.suffix == ".feather" else parquet.ParquetFile(path).read()
+        while any(pa.types.is_struct(field.type) for field in table.schema):
+            table = table.flatten()
+        names = [str(name) for name in table.column_names]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            places = ", ".join(f"{name} in columns {' and '.join(str(k) for k, n in enumerate(names) if n == name)}"
+                               for name in twice)  # fmt: skip
+            raise FormatError(
+                f"{path}: columns of the same name: {places}", "each name once", "rename one, and save it again"
+            )
+        notes: list[str] = []
+        columns = {name: _column(table.column(k), f"{path.name}: {name}", notes) for k, name in enumerate(names)}
         units = {
             field.name: field.metadata[b"unit"].decode()
             for field in table.schema
             if field.metadata and b"unit" in field.metadata
         }
-        return SourceTable(path, columns, units)
+        units |= {field.name: str(field.type.unit) for field in table.schema if pa.types.is_duration(field.type)}
+        return SourceTable(path, columns, units, tuple(notes))
 
 
-def _column(column: Any) -> np.ndarray:
+def _column(column: Any, where: str, notes: list[str]) -> np.ndarray:
     import pyarrow as pa
 
     kind = column.type
     if pa.types.is_timestamp(kind):
         return np.asarray(column.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64()).to_numpy())
     if pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind) or pa.types.is_large_list(kind):
-        rows = column.to_pylist()
-        width = max((len(row) for row in rows if row), default=1)
-        return np.array(
-            [row if row is not None and len(row) == width else [np.nan] * width for row in rows], dtype=float
-        )
+        rows = [None if row is None else np.ravel(np.array(row, float)) for row in column.to_pylist()]
+        width = max((len(row) for row in rows if row is not None), default=0) or 1
+        if lacking := sum(row is None or len(row) != width for row in rows):
+            notes.append(f"{where}: {lacking} rows with other than {width} values have no value")
+        return np.array([row if row is not None and len(row) == width else np.full(width, np.nan) for row in rows])
+    if pa.types.is_duration(kind):
+        column, kind = column.cast(pa.int64()), pa.int64()
+    if pa.types.is_dictionary(kind):
+        column = column.cast(kind.value_type)
+        kind = kind.value_type
+    if pa.types.is_decimal(kind):
+        column, kind = column.cast(pa.float64()), pa.float64()
     if pa.types.is_integer(kind) and not column.null_count and kind.bit_width == 64:
         values = column.to_numpy()
         return values if len(values) and np.abs(values).max() > 2**53 else values.astype(float)

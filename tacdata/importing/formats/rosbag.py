@@ -46,9 +46,12 @@ class Rosbag(SourceFormat):
             topic = options.get("table") or _only(path, self.tables(path), known)
             if topic not in known:
                 raise FormatError(f"{path}: no topic {topic!r}", ", ".join(known) or "none", "correct table")
-            rows = [(time, dict(_flat(reader.deserialize(raw, connection.msgtype))))
+            longer: Counter[str] = Counter()
+            rows = [(time, dict(_flat(reader.deserialize(raw, connection.msgtype), longer)))
                     for connection, time, raw in reader.messages(_connections(reader, topic))]  # fmt: skip
         columns, notes = _columns(rows, topic, path)
+        notes += [f"{path.name}: {count} messages of {topic} have more than {MOST_PARTS} parts in {name}: the first "
+                  f"{MOST_PARTS} are taken" for name, count in longer.items()]  # fmt: skip
         units = {name: "ns" for name in columns if name == RECEIVED or name.endswith("stamp")}
         return SourceTable(path, columns, units, tuple(notes))
 
@@ -108,7 +111,7 @@ def _connections(reader: Any, topic: str) -> list[Any]:
 
 def _first(reader: Any, topic: str) -> list[tuple[str, Any]]:
     for connection, _, raw in reader.messages(_connections(reader, topic)):
-        return list(_flat(reader.deserialize(raw, connection.msgtype)))
+        return list(_flat(reader.deserialize(raw, connection.msgtype), Counter()))
     return []
 
 
@@ -122,18 +125,22 @@ def _only(path: Path, numeric: tuple[str, ...], known: dict[str, int]) -> str:
     )  # fmt: skip
 
 
-def _flat(message: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield a message's fields by their paths: numbers, texts and arrays of numbers; times in ns."""
+def _flat(message: Any, longer: Counter[str], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield a message's fields by their paths: numbers, texts and arrays of numbers; times in ns.
+
+    ``longer`` counts lists of messages of which only the first `MOST_PARTS` are taken.
+    """
     for field in fields(message):
         value, name = getattr(message, field.name), f"{prefix}{field.name}"
         if is_dataclass(value):
             if hasattr(value, "nanosec"):
                 yield name, int(value.sec) * 1_000_000_000 + int(value.nanosec)  # pyright: ignore[reportAttributeAccessIssue]
             else:
-                yield from _flat(value, f"{name}.")
+                yield from _flat(value, longer, f"{name}.")
         elif isinstance(value, list) and value and is_dataclass(value[0]):
+            longer.update([name] if len(value) > MOST_PARTS else [])
             for number, part in enumerate(value[:MOST_PARTS]):
-                yield from _flat(part, f"{name}[{number}].")
+                yield from _flat(part, longer, f"{name}[{number}].")
         elif isinstance(value, (list, tuple)) and value and isinstance(value[0], str):
             yield name, " ".join(value)
         elif isinstance(value, str):

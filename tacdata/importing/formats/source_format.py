@@ -6,7 +6,9 @@ reads a file into a `SourceTable`: named columns as they stand in the file, noth
 
 from __future__ import annotations
 
+import gc
 import re
+import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,6 +24,16 @@ from tacdata.errors import FormatError, TacdataError, UsageError
 INNER = re.compile(r"(.+)\[(\d+)\]")
 """Name of one column of a table: the table's name and a number from 0, as in ``cap[3]``."""
 ROOM, BASE = "tacdata.importing.formats", "source_format"
+LONGEST = 300
+"""Letters of a library's words that an error repeats."""
+MAGIC = {
+    b"\x1f\x8b": "gzip (.gz)", b"PK\x03\x04": "a zip archive (such as .zip, .npz or .xlsx)", b"PAR1": "Parquet",
+    b"ARROW1": "Feather", b"\x89HDF": "HDF5", b"MATLAB 5.0": "a MATLAB file (.mat)", b"\x93NUMPY": "NumPy (.npy)",
+    b"SQLite format 3": "SQLite (.db3)", b"\x89MCAP": "MCAP", b"\x89PNG": "a PNG image", b"\xff\xd8": "a JPEG image",
+    b"%PDF": "PDF", b"\xd0\xcf\x11\xe0": "an old Office file (.xls)", b"BZh": "bzip2", b"\xfd7zXZ": "xz",
+    b"\x28\xb5\x2f\xfd": "zstd",
+}  # fmt: skip
+"""First bytes of files and what they are."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +122,11 @@ def _kind(path: Path, options: dict[str, Any]) -> tuple[SourceFormat, str]:
     return kind(), name
 
 
+def kind_of_bytes(data: bytes) -> str:
+    """Return what kind of file begins with these bytes, whatever its name says; "" if it is not known."""
+    return next((kind for mark, kind in MAGIC.items() if data.startswith(mark)), "")
+
+
 @contextmanager
 def _in_words(path: Path, name: str) -> Iterator[None]:
     """Turn what a library raises into an error of the file's format."""
@@ -119,11 +136,26 @@ def _in_words(path: Path, name: str) -> Iterator[None]:
         raise
     except Exception as error:
         # A damaged file can raise anything in the library that reads it: zlib.error, EOFError, struct.error, ...
+        words = " ".join((str(error) or type(error).__name__).split())
+        # What the library held goes now: Python 3.12 crashes at its end if a parser is left that stopped half way.
+        traceback.clear_frames(error.__traceback__)
+        if name == "xlsx":  # the one that parses XML; the collection takes a tenth of a second
+            gc.collect()
         raise FormatError(
-            f"{path} cannot be read as {name}: {str(error) or type(error).__name__}",
+            f"{path} {_really(path, name)}cannot be read as {name}: {words[:LONGEST]}",
             f"a whole file of the format {name}",
             "copy or save it again; if it is of another kind, name its format in the mapping",
         ) from error
+
+
+def _really(path: Path, name: str) -> str:
+    """Return what a file is if it is something else than it is read as, as "is a PNG image and "; else ""."""
+    if not path.is_file():
+        return ""
+    with path.open("rb") as stream:
+        start = stream.read(16)
+    kind = kind_of_bytes(start)
+    return "is empty and " if not start else f"is {kind} and " if kind and name not in kind else ""
 
 
 def _by_ending(path: Path) -> str:

@@ -8,6 +8,8 @@ from datetime import datetime, time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tacdata.errors import FormatError
 from tacdata.importing.formats.csv import table_of
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
@@ -27,23 +29,59 @@ class Xlsx(SourceFormat):
             if (wanted := options.get("table")) and wanted not in book.sheetnames:
                 allowed = ", ".join(book.sheetnames)
                 raise FormatError(f"{path}: no sheet {wanted}", allowed, "correct table in the mapping")
-            sheets = [book[wanted]] if wanted else [s for s in book.worksheets if s.max_row and s.max_row > 1]
-            if not sheets:
-                raise FormatError(f"{path} holds no rows", "a sheet with a header and rows", "leave it out")
-            text = io.StringIO()
-            writer = csv.writer(text, delimiter="\t", lineterminator="\n")
-            writer.writerows([_text(cell) for cell in row] for row in sheets[0].iter_rows(values_only=True))
+            table, read, others = _first_table(path, book, options)
         finally:
             book.close()
-        table = table_of(path, text.getvalue().encode(), {**options, "delimiter": "tab", "decimal": "."}, [])
-        others = [sheet.title for sheet in sheets[1:]]
-        note = (f"{path.name}: sheet {sheets[0].title} is read, not {', '.join(others)}",) if others else ()
-        return SourceTable(path, table.columns, table.units, (*table.notes, *note))
+        notes = [*table.notes, *([f"{path.name}: sheet {read} is read, not {', '.join(others)}"] if others else [])]
+        if any(values.dtype != object and not np.isfinite(values).any() for values in table.columns.values()):
+            notes += _never_computed(path, read)
+        return SourceTable(path, table.columns, table.units, tuple(notes))
+
+
+def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[SourceTable, str, list[str]]:
+    """Return the sheet that is meant, else the first with rows of numbers; its name, and those of other full sheets."""
+    wanted, refused, sheets = options.get("table"), None, {}
+    for sheet in [book[wanted]] if wanted else book.worksheets:
+        sheet.reset_dimensions()  # programs other than Excel write wrong ones, by which rows would be cut off
+        text = io.StringIO()
+        rows = [[_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
+        width = max(map(len, rows), default=0)
+        csv.writer(text, delimiter="\t", lineterminator="\n").writerows([*r, *[""] * (width - len(r))] for r in rows)
+        if any(map(any, rows)):
+            sheets[sheet.title] = text.getvalue().encode()
+    for name, data in sheets.items():
+        try:
+            table = table_of(path, data, {**options, "delimiter": "tab", "decimal": "."}, [])
+        except FormatError as error:
+            refused = refused or error
+            continue
+        return table, name, [other for other in sheets if other != name]
+    raise FormatError(
+        f"{path}: no sheet with rows of numbers ({', '.join(sheets)})" if refused else f"{path} holds no rows",
+        "a sheet with a header and rows", "leave it out, or name the sheet by table and its first lines by skip",
+    )  # fmt: skip
+
+
+def _never_computed(path: Path, sheet: str) -> list[str]:
+    """Return a note on formulas without a value: a program wrote them, and no spreadsheet ever computed them."""
+    from openpyxl import load_workbook
+
+    book = load_workbook(path, read_only=True)
+    try:
+        book[sheet].reset_dimensions()
+        cells = [cell for row in book[sheet].iter_rows(values_only=True) for cell in row]
+    finally:
+        book.close()
+    count = sum(isinstance(cell, str) and cell.startswith("=") for cell in cells)
+    words = "were never computed and have no value; save it in a spreadsheet program"
+    return [f"{path.name}: {count} formulas {words}"] if count else []
 
 
 def _text(cell: Any) -> str:
     if cell is None:
         return ""
+    if isinstance(cell, str):
+        return " ".join(cell.split())  # a line break in a header stands between name and unit
     if isinstance(cell, datetime | time):
         return cell.isoformat(*([" "] if isinstance(cell, datetime) else []))
     return repr(cell) if isinstance(cell, float) else str(cell)

@@ -7,9 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import rows_of
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
+DESCRIBED = (".zarray", ".zattrs", ".zgroup", "zarr.json")
+"""Files that hold no chunk."""
+BLOSC_HEADER = 16
+"""Bytes at a chunk's beginning; the last four say its length."""
 ENDS = "meta/episode_ends"
 """Array with the row after each episode's last."""
 WIDEST = 4096
@@ -28,6 +33,8 @@ class Zarr(SourceFormat):
         """Read the arrays; images are left out and named. See the base class."""
         import zarr
 
+        if not path.is_dir():
+            raise FormatError(f"{path} is no folder", "a folder with arrays", "unpack it, or give another ending")
         arrays: dict[str, np.ndarray] = {}
         notes: list[str] = []
         for folder in _arrays(path):
@@ -37,6 +44,10 @@ class Zarr(SourceFormat):
                 shape = " x ".join(map(str, found.shape[1:]))
                 notes.append(f"{path.name}: {name} of {shape} values a row is left out")
                 continue
+            _refuse_cut_chunks(folder)
+            if lost := found.nchunks - found.nchunks_initialized:
+                stands = f"{found.fill_value} stands for their values"
+                notes.append(f"{path.name}: {name}: {lost} of {found.nchunks} chunks are not there; {stands}")
             values = np.asarray(found[:])
             arrays[name] = np.char.strip(values) if values.dtype.kind == "U" else values
         ends = arrays.pop(ENDS, None)
@@ -46,6 +57,23 @@ class Zarr(SourceFormat):
             columns["episode"] = np.searchsorted(ends, np.arange(int(ends[-1])), side="right")
         table = rows_of(path, columns, options)
         return SourceTable(path, table.columns, table.units, (*notes, *table.notes))
+
+
+def _refuse_cut_chunks(folder: Path) -> None:
+    """Refuse chunks that are shorter than they say: Blosc decompresses them to anything.
+
+    Raises:
+        FormatError: Naming the first.
+    """
+    described = next(file for file in (folder / ".zarray", folder / "zarr.json") if file.is_file()).read_text()
+    if '"blosc"' not in described or "sharding" in described:
+        return
+    for chunk in sorted(file for file in folder.rglob("*") if file.is_file() and file.name not in DESCRIBED):
+        data = chunk.read_bytes()
+        if len(data) < BLOSC_HEADER or int.from_bytes(data[12:16], "little") != len(data):
+            said = f"{len(data)} bytes" if len(data) < BLOSC_HEADER else (
+                f"{len(data)} bytes in place of {int.from_bytes(data[12:16], 'little')}")  # fmt: skip
+            raise FormatError(f"{chunk}: a damaged chunk, {said}", "whole chunks", "copy the store again")
 
 
 def _arrays(path: Path) -> list[Path]:

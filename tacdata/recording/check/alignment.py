@@ -6,6 +6,8 @@ import numpy as np
 
 from tacdata.recording.check.figures import RecordingFigures
 from tacdata.recording.check.idle import idle_rows
+from tacdata.recording.files.reader import Recording
+from tacdata.recording.motion.move_times import AnchoredMove
 
 CONTACT = 0.3
 """Depth from which a press is used [mm]."""
@@ -15,6 +17,11 @@ FEW = 10
 """Readings without contact that are needed [count]."""
 FELT = 0.25
 """Share of a press's greatest answer at which its height is taken [1]: low, as a curved answer moves high shares."""
+
+UNKNOWN_MS = 300.0
+"""Latest sign that a move has ended, beyond the reports' interval [ms of real time]. Grbl's pauses take 50 ms more."""
+NEAR = 0.02
+"""Distance from the target at which a move has ended [mm], beyond a report's resolution."""
 
 
 def reading_lag(figures: RecordingFigures) -> float | None:
@@ -105,3 +112,47 @@ def ends_before_reports(figures: RecordingFigures) -> float:
     if not len(episode.taxels.arrival_ns) or not len(episode.cnc.arrival_ns) or not episode.complete:
         return 0.0
     return float(episode.cnc.arrival_ns[-1] - episode.taxels.arrival_ns[-1]) / 1e6
+
+
+def stood_still(figures: RecordingFigures, rate: float) -> float:
+    """Return for how long the controller may have stood still on a way in or out [ms]; 0 if it cannot have.
+
+    A profile takes it that a move is never interrupted. A controller that stalls reports nothing, and answers the pause
+    behind the move later. If this computer stalls, the readings come late, too, and nothing is said.
+
+    Args:
+        figures: Figures of the recording.
+        rate: Speed of the recording's clock [1].
+    """
+    recording, found = figures.recording, 0.0
+    arrival = recording.episode.cnc.arrival_ns
+    if len(arrival) < 2:
+        return 0.0
+    usual = float(np.median(np.diff(arrival))) + UNKNOWN_MS * 1e6 * rate
+    for move in recording.moves if recording.episode.complete else recording.moves[:-1]:
+        later = _ended_by(recording, move) - move.end_ns
+        inside = move.command.phase in ("press", "release") and move.profile.length
+        if inside and usual < later < np.inf and not _host_was_late(recording, move, later):
+            found = max(found, later / 1e6)
+    return found
+
+
+def _ended_by(recording: Recording, move: AnchoredMove) -> float:
+    """Return the host time by which a move is known to have ended [ns]; infinite if nothing shows it."""
+    episode, stream = recording.episode, recording.episode.cnc
+    off = np.linalg.norm(stream.position - move.profile.target, axis=1)
+    shown = stream.arrival_ns[(off < NEAR + recording.height_resolution) & (stream.arrival_ns > move.start_ns)]
+    ends = [float(shown[0])] if len(shown) else []
+    hold = next((phase for phase in episode.phases if phase.name == "hold"), None)
+    if hold is not None and move.command.phase == "press":
+        ends.append(hold.end_ns - episode.press.hold * 1e9)
+    return min(ends, default=np.inf)
+
+
+def _host_was_late(recording: Recording, move: AnchoredMove, later: float) -> bool:
+    """Return whether readings, too, came late when the move should have ended."""
+    arrival = recording.episode.taxels.arrival_ns
+    gaps = np.diff(arrival, prepend=move.start_ns, append=move.end_ns + later)
+    begin, end = np.append(move.start_ns, arrival), np.append(arrival, move.end_ns + later)
+    overlap = (begin < move.end_ns + later) & (end > move.start_ns)
+    return float(np.max(gaps[overlap], initial=0)) > later / 2

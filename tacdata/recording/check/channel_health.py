@@ -26,6 +26,8 @@ ANSWERING, TOGETHER = 20.0, 4
 """Answer from which a channel tells what all do [times the noise], and how many must [count]."""
 SPIKE, SPIKE_AROUND = 15.0, 5
 """Distance of a spike from the median around it [times the noise], and the frames of that median [count]."""
+SLOWER = 0.1
+"""Share of equal frames from which a board renews its readings less often than it sends them [1]."""
 LASTS = 3
 """Frames before and after over which a jump must last; a spike is no jump."""
 
@@ -205,6 +207,29 @@ def held_frames(counts: np.ndarray, noise: np.ndarray) -> int:
     same = np.concatenate([[False], (counts[1:] == counts[:-1]).all(axis=1), [False]])
     edges = np.flatnonzero(np.diff(same.astype(int)))
     return int((edges[1::2] - edges[::2]).max(initial=0)) + 1 if len(edges) else 0
+
+
+def held_by_chance(counts: np.ndarray, idle: np.ndarray, frames: int) -> float:
+    """Return how many runs of so many equal ``frames`` noise alone leaves in a recording [count].
+
+    Channels whose noise is common count as fewer. A board that renews its readings less often than it sends frames
+    has equal ones throughout; nothing is said of it (infinity).
+
+    Args:
+        counts: Readings [counts], shape (n, taxels).
+        idle: Those without contact [counts], shape (m, taxels).
+        frames: Length of the run [count].
+    """
+    change = np.diff(idle, axis=0)
+    change = change[:, change.any(axis=0)]
+    repeats = np.mean((counts[1:] == counts[:-1]).all(axis=1))
+    if len(change) < RUN or change.shape[1] < 2 or repeats > SLOWER:
+        return np.inf
+    resolution = np.abs(change[change != 0]).min()
+    # Two Gaussian readings are equal with this probability; their difference has twice the variance of one.
+    equal = np.minimum(resolution / (np.sqrt(2 * np.pi) * change.std(axis=0)), 1.0)
+    independent = change.shape[1] ** 2 / (np.corrcoef(change.T) ** 2).sum()
+    return len(counts) * float(np.exp(independent * np.log(equal).mean() * (frames - 1)))
 
 
 def _lasting(counts: np.ndarray, threshold: np.ndarray) -> list[tuple[int, int, float]]:

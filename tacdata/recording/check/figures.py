@@ -135,6 +135,7 @@ def _cnc(recording: Recording) -> dict[str, Any]:
         "contradiction": _rounded(max((move.contradiction_ns for move in moves), default=0) / 1e6),
         "hold_error": _hold_error(recording),
         "states": sorted(set(stream.state)),
+        "damaged": recording.counts.get("cnc", {}).get("corrupt", 0),
     }
 
 

@@ -6,11 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.recording.check.alignment import ends_before_reports, loading, missing_ends, other_place, reading_lag
+from tacdata.recording.check.alignment import (
+    ends_before_reports,
+    loading,
+    missing_ends,
+    other_place,
+    reading_lag,
+    stood_still,
+)
 from tacdata.recording.check.camera_findings import camera_warnings
-from tacdata.recording.check.channel_health import held_frames, spikes
+from tacdata.recording.check.channel_health import held_by_chance, held_frames, spikes
 from tacdata.recording.check.clocks import clock_warnings
 from tacdata.recording.check.figures import COUNTS, RecordingFigures
+from tacdata.recording.check.idle import idle_rows
 from tacdata.recording.check.imported import imported_findings, is_imported
 from tacdata.recording.check.possible import impossible
 
@@ -39,7 +47,9 @@ LAG_SHARE = 0.25
 PLACE_MM = 0.1
 """Distance between where the guide went and what the label says that makes a recording unusable [mm]."""
 HELD = 4
-"""Frames in a row without any change from which a live board counts as held [count]."""
+"""Frames in a row without change from which a board counts as held at any noise [count]."""
+HELD_BY_CHANCE = 1e-4
+"""... and runs of fewer frames that noise may leave in a recording, at most [count]."""
 NOISE_RATIO = 5.0
 """Warning threshold: noise of a channel over the median noise [1]."""
 DEAD_DEPTH = 0.3
@@ -169,7 +179,9 @@ def _channels(figures: RecordingFigures) -> list[Judgement]:
         found.append((UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"))
     noise = np.array([np.nan if v is None else v for v in values["idle_noise"]])
     response = np.array([np.nan if v is None else v for v in values["response"]])
-    if (held := held_frames(counts, noise)) >= HELD:
+    held = held_frames(counts, noise)
+    idle = counts[idle_rows(figures.recording.episode)]
+    if held >= HELD or (held > 1 and held_by_chance(counts, idle, held) < HELD_BY_CHANCE):
         found.append((WARNING, "taxels", f"the board repeats one frame: no channel changes for {held} frames"))
     begin_ns = figures.recording.episode.taxels.sample_ns[:1]
     for spike in spikes(figures.recording.episode, noise, response):
@@ -191,6 +203,9 @@ def _together(figures: RecordingFigures) -> list[Judgement]:
     found, rate = [], _rate_of_clock(figures)
     if words := other_place(figures, PLACE_MM):
         found.append((UNUSABLE, "label", words))
+    if still := stood_still(figures, rate):
+        text = f"the controller may have stood still for {still:.0f} ms on its way in or out, and told nothing then"
+        found.append((UNUSABLE, "cnc", text))
     late, short = missing_ends(figures)
     allowed = max(GAP_MS * rate, 2500 / figures.document["taxels"]["nominal_rate"])
     if late > allowed:
@@ -218,6 +233,9 @@ def _cnc(figures: RecordingFigures) -> list[Judgement]:
         found.append((UNUSABLE, "cnc", f"the controller was in state {', '.join(alarms)}"))
     if values["longest_gap"] / _rate_of_clock(figures) > REPORT_GAP_MS:
         found.append((WARNING, "cnc", f"no status report for {values['longest_gap']:.0f} ms"))
+    if values["damaged"]:
+        text = f"{values['damaged']} status reports could not be read: check the controller's cable and ground"
+        found.append((WARNING, "cnc", text))
     if figures.document["complete"] and values["depth_uncertainty"] > DEPTH_MM[0]:
         severity = UNUSABLE if values["depth_uncertainty"] > DEPTH_MM[1] else WARNING
         text = f"the depth while pressing is uncertain by {values['depth_uncertainty']:.3f} mm"

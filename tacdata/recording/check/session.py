@@ -45,6 +45,8 @@ PLAIN = 4.0
 NOT_FELT = "the tip did not reach the skin, or the board does not see it"
 MIDDLE, LEANING = 0.8, 300
 """Share of a drift that the middle of the latencies must show, too [1], and how many of them are looked at [count]."""
+ONE_SIGMA = 0.683
+"""Confidence level of that lean [1]."""
 LOUDER = 3.0
 """Warning threshold: noise of a recording over that of the session's quiet ones [1]."""
 
@@ -123,20 +125,22 @@ def _drifts(entries: list[RecordingFigures]) -> list[Finding]:
             continue
         # What is far off its nominal rate is named in the recording itself.
         named = abs(clock["drift"]) - 2 * clock["drift_uncertainty"] > DRIFT_PPM
-        if abs(off + _lean(entry)) > MIDDLE * DRIFT_PPM and not named:
+        low, high = off + _lean(entry)
+        if (low > MIDDLE * DRIFT_PPM or high < -MIDDLE * DRIFT_PPM) and not named:
             text = f"its clock runs {off:+.0f} ppm otherwise than in the session's other recordings"
             found.append(Finding(WARNING, "taxels", entry.recording.episode.path.name, text))
     return found
 
 
-def _lean(entry: RecordingFigures) -> float:
-    """Return by how much the middle of the latencies leans against the clock's line, which lies below them [ppm].
+def _lean(entry: RecordingFigures) -> np.ndarray:
+    """Return by how much the middle of the latencies leans against the clock's line below them [ppm], shape (2,).
 
-    In a recording of seconds a few early frames lead the line astray; they do not lead the middle.
+    In a recording of seconds a few early frames lead the line astray; they do not lead the middle. The two lie one
+    standard deviation apart from it: a slow board has too few frames to tell.
     """
     every = max(len(entry.lag) // LEANING, 1)
     time_ms = entry.recording.episode.taxels.sample_ns[::every] / 1e6
-    return 1e6 * float(np.asarray(theilslopes(entry.lag[::every], time_ms - time_ms[0]))[0])
+    return 1e6 * np.array(theilslopes(entry.lag[::every], time_ms - time_ms[0], ONE_SIGMA)[2:])
 
 
 def _not_felt(entries: list[RecordingFigures]) -> list[Finding]:

@@ -25,6 +25,7 @@ class StreamClock:
         self._fit = EnvelopeFit(axis, rate, nominal_ns)
         self._line: tuple[int, int, float] | None = None
         self._measured: tuple[StreamLatency, int, int] | None = None  # with a counter, and where the line was then [ns]
+        self._steady = self._was_steady = True  # whether the line can be used: now, and when the latency was measured
         self.frames = 0
         """Arrivals taken."""
 
@@ -37,10 +38,12 @@ class StreamClock:
             self._fit.add(arrival_ns, counter)
             if self.frames % REFIT == 0 or self._line is None:
                 self._line = self._fit.line()
+                if self.axis == "order":  # only numbers given on arrival may not fit a line
+                    self._look(self._fit.model())
                 self._follow()
             self.frames += 1
         constant = self.latency.latency_ns if self.latency else 0
-        if counter < 0 or self._line is None:
+        if counter < 0 or self._line is None or not self._steady:
             return arrival_ns - constant
         origin, host_ns, period = self._line
         return min(host_ns + round(period * (counter - origin)), arrival_ns) - constant
@@ -49,19 +52,26 @@ class StreamClock:
         """Take a constant latency that a sync tap has just measured against the present line, or None.
 
         Later arrivals with less latency let the line sink. The stored position at the tap shows by how much, and the
-        latency over the line is reduced by that.
+        latency over the line is reduced by that. Without a usable line (a camera that skips images) it was measured
+        against the arrivals. It holds as long as that is so.
         """
         self.latency, self._measured = latency, None
+        self._look(self._fit.model())
+        self._was_steady = self._steady
         line = self._fit.line()
         if latency is not None and line is not None:
             counter = max(self._fit.last_counter - round(TAP_MIDDLE_NS / line[2]), line[0])
             self._measured = latency, counter, _at(line, counter)
 
+    def _look(self, model: ClockModel | None) -> None:
+        self._steady = model is None or model.steady
+
     def _follow(self) -> None:
         if self._measured is None or self._line is None:
             return
         latency, counter, host_ns = self._measured
-        if self._fit.remembers(counter):
+        self.latency = latency if self._steady is self._was_steady else None
+        if self._steady and self.latency is not None and self._fit.remembers(counter):
             sunk = host_ns - _at(self._line, counter)
             self.latency = replace(latency, latency_ns=latency.latency_ns - sunk)
 
@@ -71,6 +81,7 @@ class StreamClock:
         if model is None:
             return None
         self._line = self._fit.line()
+        self._look(model)
         self._follow()
         return model.with_latency(self.latency)
 

@@ -46,6 +46,13 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
         DeviceError: If the disk refuses the copy.
     """
     path = Path(path)
+    if path.is_dir():
+        raise UsageError(
+            f"{path} is a folder",
+            "one MCAP recording",
+            "name its file that was broken off (NAME.partial.mcap, NAME.interrupted-0.mcap); `tacdata record --resume` "
+            "goes on with a session without it",
+        )
     if not path.is_file():
         raise UsageError(f"no file {path}", "an MCAP recording", "check the path")
     target = target or path.with_name(path.name.removesuffix(".mcap") + ".recovered.mcap")

@@ -24,9 +24,9 @@ BOARD = "taxel board"
 POLL = 0.05
 """Timeout of one read [s of the host's clock]."""
 CATCH_UP = 5.0
-"""How long the end of a recording waits for images that are not written yet [s of real time]."""
+"""How long the end of a recording waits for unwritten images [s of real time]."""
 SEARCH = 2.0
-"""How long the end of a recording waits for a tag search under way [s of real time]."""
+"""How long the end of a recording waits for a tag search [s of real time]."""
 
 
 class DeviceStreams(ABC):

@@ -21,10 +21,14 @@ def ending(motion: GuardedMotion, lost: str, data: tuple[str, ...], command: str
     """
     said = error.given if isinstance(error, TacdataError) else ""
     first = "find its zero again (home it, or touch off), then " if lost else ""
-    position = ("zero:   LOST" + (f": {lost}" if lost != said else ""),) if lost else ()
-    lines = (*motion.ending, *position, *(f"data:   {line}" for line in data), f"then:   {first}{command}")
-    known = f" ({said})" if said else ""
-    return "\n".join(f"  {line.replace(known, '') if known else line}" for line in lines)
+    moved = motion.ending
+    told = lost in said or any(lost in line for line in moved)
+    why = "do not trust the position that the machine reports" if told else lost
+    position = (f"zero:   LOST: {why}",) if lost else ()
+    lines = (*moved, *position, *(f"data:   {line}" for line in data), f"then:   {first}{command}")
+    for known in (f" ({said})", f", and {said}") if said else ():
+        lines = tuple(line.replace(known, "") for line in lines)
+    return "\n".join(f"  {line}" for line in lines)
 
 
 def on_disk(folder: Path, presses: int) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ LETTING_GO = 10.0
 """Time allowed for a stopped motion's thread to end [s of real time]."""
 
 REASON = 1.0
-"""How long a stream that stopped the motion may take to give its reason [s of real time]."""
+"""Time in which a stream that stopped the motion gives its reason [s of real time]."""
 BY_HAND = "; free it by hand"
 LATER = "; leave it, the next start lifts it straight up"
 """Where a machine at rest keeps its position: a tip that is freed by hand loses it."""
@@ -42,6 +42,7 @@ class GuardedMotion:
         self._halted = clock.host.event()
         self._rest: Position | None = None  # where it stands after a stop; None: it runs, or does not obey
         self._why = "nothing was stopped"
+        self._stands: Position | None = None  # where a machine stands that does not obey, if that is known
         self._path: AllowedPath | None = None
         self._at: Position | None = None  # where the last path ended
         self._lifted, self._clear, self._still = "", False, False
@@ -115,7 +116,7 @@ class GuardedMotion:
         """After a stop: wait until the motion's thread sends nothing more, then empty the controller's queue."""
         self._rest, self._why, self._lifted = None, "interrupted while it was being stopped", ""
         self._rising = None
-        self._clear = self._still = False
+        self._clear, self._still, self._stands = False, False, None
         work.join(LETTING_GO)
         if work.is_alive():
             self._why = "the motion's thread does not end"
@@ -125,7 +126,12 @@ class GuardedMotion:
             self._rest = self._cnc.abandon()
         except TacdataError as error:
             self._why, self._still = error.given, isinstance(error, StandsStill)
+            self._stands = error.at if isinstance(error, StandsStill) else None
         else:
+            if why := self._allowed.out_of_reach(self._rest, self._clock.now_ns()):
+                self._rest, self._why, self._still = None, why, True
+                self._cnc.lose_position(why)
+                return
             self._allowed.stand(self._rest, self._clock.now_ns())
 
     def _carry_out(
@@ -149,6 +155,7 @@ class GuardedMotion:
                 else:
                     self._allowed.move(step.target, step.speed, self._clock.now_ns())
                     done, position = self._cnc.move(step.target, step.speed), step.target
+                    self._allowed.taken(done.acknowledged_ns)
                 if writer:
                     times = done.sent_ns, done.acknowledged_ns
                     ends = np.array(before, float), np.array(position, float)
@@ -165,6 +172,8 @@ class GuardedMotion:
         return self._lifted
 
     def _lift(self, height: float, speed: float) -> str:
+        if self._rest is None and self._stands and self._stands[2] >= height:  # it parked itself
+            return f"the indenter stands clear of the skin, at machine height {self._stands[2]:.3f} mm"
         if self._rest is None:
             return f"the indenter was not lifted ({self._why}){self._advice}"
         x, y, z = self._rest
@@ -173,7 +182,7 @@ class GuardedMotion:
                 self._rising = height
                 self._lifted = f"the indenter was not lifted all the way (interrupted){self._advice}"
                 self._allowed.move((x, y, height), speed, self._clock.now_ns())
-                self._cnc.move((x, y, height), speed)
+                self._cnc.rise((x, y, height), speed)
                 self._cnc.wait_idle(MARGIN + (height - z) / speed)
                 self._rising = None
         except TacdataError as error:
@@ -214,6 +223,7 @@ class GuardedMotion:
             return (f"motion: the machine moved while homing{f', and {lost}: its position is lost' if lost else ''}",)
         if self._lifted or self._halted.is_set():
             tip = (self._lifted or f"the indenter was not lifted{self._advice}").replace(f" ({self._why})", "")
+            tip = tip.replace(LATER, self._advice)  # the position may have been lost since
             if self._still:
                 stands = "" if "stands at" in self._why else self._last_seen
                 return f"motion: stopped ({self._why}){stands}", f"tip:    {tip}"
@@ -238,7 +248,7 @@ def _look_again(looked: float, now: float) -> float:
             f"this computer stood still for {now - looked:.1f} s while the guide moved (suspended, a closed lid, or "
             "far too busy); what the devices sent meanwhile is partly lost",
             f"at most {STALL:g} s",
-            "keep it awake while it records; the press is repeated by --resume",
+            "keep it awake while the guide moves, then start again",
         )
     return now
 

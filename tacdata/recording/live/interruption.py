@@ -14,6 +14,9 @@ from typing import Any
 
 from tacdata.host import COMPUTER, Host
 
+LAST_WORDS = 3.0
+"""Time in which the last lines of a session are not broken off by one more Ctrl-C [s, real time]."""
+
 
 class Interruption:
     """Takes Ctrl-C, SIGTERM, and SIGHUP unless it is ignored (nohup), while its context lasts; for the main thread.
@@ -26,6 +29,7 @@ class Interruption:
         """Create it; no signal is taken yet."""
         self._host = host
         self._asked = self._answered = self._keeping = False
+        self._deaf_until: float | None = None
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Interruption:
@@ -66,6 +70,10 @@ class Interruption:
             self.check()
             yield
 
+    def last_words(self) -> None:
+        """From now on hear no signal, so that the last lines reach the screen; a disk that hangs still ends it."""
+        self._deaf_until = self._host.monotonic() + LAST_WORDS
+
     @contextmanager
     def _set(self, keeping: bool) -> Iterator[None]:
         before, self._keeping = self._keeping, keeping
@@ -77,5 +85,7 @@ class Interruption:
     def _heard(self, number: int, frame: FrameType | None) -> None:
         if self._keeping and not self._asked:
             self._asked = True
+            return
+        if self._deaf_until is not None and self._host.monotonic() < self._deaf_until:
             return
         raise KeyboardInterrupt

@@ -28,6 +28,20 @@ def why_lost(cnc: MotionController, remembered: str = "", resumed: bool = False)
     return remembered or cnc.position_lost
 
 
+def guard_homing(cnc: MotionController, ask: Ask, remembered: str = "", resumed: bool = False) -> None:
+    """Ask whether the tip is free before a controller homes at opening.
+
+    Nobody asks if it was merely switched on.
+    """
+
+    def before_homing() -> None:
+        why = remembered or cnc.alarm
+        if why or resumed:
+            require_free(why, ask)
+
+    cnc.before_homing = before_homing
+
+
 def require_free(why: str, ask: Ask) -> None:
     """Ask whether the tip is free, before a locked controller homes: a tip in the skin would be dragged.
 

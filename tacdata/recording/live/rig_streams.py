@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.devices.device import CncStatus, TaxelFrame
+from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
 from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.check.channel_health import reading_limits
 from tacdata.recording.clocks.clock_model import ClockModel
@@ -24,7 +24,7 @@ TRIPS = 4096
 BOARD_SILENCE, SILENT_FRAMES = 1.8, 5
 """Time without a frame after which a board counts as silent [s of real time], and in frames of a slow one."""
 AGAIN_NS = 60_000_000_000
-"""Bad readings that a plan goes on with are said again after this time [ns of the host's clock]."""
+"""Bad readings that go on are said again after this time [ns of the host's clock]."""
 TAXELS = "taxels"
 """Name of the only board's stream."""
 
@@ -86,7 +86,7 @@ class RigStreams(DeviceStreams):
         failure = self._sink.failure if self._sink else None
         if self._fault is None and failure is not None:
             given = f"writing failed: {failure}"
-            self._fail(DeviceError(given, "a disk with free space", "free some space, then --resume"))
+            self._fail(DeviceError(given, "a disk with free space", "free some space, then start again"))
         return self._fault
 
     @property
@@ -121,8 +121,11 @@ class RigStreams(DeviceStreams):
             )
         return DeviceError(
             f"{BOARD}: nothing received for {seconds:g} s", "a stream that goes on",
-            "check cable and power, then start again; a session goes on with --resume",
+            "check cable and power, then start again",
         )  # fmt: skip
+
+    def _totals(self) -> dict[str, StreamCounts]:
+        return {**super()._totals(), "cnc": StreamCounts(corrupt=self._cnc.damaged_reports)}
 
     def _damage(self) -> tuple[int, int, int]:
         counts = self._totals()[TAXELS]
@@ -151,9 +154,8 @@ class RigStreams(DeviceStreams):
                     self._sink.note(f"{stream}: {words}", "warning")
             elif words:
                 raise BadReadings(
-                    f"{stream}: {words}", "readings that live",
-                    "check the board's supply, its ribbon cable and firmware, then start again; a session goes on "
-                    "with --resume",
+                    f"{stream}: {words}", "readings that change, below their limit",
+                    "check the board's supply, its ribbon cable and firmware, then start again",
                 )  # fmt: skip
 
     def _silence_of(self, name: str) -> float:
@@ -162,9 +164,11 @@ class RigStreams(DeviceStreams):
     def _silent(self, name: str) -> None:
         if name == BOARD:
             raise self._no_frames(self._board_silence)
+        unreadable = "" if name.startswith("camera") else self._cnc.unreadable
+        what = f"only reports that cannot be read, the latest {unreadable!r}," if unreadable else "nothing received"
         raise DeviceError(
-            f"{name}: nothing received for {self.silence:g} s", "a stream that goes on",
-            "check cable and power, then start again; a session goes on with --resume",
+            f"{name}: {what} for {self.silence:g} s", "a stream that goes on",
+            "check cable and power, then start again",
         )  # fmt: skip
 
     def _broken(self, name: str, error: TacdataError) -> None:

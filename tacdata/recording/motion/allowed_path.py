@@ -16,6 +16,11 @@ TOLERANCE = 0.05
 EARLY = (1.05, 0.05)
 """By how much a move may seem to run ahead: this many times the time since it was sent, and so much more [s]. A
 controller's own clock is good to a per cent; a move whose feed was damaged on the line runs far ahead."""
+LATE = (1.3, 1.0)
+"""Moves are behind if they take this many times as long as they should, and so much more [s]. Controllers that limit
+the jerk take longer than a trapezoid, and one that is simulated waits for its computer."""
+LEAST_WAY = 1.0
+"""Distance that a guide may always have moved since a report [mm]."""
 KEPT = 256
 """Moves that are remembered [count]: a busy host reads a report after several moves of a fast clock have ended."""
 
@@ -29,6 +34,16 @@ class _Leg:
     """No report before it can be of this move [ns]."""
     ended_ns: int | None = None
     """Host time by which it is known to have ended [ns]."""
+    expected_ns: int | None = None
+    """Host time at which it ends, if it was accepted and the controller does as it is told [ns]."""
+    chain: float = 0.0
+    """Duration of this move and of those before it, since the guide was last idle [s]."""
+
+    @property
+    def due_ns(self) -> int | None:
+        """Host time after which it is behind [ns]; None if it was not accepted yet."""
+        slack = round(((LATE[0] - 1) * self.chain + LATE[1]) * 1e9)
+        return None if self.expected_ns is None else self.expected_ns + slack
 
 
 class AllowedPath:
@@ -48,6 +63,7 @@ class AllowedPath:
         self._limits, self._tolerance = limits, TOLERANCE + resolution
         self._legs: list[_Leg] = []
         self._since_ns = self._asked_ns = 0
+        self._seen: CncStatus | None = None  # the latest report that lay on the path
         self._lock = threading.Lock()
 
     def stand(self, position: tuple[float, float, float], now_ns: int) -> None:
@@ -76,6 +92,17 @@ class AllowedPath:
                 profile = self._limits.straight_move(start, np.array(target, float), speed)
                 self._legs.append(_Leg(profile, now_ns))
 
+    def taken(self, now_ns: int) -> None:
+        """Take that the latest move was accepted: it ends in time from now on, or from the end of the one before."""
+        with self._lock:
+            if not self._legs:
+                return
+            leg, before = self._legs[-1], self._legs[-2] if len(self._legs) > 1 else None
+            waits = before is not None and before.ended_ns is None and (before.expected_ns or 0) > now_ns
+            begins = before.expected_ns if waits and before else now_ns
+            leg.chain = leg.profile.duration + (before.chain if waits and before else 0.0)
+            leg.expected_ns = (begins or now_ns) + round(leg.profile.duration * 1e9)
+
     def rested(self, now_ns: int) -> None:
         """Take that every move so far has ended where it should."""
         with self._lock:
@@ -92,15 +119,30 @@ class AllowedPath:
             sent = [leg for leg in self._legs if leg.sent_ns <= status.arrival_ns] or self._legs[:1]
         if not sent or asked_ns < self._since_ns:
             return None
+        x, y, z = status.position.tolist()
         # Whatever was sent last, and what may have run since the query; of a move that had ended, only its end.
         legs = [leg for leg in sent if leg is sent[-1] or leg.ended_ns is None or leg.ended_ns >= asked_ns]
-        nearest, distance = None, np.inf
+        nearest, distance, behind = None, np.inf, None
         for leg in legs:
             off, ahead = self._distance(leg, asked_ns, status)
             if off <= self._tolerance and not ahead:
-                return None
+                if not self._is_behind(leg, asked_ns, status):
+                    self._seen = status
+                    return None
+                behind = leg
             if off < distance:
                 nearest, distance = leg, off
+        if behind:
+            return _slow(behind, asked_ns, status)
+        if far := self.out_of_reach((x, y, z), status.arrival_ns):
+            return DeviceError(
+                f"the guide cannot be where a report says: {far}",
+                "reports that follow one from the other",
+                "that report was damaged on its way (check the controller's cable and ground), or the controller lost "
+                "its count; look whether it stands where it says, then start again",
+            )
+        if earlier := self._believed_ended(sent, status):
+            return _answered_too_early(earlier, status)
         leg = nearest or legs[-1]
         ways = f"from {_text(leg.profile.start)} to {_text(leg.profile.target)} mm"
         ahead = distance <= self._tolerance
@@ -112,6 +154,36 @@ class AllowedPath:
             "coordinates ($G), or steps were lost; home or touch off if it does not stand where it says",
         )
 
+    def _believed_ended(self, sent: list[_Leg], status: CncStatus) -> _Leg | None:
+        """Return the latest move with the reported place on its way, though an answer said that it had ended."""
+        for leg in reversed(sent[:-1]):
+            profile, here = leg.profile, status.position
+            if leg.ended_ns is None or np.linalg.norm(here - profile.target) <= self._tolerance or not profile.length:
+                continue
+            along = float(np.clip(profile.progress(here[None])[0], 0.0, profile.length))
+            way = profile.start + along / profile.length * (profile.target - profile.start)
+            if np.linalg.norm(here - way) <= self._tolerance:
+                return leg
+            return None
+        return None
+
+    def out_of_reach(self, position: tuple[float, float, float], now_ns: int) -> str:
+        """Return in words why the guide cannot stand at ``position`` [mm] by ``now_ns``; empty if it can."""
+        if self._seen is None:
+            return ""
+        gone = float(np.linalg.norm(np.array(position) - self._seen.position))
+        seconds = (now_ns - self._seen.sent_ns) * 1e-9
+        if gone <= float(np.linalg.norm(self._limits.max_rate)) * seconds + LEAST_WAY:
+            return ""
+        return (
+            f"it says that it stands at {_text(np.array(position))} mm, and {seconds:.1f} s before it was at "
+            f"{_text(self._seen.position)} mm: farther than it can have moved"
+        )
+
+    def _is_behind(self, leg: _Leg, asked_ns: int, status: CncStatus) -> bool:
+        off = float(np.linalg.norm(status.position - leg.profile.target))
+        return leg.due_ns is not None and leg.due_ns < asked_ns and off > self._tolerance
+
     def _distance(self, leg: _Leg, asked_ns: int, status: CncStatus) -> tuple[float, bool]:
         """Return how far off the move a report lies [mm], and whether it lies farther along than time allows."""
         profile, position = leg.profile, status.position
@@ -122,6 +194,27 @@ class AllowedPath:
         since = EARLY[0] * (status.arrival_ns - leg.sent_ns) * 1e-9 + EARLY[1]
         ahead = along > float(profile.distance(np.array([since]))[0]) + self._tolerance
         return float(np.linalg.norm(position - on)), ahead
+
+
+def _slow(leg: _Leg, asked_ns: int, status: CncStatus) -> DeviceError:
+    ways = f"from {_text(leg.profile.start)} to {_text(leg.profile.target)} mm"
+    late = (asked_ns - (leg.expected_ns or asked_ns)) * 1e-9
+    return DeviceError(
+        f"the guide reports {_text(status.position)} mm, still on its way {ways}, {late:.1f} s too late",
+        f"moves within {LATE[0]:g} times their duration and {LATE[1]:g} s",
+        "set the feed override back to 100 % (a pendant may have changed it), and let $110 to $122 be what the machine "
+        "can do; then start again",
+    )
+
+
+def _answered_too_early(leg: _Leg, status: CncStatus) -> DeviceError:
+    ways = f"from {_text(leg.profile.start)} to {_text(leg.profile.target)} mm"
+    return DeviceError(
+        f"the guide reports {_text(status.position)} mm, still on its way {ways}, which an answer said had ended",
+        "an answer to a pause when the move before it has ended",
+        "see that no other program and no second controller uses this line (one may answer, or stop grblHAL with 0x19, "
+        "which can lose steps); check cable and ground; then start again",
+    )
 
 
 def _text(position: np.ndarray) -> str:

@@ -23,7 +23,8 @@ import warp as wp
 from tacdata.skin.contact import kernels
 from tacdata.skin.contact.contact_forces import ContactForces, ContactTangent
 from tacdata.skin.contact.history import ContactHistory
-from tacdata.skin.contact.mortar import Mortar, hats
+from tacdata.skin.contact.mortar import Mortar
+from tacdata.skin.contact.passage_check import passage_kernel
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.member.warp_arrays import REAL, argument, filled
@@ -59,7 +60,7 @@ class ContactSurface:
         self.faces, self.distances, self.device = faces, dict(distances), str(nodes.device)
         self.rough, self.activation, self.flat = rough, activation, flat
         self.weights, self.shapes = face_quadrature(nodes, faces, SUBDIVISIONS)
-        at_points = hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
+        at_points = elements.triangle_hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
         self.mortar = Mortar(
             faces.cpu().numpy(), self.weights.cpu().numpy(), self.shapes.cpu().numpy(), at_points, len(nodes),
             self.device,
@@ -203,6 +204,18 @@ class ContactSurface:
         load = now.pressure.abs() * self.area[:, None]
         mean = (load * off).sum(dim=0) / load.sum(dim=0).clamp_min(1e-30)
         return off.amax(dim=0), mean
+
+    def passed_through(self, u: torch.Tensor, pose: Pose, conditions: Conditions) -> torch.Tensor:
+        """Return in which members a point of the face lies above the shape, shape (b,), bool; ``u``: (n, 3, b)."""
+        above = torch.zeros(u.shape[2], dtype=torch.int32, device=u.device)
+        members = kernels.member_data(conditions, pose)
+        for distance, chosen in self.by_shape(conditions):
+            wp.launch(
+                passage_kernel(distance), dim=(len(self.faces), len(chosen)),
+                inputs=[argument(u), self.data, members, argument(chosen)], outputs=[argument(above)],
+                device=self.device,
+            )
+        return above > 0
 
     def _zeros(self, like: torch.Tensor, *shape: int) -> torch.Tensor:
         """Return zeros for every contact node of as many members as ``like`` has."""

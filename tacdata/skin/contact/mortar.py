@@ -18,7 +18,6 @@ import warp as wp
 
 import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.skin.member.warp_arrays import REAL, argument
-from tacdata.skin.mesh import elements
 
 
 @cache
@@ -105,25 +104,3 @@ class Mortar:
     def spread(self, forces: torch.Tensor, result: torch.Tensor) -> None:
         """Add forces per hat [N], shape (s, 3, b), to nodal forces, shape (n, 3, b)."""
         self._up.add(forces, result)
-
-
-def hats(points: np.ndarray) -> np.ndarray:
-    """Return the piecewise linear hats of a quadratic triangle's six nodes at (xi, eta) [1], shape (q, 2), as (q, 6).
-
-    >>> import numpy as np
-    >>> from tacdata.skin.contact.mortar import hats
-    >>> hats(np.array([[0.5, 0.0], [0.25, 0.25]])).tolist()
-    [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.5, 0.0, 0.5]]
-    """
-    x, y = points[:, 0], points[:, 1]
-    barycentric = np.stack([1 - x - y, x, y], axis=-1)
-    result = np.zeros((len(points), 6))
-    at_corner = barycentric > 0.5
-    corners = np.maximum(2 * barycentric - 1, 0.0)
-    result[:, :3] = corners
-    for node, (a, b) in enumerate(elements.FACE_EDGES, start=3):
-        c = 3 - a - b
-        middle = 1 - 2 * barycentric[:, c]
-        beside = np.where(at_corner[:, a], 2 * barycentric[:, b], np.where(at_corner[:, b], 2 * barycentric[:, a], 0.0))
-        result[:, node] = np.where(at_corner.any(axis=1), beside, middle)
-    return result

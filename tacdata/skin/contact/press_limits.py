@@ -14,7 +14,7 @@ _STEEPEST = 30.0
 
 
 def check_press(request: PressRequest, sensor: Sensor) -> None:
-    """Refuse a press that misses the skin or goes through it.
+    """Refuse a press that misses the skin, goes through it, or lets it close over the shape.
 
     Raises:
         SolveError: Saying which.
@@ -42,6 +42,14 @@ def check_press(request: PressRequest, sensor: Sensor) -> None:
         raise SolveError(
             f"depth {max(request.depths):g} mm in a skin {thick:.3g} mm thick at ({request.x:g}, {request.y:g}) mm",
             f"less than {thick:.3g} mm", "reduce the depth",
+        )
+    high = request.indenter.height
+    if max(request.depths) > high + 1e-9:
+        raise SolveError(
+            f"depth {max(request.depths):g} mm of a {request.indenter.shape} that is {high:g} mm high: all of it lies "
+            "in the skin, and nothing says what holds it",
+            f"at most {high:g} mm",
+            "reduce the depth, or give a mesh of the shape with its holder",
         )
     half_x, half_y = reach(sensor, request)
     over = [abs(place) + half - size / 2 for place, half, size in

@@ -167,7 +167,12 @@ def _moved(model: SkinModel, request: PressRequest, number: int, moves: dict[str
 
 
 def _spread_of(model: SkinModel, states: list[Equilibrium]) -> Uncertainty:
-    figures = model.figures([0.0] * len(states), states)
-    closure = np.array([state.taxel_closure for state in states])
-    values = (figures.surface, figures.force, figures.taxel_force, closure)
-    return Uncertainty(*(np.std(value, axis=0, ddof=1) for value in values))
+    grid, face = model.sensor.map, model.skin.face
+    values = [
+        (
+            face.depth_map(grid.x, grid.y, state.displacement, grid.sampling), state.force, state.taxel_force,
+            state.taxel_closure,
+        )
+        for state in states
+    ]
+    return Uncertainty(*(np.std(value, axis=0, ddof=1) for value in zip(*values, strict=True)))

@@ -111,10 +111,11 @@ class _MortarRows:
 
     def __init__(self, rows: sp.csr_matrix, device: str) -> None:
         self.count = rows.shape[0]  # pyright: ignore[reportOptionalSubscript]
-        self.down, self.up = (_sparse(matrix, device) for matrix in (rows, sp.csr_matrix(rows.T)))
+        self.down, self.up = (compressed_rows(matrix, device) for matrix in (rows, sp.csr_matrix(rows.T)))
 
 
-def _sparse(matrix: sp.csr_matrix, device: str) -> torch.Tensor:
+def compressed_rows(matrix: sp.csr_matrix, device: str) -> torch.Tensor:
+    """Return a matrix as a sparse tensor on a device, float32: for products alone."""
     starts, columns = (torch.as_tensor(values.astype(np.int64)) for values in (matrix.indptr, matrix.indices))
     values = torch.as_tensor(matrix.data.astype(np.float32))
     with warnings.catch_warnings():
@@ -229,7 +230,7 @@ class DenseRest:
 
     def _compliance(self, rows: sp.csr_matrix, free: np.ndarray) -> None:
         """Make M K0^-1 and M K0^-1 M^T of the rounded inverse."""
-        mortar = _sparse(sp.csr_matrix(rows[:, free] @ sp.diags_array(self.scale.cpu().numpy())), self.device)
+        mortar = compressed_rows(sp.csr_matrix(rows[:, free] @ sp.diags_array(self.scale.cpu().numpy())), self.device)
         whole = torch.empty(self.count, len(self.order), device=self.device)
         for start in range(0, len(self.order), self._BLOCK):
             part = self._inverse[start : start + self._BLOCK, : len(self.order)].T.to(torch.float32)

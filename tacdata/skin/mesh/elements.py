@@ -62,6 +62,28 @@ def triangle_gradients(points: np.ndarray) -> np.ndarray:
     return np.concatenate([corners, np.stack(edges, axis=1)], axis=1)
 
 
+def triangle_hats(points: np.ndarray) -> np.ndarray:
+    """Return the piecewise linear hats of a quadratic triangle's six nodes at (xi, eta) [1], shape (q, 2), as (q, 6).
+
+    >>> import numpy as np
+    >>> from tacdata.skin.mesh.elements import triangle_hats
+    >>> triangle_hats(np.array([[0.5, 0.0], [0.25, 0.25]])).tolist()
+    [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.5, 0.0, 0.5]]
+    """
+    x, y = points[:, 0], points[:, 1]
+    barycentric = np.stack([1 - x - y, x, y], axis=-1)
+    result = np.zeros((len(points), 6))
+    at_corner = barycentric > 0.5
+    corners = np.maximum(2 * barycentric - 1, 0.0)
+    result[:, :3] = corners
+    for node, (a, b) in enumerate(FACE_EDGES, start=3):
+        c = 3 - a - b
+        middle = 1 - 2 * barycentric[:, c]
+        beside = np.where(at_corner[:, a], 2 * barycentric[:, b], np.where(at_corner[:, b], 2 * barycentric[:, a], 0.0))
+        result[:, node] = np.where(at_corner.any(axis=1), beside, middle)
+    return result
+
+
 def triangle_quadrature(subdivisions: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """Return the 6-point rule of degree 4 (Dunavant 1985), repeated on ``subdivisions``^2 congruent sub-triangles.
 

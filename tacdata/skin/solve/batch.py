@@ -18,19 +18,17 @@ from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
+from tacdata.skin.solve.coarse_path import CoarseStart
 from tacdata.skin.solve.configuration import Configuration, Unknowns
 from tacdata.skin.solve.load_path import LoadPath
-from tacdata.skin.solve.loading_states import LoadingStates
 from tacdata.skin.solve.newton import Newton, Residual
+from tacdata.skin.solve.starts import TOUCHING, Starts
 
 _WILD = 0.3
 """Volume ratio det F below which an extrapolated start is not used [1]."""
 
 _HALVINGS, _SHORTER = 4, 4.0
 """How often a step that went astray is shortened, and by what; each costs an evaluation for the whole batch."""
-
-_TOUCHING = 0.02
-"""Gap up to which nodes are active when a load step begins [mm]: the tips on the board bear load from the first."""
 
 _ANY, _STARTED = 1e3, 0.15
 """Residuals that stand in, whole or at the least, for that before the first step of a load step [1]."""
@@ -59,6 +57,8 @@ class PlacedPress:
     """Rotation from the indenter's frame to the sensor's [1], shape (3, 3)."""
     conditions: Conditions
     """Of one member."""
+    coarse: CoarseStart | None = None
+    """Its states on a coarser mesh, if they are known: its load steps start from there."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,8 @@ class Equilibria:
     """Their indices, shape (k,)."""
     u: torch.Tensor
     """Displacements [mm], shape (n, 3, k)."""
+    turn: torch.Tensor
+    """Rotation from the indenter's frame to the sensor's [1], shape (3, 3, k)."""
     relative: np.ndarray
     """Out-of-balance force over the contact force [1], shape (k,)."""
     penetration: np.ndarray
@@ -112,10 +114,8 @@ class Batch:
         )
         none = torch.zeros_like(u[0, 0])
         self._at = Configuration(u, multipliers, idle.repeat(capacity), poses, histories, none, none.clone())
-        unknowns = self._at.unknowns
-        self._base, self._accepted, self._rate = unknowns, unknowns.zeros(), unknowns.zeros()
-        self._loading = LoadingStates(unknowns)
-        self._sticky = any(surface.attracts for surface in newton.surfaces)
+        self._base = self._at.unknowns
+        self._starts = Starts(self._base, any(surface.attracts for surface in newton.surfaces))
         self._failed_at = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
         self._presses: list[PlacedPress | None] = [None] * capacity
         self._before = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
@@ -197,13 +197,22 @@ class Batch:
         return self._newton.updated(now, self._at, which)
 
     def _judge(self, now: Residual) -> list[str]:
-        figures = torch.stack([now.relative, now.penetration, now.mean_penetration, now.volume]).cpu().numpy()
-        settings = self._newton.settings
-        rows = figures.T.tolist()
-        return [
-            "idle" if press is None else press.path.judge(error, penetration, mean, volume, settings)
-            for press, (error, penetration, mean, volume) in zip(self._presses, rows, strict=True)
+        figures = torch.stack([now.relative, now.penetration, now.mean_penetration, now.volume], dim=1).tolist()
+        verdicts = [
+            "idle" if press is None else press.path.judge(*row, settings=self._newton.settings)
+            for press, row in zip(self._presses, figures, strict=True)
         ]
+        found = self._mask(verdicts, "found").nonzero()[0]
+        if len(found):
+            at, which = self._at, self._tensor(found)
+            through = self._newton.surfaces[0].passed_through(
+                at.u.index_select(2, which), at.poses[0].take(which), at.conditions.take(which)
+            )
+            # A smaller step may keep the skin on its side.
+            for column in found[through.cpu().numpy()].tolist():
+                self._press(column).path.passed_through()
+                verdicts[column] = "failed"
+        return verdicts
 
     def _collect(
         self, verdicts: list[str], now: Residual, collect: Collect, observe: Observe | None
@@ -224,18 +233,18 @@ class Batch:
             history.accept(contact, pose, which)
         # What is not active carries nothing.
         state = Unknowns(at.u, tuple(contact.pressure for contact in now.contacts))
-        along = torch.where(straight & (moved != 0), 1 / torch.where(moved != 0, moved, 1.0), 0.0)
-        rate = state.zeros().plus(state.minus(self._accepted), along)
-        self._rate = rate.where(which & ((moved != 0) | ~straight), self._rate)
-        self._accepted = state.where(which, self._accepted)
-        self._loading.add(which, self._values({column: path.attempt for column, path in paths.items()}), state)
+        depth = self._values({column: path.attempt for column, path in paths.items()})
+        self._starts.accept(which, depth, moved, straight, state)
         wanted = [column for column, path in paths.items() if path.found()]
         if wanted:
             columns = torch.as_tensor(wanted, device=at.u.device)
             relative, penetration = torch.stack([now.relative, now.penetration])[:, columns].cpu().numpy()
             spent = [self._press(column).path.spent for column in wanted]
             states = collect(
-                Equilibria(columns, at.u[:, :, columns], relative, penetration, spent, now.contacts)
+                Equilibria(
+                    columns, at.u[:, :, columns], at.poses[0].turn[:, :, columns], relative, penetration, spent,
+                    now.contacts,
+                )
             )
             for column, state in zip(wanted, states, strict=True):
                 press = self._press(column)
@@ -274,7 +283,6 @@ class Batch:
             at.poses[0].place[:, which] = torch.as_tensor(np.stack(touch, axis=-1), device=device).double()
             at.poses[0].turn[:, :, which] = torch.as_tensor(np.stack(turn, axis=-1), device=device).double()
             self._clear(which)
-            self._loading.forget(self._tensor(new))
             at.friction_tangent.index_fill_(0, which, 0.0)
             for history, first in zip(at.histories, self._touched(which, observe), strict=True):
                 history.put(which, first)
@@ -302,16 +310,13 @@ class Batch:
         heights = self._values({c: float(press.touch[2]) - press.path.attempt for c, press in busy.items()})
         moved, place = self._values(dict.fromkeys(busy, 1.0)) > 0, self._at.poses[0].place
         place[2] = torch.where(moved, heights, place[2])
-        guess, near = self._accepted.plus(self._rate, attempt - depth), torch.full_like(depth, _TOUCHING)
-        beyond = attempt >= self._loading.deepest
-        if not bool((beyond | ~which).all()):
-            guess = guess.where(beyond, self._loading.back(self._accepted, depth, attempt, leaves=not self._sticky))
-            # The way down says which nodes are active on the way up, unless the skin sticks.
-            near = torch.where(beyond | self._sticky, near, 0.0)
+        coarse = {column: press.coarse for column, press in busy.items() if press.coarse}
+        guess, near = self._starts.guess(which, depth, attempt, coarse)
         columns = which.nonzero()[:, 0]
         chosen = guess.take(columns)
-        volume = self._newton.body.internal_force(chosen.u, self._at.conditions.take(columns))[1]
-        chosen = self._accepted.take(columns).where(volume < _WILD, chosen)
+        wild = self._newton.body.internal_force(chosen.u, self._at.conditions.take(columns))[1] < _WILD
+        chosen = self._starts.accepted.take(columns).where(wild, chosen)
+        near[columns] = torch.where(wild, TOUCHING, near[columns])
         state = self._at.unknowns.copy()
         state.put(columns, chosen)
         self._at.unknowns = state
@@ -330,6 +335,9 @@ class Batch:
         self._failed_at = torch.where(flipping, self._before.minimum(self._failed_at), self._failed_at)
         may = now.relative < _NEARER * self._failed_at
         at.friction_tangent = torch.where(may, self._newton.friction_tangent(now), 0.0)
+        for press in self._presses:
+            if press is not None:
+                press.path.stepped()
         moved, changes, used = self._newton.step(at, now, busy)
         self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
         # The first step of a load step changes the active set: the residual before says little, or nothing.
@@ -350,9 +358,9 @@ class Batch:
 
     def _clear(self, which: torch.Tensor) -> None:
         """Take columns, by index, back to the undeformed skin."""
-        for state in (self._at.unknowns, self._base, self._accepted, self._rate):
-            for field in (state.u, *state.multipliers):
-                field.index_fill_(-1, which, 0.0)
+        self._at.unknowns.flatten(which)
+        self._base.flatten(which)
+        self._starts.forget(which)
 
     def _shrink(self) -> None:
         """Halve the batch, as often as it goes, when no press is waiting and half of the columns are idle."""
@@ -366,11 +374,9 @@ class Batch:
         columns = sorted([*busy, *idle[: width - len(busy)]])
         which = torch.as_tensor(columns, device=self._at.u.device)
         self._at = self._at.take(which)
-        self._base, self._accepted, self._rate = (
-            state.take(which) for state in (self._base, self._accepted, self._rate)
-        )
+        self._base = self._base.take(which)
         self._before, self._failed_at = self._before[which], self._failed_at[which]
-        self._loading.keep(which)
+        self._starts.keep(which)
         self._presses = [self._presses[column] for column in columns]
 
     def _press(self, column: int) -> PlacedPress:

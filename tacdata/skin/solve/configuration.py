@@ -30,6 +30,15 @@ class Unknowns(Columns):
         """Return the difference from others."""
         return self.plus(other, -1.0)
 
+    def flatten(self, which: torch.Tensor) -> None:
+        """Set members, by index, shape (k,), to 0, in place."""
+        for field in (self.u, *self.multipliers):
+            field.index_fill_(-1, which, 0.0)
+
+    def single(self) -> Unknowns:
+        """Return a copy in single precision."""
+        return Unknowns(self.u.to(torch.float32), tuple(part.to(torch.float32) for part in self.multipliers))
+
     def where(self, mask: torch.Tensor, other: Unknowns) -> Unknowns:
         """Return these members where ``mask``, shape (b,), holds, else those of ``other``."""
         pairs = zip(self.multipliers, other.multipliers, strict=True)

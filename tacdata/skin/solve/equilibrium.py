@@ -18,6 +18,9 @@ class Equilibrium:
 
     displacement: np.ndarray
     """Nodal displacements [mm], shape (nodes, 3); empty where not asked for."""
+    traction: np.ndarray
+    """Contact traction on the indenter at the nodes of the outer face [MPa], by undeformed area, shape (s, 3); empty
+    where displacements are. An adhesive attraction is not in it."""
     force: np.ndarray
     """Force of the skin on the indenter [N], shape (3,)."""
     taxel_force: np.ndarray
@@ -80,12 +83,20 @@ class StateReader:
         force, load, area, closure = (
             value.T.cpu().numpy() for value in (force, load, area, self.closure(found.u))
         )
-        nothing = np.empty((0, 3))
-        u = found.u.permute(2, 0, 1).cpu().numpy() if with_displacement else [nothing] * len(column)
+        u = traction = [np.empty((0, 3))] * len(column)
+        if with_displacement:
+            u, traction = (field.permute(2, 0, 1).cpu().numpy() for field in (found.u, _on_indenter(found)))
         return [
             Equilibrium(
-                u[k], force[k], load[k], closure[k], area[k], float(found.relative[k]), float(found.penetration[k]),
-                found.newton[k],
+                u[k], traction[k], force[k], load[k], closure[k], area[k], float(found.relative[k]),
+                float(found.penetration[k]), found.newton[k],
             )
             for k in range(len(column))
         ]
+
+
+def _on_indenter(found: Equilibria) -> torch.Tensor:
+    """Return the contact traction on the indenter, in the sensor's frame [MPa], shape (s, 3, k)."""
+    pressed, column = found.contacts[0], found.column
+    normal = pressed.pressure[:, None, column] * pressed.tangent.normal[:, :, column]
+    return -(normal + torch.einsum("ijk,sjk->sik", found.turn, pressed.shear[:, :, column]))

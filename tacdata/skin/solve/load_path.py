@@ -36,9 +36,9 @@ class LoadPath:
     direction: float = 0.0
     """Of the last step [mm]."""
     newton: int = 0
-    """Newton iterations of the present attempt."""
+    """Newton steps of the present attempt."""
     spent: int = 0
-    """Newton iterations since the last wanted state, failed attempts included."""
+    """Newton steps since the last wanted state, failed attempts included."""
     _wanted: int = 0
     _step: float = 0.0
     _best: float = math.inf
@@ -86,9 +86,16 @@ class LoadPath:
             return "failed"
         if self.newton and off < 0.9 * self._best:
             self._best, self._best_at = off, self.newton
+        return "go on"
+
+    def stepped(self) -> None:
+        """Count a Newton step."""
         self.newton += 1
         self.spent += 1
-        return "go on"
+
+    def passed_through(self) -> None:
+        """Say why the present iterate, balanced as it is, is no state of this press."""
+        self.reason = f"at {self.attempt:.3f} mm the skin has passed through the indenter and lies above it"
 
     def found(self) -> bool:
         """Take the attempt as the present state; return whether it is one that is wanted."""

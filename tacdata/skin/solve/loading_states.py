@@ -26,7 +26,7 @@ class LoadingStates:
         return self._depth.gather(0, last[None])[0]
 
     def forget(self, which: torch.Tensor) -> None:
-        """Start the marked members, shape (b,), bool, anew, flat at depth 0."""
+        """Start members, by index or mask, anew, flat at depth 0."""
         self._depth[:, which] = torch.inf
         self._depth[0, which] = 0.0
         self._values[:, :, which] = 0.0

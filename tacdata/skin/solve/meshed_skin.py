@@ -19,7 +19,7 @@ from tacdata.skin.contact.adhesion import AdhesiveSurface
 from tacdata.skin.contact.contact_surface import SUBDIVISIONS, ContactSurface, face_quadrature
 from tacdata.skin.contact.first_touch import rotation, touch
 from tacdata.skin.contact.kernels import board_distance
-from tacdata.skin.contact.mortar import Mortar, hats
+from tacdata.skin.contact.mortar import Mortar
 from tacdata.skin.elasticity.body import Elasticity
 from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
 from tacdata.skin.linear.rest_stiffness import RestSolver, rest_solver
@@ -35,6 +35,7 @@ from tacdata.skin.solve.load_path import LoadPath
 from tacdata.skin.solve.newton import Newton
 from tacdata.skin.solve.settings import ModelSettings, SolverSettings
 from tacdata.skin.surface.outer_face import OuterFace
+from tacdata.skin.surface.traction_map import TractionRaster
 
 _FIRST = 0.3
 """Longest first load step over the smallest radius of curvature of the shape [1]."""
@@ -78,6 +79,7 @@ class MeshedSkin:
         """What the protrusions stand on, if they do."""
         self.reader = StateReader(self.mesh, sensor.taxels.count, self.board, device)
         self.face = OuterFace(self.mesh)
+        self.tractions = TractionRaster(self.mesh, sensor.map)
 
     @cached_property
     def rest(self) -> RestSolver:
@@ -141,7 +143,7 @@ class MeshedSkin:
 
     def _mortar(self, faces: np.ndarray) -> Mortar:
         weights, shapes = face_quadrature(self._nodes, torch.as_tensor(faces, device=self.device), SUBDIVISIONS)
-        points = hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
+        points = elements.triangle_hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
         return Mortar(faces, weights.cpu().numpy(), shapes.cpu().numpy(), points, len(self.mesh.nodes), self.device)
 
     @property

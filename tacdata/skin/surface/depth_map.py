@@ -13,6 +13,7 @@ import warp as wp
 from tacdata.errors import UsageError
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.surface.depth_map_kernel import NOTHING, highest
+from tacdata.skin.surface.pressed_shape import PressedShape
 
 SAMPLINGS = ("point", "area")
 """How a pixel gets its value: at its centre, or as the mean over its square."""
@@ -51,6 +52,7 @@ class DepthRaster:
         self._x, self._y = (wp.array(axis, dtype=wp.float64, device=device) for axis in (x, y))
         self._nodes = wp.array(mesh.nodes, dtype=wp.vec3d, device=device)
         self._faces = wp.array(np.ascontiguousarray(mesh.outer), dtype=wp.int32, device=device)
+        self._contact = np.unique(mesh.outer)
         still = torch.zeros(len(mesh.nodes), 3, 1, dtype=torch.float64, device=device)
         self._rest = self._height(still)
 
@@ -64,7 +66,28 @@ class DepthRaster:
 
     def measure(self, u: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Return `depth` and which share of each pixel lies under the skin [1], both (b, pixels_x, pixels_y)."""
+        return self._measured(self._height(u))
+
+    def pressed(self, u: torch.Tensor, shape: PressedShape) -> torch.Tensor:
+        """Return one state's depth map [mm], shape (pixels_x, pixels_y): where it touches, that of the shape.
+
+        Args:
+            u: Displacements [mm], shape (nodes, 3, 1), as of `depth`.
+            shape: What presses, and where.
+        """
         height = self._height(u)
+        shares = [self._share_of(u, height, marks) for marks in (shape.touching, shape.around)]
+        shape.lay(self._x, self._y, height[:, :, 0], *shares)
+        return self._measured(height)[0][0]
+
+    def _share_of(self, u: torch.Tensor, height: torch.Tensor, marks: np.ndarray) -> torch.Tensor:
+        """Return the sum of the contact nodes' hats above the samples, by marks, shape (samples_x, samples_y)."""
+        touching, share = torch.zeros(len(self._nodes), 1, dtype=torch.float64), torch.zeros_like(height)
+        touching[self._contact, 0] = torch.as_tensor(marks).double()
+        self._scan(u, height, touching.to(self._device), share)
+        return share[:, :, 0]
+
+    def _measured(self, height: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         covered = (height > NOTHING / 2) & (self._rest > NOTHING / 2)
         depth = torch.where(covered, self._rest - height, 0.0)
         if self._parts == 1:
@@ -74,14 +97,19 @@ class DepthRaster:
 
     def _height(self, u: torch.Tensor) -> torch.Tensor:
         """Return the height of the uppermost sheet above the samples [mm], shape (samples_x, samples_y, b)."""
-        batch = u.shape[2]
-        height = torch.full((len(self._x), len(self._y), batch), NOTHING, dtype=torch.float64, device=self._device)
+        size = len(self._x), len(self._y), u.shape[2]
+        height = torch.full(size, NOTHING, dtype=torch.float64, device=self._device)
+        none = torch.zeros(0, 0, dtype=torch.float64, device=self._device)
+        self._scan(u, height, none, none[:, :, None])
+        return height
+
+    def _scan(self, u: torch.Tensor, height: torch.Tensor, touching: torch.Tensor, share: torch.Tensor) -> None:
+        fields = [wp.from_torch(field) for field in (height, touching, share)]
         wp.launch(
-            highest, dim=(len(self._faces), batch),
-            inputs=[self._nodes, self._faces, wp.from_torch(u.detach()), self._x, self._y, wp.from_torch(height)],
+            highest, dim=(len(self._faces), u.shape[2]),
+            inputs=[self._nodes, self._faces, wp.from_torch(u.detach()), self._x, self._y, *fields],
             device=self._device,
         )
-        return height
 
     def _mean(self, samples: torch.Tensor) -> torch.Tensor:
         """Return the weighted sum over each pixel of samples (sx, sy, b), shape (b, pixels_x, pixels_y)."""

@@ -8,7 +8,8 @@ One thread takes one triangle of one state. Seen from above, a quadratic triangl
     x(xi, eta) = a + b xi + c eta + d xi^2 + e xi eta + f eta^2
 
 For every sample under its Bezier hull, Newton's method solves x(xi, eta) = sample. The greatest height wins (a
-z-buffer), so that of several sheets the uppermost is kept. A triangle whose Jacobian determinant keeps its sign holds a
+z-buffer), so that of several sheets the uppermost is kept. A second pass reads at these heights how far the face
+touches there. A triangle whose Jacobian determinant keeps its sign holds a
 sample at most once. Where it does not, or where the triangle bends strongly, the search starts from 16 places.
 """
 
@@ -119,30 +120,66 @@ def _above(
     target: wp.vec2d, p: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, e: wp.vec3d, f: wp.vec3d,
     inverse: wp.mat22d, mild: bool,
 ):
-    """Greatest height of one triangle above a sample, or NOTHING."""
+    """Greatest height of one triangle above a sample, or NOTHING, after the (xi, eta) where it has it."""
     a2, b2, c2, d2, e2, f2 = _flat(p), _flat(b), _flat(c), _flat(d), _flat(e), _flat(f)
-    best = wp.float64(NOTHING)
+    best = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(NOTHING))
     many = not mild
     if mild:
         found = _search(a2, b2, c2, d2, e2, f2, target, inverse * (target - a2))
         if found[2] > wp.float64(0.0):
-            best = _height(p, b, c, d, e, f, found)
+            best = wp.vec3d(found[0], found[1], _height(p, b, c, d, e, f, found))
         many = found[2] < wp.float64(0.0)
     if many:
         for k in range(16):
             found = _search(a2, b2, c2, d2, e2, f2, target, _center(k))
             if found[2] > wp.float64(0.0):
-                best = wp.max(best, _height(p, b, c, d, e, f, found))
+                z = _height(p, b, c, d, e, f, found)
+                if z > best[2]:
+                    best = wp.vec3d(found[0], found[1], z)
     return best
+
+
+@wp.func
+def _middle_hat(at_a: wp.float64, at_b: wp.float64, at_c: wp.float64):
+    """Hat of the node between two corners, by the barycentric coordinates of these and of the third."""
+    two, value = wp.float64(2.0), wp.max(wp.float64(1.0) - wp.float64(2.0) * at_c, wp.float64(0.0))
+    if wp.max(at_a, at_b) > wp.float64(0.5):
+        value = two * wp.min(at_a, at_b)
+    return value
+
+
+@wp.func
+def _of_touching(marks: wp.array2d(dtype=wp.float64), faces: wp.array2d(dtype=wp.int32), f: int, s: int, at: wp.vec3d):
+    """Sum of the hats of a face's marked nodes at (xi, eta), by their marks."""
+    one, two, zero = wp.float64(1.0), wp.float64(2.0), wp.float64(0.0)
+    b1, b2 = at[0], at[1]
+    b0 = one - b1 - b2
+    total = marks[faces[f, 0], s] * wp.max(two * b0 - one, zero)
+    total += marks[faces[f, 1], s] * wp.max(two * b1 - one, zero)
+    total += marks[faces[f, 2], s] * wp.max(two * b2 - one, zero)
+    total += marks[faces[f, 3], s] * _middle_hat(b0, b1, b2)
+    total += marks[faces[f, 4], s] * _middle_hat(b1, b2, b0)
+    total += marks[faces[f, 5], s] * _middle_hat(b2, b0, b1)
+    return total
 
 
 @wp.kernel(module="unique", enable_backward=False)
 def highest(
     nodes: wp.array(dtype=wp.vec3d), faces: wp.array2d(dtype=wp.int32), u: wp.array3d(dtype=Any),
     xs: wp.array(dtype=wp.float64), ys: wp.array(dtype=wp.float64), height: wp.array3d(dtype=wp.float64),
+    touching: wp.array2d(dtype=wp.float64), share: wp.array3d(dtype=wp.float64),
 ):
-    """Raise ``height`` (len(xs), len(ys), b) [mm] to that of the triangles above each sample."""
+    """Raise ``height`` (len(xs), len(ys), b) [mm] to that of the triangles above each sample.
+
+    A second pass is given ``touching`` nodes (n, b), 0 to 1. It leaves ``height``. ``share`` is the sum of their hats.
+    """
     face, state = wp.tid()
+    if touching.shape[0] > 0:
+        marked = wp.float64(0.0)
+        for k in range(6):
+            marked += touching[faces[face, k], state]
+        if marked == wp.float64(0.0):
+            return
     two, three, four, half = wp.float64(2.0), wp.float64(3.0), wp.float64(4.0), wp.float64(0.5)
     zero, one = wp.float64(0.0), wp.float64(1.0)
     p0 = _position(nodes, u, faces[face, 0], state)
@@ -180,6 +217,9 @@ def highest(
     start = wp.matrix_from_rows(wp.vec2d(t[1], -t[0]), wp.vec2d(-s[1], s[0])) / _cross(s, t)
     for i in range(i0, i1):
         for j in range(j0, j1):
-            z = _above(wp.vec2d(xs[i], ys[j]), p0, b3, c3, d3, e3, f3, start, mild)
-            if z > wp.float64(NOTHING / 2.0):
-                wp.atomic_max(height, i, j, state, z)
+            at = _above(wp.vec2d(xs[i], ys[j]), p0, b3, c3, d3, e3, f3, start, mild)
+            if at[2] > wp.float64(NOTHING / 2.0):
+                if touching.shape[0] == 0:
+                    wp.atomic_max(height, i, j, state, at[2])
+                elif at[2] > height[i, j, state] - margin:
+                    wp.atomic_max(share, i, j, state, _of_touching(touching, faces, face, state, at))

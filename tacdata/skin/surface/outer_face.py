@@ -12,6 +12,7 @@ import torch
 from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.surface.depth_map import DepthRaster
+from tacdata.skin.surface.pressed_shape import PressedShape
 
 _NEWTON = 20
 """Steps to a point on a triangle whose edges bend in plan; straight ones need none."""
@@ -92,7 +93,9 @@ class OuterFace:
         """Return the height of the undeformed face [mm], shape (n,), above (x, y) [mm], shape (n, 2)."""
         return self.displacement(points, self._mesh.nodes)[:, 2]
 
-    def depth_map(self, x: np.ndarray, y: np.ndarray, u: np.ndarray, sampling: str = "point") -> np.ndarray:
+    def depth_map(
+        self, x: np.ndarray, y: np.ndarray, u: np.ndarray, sampling: str = "point", shape: PressedShape | None = None
+    ) -> np.ndarray:
         """Return undeformed minus deformed height [mm] of pixels, shape (len(x), len(y)).
 
         Where an indenter's steep flank folds the face over itself, the uppermost sheet counts. A pixel beside the
@@ -103,6 +106,7 @@ class OuterFace:
             y: Pixel centres along y [mm], ascending.
             u: Nodal displacements [mm], shape (nodes, 3).
             sampling: "point" (at pixel centres) or "area" (mean over the pixel's square).
+            shape: What presses; where the face touches it, the map is the shape's. Without it the map is the mesh's.
 
         Raises:
             UsageError: If there is no such sampling, or pixels to average over are not evenly spaced.
@@ -110,7 +114,8 @@ class OuterFace:
         key = (np.asarray(x, dtype=float).tobytes(), np.asarray(y, dtype=float).tobytes(), sampling)
         if key not in self._rasters:
             self._rasters[key] = DepthRaster(self._mesh, x, y, sampling)
-        return self._rasters[key].depth(torch.as_tensor(np.asarray(u))[:, :, None])[0].numpy()
+        raster, moved = self._rasters[key], torch.as_tensor(np.asarray(u))[:, :, None]
+        return (raster.depth(moved)[0] if shape is None else raster.pressed(moved, shape)).numpy()
 
 
 def _middles(corners: np.ndarray) -> np.ndarray:

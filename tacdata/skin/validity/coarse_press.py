@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from tacdata.errors import SolveError
 from tacdata.skin.press import PressRequest
+from tacdata.skin.solve.coarse_path import CoarsePath
+from tacdata.skin.solve.configuration import Unknowns
 from tacdata.skin.solve.passage import Passage, PathRecorder
 from tacdata.skin.validity.mesh_error import Figures
 
@@ -24,7 +26,7 @@ class PressSolver(Protocol):
         """As `SkinModel.states_many`."""
         ...
 
-    def figures(self, depths: Sequence[float], states: list[Equilibrium]) -> Figures:
+    def figures(self, request: PressRequest, depths: Sequence[float], states: list[Equilibrium]) -> Figures:
         """As `SkinModel.figures`."""
         ...
 
@@ -39,6 +41,8 @@ class CoarsePress:
     """What is missing, in words; empty if nothing."""
     passages: tuple[Passage, ...] = ()
     """The states with all equilibria on the way, if these were to be kept."""
+    path: CoarsePath | None = None
+    """The states, for starts of the finer mesh; None if none was reached."""
 
 
 def loading(request: PressRequest) -> PressRequest:
@@ -66,23 +70,26 @@ def press_coarsely(
         One for each request, as far as it was reached.
     """
     numbers = [k for k, request in enumerate(requests) if loading(request).depths]
-    found = [[model.figures([], [])] for _ in requests]
+    found = [[model.figures(request, [], [])] for request in requests]
     remarks = [""] * len(requests)
     passages: list[list[Passage]] = [[] for _ in requests]
-    recorder = PathRecorder() if keep else None
+    reached: list[list[tuple[float, Unknowns]]] = [[] for _ in requests]
+    recorder = PathRecorder()
     asked = [loading(requests[k]) for k in numbers]
     for index, depth, state in model.states_many(asked, capacity, observe=recorder):
         number = numbers[index]
         if isinstance(state, SolveError):
             remarks[number] = f"the coarser mesh gave up: {state.given}"
             continue
-        if recorder:
-            passages[number].append(Passage(depth, state, recorder.take(index)))
+        passed = recorder.take(index)
+        reached[number].append((depth, passed[-1].unknowns.single()))
+        if keep:
+            passages[number].append(Passage(depth, state, passed))
         try:
-            found[number].append(model.figures([depth], [state]))
+            found[number].append(model.figures(requests[number], [depth], [state]))
         except SolveError as error:
             remarks[number] = f"the coarser mesh at {depth:g} mm: {error.given}"
     return [
-        CoarsePress(Figures.joined(parts), remark, tuple(passed))
-        for parts, remark, passed in zip(found, remarks, passages, strict=True)
+        CoarsePress(Figures.joined(parts), remark, tuple(kept), CoarsePath.of(states))
+        for parts, remark, kept, states in zip(found, remarks, passages, reached, strict=True)
     ]

@@ -11,6 +11,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.tags.board import Board
 from tacdata.tags.calibration.board_mismatch import mismatch
 from tacdata.tags.calibration.board_view import BoardView, find_board
+from tacdata.tags.calibration.image_file import ENDINGS, read_grey
 
 STILL = 1.0
 """Movement between two consecutive images [px per 1000 px of width] above which they are blurred."""
@@ -18,7 +19,6 @@ NEW = 40.0
 """Movement against every view kept [px per 1000 px of width] from which an image is new."""
 LOOKED_AT_AGAIN = 5
 """Images without the board that are kept to find out why [1]."""
-ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 
 class ViewPicker:
@@ -67,20 +67,21 @@ class ViewPicker:
         self.views.append(view)
         return True
 
-    def check_board(self) -> None:
-        """Look for the reason where most images show no board.
+    def check_board(self, least: int = 0) -> str:
+        """Look for the reason why images show no board; return it as a remark where others show enough.
+
+        Args:
+            least: Images with the board that are needed [count].
 
         Raises:
-            FormatError: If they show one that the board file does not describe.
+            FormatError: If the reason holds for most images, or if too few are left.
         """
-        if 2 * self.with_board >= self.seen or not self._without_board:
-            return
-        if (other := mismatch(self._without_board, self.board)) is not None:
-            raise FormatError(
-                f"the board in {self.with_board} of {self.seen} images; in the others {other.found}",
-                "the board that the board file describes",
-                other.remedy,
-            )
+        if not self._without_board or (other := mismatch(self._without_board, self.board)) is None:
+            return ""
+        given = f"the board in {self.with_board} of {self.seen} images; in the others {other.found}"
+        if 2 * self.with_board < self.seen or len(self.views) < least:
+            raise FormatError(given, "the board that the board file describes", other.remedy)
+        return f"{given}: {other.remedy}"
 
 
 def images_of(source: Path) -> Iterator[tuple[str, np.ndarray]]:
@@ -97,11 +98,7 @@ def images_of(source: Path) -> Iterator[tuple[str, np.ndarray]]:
         if not paths:
             raise UsageError(f"{source} holds no image", f"files ending in {', '.join(ENDINGS)}", "check the path")
         for path in paths:
-            # As the sensor's pixels lie: a camera turned over keeps its optical centre.
-            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-            if image is None:
-                raise FormatError(f"{path} cannot be read as an image", "whole image files", "replace or remove it")
-            yield path.name, image
+            yield path.name, read_grey(path)
         return
     if not source.is_file():
         raise UsageError(f"no file or folder {source}", "a folder of images or a video", "check the path")

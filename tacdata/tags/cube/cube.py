@@ -27,6 +27,8 @@ AXES = {
 }
 """A face's right, up and outward directions in the cube frame as columns, shape (3, 3)."""
 
+SIDES = 2.0, 1000.0
+"""Smallest and largest plausible side of a cube [mm]."""
 CORNERS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 """Right and up of a tag's corners in half tags [1], in the AprilTag library's order."""
 
@@ -67,6 +69,9 @@ class Cube:
         if not 0 < tag <= side:
             given = f"{origin}: tag {tag} mm on a side of {side} mm"
             raise FormatError(given, "0 < tag <= side", "measure the black square")
+        if not SIDES[0] <= side <= SIDES[1]:
+            given = f"{origin}: a side of {side} mm: is it in another unit?"
+            raise FormatError(given, f"{SIDES[0]:g} to {SIDES[1]:g} mm", "give side and tag in millimetres")
         unknown = sorted(set(ids) - set(NORMALS))
         if unknown or not ids:
             given = f"{origin}: ids for {', '.join(unknown) or 'no face'}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import re
 from collections import deque
 from collections.abc import Callable
 
@@ -11,12 +12,16 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.virtual_rig.firmware import texts
 from tacdata.virtual_rig.firmware.dialect import NAMES
-from tacdata.virtual_rig.firmware.machine import Machine
+from tacdata.virtual_rig.firmware.interpreter import Interpreter
 from tacdata.virtual_rig.firmware.planner import Planner
 from tacdata.virtual_rig.port import VirtualPort
 
 REALTIME = b"?!~\x18"
 """Bytes that never reach the receive buffer; nor does any above 0x7F."""
+TELL_ALL = 0x87
+"""Query for a report with the alarm's number (grblHAL)."""
+DROPPED = re.compile(r"[\x00-\x20/]")
+"""What is left out of a line: blanks, control characters, slashes."""
 BYTE_SECONDS = 10 / 115200
 NS = 1_000_000_000
 Wire = Callable[[str], str | None]
@@ -45,7 +50,7 @@ class Controller:
         kind = NAMES[firmware]
         self.settings = {**texts.DEFAULTS, **kind.changed, **(settings or {})}
         self._rng = np.random.default_rng(seed)
-        self.machine = Machine(
+        self.machine = Interpreter(
             kind, self.settings, np.array(position, float), np.array(offset, float), homed, self._rng, self._say
         )
         self.heard: list[tuple[int, int]] = []
@@ -89,6 +94,23 @@ class Controller:
     def inject_brown_out(self) -> None:
         """Fault: the supply voltage drops; the firmware restarts and assumes position zero."""
         self._faults.put(lambda now: self._wiped(lambda: self.machine.brown_out(now)))
+
+    def inject_reset(self) -> None:
+        """Fault: another program sends 0x18."""
+        self._faults.put(lambda now: self._wiped(lambda: self.machine.reset(now)))
+
+    def inject_stop(self) -> None:
+        """Fault: another program sends grblHAL's 0x19, or a digit 9 loses a bit."""
+        self._faults.put(lambda now: self._take(NAMES["grblHAL"].stop_byte, now))
+
+    def inject_stall(self, seconds: float) -> None:
+        """Fault: the firmware does something else for so long [s], neither steps nor answers, and then goes on."""
+
+        def stand(now: int) -> None:
+            self.machine.busy_until = now + round(seconds * NS)
+            self.planner.stall(now, self.machine.busy_until)
+
+        self._faults.put(stand)
 
     def inject_silence(self) -> None:
         """Fault: nothing is answered any more."""
@@ -157,14 +179,17 @@ class Controller:
         return min(max((min(due) - self.clock.now_ns()) / NS / self.clock.rate, 0.0002), 0.02)
 
     def _take(self, byte: int, now: int) -> None:
-        if byte == ord("?"):
+        if byte == ord("?") or (byte == TELL_ALL and self.machine.firmware is NAMES["grblHAL"]):
+            self.machine.whole |= byte == TELL_ALL
             if self._report_ns is None:
                 step = self.machine.firmware.dwell_step if self.machine.dwell_ns is not None else 0.0
                 self._report_ns = now + int(self._rng.uniform(0.001, max(step, 0.014)) * NS)
-        elif byte in REALTIME or byte > 0x7F:
+        elif byte in REALTIME or byte > 0x7F or byte == self.machine.firmware.stop_byte:
             self.heard.append((byte, now))
             if byte == 0x18:
                 self._wiped(lambda: self.machine.reset(now))
+            elif byte == self.machine.firmware.stop_byte:
+                self._wiped(lambda: self.machine.realtime(byte, now))
             else:
                 self.machine.realtime(byte, now)
         elif self._waiting() >= self.machine.firmware.rx_bytes:
@@ -191,8 +216,9 @@ class Controller:
 
     def _serve_lines(self, now: int) -> None:
         while self._lines and self._lines[0][0] <= now and self.machine.takes_lines(now):
-            line = self._lines[0][1].replace(" ", "")
-            if not self.machine.admits(line, now):
+            line = DROPPED.sub("", self._lines[0][1])
+            self.machine.reading = not self.machine.admits(line, now)
+            if self.machine.reading:
                 return
             self._lines.popleft()
             if self._echo:

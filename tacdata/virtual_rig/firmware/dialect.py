@@ -27,8 +27,18 @@ class Firmware:
     """Whether ``?`` is answered after a limit alarm, before the reset."""
     refuses_after_error: bool
     """Whether a refused G-code line makes it refuse all others until an empty or ``$`` line."""
-    alarm_substate: bool
-    """Whether the state reads ``Alarm:N``."""
+    prepared: float
+    """Motion that is cut into steps already; a hold brakes after it [s]."""
+    asks_only_at_rest: bool = True
+    """Whether ``$#``, ``$I`` and ``$N`` are refused in check mode, and ``$$`` is not."""
+    names_length: bool = False
+    """Whether ``$G`` lists the tool's length."""
+    stop_byte: int = 0
+    """Byte that halts motion and empties every queue; 0 for none."""
+    report_bits: dict[str, int] = field(default_factory=dict)
+    """Fields of a status report that only a bit of ``$10`` brings -> that bit's value; the others always come."""
+    answers_questions_in_critical_alarm: bool = False
+    """Whether ``$I``, ``$$``, ``$#``, ``$G`` and ``$N`` are answered then; every other line gets ``error:79``."""
     scales: bool = False
     """Whether it knows G51, which scales the coordinates of G53 lines, too."""
     changed: dict[str, str] = field(default_factory=dict)
@@ -39,7 +49,7 @@ GRBL = Firmware(
     "Grbl 1.1h ['$' for help]",
     ("[VER:1.1h.20190830:virtual]", "[OPT:V,15,128]"),
     planner_blocks=15, rx_bytes=128, line_bytes=79, dwell_step=0.05, alarm_pause=0.5,
-    answers_in_critical_alarm=False, refuses_after_error=False, alarm_substate=False,
+    answers_in_critical_alarm=False, refuses_after_error=False, prepared=0.045, report_bits={"Bf": 2, "alarm": 0},
 )  # fmt: skip
 """Grbl 1.1h on an ATmega328p (`config.h`, `protocol.c`, `report.c` of that version)."""
 
@@ -51,7 +61,9 @@ GRBLHAL = Firmware(
         "[PLUGIN:another v0.2]",
     ),
     planner_blocks=100, rx_bytes=1024, line_bytes=256, dwell_step=0.001, alarm_pause=0.1,
-    answers_in_critical_alarm=True, refuses_after_error=True, alarm_substate=True, scales=True,
+    answers_in_critical_alarm=True, refuses_after_error=True, prepared=0.09,
+    stop_byte=0x19, names_length=True, asks_only_at_rest=False, scales=True, answers_questions_in_critical_alarm=True,
+    report_bits={"Bf": 2, "FS": 8, "Pn": 16, "WCO": 32, "Ov": 64, "alarm": 1024},
     changed={"$10": "511", "$22": "1", "$481": "0"},
 )  # fmt: skip
 """grblHAL (`report.c`, `protocol.c` of its core)."""

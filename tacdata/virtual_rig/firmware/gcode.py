@@ -53,8 +53,10 @@ class Modal:
     @property
     def said(self) -> str:
         """The active modal words, in ``$G``'s form."""
-        bent = [self.words[group] for group in ("scaling", "length") if self.words.get(group) in ("G51", "G43.1")]
-        return " ".join([*(self.words[group] for group in POWER_ON), *bent])
+        scaled = "".join(axis for axis, factor in zip(AXES, self.scale, strict=True) if factor != 1)
+        bent = {"G51": f"G51:{scaled}", "G43.1": "G43.1"}  # grblHAL names the scaled axes
+        more = [bent[word] for group in ("scaling", "length") if (word := self.words.get(group)) in bent]
+        return " ".join([*(self.words[group] for group in POWER_ON), *more])
 
     @property
     def unit(self) -> float:

@@ -31,16 +31,19 @@ class Machine:
     ) -> None:  # fmt: skip
         """Stand still at ``position`` [mm, machine]; ``offset`` is the G54 [mm]; ``say`` gets (time [ns], line)."""
         self.firmware, self.settings, self.offset = firmware, settings, offset
-        self.planner = Planner(position)
+        self.planner = Planner(position, firmware.prepared)
         self.startup = ["", ""]
         self.alarm: int | None = None if homed else 0
         self.door_open = False
         self.override = 100
-        self.unreadable = False
+        self.unreadable = self.whole = False
         self.error = np.zeros(3)
         """True minus reported position [mm], shape (3,)."""
+        self.reading = False
+        """Whether a line was read and waits for motion to end."""
         self.busy_until = 0
         """Until then nothing is executed or reported [ns]: the pause after an alarm."""
+        self._dropped = False  # whether a reset ends a line that is still to be answered
         self._say, self._rng = say, rng
         self._boot_due: int | None = None
         self._clear()
@@ -49,8 +52,9 @@ class Machine:
         self.modal = gcode.Modal()
         self.counters = texts.Counters()
         self.dwell_ns: int | None = None
+        self.reading = False
         self.homing = self.critical = self.check = self.sleeping = False
-        self._door = self._limit_hit = self._jog_cancelled = False
+        self._door = self._limit_hit = self._jog_cancelled = self._jog_left = False
         self._held_at: int | None = None
         self._refused = 0
         self.override = 100
@@ -67,7 +71,8 @@ class Machine:
         if self.homing:
             return "Home"
         if self.alarm is not None:
-            return f"Alarm:{self.alarm}" if self.alarm and self.firmware.alarm_substate else "Alarm"
+            named = self.whole or int(self.settings["$10"]) & self.firmware.report_bits["alarm"]
+            return f"Alarm:{self.alarm}" if self.alarm and named else "Alarm"
         if self.check:
             return "Check"
         moving = self.moving(now)
@@ -108,8 +113,8 @@ class Machine:
         if self.homing and not left:
             self.homing, self.alarm, self.error = False, None, np.zeros(3)
             self._say(now, "ok")
-        if self._jog_cancelled and not self.moving(now):
-            self._jog_cancelled = False
+        if (self._jog_cancelled or self._jog_left) and not self.moving(now):
+            self._jog_cancelled = self._jog_left = False
             self.planner.stop(now)
         if self._limit_hit and not self.moving(now):
             self._limit_hit = False
@@ -131,6 +136,8 @@ class Machine:
         elif byte == 0x85 and state == "Jog":
             self._hold(now)
             self._jog_cancelled = True
+        elif byte == self.firmware.stop_byte:
+            self._cancel(now)
         elif byte in OVERRIDES:
             change = OVERRIDES[byte]
             new = 100 if change is None else min(max(self.override + change, 10), 200)
@@ -142,14 +149,17 @@ class Machine:
         """Open the door, by its switch or by ``0x84``."""
         if self.homing:
             self.stop_dead(now, 7)
+            self._boot_due = self.busy_until
         elif self.alarm is None:
             self._say(now, "[MSG:Check Door]")
+            self._jog_left = self.state(now) == "Jog"
             self._hold(now)
             self._door = True
 
     def takes_lines(self, now: int) -> bool:
         """Whether the main loop runs at all: not in a pause, a standing hold, an open door, sleep or homing."""
-        blocked = self.dwell_ns is not None or self.homing or self._limit_hit or self.critical or self.sleeping
+        deaf = self.critical and not self.firmware.answers_questions_in_critical_alarm
+        blocked = self.dwell_ns is not None or self.homing or self._limit_hit or deaf or self.sleeping
         return not blocked and now >= self.busy_until and self._boot_due is None and not self._suspended(now)
 
     def admits(self, line: str, now: int) -> bool:
@@ -159,34 +169,25 @@ class Machine:
             return not left and not self.moving(now) and not self.planner.held
         return line.startswith("$") or left < self.firmware.planner_blocks
 
-    def execute(self, line: str, now: int) -> None:
-        """Carry out a line and send its answer."""
-        try:
-            if len(line) > self.firmware.line_bytes:
-                raise gcode.Refused(11)
-            if line.startswith("$"):
-                self._dollar(line.upper(), now)
-            elif line:
-                self._gcode(line, now)
-            else:
-                self._say(now, "ok")
-            self._refused = 0
-        except gcode.Refused as refusal:
-            self._refused = refusal.code if self.firmware.refuses_after_error else 0
-            self._say(now, f"error:{refusal.code}")
-
     def report(self, now: int, rx_free: int) -> str:
         """Return a status report."""
         free = self.firmware.planner_blocks - self.planner.retire(now), rx_free
         believed = self.planner.position(now) - self.error
+        offset = self.offset + self.modal.shift + (0.0, 0.0, self.modal.length)
+        state, self.whole = self.state(now), False
         return texts.report(
-            self.settings, self.state(now), believed, self.planner.speed(now), self.offset, free, self.counters,
-            self.override, "D" if self.door_open else "",
+            self.settings, self.firmware.report_bits, state, believed, self.planner.speed(now), offset, free,
+            self.counters, self.override, "D" if self.door_open else "",
         )  # fmt: skip
 
     def reset(self, now: int) -> None:
-        """Process 0x18: in motion the motors are cut off and steps are lost."""
+        """Process 0x18: in motion the motors are cut off and steps are lost.
+
+        A line that is being carried out is answered with ``ok``, as if it had been.
+        """
         moving, homing = self.moving(now), self.homing
+        self._drop()
+        self.alarm = 0 if self.sleeping and self.alarm is None else self.alarm  # motors were off
         self.planner.stop(now)
         self._clear()
         self.busy_until = 0
@@ -202,12 +203,14 @@ class Machine:
         self.planner.stop(now)
         self._clear()
         self.error = self.planner.position(now)
+        self._dropped = False
         self.alarm = 0 if self.settings["$22"] != "0" else None
         self._say(now, "\x00")
         self._boot(now)
 
     def stop_dead(self, now: int, code: int) -> None:
         """Cut the motors off and raise an alarm."""
+        self._drop()
         if self.planner.stop(now):
             self.error += self._rng.normal(0, LOST, 3)
         self._clear()
@@ -244,6 +247,20 @@ class Machine:
         self._held_at = None
         self.planner.resume(now)
 
+    def _cancel(self, now: int) -> None:
+        """Process grblHAL's stop: motors halt without braking, every queue is emptied, and it says Idle."""
+        self._drop()
+        if self.planner.stop(now):
+            self.error += self._rng.normal(0, LOST, 3)
+        self._clear()
+        if self._dropped:
+            self._say(now, "ok")
+        self._dropped = False
+
+    def _drop(self) -> None:
+        """Take that the main loop breaks off what it does; it answers before it begins anew."""
+        self._dropped |= self.dwell_ns is not None or self.homing or self.reading
+
     def _raise_alarm(self, code: int, now: int) -> None:
         self.alarm = code
         self._say(now, f"ALARM:{code}")
@@ -251,6 +268,9 @@ class Machine:
 
     def _boot(self, now: int) -> None:
         self._boot_due = None
+        if self._dropped:
+            self._say(now, "ok")
+        self._dropped = False
         self._say(now, "")
         self._say(now, self.firmware.welcome)
         if self.alarm is not None:
@@ -266,14 +286,6 @@ class Machine:
                 except gcode.Refused as refusal:
                     self._say(now, f">{line}:error:{refusal.code}")
 
-    def _gcode(self, line: str, now: int) -> None:
-        if self.alarm is not None or self.state(now) == "Jog":
-            raise gcode.Refused(9)
-        if self._refused:
-            raise gcode.Refused(self._refused)
-        if self._act(line, now):
-            self._say(now, "ok")
-
     def _act(self, line: str, now: int) -> bool:
         """Carry out G-code; return False if its answer comes later or never."""
         if "G51" in line.upper() and not self.firmware.scales:
@@ -281,7 +293,7 @@ class Machine:
         action = gcode.interpret(line, self.modal, self.planner.target - self.error, self.offset)
         if action.target is not None and self._outside(action.target):
             self._hold(now)
-            self._limit_hit = True
+            self._limit_hit = self.reading = True
             return False
         if self.check:
             return True
@@ -309,86 +321,3 @@ class Machine:
         return self.settings["$20"] == "1" and bool(
             np.any(target > 0) or np.any(target < -axis_setting(self.settings, "$13"))
         )
-
-    def _dollar(self, line: str, now: int) -> None:
-        state = self.state(now).split(":")[0]
-        if line.startswith("$J="):
-            self._jog(line[3:], now)
-        elif line == "$G":
-            self._answer(now, [f"[GC:{self.modal.said} T0 F{self.modal.feed:g} S0]"])
-        elif line in ("$", "$$", "$#", "$I", "$N", "$C", "$H", "$X", "$SLP") or "=" in line:
-            if state not in ("Idle", "Alarm", "Check"):
-                raise gcode.Refused(8)
-            self._idle_command(line, now)
-        else:
-            raise gcode.Refused(3)
-
-    def _idle_command(self, line: str, now: int) -> None:
-        bent = self.modal.shift, self.modal.length
-        told = texts.information(line, self.firmware, self.settings, self.offset, self.startup, *bent)
-        if told is not None:
-            self._answer(now, ["error:7"] if line == "$#" and self.unreadable else told)
-        elif line == "$X":
-            self._answer(now, ["[MSG:Caution: Unlocked]"] if self.alarm is not None else [])
-            self.alarm = None
-        elif line == "$C":
-            self.check = not self.check
-            self._answer(now, [f"[MSG:{'Enabled' if self.check else 'Disabled'}]"])
-        elif line == "$SLP":
-            self.sleeping = True
-            self._answer(now, ["[MSG:Sleeping]"])
-        elif line == "$H":
-            self._home(now)
-        elif line.startswith("$N"):
-            self._keep(line, now)
-        else:
-            self._set(line, now)
-
-    def _answer(self, now: int, lines: list[str]) -> None:
-        for text in [*lines, "ok"]:
-            self._say(now, text)
-
-    def _keep(self, line: str, now: int) -> None:
-        number, _, text = line[2:].partition("=")
-        if number not in ("0", "1"):
-            raise gcode.Refused(3)
-        if text:
-            self._act(text, now)
-        self.startup[int(number)] = text
-        self._say(now, "ok")
-
-    def _set(self, line: str, now: int) -> None:
-        name, _, value = line.partition("=")
-        if name not in self.settings:
-            raise gcode.Refused(3)
-        try:
-            if float(value) < 0:
-                raise gcode.Refused(4)
-        except ValueError:
-            raise gcode.Refused(2) from None
-        if (name, value) == ("$20", "1") and self.settings["$22"] != "1":
-            raise gcode.Refused(10)
-        self.settings[name] = value
-        self._say(now, "ok")
-
-    def _home(self, now: int) -> None:
-        if self.settings["$22"] != "1":
-            raise gcode.Refused(5)
-        self.homing, self.error = True, np.zeros(3)
-        self._move(np.full(3, -float(self.settings["$27"])), float(self.settings["$25"]) / 60, now, "Home")
-
-    def _jog(self, line: str, now: int) -> None:
-        if self.alarm is not None:
-            raise gcode.Refused(9)
-        if self.state(now) not in ("Idle", "Jog"):
-            raise gcode.Refused(8)
-        scratch = gcode.Modal(dict(self.modal.words), 0.0)
-        action = gcode.interpret(line, scratch, self.planner.target - self.error, self.offset, jog=True)
-        if action.target is None:
-            raise gcode.Refused(16)
-        if self._outside(action.target):
-            raise gcode.Refused(15)
-        words = dict(gcode.split(line))
-        unit = 25.4 if "G20" in line or (self.modal.unit != 1.0 and "G21" not in line) else 1.0
-        self._move(action.target, words["F"] * unit / 60, now, "Jog")
-        self._say(now, "ok")

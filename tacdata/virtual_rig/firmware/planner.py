@@ -75,9 +75,10 @@ class Planner:
     Neighbouring blocks in line keep the lower of their speeds. At every other corner the machine comes to rest.
     """
 
-    def __init__(self, position: np.ndarray) -> None:
-        """Stand still at ``position`` [mm]."""
+    def __init__(self, position: np.ndarray, prepared: float = 0.0) -> None:
+        """Stand still at ``position`` [mm]; motion is cut into steps ``prepared`` [s] ahead."""
         self.held = False
+        self._prepared_ns = round(prepared * 1e9)
         self.blocks: list[Block] = []
         self._rest = np.array(position, dtype=float)  # position before the first stretch
         self._past: list[Stretch] = []
@@ -102,11 +103,12 @@ class Planner:
                 self._plan(now_ns, way, speed)
 
     def hold(self, now_ns: int) -> None:
-        """Brake to rest from now on [ns], keeping the queue."""
+        """Brake to rest, keeping the queue, as soon as the steps that are prepared by now [ns] are done."""
         with self._lock:
             if self.held:
                 return
             self.held = True
+            now_ns += self._prepared_ns if self.moving(now_ns) else 0
             way, speed = self._cut(now_ns)
             self._ends, elapsed = [], 0.0
             for block in self.blocks:
@@ -128,6 +130,13 @@ class Planner:
                 way, speed = self._cut(now_ns)
                 self.held = False
                 self._plan(now_ns, way, speed)
+
+    def stall(self, now_ns: int, until_ns: int) -> None:
+        """Stand still from now until then [ns], without braking; go on from rest: no steps are prepared meanwhile."""
+        with self._lock:
+            if self.blocks and not self.held:
+                way, _ = self._cut(now_ns)
+                self._plan(until_ns, way, 0.0)
 
     def stop(self, now_ns: int) -> bool:
         """Stop at once and clear the queue; return True if something was moving."""

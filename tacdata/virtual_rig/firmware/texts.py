@@ -61,20 +61,23 @@ class Counters:
 
     wco: int = 0
     overrides: int = 0
+    offset: tuple[float, ...] = ()
+    """The latest offset: a changed one is due at once."""
 
 
 def report(
-    settings: Mapping[str, str], state: str, machine: np.ndarray, speed: float, offset: np.ndarray,
-    free: tuple[int, int], counters: Counters, override: int, pins: str,
+    settings: Mapping[str, str], bits: Mapping[str, int], state: str, machine: np.ndarray, speed: float,
+    offset: np.ndarray, free: tuple[int, int], counters: Counters, override: int, pins: str,
 ) -> str:  # fmt: skip
     """Return a status report (Grbl's `report_realtime_status`).
 
     Args:
         settings: ``$10`` and ``$13`` select fields and unit.
+        bits: The firmware's ``report_bits``.
         state: State with substate.
         machine: Machine position by the controller's count [mm], shape (3,).
         speed: Present speed [mm/s].
-        offset: Work coordinate offset [mm], shape (3,).
+        offset: Work coordinate offset with G92 and the tool's length [mm], shape (3,).
         free: Free planner blocks and bytes of the receive buffer.
         counters: Updated.
         override: Feed override [%].
@@ -85,18 +88,22 @@ def report(
     steps = axis_setting(settings, "$10")
     position = np.round(machine * steps) / steps - (0 if mask & 1 else offset)
     fields = [state, f"{'MPos' if mask & 1 else 'WPos'}:{triple(position / unit, digits)}"]
-    if mask & 2:
+    told = {name for name in ("Bf", "FS", "Pn", "WCO", "Ov") if name not in bits or mask & bits[name]}
+    if "Bf" in told:
         fields.append(f"Bf:{free[0]},{free[1]}")
-    fields.append(f"FS:{60 * speed / unit:.0f},0")
-    if pins:
+    if "FS" in told:
+        fields.append(f"FS:{60 * speed / unit:.{digits - 3}f},0")
+    if pins and "Pn" in told:
         fields.append(f"Pn:{pins}")
+    if counters.offset != tuple(offset):
+        counters.wco, counters.offset = 0, tuple(offset)
     busy = state.split(":")[0] in ("Run", "Hold", "Jog", "Door", "Home")
     if counters.wco == 0:
         counters.wco, counters.overrides = WCO_PERIOD[busy], max(counters.overrides, 1)
-        fields.append(f"WCO:{triple(offset / unit, digits)}")
+        fields += [f"WCO:{triple(offset / unit, digits)}"] if "WCO" in told else []
     elif counters.overrides == 0:
         counters.overrides = OV_PERIOD[busy]
-        fields.append(f"Ov:{override},100,100")
+        fields += [f"Ov:{override},100,100"] if "Ov" in told else []
     counters.wco -= 1
     counters.overrides -= counters.overrides > 0
     return f"<{'|'.join(fields)}>"

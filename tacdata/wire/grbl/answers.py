@@ -9,6 +9,7 @@ next status report, as soon as the machine leaves the path that was sent (`tacda
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 
 from tacdata.errors import DeviceError
 from tacdata.wire.grbl import codes
@@ -17,12 +18,30 @@ from tacdata.wire.grbl.lines import RESPONSE
 ECHO = re.compile(r"^\[(?:MSG:\w+:? ?)?echo: ?(.*?)\]?$")
 """A received line sent back (Grbl's `report_echo_line_received`); FluidNC leaves the last bracket away."""
 
+UNASKED_ANSWER = (
+    "the controller sent {!r}, and no line was waiting for an answer: answers no longer belong to their lines",
+    "one answer for each line",
+    "see that no other program and no second controller uses this line, then start again",
+)
+"""Given, allowed, remedy: what is wrong with an answer too many."""
+
+
+@dataclass
+class SentLine:
+    """A line that waits for its answer."""
+
+    text: str
+    answer: str | None = None
+    pushed: list[str] = field(default_factory=list)
+    """Other lines that came before its answer."""
+
 
 def refusal(line: str, answer: str) -> DeviceError | None:
     """Return why a line was not carried out, by its answer; None if it was."""
     if answer == "ok":
         return None
     accepted = "a line that it accepts in its present state"
+    what = repr(line) if line else "an empty line"
     if not (code := RESPONSE.match(answer)):
         return DeviceError(
             f"the line {line!r} was dropped by a reset", accepted, "send it again when the machine is idle"
@@ -30,9 +49,10 @@ def refusal(line: str, answer: str) -> DeviceError | None:
     why = codes.error_in_words(int(code[1])) if code[1] else answer
     damaged = code[1] and int(code[1]) in codes.DAMAGED_LINE
     return DeviceError(
-        f"the controller refused {line!r}: {why}",
+        f"the controller refused {what}: {why}",
         accepted,
-        "it was well formed: bytes of it were lost or changed on their way, so check cable, ground and baud rate"
+        "it was well formed: bytes of it were lost or changed on their way, so check cable, ground and baud rate, and "
+        "that no other program sends bytes of its own"
         if damaged and not line.startswith("$")
         else "correct the controller's settings",
     )
@@ -45,5 +65,5 @@ def changed_on_its_way(sent: str, echo: str) -> DeviceError | None:
     return DeviceError(
         f"the line {sent!r} came back as {echo!r}: it was changed on its way, there or back",
         "an echo that is equal to what was sent",
-        "check cable, ground and baud rate, then start again; a session goes on with --resume",
+        "check cable, ground and baud rate, then start again",
     )

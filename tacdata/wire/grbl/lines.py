@@ -22,8 +22,12 @@ OPENED_AGAIN = ("Hold:0", "Door:0")
 """States of a machine at rest that waits for a cycle start."""
 MOVING = ("Run", "Jog", "Home")
 """States, without their substate, in which something moves."""
-BRAKING = ("Hold:1", "Door:2", "Door:3")
-"""States that end by themselves, in which a reset would lose steps: braking for a hold or a door, or going on."""
+AT_REST = (*OPENED_AGAIN, "Door:1", "Idle", "Alarm")
+"""States in which nothing moves."""
+BRAKING = ("Hold:1", "Door:2", "Door:3", "Door:4")
+"""States that end by themselves, in which a reset would lose steps: braking for a hold or a door, or going on (Grbl
+``Door:3``, grblHAL ``Door:4``).
+"""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any
 
 import serial
@@ -14,13 +13,13 @@ from tacdata.clock import Clock
 from tacdata.errors import DeviceError
 from tacdata.wire.delivered import CncStatus
 from tacdata.wire.grbl import codes
-from tacdata.wire.grbl.answers import ECHO, changed_on_its_way, refusal
+from tacdata.wire.grbl.answers import ECHO, UNASKED_ANSWER, SentLine, changed_on_its_way, refusal
 from tacdata.wire.grbl.lines import ALARM, RESPONSE, WELCOME, StatusReport, parse_status
 from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.statuses import Statuses
-from tacdata.wire.grbl.watch import WELCOME_IN_MID_STREAM, what_is_wrong
+from tacdata.wire.grbl.watch import SILENT, UNREADABLE, WELCOME_IN_MID_STREAM, stopped_by, what_is_wrong
 from tacdata.wire.patience import Patience
-from tacdata.wire.serial_port import read_available, write_all
+from tacdata.wire.serial_port import read_available, why_broken, write_all
 
 SILENCE = 3.0
 """Time without an answer after which the controller counts as gone [s of the clock, and of real time, since an emulator
@@ -32,15 +31,6 @@ RX_BYTES = 128
 """Size of the receive buffer until the controller states its own [bytes]; Grbl 1.1's."""
 READ_FAILED = "error:7"
 """Sent by ``$#`` and ``$N`` for each entry that cannot be read, before their own answer."""
-
-
-@dataclass
-class _Line:
-    """A line that waits for its answer."""
-
-    text: str
-    answer: str | None = None
-    pushed: list[str] = field(default_factory=list)
 
 
 class GrblLink:
@@ -66,18 +56,22 @@ class GrblLink:
         """Whether the controller sends received lines back, so that they can be compared."""
         self.halted = False
         """Whether the controller itself has ended all motion: an alarm, a restart, motors switched off."""
+        self.alarm: int | None = None
+        """Number of the latest alarm, as far as it was said; None once a report shows another state."""
         self.pendant = False
         """Whether a pendant has control, as far as a report has said."""
         self.interruption: DeviceError | None = None
+        self._unasked = False  # whether an answer came that no line waited for
         self.notes: list[str] = []
         self.seen = bytearray()  # first bytes ever received, for a person who has to guess the baud rate
         self.statuses = Statuses(clock)
         self.homing = False
         self._held = False
-        self._unanswered: deque[_Line] = deque()
+        self._unanswered: deque[SentLine] = deque()
         step = max(0.25, 2.0 / (poll_rate * clock.rate))  # it is looked at once a poll
         self._silence = Patience(SILENCE, clock.rate, SILENCE, step, clock.host)
-        self._unread = ""  # the latest report that could not be read, since one that could
+        self.unread = ""
+        """The latest report that could not be read, since one that could."""
         self._commanded_ns = clock.now_ns()
         self._welcome_expected, self._reset_asked = True, False
         self.polled = False
@@ -171,7 +165,7 @@ class GrblLink:
                 f"at most {min(LINE_BYTES + 1, self.rx_bytes) - 1} bytes, as its buffers hold no more",
                 "shorten the line",
             )
-        entry = _Line(line)
+        entry = SentLine(line)
         with self._turn:
             room = Owed("room in the controller's receive buffer", limit, motion)
             self.wait(lambda: self._room() >= len(data), room)
@@ -234,8 +228,8 @@ class GrblLink:
         self._write(b"\x18")
         try:
             self.wait(lambda: bool(self.welcome), Owed("the welcome after a soft reset", timeout), through_hold=True)
-        finally:
-            self._welcome_expected, self._reset_asked = not self.polled, False
+        finally:  # one that was interrupted is still answered
+            self._welcome_expected, self._reset_asked = not (self.polled and self.welcome), not self.welcome
 
     def hear(self, seconds: float) -> bool:
         """Wait at most ``seconds`` [s, real time] for a welcome or a status report; return whether one came."""
@@ -269,7 +263,7 @@ class GrblLink:
 
     def _broken(self, error: Exception) -> tuple[str, str, str]:
         return (
-            f"the line to the controller on {self.port.port} broke: {error}",
+            f"the line to the controller on {self.port.port} broke: {why_broken(error)}",
             "a port that stays connected",
             "check the cable and the power; the position is unknown, home or touch off again",
         )
@@ -292,20 +286,20 @@ class GrblLink:
             if self.homing:
                 self._silence.restart()
             elif self._silence.over():
-                unread = f"; it sends reports that cannot be read: {self._unread!r}" if self._unread else ""
-                self._fail(
-                    f"the controller on {self.port.port} said nothing of use for {SILENCE:g} s{unread}"
-                    if unread
-                    else f"the controller on {self.port.port} is silent: no answer to ? for {SILENCE:g} s",
-                    f"an answer to ? within {SILENCE:g} s",
-                    "check power and cable; the position is unknown, home or touch off again",
-                    lost=True,
-                )
+                self._take_silence()
             if self.fault is None:
                 try:
                     self.ask()
                 except DeviceError:
                     return
+
+    def _take_silence(self) -> None:
+        if self.unread:  # it is there, and a report that can be read may come again
+            given = UNREADABLE[0].format(self.port.port, self.unread)
+            self.interruption = self.interruption or DeviceError(given, *UNREADABLE[1:])
+            return
+        given, allowed, remedy = SILENT
+        self._fail(given.format(self.port.port, SILENCE), allowed.format(SILENCE), remedy, lost=True)
 
     def _listen(self) -> None:
         buffer = bytearray()
@@ -320,7 +314,7 @@ class GrblLink:
             if not data:
                 continue
             self.seen += data[: 64 - len(self.seen)] if len(self.seen) < 64 else b""
-            buffer += data
+            buffer += data.replace(b"\r", b"\n")  # some firmwares end lines with one, some with the other
             while (end := buffer.find(b"\n")) >= 0:
                 line = bytes(buffer[:end]).decode("ascii", "replace").strip("\r \x00")
                 del buffer[: end + 1]
@@ -336,21 +330,13 @@ class GrblLink:
                 if report:
                     self._take_status(report, arrival_ns)
                 else:
-                    self._unread = line
+                    self.unread = line
+                    self.statuses.spoilt()
                     self.notes.append(f"damaged status report: {line!r}")
             elif RESPONSE.match(line):
                 self._take_response(line)
             elif alarm := ALARM.match(line):
-                kept = alarm[1] and int(alarm[1]) in codes.POSITION_KEPT
-                self.halted = True
-                self._fail(
-                    f"the controller stopped with {codes.alarm_in_words(int(alarm[1])) if alarm[1] else line}",
-                    "motion without an alarm",
-                    "unlock it ($X) in a terminal, which keeps the position, then start again"
-                    if kept
-                    else "free the machine by hand if need be, then home it and start again",
-                    lost=not kept,
-                )
+                self._take_alarm(line, int(alarm[1]) if alarm[1] else None)
             elif WELCOME.search(line):
                 self._take_welcome(line)
             elif self._unanswered and (echo := ECHO.match(line)):
@@ -367,9 +353,18 @@ class GrblLink:
             with suppress(DeviceError):  # a broken line is known already
                 self.hold()
 
+    def _take_alarm(self, line: str, number: int | None) -> None:
+        self.alarm = number
+        if self.polled or self.homing:  # at its start grblHAL says why it is locked; opening tells a person
+            self.halted = True
+            self._fail(*stopped_by(number, line), lost=number not in codes.POSITION_KEPT)
+
     def _take_response(self, line: str) -> None:
         if not self._unanswered:
             self.notes.append(f"unasked {line}")
+            if self.polled and not self._welcome_expected and not self._unasked:
+                self._unasked, given = True, UNASKED_ANSWER[0].format(line)  # once: the lift must go through
+                self.interruption = self.interruption or DeviceError(given, *UNASKED_ANSWER[1:])
         elif line == READ_FAILED and self._unanswered[0].text.startswith("$"):
             self._unanswered[0].pushed.append(line)
         else:
@@ -388,11 +383,16 @@ class GrblLink:
 
     def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
         self._silence.restart()
-        self._unread = ""
+        self.unread = ""
         self.pendant = self.pendant if report.pendant is None else report.pendant
+        again = self.last is not None and self.last.state == report.state
+        before = self.last.position if again and self.last else None
+        number = report.state.partition(":")[2]
+        self.alarm = None if report.state[:5] != "Alarm" else int(number) if number else self.alarm
         self.statuses.take(report, arrival_ns)
         if self.polled and not self._welcome_expected:
-            wrong, for_good = what_is_wrong(report, self._held, self.homing)
+            still = bool(before is not None and self.last and (before == self.last.position).all())
+            wrong, for_good = what_is_wrong(report, self._held, self.homing, again, still)
             if wrong and for_good:
                 self.halted = True
                 self._fail(*wrong, lost=self.fault is None)  # an alarm's own line, if it came first, said what is lost

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from tacdata.errors import DeviceError
+from tacdata.wire.delivered import OwesAnswer
+from tacdata.wire.grbl import codes
 from tacdata.wire.grbl.lines import OPENED_AGAIN, WELCOME
 from tacdata.wire.grbl.link import GrblLink
 from tacdata.wire.grbl.settings import STATE, UNDONE_BY, GrblSettings
@@ -19,6 +21,12 @@ ATTEMPTS, SETTLE = 3, 0.5
 """Questions for the version [count], and the pause after one in which late answers come [s, real time]."""
 TALKS = ("Idle", "Alarm")
 """States in which ``$`` commands are answered."""
+DEAF = (1, 2, 17)
+"""Alarms of a machine at rest that obeys no line before a reset (grblHAL: ``error:79``, or no answer in older ones;
+Grbl says nothing at all then). The emergency stop is not among them: while it is active, a reset ends nothing.
+"""
+TELL_ALL = b"\x87"
+"""grblHAL's query for a report with all fields, the alarm's number among them. FluidNC runs a macro at it."""
 FULL_SPEED = (b"\x90", b"\x95")
 """Set feed and rapid override back to 100 %; moves nothing."""
 REMEDIES = {
@@ -47,7 +55,6 @@ def greet(link: GrblLink, baud: int) -> None:
         if link.hear(FIRST_QUERY):
             link.check()
             _refuse_old(link)
-            _place(link)
             return
         link.ask()
     raise _silent(link, baud)
@@ -56,8 +63,8 @@ def greet(link: GrblLink, baud: int) -> None:
 def _place(link: GrblLink) -> None:
     """Ask for the offset of work positions, where the reports never contain it (grblHAL with ``$10=0``)."""
     if link.statuses.unplaced:
-        link.statuses.offset = GrblSettings.read(link, ANSWER, STATE).work_offset
-        if link.statuses.offset is None:
+        link.statuses.place(GrblSettings.read(link, ANSWER, STATE).work_offset)
+        if link.statuses.unplaced:
             raise DeviceError(
                 f"the controller on {link.port.port} reports work positions and does not say their offset",
                 "machine positions, or work positions with WCO",
@@ -72,14 +79,16 @@ def straighten(link: GrblLink) -> tuple[str, ...]:
     Raises:
         DeviceError: If it cannot be ended.
     """
-    bent = GrblSettings.read(link, ANSWER, STATE).bent_by
+    now = GrblSettings.read(link, ANSWER, STATE)
+    bent = now.bent_by
     for word in dict.fromkeys(UNDONE_BY[found][0] for found in bent):
         link.command(word, ANSWER)
-    left = GrblSettings.read(link, ANSWER, STATE).bent_by if bent else ()
-    if left:
+    now = GrblSettings.read(link, ANSWER, STATE) if bent else now
+    link.statuses.place(now.work_offset)
+    if left := now.bent_by:
         raise DeviceError(
-            f"the controller on {link.port.port} bends coordinates and does not end it: {_named(left)}",
-            "machine coordinates as they are",
+            f"the controller on {link.port.port} does not leave a state that spoils every move: {_named(left)}",
+            "machine coordinates as they are, and a spindle at rest",
             "end it in a terminal; see its start-up lines ($N) and macros",
         )
     return tuple(f"{_named((word,))} was active and was ended ({UNDONE_BY[word][0]})" for word in bent)
@@ -90,15 +99,21 @@ def _named(words: tuple[str, ...]) -> str:
 
 
 def clear(link: GrblLink) -> str:
-    """End a hold at rest (nothing moves) and return the state that was found.
+    """End a hold at rest, or an alarm that hears no line (nothing moves); return the state that was found.
 
     Raises:
         DeviceError: If the machine is moving, or in another state that only a person should end.
     """
-    found = link.fresh_status(ANSWER).state
-    if found in OPENED_AGAIN:
+    found = _state(link)
+    if found in OPENED_AGAIN or (found.startswith("Alarm") and link.alarm in DEAF):
         link.soft_reset(ANSWER)
-    state = link.fresh_status(ANSWER).state
+    state = _state(link)
+    if link.pendant:
+        raise DeviceError(
+            f"a pendant has control of the controller on {link.port.port} (MPG:1): lines from here are ignored",
+            "one master",
+            "give control back at the pendant, then try again",
+        )
     if state.split(":")[0] not in TALKS:
         raise DeviceError(
             f"the controller on {link.port.port} is in state {state}",
@@ -106,6 +121,7 @@ def clear(link: GrblLink) -> str:
             REMEDIES.get(state.split(":")[0], "bring it to Idle, then try again"),
         )
     attune(link)
+    _place(link)
     for override in FULL_SPEED:
         link.realtime(override)
     return found
@@ -120,26 +136,61 @@ def attune(link: GrblLink) -> None:
     Raises:
         DeviceError: If the question is refused each time.
     """
+    unanswered = 0
     for attempt in range(1, ATTEMPTS + 1):
         try:
             if any(line.startswith("[VER:") for line in link.command("$I", ANSWER)[0]):
                 return
-        except DeviceError:
-            if attempt == ATTEMPTS or link.fault:
+        except DeviceError as error:
+            if link.fault:
                 raise
+            unanswered += isinstance(error, OwesAnswer)
+            if ATTEMPTS in (attempt, unanswered + 1):
+                raise DeviceError(
+                    f"the controller on {link.port.port} answers ? but no line: {error.given}",
+                    "answers to lines, too",
+                    "see that no pendant (MPG) and no other program has control of it; reset it if it hangs",
+                ) from None
+            if link.last and link.last.state.startswith("Alarm"):
+                _reset(link)
         link.clock.host.sleep(SETTLE)
+
+
+def name_alarm(link: GrblLink, settings: GrblSettings) -> None:
+    """Ask a locked grblHAL for its alarm's number. Reports state it only with a bit of ``$10``."""
+    if link.alarm is None and settings.is_hal:
+        link.realtime(TELL_ALL)
+        link.clock.host.sleep(SETTLE)
+
+
+def unblock(link: GrblLink) -> None:
+    """Reset a controller that obeys no line before. Nothing moves."""
+    if link.alarm in DEAF:
+        _reset(link)
+
+
+def _state(link: GrblLink) -> str:
+    return link.statuses.unplaced or link.fresh_status(ANSWER).state
+
+
+def _reset(link: GrblLink) -> None:
+    link.soft_reset(ANSWER)
+    _place(link)
 
 
 def locked(link: GrblLink, settings: GrblSettings) -> DeviceError:
     """Return what to tell a person whose controller is in alarm."""
-    state = link.last.state if link.last else "Alarm"
+    why = codes.alarm_in_words(link.alarm) if link.alarm else "state Alarm"
+    kept = link.alarm in codes.POSITION_KEPT
     home = (
-        "home it ($H), or set home: true under cnc in the rig file (every axis moves at opening)"
+        codes.UNLOCK
+        if kept
+        else "home it ($H), or set home: true under cnc in the rig file (every axis moves at opening)"
         if settings.homing
         else "unlock it ($X) in a terminal and touch off again; homing is switched off ($22=0)"
     )
     return DeviceError(
-        f"the controller on {link.port.port} is locked (state {state}): its position is not known",
+        f"the controller on {link.port.port} is locked ({why})" + ("" if kept else ": its position is not known"),
         "a homed controller in state Idle",
         home,
     )

@@ -23,9 +23,11 @@ UNDONE_BY = {
     "G43": ("G49", "tool length offset"), "G43.1": ("G49", "tool length offset"),
     "G43.2": ("G49", "tool length offset"), "G92": ("G92.1", "offset of the axes"), "G20": ("G21", "inches"),
     "G91": ("G90", "relative positions"), "G93": ("G94", "inverse time feed"), "G95": ("G94", "feed per turn"),
+    "G7": ("G8", "x as a diameter"), "M3": ("M5", "spindle on"), "M4": ("M5", "spindle on, backwards"),
+    "M53": ("M53P1", "feed hold switched off"),
 }  # fmt: skip
-"""Modal state that changes coordinates or speeds -> the word that ends it, and its description. Every move contains
-G53, G90, G21 and G94, but grblHAL scales and rotates G53 lines too.
+"""Modal state that changes coordinates or speeds, turns the tip, or lets it go on -> the word that ends it, and its
+description. Every move contains G53, G90, G21 and G94, but grblHAL scales and rotates G53 lines too.
 """
 
 
@@ -51,7 +53,8 @@ class GrblSettings:
                 elif setting := SETTING.match(pushed):
                     answers[setting[1]] = setting[2]
                 elif message := MESSAGE.match(pushed):
-                    before = f"{answers[message[1]]}; " if message[1] in answers else ""
+                    again = message[1] in answers and message[1] != "GC"  # grblHAL also sends it when it changes
+                    before = f"{answers[message[1]]}; " if again else ""
                     answers[message[1]] = before + message[2]
         return cls(answers)
 
@@ -72,9 +75,14 @@ class GrblSettings:
         return int(parts[2]) if len(parts) > 2 and parts[2].isdigit() else None
 
     @property
+    def is_hal(self) -> bool:
+        """Whether the firmware is grblHAL."""
+        return "grblHAL" in self.answers.get("FIRMWARE", "")
+
+    @property
     def homing(self) -> bool:
-        """Whether homing is switched on (``$22``)."""
-        return bool(self.number("$22"))
+        """Whether homing is switched on (bit 0 of ``$22``; grblHAL has more)."""
+        return bool(int(self.number("$22")) & 1)
 
     @property
     def work_offset(self) -> np.ndarray | None:
@@ -91,7 +99,8 @@ class GrblSettings:
     @property
     def bent_by(self) -> tuple[str, ...]:
         """Modal state that changes coordinates, by its G word (`UNDONE_BY`)."""
-        words = [word for word in self.answers.get("GC", "").split() if word in UNDONE_BY]
+        modal = (word.split(":")[0] for word in self.answers.get("GC", "").split())  # grblHAL: G51:XYZ
+        words = [word for word in modal if word in UNDONE_BY]
         for tag, word in (("G92", "G92"), ("TLO", "G43.1")):
             already = any(UNDONE_BY[w][0] == UNDONE_BY[word][0] for w in words)
             if any(_numbers(self.answers.get(tag, ""))) and not already:
@@ -108,9 +117,8 @@ class GrblSettings:
         length = np.array([self.number(f"$13{axis}") for axis in range(3)])
         if not self.number("$20") or not np.all(length > 0):
             return None
-        codes = self.answers.get("OPT", "").partition(",")[0]
-        at_switch = "grblHAL" not in self.answers.get("FIRMWARE", "") and "Z" in codes
-        at_switch = at_switch or ("grblHAL" in self.answers.get("FIRMWARE", "") and bool(int(self.number("$22")) & 8))
+        built_so = "Z" in self.answers.get("OPT", "").partition(",")[0]
+        at_switch = bool(int(self.number("$22")) & 8) if self.is_hal else built_so
         upwards = np.array([bool(int(self.number("$23")) >> axis & 1) for axis in range(3)]) & at_switch
         return np.where(upwards, 0.0, -length), np.where(upwards, length, 0.0)
 

@@ -37,8 +37,11 @@ class Statuses:
         self.automatic = False
         """Whether the controller reports by itself; it then leaves ``?`` unanswered (grblHAL, ``$481``)."""
         self.last: CncStatus | None = None
-        self.unplaced = False
-        """Whether work positions came before their offset was known."""
+        self.unplaced = ""
+        """State of the latest report whose work position lacks a known offset; empty otherwise."""
+        self.damaged = 0
+        """Reports that could not be read [count]."""
+        self._tells_offset = self._is_work = False  # whether a report has contained it; whether they are work positions
         self._queries: deque[int] = deque()  # when those went out that may not be answered yet [ns]
         self._asked_at = self._answered_at = 0.0
         self._answered = False  # whether a report has come since the latest query
@@ -61,16 +64,31 @@ class Statuses:
         return True
 
     def forget(self) -> None:
-        """Forget all queries, after a reset."""
+        """Forget all queries, and an offset that no report tells. A reset changes it."""
         self._queries.clear()
+        if not self._tells_offset and self._is_work:
+            self.offset, self.unplaced = None, "Idle"
+
+    def place(self, offset: np.ndarray | None) -> None:
+        """Take the offset [report units], shape (3,), unless reports tell it."""
+        if offset is not None and not self._tells_offset:
+            self.offset, self.unplaced = offset, ""
+
+    def spoilt(self) -> None:
+        """Take that a report cannot be read. The next query need not wait."""
+        self.damaged += 1
+        if self._queries:
+            self._queries.popleft()
+        self._answered_at, self._answered = self._clock.host.monotonic(), True
 
     def take(self, report: StatusReport, arrival_ns: int) -> CncStatus | None:
         """Take a report; return it in mm, or None if its position cannot be known yet."""
         sent_ns = self._queries.popleft() if self._queries else None
         self._answered_at, self._answered = self._clock.host.monotonic(), True
         if report.offset is not None:
-            self.offset = report.offset
-        self.unplaced = report.is_work and self.offset is None
+            self.offset, self._tells_offset = report.offset, True
+        self._is_work = report.is_work
+        self.unplaced = report.state if report.is_work and self.offset is None else ""
         if self.unplaced:
             return None  # a work position without its offset is no machine position
         if sent_ns is None or self.automatic:

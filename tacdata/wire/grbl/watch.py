@@ -11,9 +11,20 @@ Words = tuple[str, str, str]
 WELCOME_IN_MID_STREAM: Words = (
     "the controller was reset in mid-stream (it said {!r}); its position is lost",
     "one welcome, when the port is opened",
-    "check its power supply and cable (a brown-out does this); home or touch off again",
+    "check its power supply and cable (a brown-out does this), and that no other program uses its port (one can reset "
+    "it); home or touch off again",
 )
-AGAIN = "start again; a session goes on with --resume"
+SILENT: Words = (
+    "the controller on {} is silent: no answer to ? for {:g} s",
+    "an answer to ? within {:g} s",
+    "check power and cable; the position is unknown, home or touch off again",
+)
+UNREADABLE: Words = (
+    "the controller on {} sends reports that cannot be read: {!r}",
+    "reports with a position in numbers",
+    "check cable, ground and baud rate, then start again",
+)
+AGAIN = "start again"
 RESUME = f"see why, put it right, then {AGAIN}"
 UNASKED = {
     "Hold": ("someone held the motion (a button, or another program)", "no hold", RESUME),
@@ -37,29 +48,48 @@ SCALED: Words = (
 )
 LOST = ("Sleep",)
 """States after which the position is unknown."""
+KNOWN = {"Idle", "Run", "Dwell", "Alarm", *UNASKED}
+"""States that Grbl, grblHAL and FluidNC have, and GRBL-Advanced (``Dwell``, in a pause)."""
 
 
-def what_is_wrong(report: StatusReport, held: bool, homing: bool) -> tuple[Words | None, bool]:
+def stopped_by(number: int | None, line: str) -> Words:
+    """Return what to say of an alarm in motion."""
+    kept = number in codes.POSITION_KEPT
+    return (
+        f"the controller stopped with {codes.alarm_in_words(number) if number else line}",
+        "motion without an alarm",
+        codes.UNLOCK if kept else "free the machine by hand if need be, then home it and start again",
+    )
+
+
+def what_is_wrong(
+    report: StatusReport, held: bool, homing: bool, again: bool = False, still: bool = False
+) -> tuple[Words | None, bool]:  # fmt: skip
     """Return what is wrong by a report, or None, and whether that is permanent.
 
     Args:
         report: A report of a machine that was opened and made ready.
         held: Whether we sent the hold.
         homing: Whether we started the homing.
+        again: Whether the report before named the same state; one that nobody knows may be damaged.
+        still: Whether it named the same state and place.
     """
     state, _, substate = report.state.partition(":")
     if state == "Alarm":
-        why = f": {codes.alarm_in_words(int(substate))}" if substate else ""
+        why = codes.alarm_in_words(int(substate)) if substate else f"state {report.state}"
         words = (
-            f"the controller is locked (state {report.state}{why})",
+            f"the controller is locked ({why})",
             "a machine without an alarm",
             "free it by hand if need be, then home or unlock it and record again",
         )
         return words, True
     # A machine that still brakes (Hold:1) may be about to send an alarm with the reason.
-    ours = (state == "Hold" and (held or substate != "0")) or (state == "Home" and homing)
+    ours = (state == "Hold" and (held or (substate == "1" and not still))) or (state == "Home" and homing)
     if state in UNASKED and not ours:
         return UNASKED[state], state in LOST
+    if state not in KNOWN and again:
+        return (f"the controller reports the state {report.state!r}, which is not known here", "Idle or Run",
+                f"see its firmware's manual, bring it to Idle, then {AGAIN}"), False  # fmt: skip
     if report.pendant:
         return PENDANT, False
     if report.scaled:

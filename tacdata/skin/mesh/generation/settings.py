@@ -10,7 +10,7 @@ class MeshSettings:
     """Target edge lengths [mm].
 
     The default ones give some 10,200 nodes. Solutions then differ from independent ones by 1 % in force, and by 5 % of
-    the largest in each protrusion's force (`tests/skin/test_skin_reference.py`, decision 0019).
+    the largest in each protrusion's force (`tests/skin/model/test_skin_reference.py`, decision 0019).
 
     Example:
         >>> from tacdata.skin.mesh.generation.settings import MeshSettings

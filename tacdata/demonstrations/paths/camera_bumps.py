@@ -1,0 +1,273 @@
+"""A camera that was bumped while recording: since when, by how much, and which of them it was.
+
+Two cameras see the same fingers. If one is moved, the distance between their two paths jumps, and stays. Which of them
+moved is decided by the fingers' motion: through the eyes of the moved camera every finger jumps, through those of the
+other none does. From the bump on the moved camera's place is a state of the filter with a wide prior, as if it were
+another camera. So its sightings still tell the motion, and the other camera tells the place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from tacdata.demonstrations.paths.motion_density import choose
+from tacdata.demonstrations.paths.motion_filter import ProcessNoise, smooth
+from tacdata.demonstrations.paths.sightings import CameraError, Sightings
+
+SMALLEST = 0.0008
+"""Smallest jump at the fingers that is looked for [m]."""
+CLEAR = 5.0
+"""Smallest jump, over its standard error [1]."""
+EVIDENT = 12.0
+"""Smallest log-likelihood ratio of a step in the camera's place against none [nats]."""
+LOCAL = 20
+"""Pairs of sightings on each side of a bump that must show it: a jump, no slow slip [count]."""
+AGREEING = 0.5
+"""Share of a jump that these pairs must show [1]."""
+SPACED = 0.2
+"""Largest interval between sightings over which a camera's path is interpolated [s]."""
+WINDOW = 3.0
+"""Time on each side of a bump in which the motion tells which camera moved [s]."""
+CANDIDATES = 4
+"""Sightings on each side of the likeliest moment at which the bump may have been [count]."""
+DECISIVE = 5.0
+"""Difference of log-likelihoods that decides between two cameras [nats]."""
+WIDE = 0.02, float(np.radians(2.0))
+"""Smallest prior standard deviation of the place [m] and rotation [rad] of a camera whose images show a bump."""
+ROOM = 3.0, 1.0
+"""The same over the jump between two cameras [1]: of the one that moved, and of either of two."""
+MARGIN = 60_000_000
+"""Time by which a bump that shows between cameras may be earlier or later [ns]: about an image."""
+MOST = 4
+"""Largest number of bumps that are looked for in a recording [count]."""
+
+
+@dataclass(frozen=True)
+class Bump:
+    """One camera stands elsewhere than its file says, from a time on."""
+
+    camera: str
+    begin_ns: int
+    """First time at which it may stand elsewhere [ns]."""
+    sure_ns: int
+    """First time at which it surely does [ns]; what it saw in between is left out."""
+    end_ns: int | None
+    """Time from which it stands as before, or elsewhere again [ns]; None to the end."""
+    size: float
+    """Distance by which it displaces what it sees, at the fingers [m]."""
+    words: str
+    """What was noticed, for a person."""
+    room: float = 0.0
+    """Prior standard deviation of the camera's place, over the size [1]; 0 if images show it."""
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Prior standard deviation of place [m] and rotation [rad]."""
+        most = self.room * self.size or max(WIDE[0], 2 * self.size)
+        return most, WIDE[1] * most / WIDE[0]
+
+
+def jumps(seen: Mapping[str, Sightings], begin_ns: int) -> list[Bump]:
+    """Return the bumps that show between cameras, by their time.
+
+    Args:
+        seen: Finger -> its sightings.
+        begin_ns: Beginning of the demonstration [ns], for words.
+    """
+    found: list[Bump] = []
+    cameras = sorted({camera for one in seen.values() for camera in one.camera})
+    for one, other in combinations(cameras, 2):
+        steps = _steps(_apart(seen, one, other))
+        for k, (moment, size) in enumerate(steps):
+            # Another bump close by must not stand for this one.
+            first = max([_before(seen, (one, other), moment), *(t for t, _ in steps[:k])])
+            last = min([moment + WINDOW * 1e9, *(t for t, _ in steps[k + 1 :])])
+            which, at, gain = _which(seen, (one, other), moment, (first, last))
+            if gain < EVIDENT:
+                continue
+            if any(b.camera in which and abs(b.sure_ns - at) < 1e9 for b in found):
+                continue  # a third camera shows the same bump
+            seconds, jump = (at - begin_ns) * 1e-9, f"{1000 * size:.1f} mm apart where they agreed before"
+            if len(which) == 1:
+                rest = other if which[0] == one else one
+                words = f"it shows the fingers {jump}, against camera {rest}"
+            else:
+                words = f"it and camera {{}} show the fingers {jump}, and the motion does not tell which of them moved"
+            for name in which:
+                rest = other if name == one else one
+                start = f"camera {name} was moved {seconds:.1f} s after the beginning: "
+                room = ROOM[len(which) - 1]
+                found.append(Bump(name, at - MARGIN, at + MARGIN, None, size, start + words.format(rest), room))
+    return sorted(found, key=lambda bump: bump.begin_ns)
+
+
+def split(seen: Mapping[str, Sightings], bumps: Sequence[Bump]) -> dict[str, Sightings]:
+    """Return sightings in which a camera that was moved is another camera, whose place is hardly known.
+
+    Sightings of the moment itself are left out: where the camera stood then is not known.
+    """
+    made = dict(seen)
+    for number, bump in enumerate(bumps):
+        name = f"{bump.camera} (moved, {number + 1})"
+        for finger, found in made.items():
+            moment = (found.time_ns >= bump.begin_ns) & (found.time_ns < bump.sure_ns)
+            found = found.where(~(moment & _of(found, bump.camera)))
+            made[finger] = found
+            moved = _of(found, bump.camera) & (found.time_ns >= bump.sure_ns)
+            if bump.end_ns is not None:
+                moved &= found.time_ns < bump.end_ns
+            if moved.any():
+                made[finger] = _renamed(found, moved, bump, name)
+    return made
+
+
+def unmoved(seen: Sightings) -> np.ndarray:
+    """Return which sightings are of cameras that stand where their files say, shape (p,), bool."""
+    return np.array([" (moved" not in camera for camera in seen.camera], bool)
+
+
+def _before(seen: Mapping[str, Sightings], cameras: tuple[str, str], moment: int) -> float:
+    """Return from when on sightings before a moment tell the place before it [ns]: earlier if fingers were hidden."""
+    first = [moment - WINDOW * 1e9]
+    for camera in cameras:
+        times = np.sort(np.concatenate([found.time_ns[_of(found, camera)] for found in seen.values()]))
+        times = times[times < moment]
+        first += [float(times[-min(len(times), LOCAL * len(seen))])] if len(times) else []
+    return min(first)
+
+
+def _of(seen: Sightings, camera: str) -> np.ndarray:
+    """Return which sightings are of a camera, moved or not, shape (p,), bool."""
+    return np.array([name.partition(" (moved")[0] == camera for name in seen.camera], bool)
+
+
+def _renamed(seen: Sightings, moved: np.ndarray, bump: Bump, name: str) -> Sightings:
+    cameras = tuple(name if hit else camera for hit, camera in zip(moved, seen.camera, strict=True))
+    known = seen.cameras.get(bump.camera)
+    # Without a stated error the camera's place is not known here; a turn about the fingers themselves does as well.
+    place = seen.position[moved].mean(axis=0) if known is None else known.place
+    return replace(seen, camera=cameras, cameras={**seen.cameras, name: CameraError(place, bump.spread)})
+
+
+def _apart(seen: Mapping[str, Sightings], one: str, other: str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return, for each finger, times [ns] at which one camera saw it and its distance from the other's path [m]."""
+    pairs = []
+    for found in seen.values():
+        own, rest = (np.array([camera == name for camera in found.camera], bool) for name in (one, other))
+        if min(own.sum(), rest.sum()) < 2:
+            continue
+        times, path, at = found.time_ns[rest], found.position[rest], found.time_ns[own]
+        after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+        near = (at >= times[0]) & (at <= times[-1]) & (times[after] - times[after - 1] <= SPACED * 1e9)
+        begin = times[0]
+        there = np.stack([np.interp(at[near] - begin, times - begin, path[:, k]) for k in range(3)], axis=1)
+        pairs.append((at[near], found.position[own][near] - there))
+    return pairs
+
+
+def _steps(pairs: list[tuple[np.ndarray, np.ndarray]]) -> list[tuple[int, float]]:
+    """Return the times [ns] and sizes [m] of all steps of the distance: the clearest, then those beside it."""
+    steps, spans = [], [(-np.inf, np.inf)]
+    while spans and len(steps) < MOST:
+        first, last = spans.pop()
+        inside = [(t[rows], d[rows]) for t, d in pairs if (rows := (t > first) & (t < last)).any()]
+        step = _step(inside)
+        if step is not None:
+            steps.append(step)
+            spans += [(first, step[0]), (step[0], last)]
+    return sorted(steps)
+
+
+def _step(pairs: list[tuple[np.ndarray, np.ndarray]]) -> tuple[int, float] | None:
+    """Return the time [ns] and size [m] of the clearest step; None if there is none."""
+    pairs = [(t, d) for t, d in pairs if len(t) >= 2 * LOCAL]
+    if not pairs:
+        return None
+    moments = np.unique(np.concatenate([t for t, _ in pairs]))
+    moments = moments[:: max(len(moments) // 200, 1)]
+    costs = [_cost(pairs, moment) for moment in moments]
+    best = int(np.argmin(costs))
+    near = np.unique(np.concatenate([t for t, _ in pairs]))
+    near = near[(near >= moments[max(best - 1, 0)]) & (near <= moments[min(best + 1, len(moments) - 1)])]
+    at = int(min(near, key=lambda moment: _cost(pairs, moment)))
+    jump, local, weight, variance = np.zeros(3), np.zeros(3), 0, 0.0
+    for t, d in pairs:
+        before, after = d[t < at], d[t >= at]
+        if min(len(before), len(after)) < LOCAL:
+            continue
+        share = min(len(before), len(after))
+        jump += share * (np.median(after, axis=0) - np.median(before, axis=0))
+        local += share * (np.median(after[:LOCAL], axis=0) - np.median(before[-LOCAL:], axis=0))
+        weight += share
+        for part in (before, after):
+            # Robust; a median of pairs that share sightings is known as well as a mean of a quarter of them.
+            scatter = 1.4826 * np.median(np.abs(part - np.median(part, axis=0)), axis=0)
+            variance += share**2 * float(scatter @ scatter) / (len(part) / 4)
+    if not weight:
+        return None
+    jump, local = jump / weight, local / weight
+    size = float(np.linalg.norm(jump))
+    if size < max(SMALLEST, CLEAR * np.sqrt(variance) / weight) or local @ jump < AGREEING * size**2:
+        return None
+    return at, size
+
+
+def _cost(pairs: list[tuple[np.ndarray, np.ndarray]], moment: float) -> float:
+    """Return the sum of distances from the medians before and after a moment [m]: outliers hardly count."""
+    total = 0.0
+    for t, d in pairs:
+        for part in (d[t < moment], d[t >= moment]):
+            if len(part):
+                total += float(np.abs(part - np.median(part, axis=0)).sum())
+    return total
+
+
+def _which(
+    seen: Mapping[str, Sightings], cameras: tuple[str, str], moment: int, span: tuple[float, float]
+) -> tuple[tuple[str, ...], int, float]:
+    """Return which of two cameras moved, both if the motion does not tell, when [ns], and what it gains [nats]."""
+    near = {}
+    for finger, found in seen.items():
+        kept = (found.time_ns > span[0]) & (found.time_ns < span[1])
+        kept &= np.array([camera in cameras for camera in found.camera], bool)
+        if kept.sum() >= LOCAL:
+            near[finger] = found.where(kept)
+    if not near:
+        return cameras, moment, 0.0
+    scores: dict[tuple[str, int], float] = {}
+    without: dict[str, float] = {}
+    for name, rest in (cameras, cameras[::-1]):
+        noise = {finger: _noise(found, rest) for finger, found in near.items()}
+        times = np.unique(np.concatenate([
+            found.time_ns[[camera == name for camera in found.camera]] for found in near.values()
+        ]))  # fmt: skip
+        middle = int(np.searchsorted(times, moment))
+        # Before the bump, too, the camera's place may be a little off: only the change counts.
+        whole = Bump(name, 0, 0, None, 0.0, "")
+        without[name] = _likelihood(split(near, (whole,)), noise)
+        for at in times[max(middle - CANDIDATES, 0) : middle + CANDIDATES + 1]:
+            bump = Bump(name, int(at), int(at), None, 0.0, "")
+            scores[name, int(at)] = _likelihood(split(near, (replace(whole, end_ns=int(at)), bump)), noise)
+    best = max(scores, key=lambda key: scores[key])
+    rest = cameras[1] if best[0] == cameras[0] else cameras[0]
+    rival = max((score for (name, _), score in scores.items() if name == rest), default=-np.inf)
+    gain = scores[best] - without[best[0]]
+    if scores[best] - rival < DECISIVE:
+        return cameras, moment, gain
+    return (best[0],), best[1], gain
+
+
+def _likelihood(seen: Mapping[str, Sightings], noise: Mapping[str, ProcessNoise]) -> float:
+    """Return the log-likelihood of all fingers' sightings [nats]."""
+    none = np.zeros(0, np.int64)
+    return sum(smooth(found, none, noise[finger], back=False).log_likelihood for finger, found in seen.items())
+
+
+def _noise(seen: Sightings, camera: str) -> ProcessNoise:
+    """Return the process noise that one camera alone saw: a bump of the other is no motion."""
+    own = np.array([name == camera for name in seen.camera], bool)
+    return choose(seen.where(own) if own.sum() >= LOCAL else seen)

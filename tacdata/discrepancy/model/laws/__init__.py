@@ -1,0 +1,1 @@
+"""Contact laws: how a skin without memory answers to depth."""

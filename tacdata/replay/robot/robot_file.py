@@ -1,0 +1,112 @@
+"""A robot file (`schemas/robot.schema.json`): where a robot stands, which links carry fingertips, its limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata import documents, provenance
+from tacdata.demonstrations.camera_world import pose_matrix
+from tacdata.errors import FormatError
+from tacdata.replay.robot.urdf import FARTHEST, read_urdf
+
+POSITION_TOLERANCE = 0.0005
+"""Default position tolerance of a target [m]."""
+ORIENTATION_WEIGHT = 0.02
+"""Weight of a rotation error relative to a position error [m/rad]: 1 deg counts as 0.35 mm."""
+
+LONGEST = 1.0
+"""Largest plausible distance of a fingertip from its link [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot: its URDF, fingertips and limits."""
+
+    name: str
+    urdf: str
+    """The URDF's text."""
+    urdf_hash: str
+    """SHA-256 of the URDF's file."""
+    base: np.ndarray
+    """The URDF's root in the demonstration's frame, shape (4, 4) [m]."""
+    tips: dict[str, tuple[str, np.ndarray]]
+    """Finger -> link, and the fingertip's frame in it, shape (4, 4) [m]."""
+    home: dict[str, float]
+    """Joint -> start of the search [rad or m]."""
+    orientation_weight: float
+    """Weight of a rotation error relative to a position error [m/rad]."""
+    tolerance: tuple[float, float | None]
+    """Tolerance of position [m] and rotation [rad]; None: rotations are not checked."""
+    velocity: dict[str, float]
+    """Joint -> largest speed [rad/s or m/s]: the robot file's, else the URDF's; joints without limit are missing."""
+    acceleration: dict[str, float]
+    """Joint -> largest acceleration [rad/s^2 or m/s^2], where the robot file gives one."""
+    workspace: tuple[np.ndarray, np.ndarray] | None
+    """Lower and upper corner of the box that targets must lie in, root frame [m], shape (3,) each."""
+    document: dict[str, Any]
+    remarks: tuple[str, ...] = ()
+    """What a person should know of the URDF's limits."""
+
+
+def read_robot(path: Path) -> Robot:
+    """Read a robot file and the URDF that it names.
+
+    Raises:
+        UsageError: If one of them does not exist.
+        FormatError: If one is damaged, a link is not in the URDF, or the workspace is empty.
+    """
+    document = documents.read(Path(path), "robot")
+    origin = Path(path).parent / document["urdf"]
+    urdf = read_urdf(origin)
+    for what, given, known in (
+        ("link", [entry["link"] for entry in document["fingers"].values()], urdf.links),
+        ("joint", [n for key in ("home", "velocity", "acceleration") for n in document.get(key, {})], urdf.joints),
+    ):
+        unknown = sorted(set(given) - set(known))
+        if unknown:
+            raise FormatError(
+                f"{path}: {what} {', '.join(unknown)}, not in {origin.name}", ", ".join(sorted(known)),
+                f"name a {what} of the URDF",
+            )  # fmt: skip
+    velocity = urdf.velocity | document.get("velocity", {})
+    tips = {
+        name: (entry["link"], _pose({**HERE, **entry}, f"{path}: fingers/{name}", LONGEST))
+        for name, entry in document["fingers"].items()
+    }
+    allowed = document.get("tolerance", {})
+    tolerance = float(allowed.get("position", POSITION_TOLERANCE)), allowed.get("rotation")
+    return Robot(
+        document["name"], urdf.text, provenance.file_hash(origin),
+        _pose(document.get("base", HERE), f"{path}: base", FARTHEST), tips, document.get("home", {}),
+        float(document.get("orientation_weight", ORIENTATION_WEIGHT)), tolerance, velocity,
+        document.get("acceleration", {}), _workspace(document, str(path)), document, urdf.remarks,
+    )  # fmt: skip
+
+
+HERE = {"position": [0.0, 0.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+
+
+def _pose(given: dict[str, Any], origin: str, farthest: float) -> np.ndarray:
+    """Return a pose, shape (4, 4) [m]; refuse a position in millimetres."""
+    away = float(np.linalg.norm(given["position"]))
+    if away > farthest:
+        raise FormatError(
+            f"{origin}: a position {away:g} m away: are these millimetres?", f"metres, up to {farthest:g} m",
+            "give it in metres",
+        )  # fmt: skip
+    return pose_matrix(given, origin)
+
+
+def _workspace(document: dict[str, Any], origin: str) -> tuple[np.ndarray, np.ndarray] | None:
+    box = document.get("workspace")
+    if box is None:
+        return None
+    low, high = np.array(box["min"], float), np.array(box["max"], float)
+    if (low >= high).any():
+        given = f"{origin}: workspace min {box['min']}, max {box['max']} m"
+        raise FormatError(given, "min below max on every axis", "correct the workspace")
+    return low, high

@@ -1,0 +1,82 @@
+"""Streams that tell another time are refused or moved, and said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from demo_examples import recording, taxels, truth_at, view
+
+from tacdata.demonstrations.paths.tracking import track
+from tacdata.errors import FormatError
+
+NAMES = ("thumb", "index", "middle")
+TWO = {"cameras": ("eye", "other")}
+
+
+def later(stream, seconds, rows=slice(None)):
+    times = stream.sample_ns.copy()
+    times[rows] += round(seconds * 1e9)
+    return replace(stream, sample_ns=times)
+
+
+def views(change=lambda stream: stream, rate=25.0):
+    own = [view(name) for name in NAMES]
+    return (*own, *(change(view(name, rate=rate, camera="other", seed=1)) for name in NAMES))
+
+
+def errors(made):
+    off = [t.position - truth_at(name, made.time_ns)[:, :3, 3] for name, t in made.tracks.items()]
+    return 1000 * np.linalg.norm(np.concatenate(off), axis=1)
+
+
+@pytest.mark.parametrize("lag", [0.04, 0.5, 5.0, -0.1])
+def test_a_camera_that_is_late_is_said_and_moved_back(tmp_path, lag):
+    made = track(recording(tmp_path, views=views(lambda stream: later(stream, lag), rate=20.0), **TWO))
+    late, early = ("other", "eye") if lag > 0 else ("eye", "other")
+    (words,) = made.remarks[:1]
+    assert words.startswith(f"the images of camera {late} are {abs(lag):.2f} s later than those of camera {early}")
+    # The path is where the fingers were by the clock of the camera that is not late.
+    shift = min(lag, 0.0)
+    moved = replace(made, time_ns=made.time_ns - round(shift * 1e9))
+    off = errors(moved)
+    assert np.nanmedian(off) < 0.4 and np.nanmax(off) < 2.0
+    assert sum(t.outliers for t in made.tracks.values()) < 5
+
+
+@pytest.mark.parametrize("rates", [(25.0, 25.0), (60.0, 7.0)])
+def test_cameras_in_step_are_left_alone_whatever_their_rates(tmp_path, rates):
+    own = [view(name, rate=rates[0]) for name in NAMES]
+    other = [view(name, rate=rates[1], camera="other", seed=1) for name in NAMES]
+    made = track(recording(tmp_path, views=(*own, *other), **TWO))
+    assert made.remarks == () and np.nanmax(errors(made)) < 1.5
+
+
+def test_a_stream_of_another_hour_is_refused(tmp_path):
+    with pytest.raises(FormatError, match="camera other lies 3592 s after all other streams"):
+        track(recording(tmp_path, views=views(lambda stream: later(stream, 3600.0)), **TWO))
+    felt = {name: taxels(name) for name in NAMES}
+    felt["index"] = later(felt["index"], -3600.0)
+    with pytest.raises(FormatError, match="the board of index lies 3592 s before"):
+        track(recording(tmp_path, streams=felt))
+
+
+def test_times_that_go_back_are_refused(tmp_path):
+    own = [view(name) for name in NAMES]
+    with pytest.raises(FormatError, match=r"camera eye on index go back by 2\.0 s, 4\.0 s after its first"):
+        track(recording(tmp_path, views=[own[0], later(own[1], -2.0, slice(100, None)), own[2]]))
+    felt = {name: taxels(name) for name in NAMES}
+    felt["thumb"] = later(felt["thumb"], -2.0, slice(120, None))
+    with pytest.raises(FormatError, match="the board of thumb go back"):
+        track(recording(tmp_path, streams=felt))
+
+
+def test_late_images_do_not_average_out(tmp_path):
+    """All images are 60 ms late, as their clock allows: the truth lies within what is stated, and it is said."""
+    made = recording(tmp_path, views=tuple(later(view(name), 0.06) for name in NAMES))
+    tracked = track(replace(made, timing={"eye": 0.06}))
+    (words,) = tracked.remarks
+    assert words.startswith("the times of camera eye's images are known to 0.06 s only")
+    off = np.concatenate([t.position - truth_at(n, tracked.time_ns)[:, :3, 3] for n, t in tracked.tracks.items()])
+    spread = np.concatenate([np.sqrt(t.covariance[:, range(3, 6), range(3, 6)]) for t in tracked.tracks.values()])
+    assert 1000 * np.nanmax(np.abs(off)) > 5.0
+    assert (np.abs(off) > 3 * spread).any(axis=1).mean() < 0.01

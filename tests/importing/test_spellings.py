@@ -1,0 +1,184 @@
+"""Spellings of strangers' files: units in headers, words for no value, numbers and names in text files."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign import mapping
+
+from tacdata.errors import FormatError
+from tacdata.importing.formats.source_format import read_table
+from tacdata.importing.imported_session import import_session
+from tacdata.importing.units import clock_unit, split_unit
+from tacdata.recording.files.reader import read_recording
+
+ROWS, RATE = 120, 20.0
+TIME, DEPTH = np.arange(ROWS) / RATE, 0.01 * np.arange(ROWS)
+
+
+def text(header="t [s],disp [mm],cap0,cap1", scale=1.0, begin=0.0):
+    rows = [f"{begin + t * scale:.15g},{d:.3f},{20 + d:.4f},{30 + d:.4f}" for t, d in zip(TIME, DEPTH, strict=True)]
+    return "\n".join([header, *rows]) + "\n"
+
+
+def brought(folder, data, **changes):
+    (folder / "wide.csv").write_bytes(data if isinstance(data, bytes) else data.encode())
+    clock = {"path": "wide.csv", "time": {"column": 0}, **changes.pop("file", {})}
+    taxels = {"file": "data", "columns": [2, 3], "unit": "pF"}
+    depth = {"file": "data", "depth": {"column": 1, "unit": "mm"}}
+    path = mapping(
+        folder, version="1.2", measured=None, files={"data": clock}, taxels=taxels, **{"position": depth, **changes}
+    )
+    made = import_session(folder, path, Path(f"{folder}.session"))
+    return made, read_recording(made.folder / "episode-000000.mcap").episode
+
+
+def refusal(folder, data, **changes):
+    with pytest.raises(FormatError) as caught:
+        brought(folder, data, **changes)
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("header", "scale"),
+    [("t{ms}", 1e3), ("t<ms>", 1e3), ("t\uff08ms\uff09", 1e3), ("t\u3010ms\u3011", 1e3), ("t [ms] since start", 1e3),
+     ("t.ms", 1e3), ("t-ms", 1e3), ("tMs", 1e3), ("t_ms_rel", 1e3), ("t in ms", 1e3), ("ms", 1e3), ("millis", 1e3),
+     ("millis()", 1e3), ("micros", 1e6), ("t [\u00b5s]", 1e6), ("t [\u03bcs]", 1e6), ("time_10ms", 1e2), ("t [s.]", 1),
+     ("t [SEC]", 1), ("t [10^-3 s]", 1e3), ("t [x10 ms]", 1e2), ("t [1/20 s]", 20), ("t [Minutes]", 1 / 60)],
+)  # fmt: skip
+def test_a_unit_is_understood_however_it_is_spelled(tmp_path, header, scale):
+    _, episode = brought(tmp_path, text(f'"{header}",disp,cap0,cap1', scale))
+    np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 50_000_000, atol=20_000)
+
+
+@pytest.mark.parametrize("unit", ["ticks", "Sekunden", "weeks", "hh:mm:ss", "ms/10", "?", "mm", "m"])
+def test_a_unit_that_is_not_understood_is_named_as_it_stands(tmp_path, unit):
+    error = refusal(tmp_path, text(f"t [{unit}],disp,cap0,cap1"))
+    assert f"unit {unit!r}" in error.given and error.allowed == "s, ms, us, ns, min, h, d"
+
+
+@pytest.mark.parametrize(
+    ("scale", "begin", "given", "unit"),
+    [(1e3, 0, "a row comes every 50 s", "unit: ms or s"), (1e6, 0, "every 50000 s", "unit: us or s"),
+     (20, 0, "every 1 s", "of a counter of rows"), (1 / 3600, 0, "7.2e+04 Hz", "min or h or s"),
+     (20 / 86_400, 46_000.4, "8.64e+04 Hz", "unit: excel or s"),
+     (2000 / 86_400, 46_000.4, "864 Hz", "unit: excel or s"),
+     (20 / 86_400, 740_311.4, "8.64e+04 Hz", "unit: datenum or s")],
+)  # fmt: skip
+def test_times_without_a_unit_that_cannot_be_seconds_are_asked_for(tmp_path, scale, begin, given, unit):
+    error = refusal(tmp_path, text("t,disp,cap0,cap1", scale, begin))
+    assert "no unit is given" in error.given and given in error.given and unit in error.remedy
+
+
+def test_a_unit_that_is_given_wrongly_is_held_against_the_rate(tmp_path):
+    error = refusal(tmp_path, text("t [s],disp,cap0,cap1", 1 / 86_400, 46_000.4))
+    assert "in s the rows come at 1.73e+06 Hz" in error.given and "excel" in error.remedy
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [("Fz [N]", ("Fz", "N")), ("cap[3]", ("cap", "3")), ("force.min", ("force.min", "")), ("plug-in", ("plug-in", "")),
+     ("depth_d", ("depth_d", "")), ("Fz / N", ("Fz", "N")), ("disp {um} raw", ("disp raw", "um")), ("c0", ("c0", ""))],
+)  # fmt: skip
+def test_a_name_is_parted_from_its_unit(name, parts):
+    assert split_unit(name) == parts
+
+
+@pytest.mark.parametrize(("unit", "size"), [("ft", 304.8), ("thou", 0.0254), ("in", 25.4), ("feet", 304.8), ("m", 1e3)])
+def test_lengths_of_other_units_are_converted(tmp_path, unit, size):
+    rows = [f"{t:g},{d / size:.9g},{20 + d:.4f},{30 + d:.4f}" for t, d in zip(TIME, DEPTH, strict=True)]
+    text_in = "\n".join([f"t [s],disp [{unit}],cap0,cap1", *rows])
+    made, episode = brought(tmp_path, text_in, position={"file": "data", "depth": {"column": 1}})
+    assert episode.press.depth == pytest.approx(DEPTH.max(), rel=1e-3) and "taken in mm" not in " ".join(made.notes)
+
+
+def test_a_position_without_a_unit_is_said_to_be_taken_in_mm(tmp_path):
+    made, _ = brought(tmp_path, text("t [s],disp,cap0,cap1"), position={"file": "data", "depth": {"column": 1}})
+    wanted = "position: disp has no unit and is taken in mm; else give unit under position/depth in the mapping"
+    assert wanted in made.notes
+    brought_m = tmp_path / "metres"
+    brought_m.mkdir()
+    made, _ = brought(brought_m, text("t [s],disp,cap0,cap1"))
+    assert not [note for note in made.notes if "taken in mm" in note], "the mapping gives a unit"
+
+
+def test_minutes_and_seconds_as_excel_shows_them(tmp_path):
+    rows = [
+        f"{int(t // 60)}:{t % 60:04.1f},{d:.3f},{20 + d:.4f},{30 + d:.4f}" for t, d in zip(2 * TIME, DEPTH, strict=True)
+    ]
+    _, episode = brought(tmp_path, "\n".join(["t,disp,cap0,cap1", *rows]))
+    np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 100_000_000, atol=20_000)
+
+
+def test_two_units_in_a_clocks_name_are_none():
+    assert clock_unit("time_sec_and_ms") == ""
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        "-nan(ind)",
+        "1.#QNAN",
+        "-1.#IND",
+        "1.#INF",
+        "<NA>",
+        "NaT",
+        "(null)",
+        "n.a.",
+        "#NV",
+        "inf",
+        "Err:502",
+        "*****",
+        "-1.#IND00",
+    ],
+)
+def test_words_for_no_value_stand_in_any_row_the_first_too(tmp_path, word):
+    lines = text().splitlines()
+    lines[1:] = [line.replace(f"{20 + d:.4f}", word) if k % 7 == 0 else line
+                 for k, (line, d) in enumerate(zip(lines[1:], DEPTH, strict=True))]  # fmt: skip
+    _, episode = brought(tmp_path, "\n".join(lines))
+    assert np.isnan(episode.taxels.counts).sum() == 18 and len(episode.taxels.counts) == ROWS
+
+
+@pytest.mark.parametrize("word", ["OL", "overflow", "missing", "1'010.5"])
+def test_an_unknown_word_is_named_with_its_column_and_row(tmp_path, word):
+    error = refusal(tmp_path, text().replace("20.0000", word, 1))
+    assert f"column cap0, row 1 of the data: {word!r}" in error.given
+    assert ("missing in the mapping" in error.remedy) == (word != "1'010.5")
+
+
+@pytest.mark.parametrize(
+    ("change", "note"),
+    [(lambda t: ("note\x85 by us\n" + t).encode("latin-1"), "Latin-1"), (lambda t: t.encode("utf-32"), ""),
+     (lambda t: t.encode() + bytes(5000), "5000 zero bytes"), (lambda t: t.replace("cap0", '"cap0\n[pF]"'), ""),
+     (lambda t: t.replace("cap1", "cap0", 1), "later columns are called cap0'"),
+     (lambda t: t.replace("0.5,0.100", "t [s],disp [mm],cap0,cap1\n0.5,0.100"), "1 repeated header lines"),
+     (lambda t: "".join(f"{k}: info\n" for k in range(700)) + t, ""),
+     (lambda t: "operator,Jane,,\n" + t, ""), (lambda t: t.replace("\n", "\r"), "")],
+    ids=["x85", "utf-32", "zeros", "line break", "twice", "header again", "700 lines", "two heads", "cr"],
+)  # fmt: skip
+def test_every_row_of_a_text_file_is_imported_or_counted(tmp_path, change, note):
+    made, episode = brought(tmp_path, change(text()))
+    assert len(episode.taxels.counts) == ROWS and not np.isnan(episode.taxels.counts).any()
+    np.testing.assert_allclose(episode.taxels.counts[:, 0], 20 + DEPTH, atol=1e-4)
+    assert note in " ".join(made.notes)
+
+
+def test_a_file_that_is_called_compressed_and_is_not_is_to_be_renamed(tmp_path):
+    (tmp_path / "a.csv.gz").write_text(text())
+    with pytest.raises(FormatError, match="and is not compressed") as caught:
+        read_table(tmp_path / "a.csv.gz", {})
+    assert caught.value.remedy == "rename it to a.csv"
+
+
+@pytest.mark.parametrize(
+    ("data", "given"),
+    [(b"", "is empty"), (text().encode("utf-16-le"), "UTF-16 by all appearance"),
+     (text()[:500].encode() + bytes(99) + text()[500:].encode(), "99 zero bytes, the first in line"),
+     (gzip.compress(text().encode()), "is gzip"), (b"PK\x03\x04" + bytes(99), "is a zip archive"),
+     ("\n".join(text().splitlines()[:2]), "fewer than two rows")],
+    ids=["empty", "utf-16", "zeros", "gzip", "zip", "one row"],
+)  # fmt: skip
+def test_what_is_no_table_is_called_what_it_is(tmp_path, data, given):
+    assert given in refusal(tmp_path, data).given

@@ -1,0 +1,142 @@
+"""Several contacts in one depth map: where each is, which are missed and which are invented.
+
+Two indenters near each other make one region above any threshold, but two hills of depth. A contact is therefore a
+hill: a local maximum that stands out from the pass to the next deeper one (its prominence, as of mountains), with the
+pixels whose way uphill ends there. Hills are found by flooding from the deepest pixel down, as in a watershed
+(L. Vincent, P. Soille, IEEE Trans. Pattern Anal. 13 (1991) 583). Predicted and labelled contacts are matched one to
+one with the least sum of distances (H. W. Kuhn, Naval Research Logistics 2 (1955) 83).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from training.metrics.depth_maps import CONTACT_THRESHOLD
+
+PROMINENCE = 0.15
+"""Least prominence of a hill, over its own depth [1]."""
+LEAST_PROMINENCE = 0.03
+"""Least prominence of a hill [mm]: below, noise makes hills."""
+REACH = 2.0
+"""Farthest apart that a predicted and a labelled contact may lie to be the same [mm]."""
+
+
+@dataclass(frozen=True)
+class ContactMatch:
+    """The contacts of one frame in label and prediction."""
+
+    labelled: np.ndarray
+    """Centroids in the label [px], shape (k, 2), the deepest contact first."""
+    predicted: np.ndarray
+    """Centroids in the prediction [px], shape (m, 2)."""
+    error: np.ndarray
+    """Distance to the matched predicted contact [px], shape (k,); NaN where the contact is missed."""
+
+    @property
+    def missed(self) -> int:
+        """Labelled contacts without a predicted one."""
+        return int(np.isnan(self.error).sum())
+
+    @property
+    def invented(self) -> int:
+        """Predicted contacts without a labelled one."""
+        return len(self.predicted) - len(self.labelled) + self.missed
+
+    @property
+    def apart(self) -> float:
+        """Least distance between two labelled contacts [px]; infinite if there are not two."""
+        if len(self.labelled) < 2:
+            return np.inf
+        distance = cdist(self.labelled, self.labelled)
+        return float(distance[np.triu_indices(len(distance), 1)].min())
+
+
+def match(prediction: np.ndarray, label: np.ndarray, pitch: float) -> ContactMatch:
+    """Match the contacts of one frame.
+
+    Args:
+        prediction: Predicted depth [mm], shape (pixels_x, pixels_y).
+        label: Labelled depth [mm], same shape.
+        pitch: Distance of pixels [mm].
+
+    Example:
+        >>> import numpy as np
+        >>> from training.metrics.contacts import match
+        >>> x = np.arange(35)[:, None] - np.array([12, 22])  # px: two balls 4 mm apart
+        >>> y = np.arange(26) - 13
+        >>> label = np.max(0.8 - 0.02 * (x[:, :, None] ** 2 + y**2), axis=1).clip(0)  # mm
+        >>> found = match(np.roll(label, 1, axis=0), label, pitch=0.4)
+        >>> len(found.labelled), found.missed, found.invented, found.error.round(2).tolist()
+        (2, 0, 0, [1.0, 1.0])
+    """
+    ours, theirs = centroids(prediction), centroids(label)
+    error = np.full(len(theirs), np.nan)
+    if len(ours) and len(theirs):
+        distance = cdist(theirs, ours)
+        # What lies too far apart costs more than all that does not, so that it is matched last.
+        far = distance > REACH / pitch
+        rows, columns = linear_sum_assignment(np.where(far, 1e6, distance))
+        near = ~far[rows, columns]
+        error[rows[near]] = distance[rows, columns][near]
+    return ContactMatch(theirs, ours, error)
+
+
+def centroids(depth: np.ndarray) -> np.ndarray:
+    """Return the depth-weighted centroid of each contact [px], shape (k, 2), the deepest first.
+
+    Args:
+        depth: Depth map [mm], shape (pixels_x, pixels_y).
+    """
+    owner = hills(depth)
+    count = int(owner.max(initial=-1)) + 1
+    i, j = np.nonzero(owner >= 0)
+    where, weight = owner[i, j], depth[i, j].astype(np.float64)
+    moments = np.column_stack([np.bincount(where, weight * axis, count) for axis in (i, j)])
+    return moments / np.bincount(where, weight, count)[:, None]
+
+
+def hills(depth: np.ndarray, threshold: float = CONTACT_THRESHOLD) -> np.ndarray:
+    """Return which hill each pixel deeper than the threshold belongs to, the deepest hill is 0; -1 elsewhere.
+
+    Args:
+        depth: Depth map [mm], shape (pixels_x, pixels_y).
+        threshold: Depth above which a pixel belongs to a contact [mm].
+    """
+    rows, columns = depth.shape
+    # A border around the map, so that every pixel has eight neighbours.
+    owner = np.full((rows + 2) * (columns + 2), -1)
+    padded = np.pad(depth, 1).reshape(-1)
+    order = np.flatnonzero(padded > threshold)
+    order = order[np.argsort(-padded[order], kind="stable")]
+    width = columns + 2
+    around = (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1)
+    tops: list[float] = []
+    joined: list[int] = []  # hill -> hill that it turned out to be a shoulder of; itself while it stands alone
+
+    def standing(hill: int) -> int:
+        while joined[hill] != hill:
+            hill = joined[hill]
+        return hill
+
+    flooded, values = owner.tolist(), padded.tolist()
+    for pixel in order.tolist():
+        height = values[pixel]
+        higher = [pixel + step for step in around if flooded[pixel + step] >= 0]
+        if not higher:
+            flooded[pixel] = len(tops)
+            joined.append(len(tops))
+            tops.append(height)
+            continue
+        flooded[pixel] = flooded[max(higher, key=values.__getitem__)]
+        beside = {standing(flooded[other]) for other in higher}
+        highest = min(beside)  # hills are numbered from the deepest
+        for hill in beside - {highest}:
+            if tops[hill] - height < max(PROMINENCE * tops[hill], LEAST_PROMINENCE):
+                joined[hill] = highest
+    found = np.array([standing(hill) if hill >= 0 else -1 for hill in flooded])
+    _, numbered = np.unique(np.append(found, -1), return_inverse=True)
+    return (numbered[:-1] - 1).reshape(rows + 2, width)[1:-1, 1:-1]

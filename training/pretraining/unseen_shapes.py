@@ -1,0 +1,103 @@
+"""Intervals that hold on shapes that a network never saw: each shape's errors come from a network without it.
+
+Split conformal prediction takes the errors of validation episodes. These have the shapes of the training episodes, so
+a shape unlike all others lies outside too often. Here the shapes are dealt into groups. For each group a network is
+trained on the others by the same recipe, and predicts what it did not learn (cross-conformal prediction; V. Vovk,
+Annals of Mathematics and Artificial Intelligence 74 (2015) 9). The errors of all groups together make the intervals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tacdata.errors import UsageError
+from training.frames.frames import EpisodeSpan, Frames
+from training.frames.windows import Windows
+from training.inference import checkpoint
+from training.inference.checkpoint import Checkpoint
+from training.inference.compute import reproducible
+from training.inference.predictor import predict
+from training.metrics import conformal_intervals
+from training.metrics.conformal_intervals import ConformalIntervals
+from training.splits.split import VALIDATION_SHARE, Split, share
+from training.train import Progress, train
+
+_SEED = 47
+"""Tells the random numbers of groups from those of training."""
+
+
+def calibrate_on_unseen_shapes(
+    trained: Checkpoint,
+    frames: Frames,
+    groups: int,
+    device: str = "auto",
+    threads: int | None = None,
+    pretrained: Checkpoint | None = None,
+    simulated: Frames | None = None,
+    begun: Callable[[int], Callable[[Progress], None]] = lambda group: lambda progress: None,
+) -> ConformalIntervals:
+    """Replace the intervals of a trained network by ones that hold on unseen shapes; write them beside it.
+
+    Args:
+        trained: The network, in its run's folder. The other networks are trained there too.
+        frames: What it was trained on.
+        groups: Into how many groups the shapes are dealt; as many networks are trained.
+        device: As of `train`.
+        threads: As of `train`.
+        pretrained: What it was started from.
+        simulated: The simulated frames that were mixed in.
+        begun: Called with each group's number; returns the listener of that training's progress.
+
+    Raises:
+        UsageError: If the training episodes have fewer shapes than groups.
+    """
+    known = frames.spans((*trained.split.train, *trained.split.validation))
+    maps, labels = [], []
+    for number, held in enumerate(_dealt(known, groups, frames.origin)):
+        division = _without(held, known, trained.split)
+        run = trained.path.parent / f"without-{number}"
+        resume = (run / checkpoint.LAST).is_file()
+        other = train(
+            frames, trained.settings, run, device, resume, threads, begun(number), pretrained=pretrained,
+            simulated=simulated, split=division,
+        )  # fmt: skip
+        windows, top = Windows(frames, other.network.offsets), frames.sensor.map.depth_max
+        with reproducible(threads):
+            for episode in division.test:
+                chosen = frames.indices((episode,))
+                maps.append(predict(other.network, windows, chosen, top))
+                labels.append(np.clip(frames.depth[chosen], 0.0, top))
+    # Shuffled, so that both halves hold all shapes: one gives the deviations, the other the factors.
+    order = np.random.default_rng(_SEED).permutation(len(maps))
+    found = conformal_intervals.calibrate(
+        [maps[k] for k in order],
+        [labels[k] for k in order],
+        frames.sensor.map.pixel_pitch,
+        trained.content_hash,
+        "presses of shapes left out of training",
+    )
+    conformal_intervals.write(trained.path.parent, found)
+    return found
+
+
+def _dealt(spans: tuple[EpisodeSpan, ...], groups: int, origin: str) -> list[tuple[EpisodeSpan, ...]]:
+    shapes = sorted({span.shape for span in spans})
+    if not 2 <= groups <= len(shapes):
+        raise UsageError(
+            f"{groups} groups of the {len(shapes)} shapes to train on in {origin}", f"2 to {len(shapes)}",
+            "ask for fewer, or record more shapes",
+        )  # fmt: skip
+    turn = np.random.default_rng(_SEED).permutation(len(shapes)) % groups
+    return [tuple(span for span in spans if turn[shapes.index(span.shape)] == group) for group in range(groups)]
+
+
+def _without(held: tuple[EpisodeSpan, ...], known: tuple[EpisodeSpan, ...], split: Split) -> Split:
+    """Return a division whose test episodes are those held out; some of the others choose the epoch."""
+    numbers = {span.number for span in held}
+    rest = [span.number for span in known if span.number not in numbers]
+    order = np.random.default_rng([_SEED, split.seed]).permutation(rest)
+    chosen = set(order[: share(len(rest), VALIDATION_SHARE)].tolist())
+    train_on = tuple(n for n in rest if n not in chosen)
+    return Split(split.name, split.seed, train_on, tuple(sorted(chosen)), tuple(sorted(numbers)))

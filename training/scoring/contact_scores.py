@@ -1,0 +1,52 @@
+"""Scores of single contacts: presses with one, and presses with several at once, by how near these are."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+from training.metrics.contacts import LEAST_PROMINENCE, PROMINENCE, REACH, ContactMatch, match
+from training.metrics.depth_maps import summarize
+
+DISTANCES = (3.0, 4.0, 5.0)
+"""Borders of the distance of the two nearest contacts, by which presses are told apart [mm]."""
+
+
+def scored(presses: Iterable[tuple[np.ndarray, np.ndarray]], pitch: float) -> dict[str, Any]:
+    """Return the part "contacts" of a scores document.
+
+    Args:
+        presses: Predicted and labelled map of each press at full depth [mm], shapes (pixels_x, pixels_y).
+        pitch: Distance of pixels [mm].
+    """
+    found = [match(depth, label, pitch) for depth, label in presses]
+    return {
+        "prominence": PROMINENCE, "least_prominence_mm": LEAST_PROMINENCE, "reach_mm": REACH,
+        "presses": contact_rows(found, pitch),
+    }  # fmt: skip
+
+
+def contact_rows(found: Sequence[ContactMatch], pitch: float) -> list[dict[str, Any]]:
+    """Return a row for presses with one contact, and rows for those with several by their least distance [mm]."""
+    rows = [_row([m for m in found if len(m.labelled) == 1], "one", None, None)]
+    for low, high in itertools.pairwise((0.0, *DISTANCES, np.inf)):
+        chosen = [m for m in found if len(m.labelled) > 1 and low <= pitch * m.apart < high]
+        rows.append(_row(chosen, "several", low, None if high == np.inf else high))
+    return [row for row in rows if row["presses"]]
+
+
+def _row(chosen: list[ContactMatch], contacts: str, low: float | None, high: float | None) -> dict[str, Any]:
+    every = sum(not m.missed for m in chosen)
+    interval = binomtest(every, len(chosen)).proportion_ci(method="wilson") if chosen else (None, None)
+    errors = np.concatenate([m.error for m in chosen]) if chosen else np.zeros(0)
+    return {
+        "contacts": contacts, "above_mm": low, "up_to_mm": high, "presses": len(chosen),
+        "all_found": {"count": every, "of": len(chosen), "wilson_95": list(interval)},
+        "missed": sum(m.missed for m in chosen), "invented": sum(m.invented for m in chosen),
+        "centroid_error": asdict(summarize(errors)),
+    }  # fmt: skip

@@ -1,0 +1,278 @@
+"""A tracked hand as a film: what the cameras saw, fingertips in space, what each of them felt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from scipy.spatial.transform import Rotation
+
+from viewers.scene.color_scale import HUES
+from viewers.scene.moments import nearest
+from viewers.scene.scene import Body, CameraView, Curves, Scene
+
+SIZE, RESOLUTION = (13.0, 8.6), 80
+"""Of a frame [inch], and dots an inch."""
+TAIL = 1.5
+"""Length of path behind a fingertip that stays in sight [s]."""
+PLATE = 18.0
+"""Length at which a fingertip is drawn, along the finger [mm]."""
+NAME, WIDE = (0.5, 0.16), 3.7
+"""Width and height of a finger's name, and width of a view [inch]."""
+MARGIN = 20.0
+"""Around all paths [mm]."""
+
+
+def hand_times(scene: Scene, rate: float, most: int) -> np.ndarray:
+    """Return the times of a film's frames [ns]: from the first known fingertip to the last.
+
+    Args:
+        scene: A demonstration that was tracked.
+        rate: Frames a second [Hz].
+        most: Frames at most; what lasts longer is shown faster.
+    """
+    begin, end = _begin(scene), max(int(body.time_ns[-1]) for body in scene.bodies)
+    return np.linspace(begin, end, int(np.clip((end - begin) / 1e9 * rate, 2, most))).astype(np.int64)
+
+
+def hand_frames(scene: Scene, times: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the frames of a film at times [ns], uint8, shape (height, width, 3) each."""
+    page = HandPage(scene)
+    canvas = FigureCanvasAgg(page.figure)
+    canvas.draw()
+    page.figure.set_layout_engine("none")  # laid out once; every frame is alike
+    for time in times.tolist():
+        page.show(time)
+        canvas.draw()
+        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+class HandPage:
+    """A tracked hand at one time: cameras above, fingertips from the side and from above, maps, predicted depth."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Draw what does not move."""
+        self._scene = scene
+        self._fingers = [body.name for body in scene.bodies]
+        self._bridged = {c.name.split("/", 1)[1]: c for c in scene.curves if c.name.startswith("fingertip/")}
+        self.figure = Figure(figsize=SIZE, dpi=RESOLUTION)
+        self.figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.95))
+        self._title = self.figure.text(0.01, 0.985, "", fontsize=11, va="top", weight="bold")
+        parts: Any = self.figure.subfigures(1, 2, width_ratios=[3.0, 1.0]) if scene.maps else [self.figure]
+        heights = [1.5, 1.5, 0.8] if scene.cameras else [1.5, 0.8]
+        rows: Any = parts[0].subfigures(len(heights), 1, height_ratios=heights)
+        self._cameras = [] if not scene.cameras else [
+            _CameraPicture(axes, view, scene.bodies)
+            for axes, view in zip(
+                rows[0].subplots(1, len(scene.cameras), squeeze=False)[0], scene.cameras, strict=True
+            )
+        ]  # fmt: skip
+        low, high = _ends(scene)
+        self._space = [
+            _Plane(axes, scene.bodies, (across, up), (low, high))
+            for axes, (across, up) in zip(rows[-2].subplots(1, 2), ((0, 2), (0, 1)), strict=True)
+        ]
+        self._line = _depth_curves(rows[-1].subplots(), scene, self._fingers)
+        self._maps: list[tuple[Any, Any, str]] = []
+        if scene.maps:
+            self._draw_maps(parts[1])
+        self.show(_begin(scene))
+
+    def _draw_maps(self, figure: Any) -> None:
+        axes = figure.subplots(len(self._scene.maps), 1, squeeze=False)[:, 0]
+        for own, maps in zip(axes, self._scene.maps, strict=True):
+            name = maps.name.removeprefix("predicted ")
+            image = own.imshow(
+                maps.values[0].T, origin="lower", cmap=maps.scale.colormap, vmin=maps.scale.low, vmax=maps.scale.high,
+                extent=(maps.x[0], maps.x[-1], maps.y[0], maps.y[-1]),
+            )  # fmt: skip
+            own.tick_params(labelsize=7)
+            own.set_ylabel("y [mm]", fontsize=8)
+            self._maps.append((image, own.set_title(name, fontsize=9), name))
+        axes[-1].set_xlabel("x [mm]", fontsize=8)
+        bar = figure.colorbar(self._maps[0][0], ax=axes.tolist(), location="bottom", shrink=0.9)
+        bar.set_label("predicted depth [mm]", fontsize=8)
+        bar.ax.tick_params(labelsize=7)
+
+    def show(self, time_ns: int) -> None:
+        """Move everything to where it was at a time [ns]."""
+        bridged = {name: _bridged_at(self._bridged.get(name), time_ns) for name in self._fingers}
+        seconds = (time_ns - _begin(self._scene)) / 1e9
+        words = f"{self._scene.title}, {seconds:.1f} s"
+        if any(bridged.values()):
+            words += ": no sighting of " + ", ".join(n for n, hit in bridged.items() if hit) + ", path bridged"
+        self._title.set_text(words)
+        for picture in self._cameras:
+            picture.show(time_ns, bridged)
+        for plane in self._space:
+            plane.show(time_ns, bridged)
+        self._line.set_xdata([seconds, seconds])
+        for (image, title, name), maps in zip(self._maps, self._scene.maps, strict=True):
+            image.set_data(maps.values[nearest(maps.time_ns, time_ns)].T)
+            title.set_text(f"{name}: path bridged" if bridged.get(name) else name)
+            title.set_color("crimson" if bridged.get(name) else "black")
+
+
+class _CameraPicture:
+    """What one camera saw. The paths are drawn into it: a dot beside its fingertip shows a wrong path."""
+
+    def __init__(self, axes: Axes, view: CameraView, bodies: tuple[Body, ...]) -> None:
+        self._view, self._bodies = view, bodies
+        self._image = axes.imshow(np.full((view.height, view.width, 3), 255, np.uint8))
+        axes.set(xticks=[], yticks=[], xlim=(0, view.width), ylim=(view.height, 0))
+        axes.set_title(f"camera {view.name}", fontsize=9)
+        self._marks = [_mark(axes, body.name, k) for k, body in enumerate(bodies)]
+
+    def show(self, time_ns: int, bridged: dict[str, bool]) -> None:
+        view = self._view
+        if len(view.image_ns):
+            self._image.set_data(_opened(view.images[nearest(view.image_ns, time_ns)]))
+        # A camera without a known place gets no dots.
+        found = [view.pixel(body.position[nearest(body.time_ns, time_ns)]) for body in self._bodies]
+        places = np.array([np.full(2, np.nan) if place is None else place for place in found])
+        # Rows of an image count downwards.
+        names = apart(places * [1, -1], 0.14 * view.width, 0.06 * view.height) * [1, -1]
+        for (dot, name), body, place, at in zip(self._marks, self._bodies, places, names, strict=True):
+            dot.set_data([place[0]], [place[1]])
+            dot.set_markerfacecolor("white" if bridged[body.name] else dot.get_color())
+            name.set_position(tuple(at))
+            name.set_visible(bool(np.isfinite(at).all()))
+
+
+class _Plane:
+    """Fingertips in one plane of space: a plate along each finger, a name, and the path just behind it."""
+
+    def __init__(
+        self, axes: Axes, bodies: tuple[Body, ...], shown: tuple[int, int], ends: tuple[np.ndarray, np.ndarray]
+    ) -> None:
+        self._bodies, self._shown = bodies, list(shown)
+        across, up = shown
+        inch = float(ends[1][across] - ends[0][across]) / WIDE
+        self._letters = NAME[0] * inch, NAME[1] * inch
+        axes.set(xlim=(ends[0][across], ends[1][across]), ylim=(ends[0][up], ends[1][up]))
+        axes.set_aspect("equal", adjustable="box")
+        axes.set_title("from the side" if up == 2 else "from above", fontsize=9)
+        axes.set_xlabel(f"{'xyz'[across]} [mm]", fontsize=8)
+        axes.set_ylabel(f"{'xyz'[up]} [mm]", fontsize=8)
+        axes.tick_params(labelsize=7)
+        self._marks = [_mark(axes, body.name, k) for k, body in enumerate(bodies)]
+        self._tails = [axes.plot([], [], color=_color(k), linewidth=1.2)[0] for k in range(len(bodies))]
+        self._plates = [
+            axes.plot([], [], color=_color(k), linewidth=5, alpha=0.5, solid_capstyle="round")[0]
+            for k in range(len(bodies))
+        ]
+
+    def show(self, time_ns: int, bridged: dict[str, bool]) -> None:
+        tips = []
+        for (dot, _), tail, plate, body in zip(self._marks, self._tails, self._plates, self._bodies, strict=True):
+            row = nearest(body.time_ns, time_ns)
+            behind = (body.time_ns <= time_ns) & (body.time_ns >= time_ns - TAIL * 1e9)
+            place = body.position[row]
+            along = Rotation.from_quat(np.atleast_2d(body.quaternion)[row]).apply([PLATE / 2, 0.0, 0.0])
+            dot.set_data([place[self._shown[0]]], [place[self._shown[1]]])
+            dot.set_markerfacecolor("white" if bridged.get(body.name) else dot.get_color())
+            tail.set_data(*body.position[behind][:, self._shown].T)
+            tail.set_linestyle(":" if bridged.get(body.name) else "-")
+            plate.set_data(*np.stack([place - along, place + along])[:, self._shown].T)
+            tips.append(place[self._shown])
+        for (_, name), place in zip(self._marks, apart(np.array(tips), *self._letters), strict=True):
+            name.set_position(tuple(place))
+
+
+def apart(places: np.ndarray, wide: float, high: float) -> np.ndarray:
+    """Return where names stand, shape (n, 2): above their places, and pushed up where they would cover each other.
+
+    Args:
+        places: Places that are named, y upwards, shape (n, 2) [mm or px]; names of unknown places, NaN, push none.
+        wide: Width that a name takes, in the same unit.
+        high: Height that a name takes.
+
+    Example:
+        >>> import numpy as np
+        >>> from viewers.pictures.hand_film import apart
+        >>> apart(np.array([[0.0, 1.0], [5.0, 0.0]]), wide=26.0, high=8.0)[:, 1].round(1).tolist()
+        [12.8, 4.8]
+    """
+    made = np.full_like(places, np.nan)
+    put: list[np.ndarray] = []
+    for k in np.argsort(places[:, 1], kind="stable"):
+        if not np.isfinite(places[k]).all():
+            continue
+        at = places[k] + np.array([0.0, 0.6 * high])
+        # From below upwards, so that a name only ever moves up.
+        for other in sorted(put, key=lambda own: own[1]):
+            if abs(other[0] - at[0]) < wide and abs(other[1] - at[1]) < high:
+                at[1] = other[1] + high
+        put.append(at)
+        made[k] = at
+    return made
+
+
+def _begin(scene: Scene) -> int:
+    """Return the time of the first known fingertip [ns]."""
+    return min(int(body.time_ns[0]) for body in scene.bodies)
+
+
+def _color(number: int) -> tuple[float, ...]:
+    return tuple(channel / 255 for channel in HUES[number % len(HUES)])
+
+
+def _mark(axes: Axes, name: str, number: int) -> tuple[Any, Any]:
+    """Return a dot and a name with a white rim, in the finger's colour."""
+    rim = [withStroke(linewidth=2.5, foreground="white")]
+    (dot,) = axes.plot([], [], "o", color=_color(number), markersize=6, markeredgewidth=1.5, zorder=3)
+    words = axes.text(
+        0, 0, name, fontsize=8, ha="center", va="bottom", color=_color(number), path_effects=rim, zorder=4
+    )
+    words.set_clip_on(True)
+    return dot, words
+
+
+def _opened(data: bytes) -> np.ndarray:
+    """Return a JPEG image, uint8, shape (height, width, 3)."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    return np.asarray(Image.open(BytesIO(data)).convert("RGB"))
+
+
+def _ends(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Return least and largest x, y and z of all fingertips, with a margin [mm], shape (3,) each."""
+    places = np.concatenate([body.position for body in scene.bodies])
+    return places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
+
+
+def _bridged_at(curves: Curves | None, time_ns: int) -> bool:
+    """Return whether a path is a bridge at a time [ns]."""
+    return curves is not None and len(curves.doubtful) > 0 and bool(curves.doubtful[nearest(curves.time_ns, time_ns)])
+
+
+def _depth_curves(axes: Axes, scene: Scene, fingers: list[str]) -> Any:
+    """Draw each finger's predicted depth over time, grey where any path is bridged; return the line at the time."""
+    depth = next((c for c in scene.curves if c.name == "predicted depth"), None)
+    zero, end = _begin(scene), max(int(body.time_ns[-1]) for body in scene.bodies)
+    if depth:
+        seconds = (depth.time_ns - zero) / 1e9
+        for name, values in zip(depth.labels, depth.values.T, strict=True):
+            axes.plot(seconds, values, color=_color(fingers.index(name)), linewidth=1.2, label=name)
+    for curves in scene.curves:
+        if curves.name.startswith("fingertip/") and len(curves.doubtful):
+            seconds = (curves.time_ns - zero) / 1e9
+            axes.fill_between(
+                seconds, 0, 1, where=curves.doubtful.tolist(), transform=axes.get_xaxis_transform(), color="0.85",
+                zorder=0, linewidth=0,
+            )  # fmt: skip
+    axes.set(xlim=(0.0, (end - zero) / 1e9))
+    axes.set_xlabel("time [s]; grey: a path is bridged", fontsize=8)
+    axes.set_ylabel("predicted\ndepth [mm]" if depth else "no predicted\ndepth", fontsize=8)
+    axes.tick_params(labelsize=7)
+    if depth:
+        axes.set_ylim(0.0, 1.3 * max(float(np.nanmax(depth.values, initial=0.0)), 0.1))  # room for names
+        axes.legend(loc="upper right", fontsize=7, ncols=4, frameon=False)
+    return axes.axvline(0.0, color="black", linewidth=1)
