@@ -1,11 +1,7 @@
-"""One small model of each kind for the whole room; meshes go into a folder of the test run.
+"""One small model of each kind for the whole room; their meshes lie in `meshes/` (`running.user_cache`).
 
-The models' meshes lie in `meshes/`: fTetWild never gives the same one twice, and figures should not scatter. When
-`tacdata.skin.mesh.build.RECIPE` changes they are no longer found and are made anew at every run: replace them then.
+When `tacdata.skin.mesh.build.RECIPE` changes they are no longer found: replace them then.
 """
-
-import shutil
-from pathlib import Path
 
 import pytest
 import torch
@@ -22,15 +18,10 @@ def _settings(**mesh):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def mesh_cache(tmp_path_factory):
-    """Keep meshes of the tests apart from the user's; start Warp; one thread, as in a worker of the farm."""
+def one_thread():
+    """Start Warp; one thread, as in a worker of the farm."""
     wp.init()
     torch.set_num_threads(1)
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
-        shutil.copytree(Path(__file__).parent / "meshes", folder / "meshes")
-        patch.setenv("TACDATA_CACHE", str(folder))
-        yield folder
 
 
 @pytest.fixture(scope="session")

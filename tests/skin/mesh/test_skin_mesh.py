@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from running.user_cache import MESHES
 from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata.errors import SolveError
@@ -103,11 +104,20 @@ def test_the_named_faces_hold_the_nodes_that_lie_on_them(slab, bumps):
     assert not (bumps.mesh.bottom & free_tips).any()
 
 
-def test_a_mesh_comes_back_from_the_cache_as_it_was(slab, mesh_cache):
-    before = set((mesh_cache / "meshes").iterdir())
+def test_a_mesh_comes_back_from_the_cache_as_it_was(slab, user_cache):
+    kept = user_cache / "meshes" / f"{mesh_key(slab.sensor, slab.settings.mesh)}.npz"
+    before = kept.stat().st_mtime_ns
     again = build_mesh(slab.sensor, slab.settings.mesh)
     assert again.content_hash == slab.mesh.content_hash
-    assert set((mesh_cache / "meshes").iterdir()) == before
+    assert kept.stat().st_mtime_ns == before
+
+
+def test_figures_of_this_room_come_from_meshes_that_are_kept(slab, fine_slab, bumps):
+    """A mesh made anew differs at every run, and with it every figure that a test is held to."""
+    for model in (slab, fine_slab, bumps):
+        assert SkinMesh.load(MESHES / f"{mesh_key(model.sensor, model.settings.mesh)}.npz").content_hash == (
+            model.mesh.content_hash
+        )
 
 
 def test_other_settings_give_another_mesh(slab):

@@ -123,7 +123,7 @@ def dome():
 
 
 @pytest.fixture(scope="module")
-def own(tmp_path_factory, mesh_cache):
+def own(tmp_path_factory):
     """The dome as a sensor's own surface, and its mesh."""
     sensor = read_sensor(written(tmp_path_factory.mktemp("own"), document(surface={"file": "dome.stl"}), dome=dome()))
     return sensor, make_mesh(sensor, MeshSettings(outer=0.7, interior=1.2))
