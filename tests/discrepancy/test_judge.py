@@ -20,6 +20,7 @@ from tacdata.discrepancy.search.rivals import required_margin
 from tacdata.discrepancy.verdict.calibration import BEYOND, gains_beyond_calibration
 from tacdata.discrepancy.verdict.decide import Decision, adequate, decide, settled
 from tacdata.discrepancy.verdict.document import document
+from tacdata.discrepancy.verdict.likelihood_ratio import LikelihoodRatio
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.residual_slices import slices
 from tacdata.discrepancy.verdict.sealed import Gap
@@ -54,6 +55,11 @@ def judged(effects=FEW, made=None, **world):
     setting = Setting(made, FittedResponse(made), [load(name) for name in effects])
     found, checks = find(setting), check(setting)
     return Judged(found, checks, decide(found, checks))
+
+
+def sealed(power, share):
+    """Return what four sealed episodes show of an answer, of a squared size of ``power``."""
+    return Gap(*np.ones((3, 4)), tuple("abcd"), ratio=LikelihoodRatio(power, share))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -180,31 +186,30 @@ def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():
 
 
 @pytest.mark.parametrize(
-    ("explained", "before", "after", "status"),
-    [(400.0, 2.0, 1.2, "named"), (400.0, 2.0, 2.1, "unknown"), (20.0, 2.0, 2.1, "named")],
+    ("power", "share", "status"),
+    [(40.0, 0.7, "named"), (40.0, 0.3, "unknown"), (3.0, 0.3, "named"), (3.0, -0.5, "unknown"), (0.5, -0.5, "named")],
 )
-def test_sealed_episodes_that_should_show_a_name_can_take_it_away(explained, before, after, status):
-    """Four of 44: an answer that explains 400 in all should show 36 there; one of 20 need not show its 2."""
+def test_sealed_episodes_take_a_name_away_where_chance_is_no_reason(power, share, status):
+    """Of an answer that they should hardly show, they may show nothing."""
     one = FoundEffect(Placed(load("latency"), {"L": np.array(0.05)}), {}, (), (), {}, 9.0, corrected_p=0.001)
     setting = SimpleNamespace(
         course=course(episodes=8), channel_gain=None, response=FittedResponse(course(episodes=8)), nuisance={}
     )
     fields = {
         "effects": (one,), "until": "decide", "gap": True, "tests": SimpleNamespace(p_generic=0.001),
-        "left": SimpleNamespace(t=0.0, gain=0.0), "share_left": 0.0, "loudness": 2.0, "explained": explained,
+        "left": SimpleNamespace(t=0.0, gain=0.0), "share_left": 0.0, "loudness": 2.0, "explained": 400.0,
         "values": np.ones(40), "gains": np.zeros(3), "energy": (np.ones(40),) * 2,
         "problem": SimpleNamespace(setting=setting, null=SimpleNamespace(odd=())),
     }  # fmt: skip
     found = cast(Any, SimpleNamespace(**fields))
-    shown = Gap(np.full(4, before), np.full(4, after), np.ones(4), tuple("abcd"))
-    assert decide(found, DataChecks(44), (), shown).status == status
+    assert decide(found, DataChecks(44), (), sealed(power, share)).status == status
 
 
 @pytest.mark.parametrize(
-    ("gap", "shown", "status"),
-    [(True, None, "named"), (False, None, "ambiguous"), (False, 1.2, "named"), (False, 2.1, "unknown")],
+    ("gap", "share", "status"),
+    [(True, None, "named"), (False, None, "ambiguous"), (False, 0.9, "named"), (False, 0.1, "unknown")],
 )
-def test_behind_a_closed_gate_sealed_episodes_alone_bear_a_gain_out(gap, shown, status):
+def test_behind_a_closed_gate_sealed_episodes_alone_bear_a_gain_out(gap, share, status):
     gains = np.array([0.3, -0.3, *np.tile([0.01, -0.01], 11)])
     made = course(episodes=8)
     setting = SimpleNamespace(
@@ -216,8 +221,8 @@ def test_behind_a_closed_gate_sealed_episodes_alone_bear_a_gain_out(gap, shown, 
         "gains": gains, "halves": np.stack([gains, gains]), "energy": (np.ones(40),) * 2,
         "problem": SimpleNamespace(setting=setting, null=SimpleNamespace(odd=())),
     }  # fmt: skip
-    sealed = None if shown is None else Gap(np.full(4, 2.0), np.full(4, shown), np.ones(4), tuple("abcd"))
-    assert decide(cast(Any, SimpleNamespace(**fields)), DataChecks(44), (), sealed).status == status
+    shown = None if share is None else sealed(40.0, share)
+    assert decide(cast(Any, SimpleNamespace(**fields)), DataChecks(44), (), shown).status == status
 
 
 def test_few_episodes_carry_no_verdict():

@@ -69,8 +69,10 @@ class EpisodeErrors:
         rest = residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
         process = offset_process(rest, course, known.scale, known.memory, kinds)
-        walk = offset_random_walk.modes(rest, course, known.scale, known.memory, self._repeats)
-        return replace(known, offsets=process, random_walk=walk, tag=readings.tag_offset_spread(rest, course, known))
+        rate = offset_random_walk.walk_rate(rest, course, known.scale, known.memory, self._repeats)
+        walk = offset_random_walk.modes(rate, course, known.memory)
+        tag = readings.tag_offset_spread(rest, course, known)
+        return replace(known, offsets=process, random_walk=walk, walk_rate=rate, tag=tag)
 
     def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> ErrorSizes:
         """Return the estimated size of episodes' own errors of pose.

@@ -26,6 +26,8 @@ class Noise:
     random_walk: np.ndarray | None = None
     """What one standard deviation of each mode of the random walk within an episode changes [noise scales], shape
     (n, modes); None: there is none."""
+    walk_rate: float = 0.0
+    """Rate of that random walk [noise scales squared a second]."""
     relative_scale: np.ndarray | None = None
     """How much larger noise is in each value than without load [1], shape (n, streams); None: it is not."""
     tag: float | None = None

@@ -13,6 +13,7 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.fitted_response import contexts
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise import offset_random_walk, readings
 from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, ErrorSizes
 from tacdata.discrepancy.noise.gram import episode_grams
 from tacdata.discrepancy.noise.noise_model import Noise
@@ -61,7 +62,7 @@ class NullModel:
     draws: np.ndarray
     """White noise, drawn [noise scales], shape (m, streams, draws)."""
     sizes: np.ndarray | None = None
-    """Of errors of pose, over their priors [1], shape (kinds,); None where all models share ``errors``."""
+    """Of errors of pose, over their priors [1], shape (kinds,); None: as their priors."""
     spread: float = 0.0
     """Of the gain of a stream of an episode, as a standard deviation [1]."""
 
@@ -101,13 +102,38 @@ class NullModel:
         if features is before or (features is not None and before is not None and np.array_equal(features, before)):
             return self.whitener
         errors, noise = self.errors, self.noise
-        if self.sizes is not None and noise.gain_error is not None:
+        if setting.response.fitted and noise.gain_error is not None:
             episode, streams = course.reduced.episode, Streams.of(course)
             said = predicted or predict(course, setting.response, list(placed))
             errors = as_large(pose_errors(setting, placed, said), errors, episode)
             rise = streams.rise(said, setting.response)
             noise = replace(noise, gain_error=as_large(rise, noise.gain_error, episode))
         return Whitener(course.reduced, noise, self.context, features, errors, self.whitener)
+
+    def whiteners(self, setting: Setting, fewer: Course) -> tuple[Whitener, Whitener]:
+        """Return what takes nuisances out of columns of all rows read, and of those of fewer.
+
+        Args:
+            setting: With the model's response and effects, and all readings.
+            fewer: The course with those that the noise was estimated from.
+        """
+        course, response, placed = setting.course, setting.response, list(setting.given)
+        reduced, streams, said = course.reduced, Streams.of(course), predict(course, response, placed)
+        residual = streams.measured(course) - streams.predicted(said)
+        rise = streams.rise(said, response).astype(np.float32)
+        missing, noise, process = ~np.isfinite(residual), self.noise, self.noise.offsets
+        noise = replace(
+            noise, gain_error=(rise * self.spread).astype(np.float32), missing=missing if missing.any() else None,
+            random_walk=offset_random_walk.modes(noise.walk_rate, reduced, noise.memory),
+            relative_scale=None if noise.relative_scale is None else readings.relative_scale(residual, rise, reduced),
+            offsets=process and process.beside(reduced),
+        )  # fmt: skip
+        errors = pose_errors(setting, placed, said) * (1.0 if self.sizes is None else self.sizes)
+        context, features = contexts(reduced), taken_up(course, response, placed)
+        kept = np.isin(course.read, fewer.read)
+        shared = None if features is None else features[kept]
+        some = Whitener(fewer.reduced, noise.of(kept), context[kept], shared, errors[kept])
+        return Whitener(reduced, noise, context, features, errors), some
 
     def projected_draws(self, whitener: Whitener) -> np.ndarray:
         """Return what a cleaner leaves of the draws [noise scales], shape (m, streams, draws), float32."""
@@ -167,8 +193,7 @@ def null_model(setting: Setting) -> NullModel:
     whitener = Whitener(reduced, known, context, features, errors)
     beside = whitener.whitened(every[:, :, : extra.shape[2] + rich.shape[2]])
     folds = fold_of(course.episodes)
-    sizes = own.sizes if response.fitted else None
     return NullModel.of(
-        reduced, context, features, errors, ridge, beside, known, folds, whitener, own.odd, sizes,
+        reduced, context, features, errors, ridge, beside, known, folds, whitener, own.odd, own.sizes,
         max(spread, LEAST_GAIN_ERROR),
     )  # fmt: skip

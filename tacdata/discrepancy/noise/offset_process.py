@@ -92,6 +92,10 @@ class OffsetProcess:
             np.searchsorted(episodes, number),
         )  # fmt: skip
 
+    def beside(self, course: Course) -> OffsetProcess:
+        """Return it for a course with readings of more episodes: their offsets let no others be expected."""
+        return replace(self, quiet=_quiet(course), episode=course.episode)
+
     def expected(self, values: np.ndarray, missing: np.ndarray | None = None) -> np.ndarray:
         """Return the offsets that those of the episodes before let one expect, shape (episodes, streams, columns).
 
@@ -115,7 +119,7 @@ def offset_process(
         memory: Correlation of successive rows [1].
         levels: Kinds of unknown levels, each as the number of the one that an episode has, shape (episodes,).
     """
-    quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
+    quiet = _quiet(course)
     streams = residual[:, : course.channels] / scale[: course.channels]
     missing = ~np.isfinite(streams)
     there = quiet & ~missing.any(axis=1)
@@ -132,6 +136,11 @@ def offset_process(
     same = np.sum([level[:, None] == level for level in levels], axis=0)
     covariance = walk * np.exp(-apart / length) + FREE_LEVEL**2 * same + max(own, LEAST_OWN**2) * np.eye(len(time))
     return OffsetProcess(covariance, error, quiet, course.episode)
+
+
+def _quiet(course: Course) -> np.ndarray:
+    """Return rows where nothing presses, shape (m,), bool."""
+    return course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
 
 
 def _times(course: Course) -> np.ndarray:

@@ -25,19 +25,14 @@ QUIET_ROWS = 3
 """Rows without contact from which an offset before or after a press is read, at least."""
 
 
-def modes(
-    rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray
-) -> np.ndarray | None:  # fmt: skip
+def modes(rate: float, course: Course, memory: float) -> np.ndarray | None:
     """Return what one standard deviation of each mode changes [noise scales], shape (m, modes); None for none.
 
     Args:
-        rest: What an over-rich fit leaves [each stream's unit], shape (m, streams); NaN where nothing was read.
+        rate: Of the random walk [noise scales squared a second].
         course: With the rows read alone.
-        scale: Standard deviation of the innovations of rows, shape (streams,).
         memory: Correlation of successive rows [1].
-        place: Of each episode, shape (episodes,).
     """
-    rate = walk_rate(rest, course, scale, memory, place)
     count = np.bincount(course.episode, minlength=course.episodes)
     begin = np.full(course.episodes, np.inf)
     np.minimum.at(begin, course.episode, course.time)
@@ -58,7 +53,15 @@ def modes(
 
 
 def walk_rate(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float, place: np.ndarray) -> float:
-    """Return the rate of the random walk [noise scales squared a second], 0 where it is unknown; as for `modes`."""
+    """Return the rate of the random walk [noise scales squared a second], 0 where it is unknown.
+
+    Args:
+        rest: What an over-rich fit leaves [each stream's unit], shape (m, streams); NaN where nothing was read.
+        course: With the rows read alone.
+        scale: Standard deviation of the innovations of rows, shape (streams,).
+        memory: Correlation of successive rows [1].
+        place: Of each episode, shape (episodes,).
+    """
     quiet = course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
     streams = rest[:, : course.channels] / scale[: course.channels]
     quiet &= np.isfinite(streams).all(axis=1)

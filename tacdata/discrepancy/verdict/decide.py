@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
-import numpy as np
-
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
@@ -46,13 +44,6 @@ RARE_P = 0.003
 
 INCOMPLETE = "named, incomplete"
 """Status: some of what is missing has a name, the rest has not."""
-
-
-SHOULD_SHOW = 4.0
-"""Sealed episodes: they should show an answer that explains so much of half their sum of squares [1].
-
-It then lowers their gap with a probability of 92 % or more: a likelihood ratio of 8 has a standard deviation of 2.8.
-"""
 
 
 class Reason(Enum):
@@ -129,7 +120,8 @@ def decide(
     status, reason = _status(found, answer)
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
     levels = [finest(f) for f in answer]
-    if reason is Reason.LEFTOVERS and (shown is None or not len(shown.names) or shown.shrinks):
+    sealed = shown is not None and bool(len(shown.names))
+    if reason is Reason.LEFTOVERS and not refuted(shown) and (borne_out(shown) or not sealed):
         first = leading(answer)
         levels = [beside_much(found, f, own.get(f.placed.effect.name), shown) for f in answer]
         if first is None or levels[first] is None:
@@ -147,11 +139,11 @@ def decide(
         # One of several names may stand in for a part of what has none: only the others are sure.
         levels = [None if doubt else level for doubt, level in zip(open_ones, levels, strict=True)]
         status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
-    if status == "named" and not found.gap and (shown is None or not len(shown.names)):
+    if status in ("named", INCOMPLETE) and refuted(shown):
+        status, reason = "unknown", Reason.SEALED
+    if status == "named" and not found.gap and not borne_out(shown):
         # Behind a closed gate, sealed episodes alone bear a gain out.
         levels, status, reason = [None for _ in answer], "ambiguous", Reason.RIVALS
-    if status in ("named", INCOMPLETE) and refuted(found, answer, shown):
-        status, reason = "unknown", Reason.SEALED
     if checks.contradictions:
         status, reason = "unknown", Reason.CONTRADICTION
     elif checks.too_few:
@@ -201,13 +193,14 @@ def seems_early(finding: FoundEffect, answer: list[FoundEffect]) -> bool:
     return memory and finding.placed.effect.delay(finding.placed.values) < 0
 
 
-def refuted(found: Findings, answer: list[FoundEffect], shown: Gap | None) -> bool:
-    """Return whether sealed episodes that should show an answer have no smaller gap with it."""
-    if shown is None or not len(shown.names) or shown.shrinks:
-        return False
-    judged = max(int(np.count_nonzero(found.values)), 1)
-    raced = any(f.corrected_p is not None for f in answer)
-    return not raced or found.explained / judged * len(shown.names) >= SHOULD_SHOW
+def refuted(shown: Gap | None) -> bool:
+    """Return whether sealed episodes take an answer away (`LikelihoodRatio.refutes`)."""
+    return shown is not None and shown.ratio is not None and shown.ratio.refutes
+
+
+def borne_out(shown: Gap | None) -> bool:
+    """Return whether sealed episodes show an answer by themselves (`LikelihoodRatio.bears_out`)."""
+    return shown is not None and shown.ratio is not None and shown.ratio.bears_out
 
 
 def finest(finding: FoundEffect) -> Level | None:

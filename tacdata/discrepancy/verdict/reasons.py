@@ -53,7 +53,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
         case Reason.INCOMPLETE:
             return _incomplete(decision, shown) + _nameless(found, 0.0)
         case Reason.SEALED:
-            return f"{names} fits the presses that were judged; the sealed ones do not bear it out: not the name"
+            return f"{names} fits the presses that were judged; {_against(shown)}: not the name"
         case Reason.LEFTOVERS:
             return f"something is missing; {_closest(answer, found.share_left, shown)}"
         case Reason.ODD:
@@ -64,6 +64,14 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             return off + (_lone(decision, found, ": ") or ": look at where it lives")
         case Reason.UNEXPLAINED:
             return "something is missing that no modelled effect explains" + _lone(decision, found, "; ")
+
+
+def _against(shown: Gap | None) -> str:
+    """Return how sealed episodes speak against an answer."""
+    if shown is None or shown.ratio is None:
+        return "the sealed ones do not bear it out"
+    share, error = 100 * shown.ratio.share, 100 * shown.ratio.error
+    return f"the sealed ones do not bear it out (they show {share:.0f} % of it, with a standard error of {error:.0f} %)"
 
 
 def _lone(decision: Decision, found: Findings, before: str) -> str:
@@ -142,7 +150,8 @@ def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
     it, name = ("it", "it is not the name") if alone else ("them", "they are not the names")
     if shown is not None and len(shown.before):
         before, after = float(shown.before.mean()), float(shown.after.mean())
-        if worse := worsened(before, after):
+        against = shown.ratio is None or shown.ratio.observed < 0
+        if against and (worse := worsened(before, after)):
             return (
                 f"{words}, but sealed episodes fit {worse} with {it} (mean square {before:.3g} times the noise "
                 f"without, {after:.3g} with): {name}"

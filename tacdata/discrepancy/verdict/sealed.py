@@ -12,6 +12,7 @@ from tacdata.chain import Course, predict
 from tacdata.discrepancy.regressors.generic import histories
 from tacdata.discrepancy.search.findings import Findings
 from tacdata.discrepancy.verdict.calibration import gains_beyond_calibration
+from tacdata.discrepancy.verdict.likelihood_ratio import LikelihoodRatio, likelihood_ratio
 
 SEALED_SHARE = 0.1
 """Share of the episodes that is sealed [1]..."""
@@ -78,11 +79,8 @@ class Gap:
     names: tuple[str, ...]
     without: dict[str, np.ndarray] = field(default_factory=dict)
     """Effect -> the same with all effects but that one [1], shape (k,)."""
-
-    @property
-    def shrinks(self) -> bool:
-        """Whether the effects make the gap smaller."""
-        return bool(self.after.sum() < self.before.sum())
+    ratio: LikelihoodRatio | None = None
+    """How likely the sealed episodes are with the effects, over without; None where there are none."""
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -113,6 +111,7 @@ class Gap:
             "closed": float(closed), "interval": [low, high], "certain": high - low < WIDEST,
             "shares": self._shares(float(closed)),
             "worst": {"episode": self.names[worst], "after": float(self.after[worst])},
+            **({} if self.ratio is None else {"ratio": self.ratio.document()}),
         }  # fmt: skip
 
     def _shares(self, closed: float) -> dict[str, float]:
@@ -161,7 +160,8 @@ def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
         alone = course.readings[rows] - predict(course, one.without.response, others).signal[rows]
         [name] = {p.effect.name for p in model.placed} - {p.effect.name for p in one.without.placed}
         without[name] = _squares(alone / scale, number, episodes)
-    return Gap(before, after, ceiling, tuple(course.names[k] for k in episodes), without)
+    names = tuple(course.names[k] for k in episodes)
+    return Gap(before, after, ceiling, names, without, likelihood_ratio(course, found))
 
 
 def _squares(residual: np.ndarray, number: np.ndarray, episodes: np.ndarray) -> np.ndarray:

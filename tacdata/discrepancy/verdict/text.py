@@ -118,13 +118,25 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
         lines.append(f"{head}{sealed['before']:.3f}{by_path if sealed['ceiling'] < 0.9 * sealed['before'] else ''}")
     else:
         lines.append(f"{head}{sealed['before']:.3f} before, {sealed['after']:.3f} after{_closed(sealed)}")
+        lines += [] if sealed["certain"] else _borne_out(sealed.get("ratio"))
     return [*lines, f"  ({unit}, the sealed episodes do not: they do not compare)"]
+
+
+def _borne_out(ratio: dict[str, Any] | None) -> list[str]:
+    """Return how much of the answer sealed episodes show, where each press's own pose and gain are accounted for."""
+    if ratio is None or ratio["error"] is None:
+        return []
+    return [
+        f"  they show {100 * ratio['share']:.0f} % of the answer (standard error {100 * ratio['error']:.0f} %), each "
+        "press's own pose and gain aside: 100 % is expected with it, 0 % without"
+    ]
 
 
 def _closed(sealed: dict[str, Any]) -> str:
     """Return how far the gap on sealed episodes is closed, in words that follow its numbers."""
     best = f", {sealed['ceiling']:.3f} at best"
-    if worse := worsened(sealed["before"], sealed["after"]):
+    ratio = sealed.get("ratio")
+    if (ratio is None or ratio["observed"] < 0) and (worse := worsened(sealed["before"], sealed["after"])):
         return f": {worse}{best}"
     if not sealed["certain"]:
         return f" (90 %: {sealed['after_interval'][0]:.3g} to {sealed['after_interval'][1]:.3g}){best}"

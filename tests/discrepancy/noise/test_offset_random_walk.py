@@ -41,8 +41,8 @@ def test_white_noise_does_not_wander():
 def test_modes_add_up_to_a_brownian_motion_about_its_mean():
     rng = np.random.default_rng(2)
     reduced, rest = projected_draws(2, 3.0, 12)
-    modes = offset_random_walk.modes(rest, reduced, np.ones(3), 0.0, reduced.site)
     rate = offset_random_walk.walk_rate(rest, reduced, np.ones(3), 0.0, reduced.site)
+    modes = offset_random_walk.modes(rate, reduced, 0.0)
     rows = np.flatnonzero(reduced.episode == 0)
     # Evenly in time: the mean over an episode is one over time, not over rows.
     walk = np.cumsum(rng.normal(size=(4000, 400)) * np.sqrt(rate * np.ptp(reduced.time[rows]) / 400), axis=1)
@@ -56,7 +56,8 @@ def test_modes_add_up_to_a_brownian_motion_about_its_mean():
 def test_what_is_slow_within_a_press_scatters_as_the_noise_says(told):
     """A column that grows while pressed: its scores scatter by what they know, unless the wander is not told."""
     reduced, rest = projected_draws(7, 0.5)
-    modes = offset_random_walk.modes(rest, reduced, np.ones(3), 0.0, reduced.site) if told else None
+    rate = offset_random_walk.walk_rate(rest, reduced, np.ones(3), 0.0, reduced.site)
+    modes = offset_random_walk.modes(rate, reduced, 0.0) if told else None
     none = np.zeros((reduced.rows, 1), dtype=np.int64)[:, 0]
     whitener = Whitener(reduced, Noise(np.ones(3), 0.0, random_walk=modes), none, None, np.zeros((reduced.rows, 3, 1)))
     begin = reduced.time[np.flatnonzero(reduced.first)][np.cumsum(reduced.first) - 1]

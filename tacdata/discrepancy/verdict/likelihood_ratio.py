@@ -1,0 +1,127 @@
+"""The likelihood ratio of sealed episodes with and without an answer, and what chance makes of it.
+
+The density of sealed episodes given the open ones is what counts. Its logarithm is that of all less that of the open.
+The covariance is the null model's: noise, offsets, each press's own pose and gains. Open episodes tell what calibration
+leaves open.
+
+d is what the answer changes, r the residual without it. The log-likelihood ratio is d'r - d'd / 2. The share of the
+answer that is found, d'r / d'd, says the same. It is 1 on average with the answer, 0 without.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.chain import Course, predict
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.noise.nuisances import nuisance_columns
+from tacdata.discrepancy.regressors.stack import apart, side_by_side
+from tacdata.discrepancy.search.findings import Findings
+from tacdata.discrepancy.statistics.gram_fit import eliminated
+from tacdata.discrepancy.verdict.calibration import gains_beyond_calibration
+from tacdata.effects import Placed
+
+LEVEL_Z = 1.645
+"""Both tests: one-sided level of 5 % [standard errors]."""
+HALF = 0.5
+"""Share of an answer at which sealed episodes are as likely with it as without [1]."""
+
+
+@dataclass(frozen=True)
+class LikelihoodRatio:
+    """How likely sealed episodes are with an answer, over without."""
+
+    power: float
+    """d'd: twice the log-likelihood ratio that is expected with the answer [1]."""
+    share: float
+    """Share of the answer that the sealed episodes show [1]."""
+    scatter: float = 1.0
+    """Variance of open episodes' scores over what the covariance says, 1 at least [1]."""
+    known: float = float("inf")
+    """d'd of the open episodes, which gave the answer its size [1]."""
+
+    @property
+    def observed(self) -> float:
+        """The log-likelihood ratio [1]."""
+        return self.power * (self.share - HALF)
+
+    @property
+    def expected(self) -> float:
+        """What it is on average with the answer [1]; the negative of it without."""
+        return HALF * self.power
+
+    @property
+    def error(self) -> float:
+        """Standard error of the share with the answer [1]: chance in the sealed episodes, and in its size."""
+        return float(np.sqrt(self.scatter * (1 / self.power + 1 / self.known))) if self.power > 0 else float("inf")
+
+    @property
+    def refutes(self) -> bool:
+        """Whether sealed episodes take the answer away.
+
+        They are likelier without it. Their ratio is below what it is with the answer, by more than chance: one-sided,
+        5 %. So a model is tested by its likelihood ratio against another (Cox, Proc. 4th Berkeley Symposium 1, 1961,
+        105). The answer's size has an error of its own (Chow, Econometrica 28, 1960, 591).
+        """
+        return self.share < HALF and self.share + LEVEL_Z * self.error < 1
+
+    @property
+    def bears_out(self) -> bool:
+        """Whether sealed episodes show the answer: their ratio is above chance without it, at 5 %."""
+        return self.power > 0 and self.share > LEVEL_Z * float(np.sqrt(self.scatter / self.power))
+
+    def document(self) -> dict[str, float | None]:
+        """Return it as in the verdict."""
+        error = self.error if np.isfinite(self.error) else None
+        return {"observed": self.observed, "expected": self.expected, "share": self.share, "error": error}
+
+
+def likelihood_ratio(course: Course, found: Findings) -> LikelihoodRatio | None:
+    """Return the likelihood ratio of sealed episodes; None where no effect was found.
+
+    Args:
+        course: All recordings, with the readings that the search did not have.
+        found: What was found without them.
+    """
+    model, beyond = found.final, [f.placed for f in gains_beyond_calibration(found)]
+    fewer, given = found.problem.setting.course, list(model.setting.given)
+    kept = np.isin(course.read, fewer.read)
+    if kept.all() or not (model.placed or beyond):
+        return None
+    setting = replace(model.setting, course=course, given=(*given, *model.placed))
+    every, some = model.null.whiteners(setting, fewer)
+    streams = Streams.of(course)
+    without = streams.predicted(predict(course, found.problem.setting.response, given))
+    change = streams.predicted(predict(course, setting.response, [*setting.given, *beyond])) - without
+    nuisances, ridge = nuisance_columns(setting, setting.given)
+    nuisances = _beside(nuisances, beyond, course.channels)
+    columns = side_by_side([streams.measured(course) - without, change, *apart(nuisances)])
+    shown = some.episode_grams(columns[kept]).gram
+    before = _marginal(shown.sum(axis=0), ridge)
+    after = _marginal(every.episode_grams(columns).gram.sum(axis=0), ridge)
+    power = float(after[1, 1] - before[1, 1])
+    if power <= 0:
+        return LikelihoodRatio(0.0, 0.0)
+    each = eliminated(shown, np.arange(1, shown.shape[1] - 1), ridge)
+    score = each[:, 0, 1] - each[:, 1, 1]
+    scatter = max(float(np.sum(np.square(score))) / max(float(each[:, 1, 1].sum()), 1e-12), 1.0)
+    return LikelihoodRatio(power, float(after[0, 1] - before[0, 1]) / power, scatter, max(float(before[1, 1]), 1e-12))
+
+
+def _beside(nuisances: np.ndarray, beyond: list[Placed], channels: int) -> np.ndarray:
+    """Return nuisances that cannot do what found gains do; channels' gains stand first."""
+    if not beyond:
+        return nuisances
+    sizes = [np.broadcast_to(next(iter(p.values.values())), channels) for p in beyond]
+    taken = np.linalg.qr(np.stack(sizes, axis=1).astype(float))[0]
+    result = nuisances.copy()
+    result[:, :, :channels] -= (nuisances[:, :, :channels] @ taken) @ taken.T
+    return result
+
+
+def _marginal(gram: np.ndarray, ridge: np.ndarray) -> np.ndarray:
+    """Return products of the first two columns, the others integrated out, shape (2, 2)."""
+    beside = gram[2:, 2:] + np.diag(ridge)
+    return gram[:2, :2] - gram[:2, 2:] @ np.linalg.solve(beside, gram[2:, :2])
