@@ -1,0 +1,128 @@
+"""Networks that are trained beside each other on the same presses, and how one of them is trained in a given time."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import presses
+
+from training.frames.frames import Frames
+from training.loss import WeightedLoss
+from training.metrics.depth_maps import CONTACT_THRESHOLD
+from training.pretraining.recipe import recipe
+from training.settings import TrainingSettings
+from training.train import Progress, train
+
+WIDE: dict[str, Any] = {"arguments": {"hidden": 512, "layers": 3}}
+BROAD = {"gain_jitter": 0.1, "scale_jitter": 0.25, "exponent_jitter": 0.15}
+"""How far a unit may be from the model, as the network that ships was trained until now [1]."""
+NARROW = {"gain_jitter": 0.04, "scale_jitter": 0.12, "exponent_jitter": 0.06}
+"""What remains of it after a calibration with ten presses. A network that must allow for more rounds what it sees:
+two shapes whose readings differ by less than the gains' spread get the mean of their maps [1]."""
+VARIANTS: dict[str, dict[str, Any]] = {
+    "as-before": {**BROAD},
+    "narrow": {**NARROW},
+    "narrow-wide": {**NARROW, **WIDE},
+    # Squared errors favour the mean of all maps that fit the readings, absolute ones their median: less rounded.
+    "narrow-wide-absolute": {
+        **NARROW, **WIDE, "loss": WeightedLoss(mixture=0.5, threshold=1 / 30, foreground=3.0),
+    },
+}  # fmt: skip
+FEWEST, MOST = 2, 80
+"""Epochs, whatever the time allows [count]."""
+_IDLE = 0.3
+"""Share of the frames without contact that an epoch takes [1]."""
+_LEARNED = 0.7
+"""Share of the presses that are trained on, about [1]."""
+_TRIED, _STEPS = 8, 300
+"""Files of presses, and steps, that tell how long a step takes [count]."""
+_VALIDATION = 4.0
+"""Time of an epoch's validation [s]."""
+_AROUND = 100.0
+"""Time for what is before the first epoch and after the last: reading, calibration, intervals, readings seen [s]."""
+
+
+def settings(name: str, epochs: int, batch: int) -> TrainingSettings:
+    """Return the recipe of a variant."""
+    asked = {
+        "network": "pattern", "batch_size": batch, "learning_rate": 2e-3, "idle_share": _IDLE, "epochs": epochs,
+        **VARIANTS[name],
+    }  # fmt: skip
+    return recipe(asked)
+
+
+def train_one(
+    name: str, solved: Path, packed: Path, runs: Path, out: Path, until: float, device: str, batch: int,
+    shown: Callable[[str], None] = print,
+) -> None:  # fmt: skip
+    """Train a variant until a time; a trial tells how many epochs fit.
+
+    Args:
+        name: One of `VARIANTS`.
+        solved: Folder of the solved presses.
+        packed: Their frames.
+        runs: Where runs lie.
+        out: Where NAME.safetensors is put.
+        until: When it must be done [s since 1970].
+        device: What it trains on.
+        batch: Frames a step.
+        shown: Called with each line of progress.
+    """
+    began = time.time()
+
+    def told(progress: Progress) -> None:
+        if progress.finished:
+            line = progress.finished
+            shown(
+                f"{name}: epoch {line['epoch']} of {progress.epochs}, {line['seconds']:.1f} s, validation loss "
+                f"{line['validation_loss']:.6f}, contact RMSE {line['validation_contact_rmse_mm']:.4f} mm"
+            )
+
+    run, kept = runs / name, runs / f"{name}.epochs"
+    resumed = (run / "last.safetensors").is_file()
+    if not resumed:
+        runs.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(run, ignore_errors=True)
+        some = presses.read(solved, packed, _TRIED)
+        step = _step_seconds(some, settings(name, MOST, batch), runs / f"{name}-trial", device)
+        steps = _steps(some, batch) * len(list(packed.glob("*.npz"))) / min(len(list(packed.glob("*.npz"))), _TRIED)
+        epochs = int((until - time.time() - _AROUND) / (steps * step + _VALIDATION))
+        kept.write_text(str(min(max(epochs, FEWEST), MOST)))
+        shown(f"{name}: {1000 * step:.2f} ms a step, {steps:.0f} steps an epoch, so {kept.read_text()} epochs")
+    frames = presses.read(solved, packed)
+    shown(f"{name}: {len(frames.taxels)} frames read after {time.time() - began:.0f} s")
+    best = train(frames, settings(name, int(kept.read_text()), batch), run, device, resumed, threads=2, listener=told)
+    out.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(best.path, out / f"{name}.safetensors")
+    shown(f"{name}: done, {time.time() - began:.0f} s in all, best epoch {best.document['best']}")
+
+
+class _Enough(Exception):
+    """The trial has told how long a step takes."""
+
+
+def _step_seconds(frames: Frames, recipe: TrainingSettings, run: Path, device: str) -> float:
+    """Return how long a step takes [s], beside whatever else runs on this machine: the mean after the first quarter."""
+    times: list[float] = []
+
+    def count(progress: Progress) -> None:
+        times.append(time.monotonic())
+        if len(times) >= _STEPS:
+            raise _Enough
+
+    shutil.rmtree(run, ignore_errors=True)
+    with contextlib.suppress(_Enough):
+        train(frames, recipe, run, device, threads=2, listener=count)
+    first = len(times) // 4
+    return (times[-1] - times[first]) / (len(times) - 1 - first)
+
+
+def _steps(frames: Frames, batch: int) -> float:
+    """Return the steps of an epoch [1]."""
+    touching = float((frames.depth.max(axis=(1, 2)) > CONTACT_THRESHOLD).mean())
+    return len(frames.taxels) * _LEARNED * (touching + _IDLE * (1 - touching)) / batch

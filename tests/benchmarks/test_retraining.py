@@ -1,0 +1,112 @@
+"""Retraining: packed presses are those that a dataset holds, a choice loses nothing, and all shapes can be pressed."""
+
+import importlib.util
+import os
+import sys
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from label_farm.simulated.packing import write_dataset
+from label_farm.simulated.plan import SimulationPlan, read_simulation_plan
+from label_farm.simulated.press_draw import draw_press
+from label_farm.simulated.simulation import Simulation
+from label_farm.simulated.solving import solve_batch
+from tacdata.sensor import default_sensor
+from training.frames.data import read_frames
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
+from bump_skin import SMALL, BumpSkin
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def module(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "benchmarks" / "retraining" / f"{name}.py")
+    found = importlib.util.module_from_spec(spec)
+    sys.modules[name] = found
+    spec.loader.exec_module(found)
+    return found
+
+
+presses, retrain = module("presses"), module("retrain")
+
+
+@pytest.fixture
+def solved(tmp_path):
+    simulation = Simulation(tmp_path / "solved", SimulationPlan.from_document(SMALL, "small"), default_sensor(), seed=3)
+    simulation.folder.mkdir()
+    simulation.open()
+    for specimen in (0, 1):
+        skin = BumpSkin(simulation.specimens[specimen])
+        solve_batch(simulation, skin, list(range(specimen, 6, 2)), "cpu").write(simulation.folder)
+    return simulation
+
+
+def test_packed_presses_are_those_that_a_dataset_holds(solved, tmp_path, monkeypatch):
+    monkeypatch.setenv("TACDATA_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(presses, "CHUNK", 2)
+    episodes, total = write_dataset(solved, 6, tmp_path / "dataset")
+    assert presses.pack(solved.folder, tmp_path / "packed", 1) == episodes
+    packed, dataset = presses.read(solved.folder, tmp_path / "packed"), read_frames(tmp_path / "dataset")
+    assert len(packed.taxels) == total
+    assert packed.simulated
+    same = {span.number: span for span in packed.episodes}
+    # The dataset has its episodes in the order of presses; the packed ones lie specimen after specimen.
+    for number, span in zip(sorted(same), dataset.episodes, strict=True):
+        mine = same[number]
+        assert replace(span, number=number, start=mine.start, stop=mine.stop, purpose="") == mine
+        for name in ("taxels", "tip", "phase", "time_ns", "valid", "taxel_force"):
+            ours, theirs = (getattr(of, name)[one.start : one.stop] for of, one in ((packed, mine), (dataset, span)))
+            np.testing.assert_array_equal(ours, theirs, err_msg=name)
+        # A dataset keeps labels in metres, in single precision.
+        ours, theirs = packed.depth[mine.start : mine.stop], dataset.depth[span.start : span.stop]
+        np.testing.assert_allclose(ours, theirs, rtol=1e-6)
+
+
+def test_packing_goes_on_where_it_was(solved, tmp_path, monkeypatch):
+    monkeypatch.setattr(presses, "CHUNK", 2)
+    packed = tmp_path / "packed"
+    presses.pack(solved.folder, packed, 1)
+    first, *others = sorted(packed.glob("*.npz"))
+    before = [os.stat(path).st_ino for path in others]
+    first.unlink()
+    assert presses.pack(solved.folder, packed, 1) == 6
+    assert [os.stat(path).st_ino for path in others] == before
+
+
+def test_the_plan_presses_each_of_its_shapes():
+    plan, sensor = read_simulation_plan(retrain.PLAN), default_sensor()
+    drawn = Counter(draw_press(plan, sensor, 0, number).indenter_name for number in range(600))
+    assert set(drawn) == {shape.name for shape in plan.shapes}
+    weights = sum(shape.weight for shape in plan.shapes)
+    for shape in plan.shapes:
+        # Sizes that find no place are drawn again, so wide shapes come up less often than their weight says.
+        assert drawn[shape.name] > 0.3 * 600 * shape.weight / weights, shape.name
+
+
+def scores(centroid, overlap, pairs, ridge):
+    rig = {
+        "held out": {"centroid": centroid, "iou_deep": overlap},
+        "contacts": {kind: {"all_found": pairs} for kind in ("balls_4mm", "unlike_4mm")},
+    }
+    return {"rig 20": rig, "rig 21": rig, "worn": {"aligned_iou": ridge}}
+
+
+def test_a_network_that_loses_on_single_presses_is_not_chosen():
+    found = {
+        "shipped": scores(0.40, 0.80, 0.86, 0.74),
+        "loses": scores(0.60, 0.80, 0.99, 0.90),
+        "gains": scores(0.41, 0.80, 0.95, 0.80),
+        "unfinished": {"worn": {"aligned_iou": 0.99}},
+    }
+    assert retrain.chosen(found) == "gains"
+
+
+def test_nothing_is_chosen_before_all_scores_are_there():
+    found = {"shipped": scores(0.40, 0.80, 0.86, 0.74), "unfinished": {"worn": {"aligned_iou": 0.99}}}
+    with pytest.raises(SystemExit, match="call score again"):
+        retrain.chosen(found)
