@@ -20,6 +20,7 @@ import shutil
 import subprocess
 import sys
 import time
+import traceback
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,6 +46,8 @@ class SolvedSet:
     """Whether its files go to OUT."""
 
 
+_ROUNDS = 3
+"""How often scores that failed are tried: a process that was killed takes the others of its pool along [count]."""
 PLAN = HERE / "pretraining.yaml"
 SETS = (
     SolvedSet("dev-presses", CURVE / "rig_presses.yaml", 300, 1),
@@ -165,24 +168,44 @@ def score(work: Path, out: Path, seconds: float, names: list[str], final: bool) 
         for rig in rigs:
             jobs[name, f"rig {rig}"] = (scoring.on_rig, start, own, contacts, rig, fits / f"{name}-{rig}", counts)
     waiting = {key: job for key, job in jobs.items() if key[1] not in found.get(key[0], {})}
+    for _ in range(_ROUNDS):
+        _run(waiting, found, target, clock)
+        waiting = {key: job for key, job in waiting.items() if key[1] not in found.get(key[0], {})}
+        if not waiting or clock.left < 5:
+            break
+    clock.note("score", began, jobs=len(waiting))
+    table(found)
+
+
+def _in_words(function: Any, *given: Any) -> Any:
+    """Call a function; what it raises becomes words, as not every exception survives the way between processes."""
+    try:
+        return function(*given)
+    except Exception:
+        raise RuntimeError(traceback.format_exc()) from None
+
+
+def _run(
+    jobs: dict[tuple[str, str], tuple[Any, ...]], found: dict[str, dict[str, Any]], target: Path, clock: Clock
+) -> None:
+    """Run jobs side by side until the time is over, and write down each result as it comes."""
     # Not "with": a pool that is left waits for its last job, and the time may be over.
     pool = ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=multiprocessing.get_context("spawn"))
-    tasks = {pool.submit(*job): key for key, job in waiting.items()}
+    tasks = {pool.submit(_in_words, *job): key for key, job in jobs.items()}
     try:
-        for task in as_completed(tasks, timeout=clock.left):
+        for task in as_completed(tasks, timeout=max(clock.left, 1)):
             name, part = tasks[task]
-            shown: Any = repr(task.exception()) if task.exception() else task.result()
-            if not task.exception():
-                found.setdefault(name, {})[part] = shown
-                target.write_text(json.dumps(found, indent=1) + "\n")
-            print(f"{time.time() - began:.0f} s", name, part, shown, flush=True)
+            if error := task.exception():
+                print(name, part, repr(error), flush=True)
+                continue
+            found.setdefault(name, {})[part] = task.result()
+            target.write_text(json.dumps(found, indent=1) + "\n")
+            print(f"{clock.left:.0f} s left", name, part, found[name][part], flush=True)
     except TimeoutError:
         print("no time for the rest; called again, it goes on", flush=True)
     for process in (pool._processes or {}).values():
         process.terminate()
     pool.shutdown(wait=False, cancel_futures=True)
-    clock.note("score", began, jobs=len(waiting))
-    table(found)
 
 
 def chosen(found: dict[str, dict[str, Any]]) -> str:
@@ -200,7 +223,9 @@ def chosen(found: dict[str, dict[str, Any]]) -> str:
         pairs = [rig[kind]["all_found"] for rig in rigs for kind in ("balls_4mm", "unlike_4mm")]
         return sum(pairs) / max(len(pairs), 1) + found[name]["worn"]["aligned_iou"]
 
-    whole = [name for name, parts in found.items() if name != "shipped" and len(parts) == len(found.get("shipped", ()))]
+    known = set(found.get("shipped", ()))
+    scored = "worn" in known and any(part.startswith("rig") for part in known)
+    whole = [name for name, parts in found.items() if scored and name != "shipped" and known <= set(parts)]
     if not whole:
         raise SystemExit("no network has all its scores yet: call score again, or name one by --variants")
     kept = [

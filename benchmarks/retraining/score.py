@@ -6,6 +6,7 @@ to 22 and 300 to 305 and on presses of seed 1. What is chosen is scored there on
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ def on_rig(
     start: str, rig_presses: Path, contacts: Path, rig: int, out: Path, counts: tuple[int, ...] = (PRESSES,)
 ) -> dict[str, Any]:
     """Return the scores of a network fitted to a rig, with ten presses and perhaps with other numbers of them."""
+    shutil.rmtree(out, ignore_errors=True)  # what was broken off
     frames, others = run.rig_frames(rig_presses, rig), run.rig_frames(contacts, rig)
     unseen = [span for span in frames.episodes if span.indenter in run.UNSEEN]
     edge = [span for span in frames.episodes if span not in unseen and run.at_edge(span, frames.sensor)]
@@ -51,6 +53,7 @@ def worn(
     start: str, rig_presses: Path, out: Path, fitted_to: int = RIGS[0], wearers: range = WEARERS
 ) -> dict[str, float]:
     """Return the aligned overlap of prisms on rigs that a network never saw, fitted to one other rig."""
+    shutil.rmtree(out, ignore_errors=True)  # what was broken off
     network = wearing.fitted(rig_presses, fitted_to, 30, pretrained(start), out)
     prisms, means = wearing.prisms(rig_presses), []
     for rig in wearers:
