@@ -78,7 +78,9 @@ class AtRest(StrEnum):
     """What becomes of an effect while the tip stands still. Presses of one rate show nothing else of it."""
 
     CATCHES_UP = "catches up"
-    """It is over soon: a delay, a filter."""
+    """It was behind, and is over soon: a delay, a filter."""
+    FALLS_BACK = "falls back"
+    """It was ahead, and is over at once: what grows with the rate itself."""
     STAYS = "stays"
     """It stays as it is: play, friction."""
     GOES_ON = "goes on"

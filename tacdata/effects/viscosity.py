@@ -29,7 +29,7 @@ class Viscosity(Effect):
         Parameter("k", "1", "share added at 1 mm/s", 0.05, 0.0, 2.0),
         Parameter("n", "1", "power of the rate", 0.5, 0.1, 1.5, grid=(0.25, 0.6, 1.0)),
     )
-    at_rest = AtRest.CATCHES_UP
+    at_rest = AtRest.FALLS_BACK
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

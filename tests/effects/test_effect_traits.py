@@ -132,10 +132,11 @@ def test_one_that_needs_two_rates_is_not_split_by_one(newcomer):
     effect = newcomer("at_rest = AtRest.CATCHES_UP", unit="s")
     course, response = read_with(effect, 0.1, (1.0,))
     others = lookalikes(course, effect, {"k": 0.1})
-    assert {"latency", "backlash"} <= set(others) and "newcomer" not in others
+    assert "latency" in others and not {"backlash", "newcomer"} & set(others), "in a hold it catches up"
+    assert {"latency", "backlash"} <= set(lookalikes(course, effect, {"k": 2.0})), "it does not in a short one"
     assert "newcomer" in lookalikes(course, load("latency"), {}), "nor are the others from it"
     decision = decide(find(Setting(course, response, [effect])), DataChecks(course.episodes))
-    assert decision.status == "ambiguous" and "backlash" in decision.effects[0].finding.rivals
+    assert decision.status == "ambiguous" and "latency" in decision.effects[0].finding.rivals
     assert lookalikes(read_with(effect, 0.1, (0.5, 2.0))[0], effect, {"k": 0.1}) == ()
 
 

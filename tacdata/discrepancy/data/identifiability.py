@@ -17,6 +17,8 @@ from tacdata.effects import AtRest, Effect, library
 
 QUICK = 0.2
 """Relaxation so much shorter than a press takes is a lag of the other sign: one rate does not split them [1]."""
+OVER = 5.0
+"""A lag is over in a hold of so many times its length [1]."""
 SAME_CLOCK = 0.995
 """Presses are evenly spaced from this correlation of their number at a place with the clock on [1]."""
 
@@ -43,13 +45,19 @@ def _at_one_rate(course: Course, effect: Effect, values: Mapping[str, np.ndarray
     if effect.at_rest is None or not one_rate(course):
         return []
     known = {p.name: np.asarray(values.get(p.name, 0.0)) for p in effect.parameters}
-    held = longest_hold(course) >= max(HOLD, effect.time_constant(known))
+    hold, lag = longest_hold(course), max(effect.time_constant(known), effect.delay(known))
+    held = hold >= max(HOLD, effect.time_constant(known))
+    if effect.at_rest is AtRest.CATCHES_UP and effect.delay(known) >= 0 and (
+        stairs(course) or hold >= max(HOLD, OVER * lag)
+    ):  # fmt: skip
+        # At a stop it catches up, and is done: play stays behind there, what relaxes falls, what creeps goes on.
+        return _that(AtRest.CATCHES_UP)
     if not stairs(course):
         quick = effect.at_rest is AtRest.RELAXES and 0 < effect.time_constant(known) < QUICK * pressing_time(course)
         slow = (AtRest.GOES_ON,) if held and not quick else (AtRest.GOES_ON, AtRest.RELAXES)
-        return _that(AtRest.CATCHES_UP) + _that(AtRest.STAYS) + _that(*slow)
-    if effect.at_rest is AtRest.CATCHES_UP:
-        return _that(AtRest.CATCHES_UP)
+        return _that(AtRest.CATCHES_UP, AtRest.FALLS_BACK) + _that(AtRest.STAYS) + _that(*slow)
+    if effect.at_rest in (AtRest.CATCHES_UP, AtRest.FALLS_BACK):
+        return _that(AtRest.CATCHES_UP, AtRest.FALLS_BACK)
     if held:
         return []
     if effect.at_rest is AtRest.STAYS:

@@ -133,6 +133,17 @@ def test_a_staircase_of_one_rate_tells_what_stays_from_what_catches_up():
     assert stairs(long) and stairs(short) and not stairs(course()) and not stairs(staircase(0.2))
     assert lookalikes(long, load("hysteresis"), {}) == ()
     assert set(lookalikes(short, load("hysteresis"), {})) == {"creep", "relaxation"}
-    assert set(lookalikes(long, load("latency"), {})) == {"low_pass_filter", "servo_lag", "viscosity"}
+    assert set(lookalikes(long, load("latency"), {})) == {"low_pass_filter", "servo_lag"}
+    assert {"latency", "creep"} <= set(lookalikes(course(rates=(1.0,)), load("viscosity"), {}))
     assert lookalikes(long, load("relaxation"), {"tau": 0.5}) == ()
     assert "hysteresis" in lookalikes(long, load("relaxation"), {"tau": 6.0})
+
+
+def test_a_lag_that_is_over_in_a_hold_is_of_its_family():
+    """At one rate play is still behind at the end of a hold, what relaxes falls; a short hold tells neither."""
+    kin = {"low_pass_filter", "servo_lag"}
+    assert set(lookalikes(course(rates=(1.0,), hold=1.5), load("latency"), {"L": 0.1})) == kin
+    for late, hold, other in ((0.1, 0.4, "backlash"), (0.6, 1.5, "backlash"), (-0.1, 1.5, "viscosity")):
+        found = set(lookalikes(course(rates=(1.0,), hold=hold), load("latency"), {"L": late}))
+        assert {*kin, other} < found
+    assert "backlash" in lookalikes(course(rates=(1.0,), hold=1.5), load("low_pass_filter"), {"tau": 0.6})
