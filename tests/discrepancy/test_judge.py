@@ -11,6 +11,7 @@ from pressing import course
 from tacdata import documents
 from tacdata.discrepancy.data.checks import DataChecks, check
 from tacdata.discrepancy.data.sufficiency import shortcomings
+from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.search.find import find
@@ -111,9 +112,17 @@ def test_friction_of_a_skin_that_forgets_it_in_the_air_is_named(power):
 
 
 def test_one_rate_names_no_lag():
-    answer = judged(delay=0.05, rates=(1.0,))
+    answer = judged(delay=0.05, rates=(1.0,), hold=0.4)
     assert answer.decision.status in ("ambiguous", "unknown")
     assert "backlash" in answer.decision.effects[0].finding.rivals
+
+
+def test_a_hold_names_a_lags_family_at_one_rate():
+    """In a hold of 1.5 s readings catch up: play does not."""
+    (decided,) = judged(effects=(*FEW, "servo_lag"), delay=0.05, rates=(1.0,)).decision.effects
+    assert decided.level is Level.FAMILY and "backlash" not in decided.finding.rivals
+    (decided,) = judged(effects=(*FEW, "servo_lag"), play=0.05, rates=(1.0,)).decision.effects
+    assert decided.level is None and "latency" in decided.finding.rivals, "play and what creeps look alike"
 
 
 def test_an_effect_that_no_file_holds_is_not_named():
@@ -253,7 +262,7 @@ def test_what_is_of_another_unit_or_stuck_is_said():
 @pytest.mark.long("tacdata/discrepancy", reason="a pair of effects, judged with one rate and with two")
 def test_what_one_rate_cannot_split_is_a_set_and_no_pair():
     effects = (*FEW, "servo_lag")
-    answer = judged(effects=effects, rates=(1.0,), play=0.05, delay=0.1)
+    answer = judged(effects=effects, rates=(1.0,), play=0.05, delay=0.1, hold=0.4)
     assert answer.decision.status == "ambiguous" and len(answer.found.effects) == 1
     assert {"latency", "backlash"} <= {*answer.names, *answer.decision.effects[0].finding.rivals}
     assert judged(effects=effects, play=0.05, delay=0.1).names == {"latency", "backlash"}, "two rates split them"

@@ -131,6 +131,10 @@ def decide(
             status, reason = INCOMPLETE, Reason.INCOMPLETE
         elif first is not None and stands(found, answer[first], own.get(answer[first].placed.effect.name), shown):
             status, reason = "ambiguous", Reason.RIVALS
+    if reason is Reason.RIVALS:
+        sure = beside_open(found, answer, levels)
+        if any(sure) and not all(sure):
+            levels, status, reason = sure, INCOMPLETE, Reason.INCOMPLETE
     if status == "named" and lends_form(found, answer):
         levels, status, reason = [Level.FAMILY], INCOMPLETE, Reason.INCOMPLETE
     early = [seems_early(f, answer) for f in answer]
@@ -174,6 +178,17 @@ def stands_in(found: Findings, finding: FoundEffect) -> bool:
     if len(found.effects) < 2 or found.left.t < LEFT_T or finding.corrected_p is None:
         return False
     return found.left.gain >= SHARE_LEFT_ALONE * (found.left.gain + max(finding.bought, 0.0))
+
+
+def beside_open(found: Findings, answer: list[FoundEffect], levels: list[Level | None]) -> list[Level | None]:
+    """Return the levels that hold beside effects of the answer that are open: these count as left over, too.
+
+    What explains most has a name, whatever else of the answer may be something else.
+    """
+    left = found.left.gain if found.left.t >= LEFT_T else 0.0
+    left += sum(max(f.bought, 0.0) for f, level in zip(answer, levels, strict=True) if level is None)
+    large = [left < SHARE_LEFT_ALONE * (left + max(f.bought, 0.0)) for f in answer]
+    return [level if much else None for level, much in zip(levels, large, strict=True)]
 
 
 def lends_form(found: Findings, answer: list[FoundEffect]) -> bool:

@@ -11,7 +11,16 @@ from tacdata.discrepancy.levels.constancy import spread
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.remainder import _size
 from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.verdict.decide import beside_much, finest, leading, lends_form, seems_early, stands, stands_in
+from tacdata.discrepancy.verdict.decide import (
+    beside_much,
+    beside_open,
+    finest,
+    leading,
+    lends_form,
+    seems_early,
+    stands,
+    stands_in,
+)  # fmt: skip
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.effects import Placed, load
 
@@ -180,3 +189,13 @@ def test_a_further_name_may_stand_in_for_what_is_left(bought, left, t, part):
     assert stands_in(found, replace(ONE, bought=bought)) == part
     alone = cast(Any, SimpleNamespace(effects=(ONE,), left=SimpleNamespace(t=t, gain=left)))
     assert not stands_in(alone, replace(ONE, bought=bought))
+
+
+@pytest.mark.parametrize(
+    ("bought", "left", "named"), [(100, 0, True), (100, 50, False), (5, 0, False)]
+)
+def test_what_explains_most_is_named_beside_one_that_is_open(bought, left, named):
+    """An effect that may be another one counts as left over: beside little of that, the large one is sure."""
+    found = cast(Any, SimpleNamespace(left=SimpleNamespace(t=5.0, gain=left)))
+    answer = [replace(ONE, bought=bought), replace(ONE, bought=3.0, rivals=("backlash",))]
+    assert beside_open(found, answer, [Level.FORM, None]) == [Level.FORM if named else None, None]
