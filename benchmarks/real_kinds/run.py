@@ -74,6 +74,7 @@ def outcome(row):
     fair = families | ({MEMORY, FRICTION} if row["remainder"] in LOOPS else set())
     effects = row["verdict"]["effects"]
     named = [e for e in effects if e["status"] == "named" and e.get("level", "form")]
+    named += [e for e in effects if e["status"] == "ambiguous" and e.get("level") == "family"]  # a set of one family
     sets = [{e["mechanism"], *e["alternatives"]} for e in effects if e["status"] in ("named", "ambiguous")]
     wrong = [e for e in named if e["family"] not in fair]
     wrong += [

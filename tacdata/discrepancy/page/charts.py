@@ -106,15 +106,20 @@ def _framed(title: str, parts: list[str], x: _Axis, y: _Axis, labels: tuple[str,
     """Return a chart with its frame, the ends of its axes and their names."""
     low, high = HEIGHT - BOTTOM, TOP
     ticks = [
-        f'<text x="{LEFT}" y="{low + 12}">{x.low:.3g}</text>',
-        f'<text x="{WIDTH - RIGHT}" y="{low + 12}" class="end">{x.high:.3g}</text>',
+        f'<text x="{LEFT}" y="{low + 12}">{_number(x.low)}</text>',
+        f'<text x="{WIDTH - RIGHT}" y="{low + 12}" class="end">{_number(x.high)}</text>',
         f'<text x="{(LEFT + WIDTH) / 2:.0f}" y="{low + 22}" class="middle">{escape(labels[0])}</text>',
-        f'<text x="{LEFT - 4}" y="{low}" class="end">{y.low:.3g}</text>',
-        f'<text x="{LEFT - 4}" y="{high + 6}" class="end">{y.high:.3g}</text>',
+        f'<text x="{LEFT - 4}" y="{low}" class="end">{_number(y.low)}</text>',
+        f'<text x="{LEFT - 4}" y="{high + 6}" class="end">{_number(y.high)}</text>',
         f'<text x="{LEFT}" y="{high - 5}">{escape(labels[1])}</text>',
     ]
     frame = f'<path class="frame" d="M{LEFT} {high}V{low}H{WIDTH - RIGHT}"/>'
     return _figure(title, f"0 0 {WIDTH} {HEIGHT}", f"{frame}{''.join(ticks)}{''.join(parts)}")
+
+
+def _number(value: float) -> str:
+    """Return a number as short as an axis has room for, without an exponent where it needs none."""
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def _figure(title: str, size: str, inner: str) -> str:

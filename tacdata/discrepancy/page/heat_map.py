@@ -12,6 +12,8 @@ from tacdata.discrepancy.verdict.residual_table import Residuals
 FEWEST = 30
 """Readings of a field of the map, at least."""
 STILL = "hold"
+AT_TOUCH = 0.005
+"""A depth of less is where the tip touches [deepest]."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ def heat_map(found: Residuals) -> HeatMap:
     first, last = (np.nanmean(np.square(found.standardized(p)), axis=1) for p in (found.before, found.after))
     inside = found.phase > 0
     edges = np.quantile(found.depth[inside], [0, 1 / 3, 2 / 3, 1]).round(6) if inside.any() else np.zeros(4)
-    columns = tuple(f"{low:.2g} to {high:.2g} mm" for low, high in itertools.pairwise(edges))
+    said = [f"{edge:.2g}" if edge >= AT_TOUCH * edges[-1] else "0" for edge in edges]
+    columns = tuple(f"{low} to {high} mm" for low, high in itertools.pairwise(said))
     within = [(found.depth >= low) & (found.depth <= high) for low, high in itertools.pairwise(edges)]
     rate = np.abs(found.rate)
     rows, fields = [], []

@@ -129,9 +129,9 @@ def _path(verdict: dict[str, Any]) -> Part:
     lines = []
     for step in verdict["path"]:
         title, share = load(step["effect"]).title, step["share"]
-        told = "dropped, or replaced by another form" if share is None else f"buys {100 * share:.0f} %"
+        told = "dropped, or replaced by another form" if share is None else f"{100 * share:.0f} %"
         lines.append(f"{title}: {told}")
-    return Part("In which order effects were added, and what each buys", lines=tuple(lines))
+    return Part("In which order effects were added, and what each explains beyond the others", lines=tuple(lines))
 
 
 def _rivals(verdict: dict[str, Any]) -> Part:
@@ -145,7 +145,8 @@ def _rivals(verdict: dict[str, Any]) -> Part:
             if called in e.get("unphysical", ()):
                 lines.append(f"not {called}: it would need an unphysical size")
             elif called in near:
-                lines.append(f"{called} may stand in for {e['mechanism']}: {_apart(by)}")
+                form = ", but another form of it may not" if by > 0 else ""
+                lines.append(f"{called} may stand in for {e['mechanism']}: {_apart(by)}{form}")
             else:
                 lines.append(f"not {called}: {_apart(by)} than {e['mechanism']}")
     return Part("Why not the others", lines=tuple(dict.fromkeys(lines)))

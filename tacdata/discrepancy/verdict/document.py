@@ -144,7 +144,7 @@ def following(decision: Decision, course: Course, watched: bool = False) -> list
     if decision.reason is Reason.QUIET and watched:
         return ["mend what the remarks say of single channels, and record again"]
     if decision.reason is Reason.QUIET:
-        return ["nothing: below the limits in verdict.json an effect would show in more or deeper presses alone"]
+        return ["nothing: below the limits in verdict.json an effect shows only in more or deeper presses"]
     if decision.status == "named":
         return [f"give it to the model, and see what that changes: {REVISE}"]
     answer = [e.finding for e in decision.effects]

@@ -133,7 +133,8 @@ def in_words(found: list[Slice], alone: list[str] | None = None) -> list[str]:
             alike.append((by, float(np.median([s.mean_square for s in high]))))
         else:
             high.sort(key=lambda s: -s.mean_square)
-            words.append(f"{by}: " + ", ".join(f"{s.name} {s.mean_square:.3g}" for s in high[:4]) + " times the noise")
+            each = ", ".join(f"{s.name} at {s.mean_square:.3g}" for s in high[:4])
+            words.append(f"{by}: {each} times the noise")
     if alike:
         usual = [level for _, level in alike]
         much = f"{min(usual):.3g}" if len(usual) == 1 else f"{min(usual):.3g} to {max(usual):.3g}"

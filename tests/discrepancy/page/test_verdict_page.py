@@ -1,6 +1,7 @@
 """The page of a verdict holds all of itself, and says what the document and the text say."""
 
 import re
+from copy import deepcopy
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
@@ -88,3 +89,26 @@ def test_the_map_is_the_mean_square_over_the_noise(judged):
 def test_a_bar_of_shares_is_as_long_as_they_are():
     bar = ElementTree.fromstring(charts.shares_bar([("share0", "a <b>", 0.6), ("rest", "no name yet", 0.3)]))
     assert [float(r.get("width")) for r in bar] == pytest.approx([480, 240])
+
+
+def test_the_ends_of_an_axis_fit_beside_it():
+    drawn = charts.curves("", np.arange(3.0), [("measured", np.array([-123456.0, 0, 1049.6]))], ("s", "counts"))
+    ends = [t.text or "" for t in ElementTree.fromstring(drawn).iter("text")]
+    assert not any("e+" in t for t in ends) and max(len(t) for t in ends) <= 7
+
+
+def test_a_map_of_depths_begins_at_touch(judged):
+    made = heat_map(judged[1])
+    assert made.columns[0].startswith("0 to ") and not any("e-" in words for words in made.columns)
+
+
+def test_a_rival_that_fits_worse_is_said_to_have_other_forms(judged):
+    verdict = deepcopy(judged[0])
+    if not verdict["effects"]:
+        assert "Why not the others" not in verdict_page(*judged)
+        return
+    effect = verdict["effects"][0]
+    effect["margins"], effect["alternatives"] = {"drift": 4.0, "creep": 9.0}, ["drift"]
+    page = verdict_page(verdict, judged[1])
+    assert "drift may stand in" in page and "4.0 standard errors, but another form of it may not" in page
+    assert "not creep: it explains the presses worse by 9.0 standard errors than" in page

@@ -1,0 +1,49 @@
+"""How a verdict on a stand-in for real recordings is scored."""
+
+import importlib.util
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOM = Path(__file__).parents[2] / "benchmarks" / "real_kinds"
+PLAY = "friction and play"
+
+
+@pytest.fixture(scope="module")
+def outcome():
+    """Return the benchmark's scorer; path, modules and environment are as before when it is done."""
+    before, environment, modules = list(sys.path), dict(os.environ), set(sys.modules)
+    sys.path.insert(0, str(ROOM))
+    spec = importlib.util.spec_from_file_location("real_kinds_run", ROOM / "run.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module.outcome
+    sys.path[:] = before
+    os.environ.clear()
+    os.environ.update(environment)
+    for name in {"kinds", "written", "shapes"} & (set(sys.modules) - modules):
+        del sys.modules[name]
+
+
+def row(mechanism, family, status, level, alternatives=()):
+    """Return a verdict with one effect on a piston with dry friction."""
+    effect = {"mechanism": mechanism, "family": family, "status": status, "level": level,
+              "alternatives": list(alternatives)}  # fmt: skip
+    return {"kind": "piston", "share": 0.15, "remainder": "real bend", "verdict": {"effects": [effect]}}
+
+
+@pytest.mark.parametrize(
+    ("given", "right"),
+    [
+        (row("hysteresis", PLAY, "ambiguous", "family", ["dry_friction"]), {"family", "mechanism", "suspected"}),
+        (row("hysteresis", PLAY, "ambiguous", None, ["dry_friction", "latency"]), {"suspected"}),
+        (row("latency", "delay and filtering", "ambiguous", "family", ["servo_lag"]), {"wrong"}),
+        (row("dry_friction", PLAY, "named", "form"), {"family", "mechanism", "suspected"}),
+        (row("hysteresis", PLAY, "named", "form"), {"family", "wrong"}),
+        (row("hysteresis", PLAY, "named", "family"), {"family"}),
+    ],
+)  # fmt: skip
+def test_a_set_of_one_family_tells_the_family_and_answers_for_it(outcome, given, right):
+    assert {name for name, true in outcome(given).items() if true} == right
