@@ -12,6 +12,8 @@ from tacdata.effects import load
 
 SPEAKS_FROM = 0.005
 """Share of what could be explained from which on a form is worth a word [1]."""
+LEAST_CLOSED = 0.01
+"""Share of the gap on sealed presses from which on it is worth a word [1]."""
 MOST_LISTED = 6
 """Episodes that are listed by name."""
 MOST_STAND_INS = 3
@@ -108,7 +110,7 @@ def _closed(decision: Decision, shown: Gap | None) -> str:
         return ""
     each, own = sealed["shares"], [e.finding.placed.effect.name for e in decision.effects if e.level is not None]
     share = sum(each.get(name, 0.0) for name in own) if own and any(each.values()) else sealed["closed"]
-    return f"{100 * share:.0f} % of the gap on sealed presses" if share > 0 else ""
+    return f"{100 * share:.0f} % of the gap on sealed presses" if share >= LEAST_CLOSED else ""
 
 
 def _nameless(found: Findings, least: float) -> str:

@@ -186,6 +186,24 @@ def test_what_stays_named_is_told_from_what_stands_in():
     )
 
 
+def test_what_sealed_presses_show_is_told_where_their_mean_square_says_little():
+    """Their own poses and gains are in the mean square: larger with the right name, it is no reason against it."""
+    ratio = {"observed": 20.7, "expected": 28.0, "share": 0.87, "error": 0.16}
+    text = in_text(document("named", [effect("power_creep")], sealed={"ratio": ratio}))
+    assert "worse" not in line(text, "4 sealed")
+    assert line(text, "they show").startswith("  they show 87 % of the answer (standard error 16 %)")
+    against = in_text(document("unknown", [effect("power_creep")], sealed={"ratio": ratio | {"observed": -3.0}}))
+    assert "worse by 10 %" in line(against, "4 sealed")
+
+
+def test_a_gap_that_hardly_closes_is_not_told_in_shares():
+    decision = Decision("ambiguous", Reason.RIVALS, (Decided(finding("latency", "creep"), "ambiguous", {}, None),))
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.0, left=SimpleNamespace(t=0.0)))
+    for after, told in ((29.9, False), (7.0, True)):
+        shown = Gap(np.full(4, 30.0), np.full(4, after), np.full(4, 1.0), tuple("abcd"))
+        assert ("of the gap" in reason_in_words(decision, found, DataChecks(8), shown)) == told
+
+
 def test_a_family_that_is_named_is_told_from_a_mechanism_that_is():
     """What fits best is no name, and a pure number has no unit."""
     entry = effect("power_creep") | {"family": "memory of the skin", "level": "family"}
