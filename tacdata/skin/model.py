@@ -218,26 +218,29 @@ class SkinModel:
 
         Maps are the indenter's surface where it touches (`tacdata.skin.surface.pressed_shape`).
         """
-        grid, maps = self.sensor.map, []
-        for depth, state in zip(depths, states, strict=True):
-            shape = self.pressed_shape(request, depth, state)
-            maps.append(self.skin.face.depth_map(grid.x, grid.y, state.displacement, grid.sampling, shape))
+        grid, shapes = self.sensor.map, self.pressed_shapes(request, depths, states)
+        moved = [state.displacement for state in states]
         return Figures(
-            np.array(depths, dtype=float), np.array(maps).reshape(-1, *grid.shape),
+            np.array(depths, dtype=float),
+            self.skin.face.pressed_maps(grid.x, grid.y, moved, grid.sampling, shapes),
             np.array([state.force for state in states]).reshape(-1, 3),
             np.array([state.taxel_force for state in states]).reshape(-1, self.sensor.taxels.count),
         )
 
-    def pressed_shape(self, request: PressRequest, depth: float, state: Equilibrium) -> PressedShape:
-        """Return the indenter as it presses in a state at a depth [mm]."""
-        place, turn = touch(self.sensor, self.skin.face, request) - np.array([0.0, 0.0, depth]), rotation(request)
-        lowest = float(place[2]) - rise(request.indenter, turn)
-        slots = self.skin.tractions.slots
-        touching = touching_share(state.traction, slots)
+    def pressed_shapes(
+        self, request: PressRequest, depths: Sequence[float], states: list[Equilibrium]
+    ) -> list[PressedShape]:
+        """Return the indenter as it presses in each state of a press at depths [mm]."""
+        start, turn = touch(self.sensor, self.skin.face, request), rotation(request)
+        risen, slots = rise(request.indenter, turn), self.skin.tractions.slots
         borne = self.skin.board or "bottom" in self.sensor.contact.bonded
-        return PressedShape(
-            request.indenter, place, turn, lowest, touching, around(touching, slots) if borne else touching
-        )
+        shapes = []
+        for depth, state in zip(depths, states, strict=True):
+            place = start - np.array([0.0, 0.0, depth])
+            touching = touching_share(state.traction, slots)
+            wide = around(touching, slots) if borne else touching
+            shapes.append(PressedShape(request.indenter, place, turn, float(place[2]) - risen, touching, wide))
+        return shapes
 
     def numerical_error(
         self, request: PressRequest, fine: Figures, coarse: CoarsePress | None = None

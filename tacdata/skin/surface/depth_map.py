@@ -6,6 +6,8 @@ the same (x, y). A sample above which no skin lies, deformed or undeformed, has 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 import warp as wp
@@ -68,24 +70,27 @@ class DepthRaster:
         """Return `depth` and which share of each pixel lies under the skin [1], both (b, pixels_x, pixels_y)."""
         return self._measured(self._height(u))
 
-    def pressed(self, u: torch.Tensor, shape: PressedShape) -> torch.Tensor:
-        """Return one state's depth map [mm], shape (pixels_x, pixels_y): where it touches, that of the shape.
+    def pressed(self, u: torch.Tensor, shapes: Sequence[PressedShape]) -> torch.Tensor:
+        """Return depth maps [mm], shape (b, pixels_x, pixels_y): where the face touches, those of the shape.
 
         Args:
-            u: Displacements [mm], shape (nodes, 3, 1), as of `depth`.
-            shape: What presses, and where.
+            u: Displacements [mm], shape (nodes, 3, b), as of `depth`.
+            shapes: What presses in each state, and where, (b,).
         """
         height = self._height(u)
-        shares = [self._share_of(u, height, marks) for marks in (shape.touching, shape.around)]
-        shape.lay(self._x, self._y, height[:, :, 0], *shares)
-        return self._measured(height)[0][0]
+        touching = self._share_of(u, height, np.stack([shape.touching for shape in shapes], axis=1))
+        around = self._share_of(u, height, np.stack([shape.around for shape in shapes], axis=1))
+        for k, shape in enumerate(shapes):
+            shape.lay(self._x, self._y, height[:, :, k], touching[:, :, k], around[:, :, k])
+        return self._measured(height)[0]
 
     def _share_of(self, u: torch.Tensor, height: torch.Tensor, marks: np.ndarray) -> torch.Tensor:
-        """Return the sum of the contact nodes' hats above the samples, by marks, shape (samples_x, samples_y)."""
-        touching, share = torch.zeros(len(self._nodes), 1, dtype=torch.float64), torch.zeros_like(height)
-        touching[self._contact, 0] = torch.as_tensor(marks).double()
+        """Return the sum of the contact nodes' hats above the samples, by marks (s, b), shape (sx, sy, b)."""
+        touching = torch.zeros(len(self._nodes), marks.shape[1], dtype=torch.float64)
+        touching[self._contact] = torch.as_tensor(marks).double()
+        share = torch.zeros_like(height)
         self._scan(u, height, touching.to(self._device), share)
-        return share[:, :, 0]
+        return share
 
     def _measured(self, height: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         covered = (height > NOTHING / 2) & (self._rest > NOTHING / 2)

@@ -6,6 +6,8 @@ states at once, or on a GPU, see `tacdata.skin.surface.depth_map`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 
@@ -93,10 +95,8 @@ class OuterFace:
         """Return the height of the undeformed face [mm], shape (n,), above (x, y) [mm], shape (n, 2)."""
         return self.displacement(points, self._mesh.nodes)[:, 2]
 
-    def depth_map(
-        self, x: np.ndarray, y: np.ndarray, u: np.ndarray, sampling: str = "point", shape: PressedShape | None = None
-    ) -> np.ndarray:
-        """Return undeformed minus deformed height [mm] of pixels, shape (len(x), len(y)).
+    def depth_map(self, x: np.ndarray, y: np.ndarray, u: np.ndarray, sampling: str = "point") -> np.ndarray:
+        """Return undeformed minus deformed height [mm] of pixels, shape (len(x), len(y)): the mesh's own map.
 
         Where an indenter's steep flank folds the face over itself, the uppermost sheet counts. A pixel beside the
         skin, deformed or not, has depth 0.
@@ -106,16 +106,41 @@ class OuterFace:
             y: Pixel centres along y [mm], ascending.
             u: Nodal displacements [mm], shape (nodes, 3).
             sampling: "point" (at pixel centres) or "area" (mean over the pixel's square).
-            shape: What presses; where the face touches it, the map is the shape's. Without it the map is the mesh's.
 
         Raises:
             UsageError: If there is no such sampling, or pixels to average over are not evenly spaced.
         """
+        return self._raster(x, y, sampling).depth(_columns([u]))[0].numpy()
+
+    def pressed_maps(
+        self, x: np.ndarray, y: np.ndarray, u: Sequence[np.ndarray], sampling: str, shapes: Sequence[PressedShape]
+    ) -> np.ndarray:
+        """Return depth maps [mm] of states, shape (b, len(x), len(y)); where the face touches, those of the shape.
+
+        Args:
+            x: Pixel centres along x [mm], ascending.
+            y: Pixel centres along y [mm], ascending.
+            u: Nodal displacements [mm] of each state, (b,) of shape (nodes, 3).
+            sampling: As of `depth_map`.
+            shapes: What presses in each state, (b,).
+
+        Raises:
+            UsageError: As of `depth_map`.
+        """
+        if not len(u):
+            return np.empty((0, len(x), len(y)))
+        return self._raster(x, y, sampling).pressed(_columns(u), shapes).numpy()
+
+    def _raster(self, x: np.ndarray, y: np.ndarray, sampling: str) -> DepthRaster:
         key = (np.asarray(x, dtype=float).tobytes(), np.asarray(y, dtype=float).tobytes(), sampling)
         if key not in self._rasters:
             self._rasters[key] = DepthRaster(self._mesh, x, y, sampling)
-        raster, moved = self._rasters[key], torch.as_tensor(np.asarray(u))[:, :, None]
-        return (raster.depth(moved)[0] if shape is None else raster.pressed(moved, shape)).numpy()
+        return self._rasters[key]
+
+
+def _columns(u: Sequence[np.ndarray]) -> torch.Tensor:
+    """Return displacements (nodes, 3) of b states side by side, shape (nodes, 3, b)."""
+    return torch.as_tensor(np.stack([np.asarray(state) for state in u], axis=-1))
 
 
 def _middles(corners: np.ndarray) -> np.ndarray:

@@ -56,8 +56,9 @@ def compare(case, sensor, request):
         places = fields[depth]
         there = -CloughTocher2DInterpolator(places[:, :2], places[:, 2])(across, along)
         raw = (model.skin.face.depth_map(x, y, state.displacement) - there) / depth * 100
-        shape = model.pressed_shape(request, depth, state)
-        off = (model.skin.face.depth_map(x, y, state.displacement, shape=shape) - there) / depth * 100
+        shapes = model.pressed_shapes(request, [depth], [state])
+        [laid] = model.skin.face.pressed_maps(x, y, [state.displacement], "point", shapes)
+        off = (laid - there) / depth * 100
         near = np.hypot(across - request.x, along - request.y) < np.sqrt(2 * 4.0 * depth) * 0.8
         forces = force_of(document, depth)
         row = {

@@ -42,7 +42,7 @@ def pressed(mesh, shape, lowest, touching=None, turn=EVEN, down=0.0):
     count = len(np.unique(mesh.outer))
     marks = np.zeros(count, bool) if touching is None else touching
     at = PressedShape(shape, np.array([0.0, 0.0, 2.0 - lowest]), turn, 2.0 - lowest, marks, marks)
-    return OuterFace(mesh).depth_map(X, Y, level(mesh, down), shape=at)
+    return OuterFace(mesh).pressed_maps(X, Y, [level(mesh, down)], "point", [at])[0]
 
 
 def contact_places(mesh):
@@ -115,7 +115,7 @@ def test_beside_the_contact_no_point_stays_below_the_lowest(mesh):
     wide = around(touching, slots_of(mesh))
     assert (wide[np.hypot(*contact_places(mesh).T) < 0.9] == 1.0).all() and wide.mean() < 0.25
     at = PressedShape(ball, np.array([0.0, 0.0, 1.995]), EVEN, 1.995, touching, wide)
-    found = OuterFace(mesh).depth_map(X, Y, level(mesh, 0.01), shape=at)
+    [found] = OuterFace(mesh).pressed_maps(X, Y, [level(mesh, 0.01)], "point", [at])
     near = np.hypot(*GRID) < 0.8
     assert found[near].max() < 0.005 + 1e-9
     assert found[np.hypot(*GRID) > 2.0] == pytest.approx(0.01), "where skin may sag it stays"
@@ -127,7 +127,7 @@ def test_skin_that_hangs_in_a_frame_may_sag_lower_than_the_shape(mesh, bonded, w
     model, request = SkinModel(sensor, PLAIN, mesh=mesh), PressRequest(Sphere(2.0), 0.0, 0.0, 0.0, (0.1,))
     traction = np.zeros((len(contact_places(mesh)), 3))
     traction[np.hypot(*contact_places(mesh).T) < 0.6, 2] = 0.05
-    at = model.pressed_shape(request, 0.1, SimpleNamespace(traction=traction))
+    [at] = model.pressed_shapes(request, [0.1], [SimpleNamespace(traction=traction)])
     assert (at.around.sum() > 2 * at.touching.sum()) == wider
     assert wider or np.array_equal(at.around, at.touching)
 
@@ -165,7 +165,7 @@ def test_a_node_amid_others_that_touch_does_as_well(mesh):
 def test_a_mean_over_a_pixel_is_of_the_shape_as_well(mesh):
     none = np.zeros(len(contact_places(mesh)))
     at = PressedShape(Sphere(2.0), np.array([0.0, 0.0, 1.9]), EVEN, 1.9, none, none)
-    found = DepthRaster(mesh, X, Y, "area").pressed(torch.zeros(len(mesh.nodes), 3, 1, dtype=torch.float64), at)
+    [found] = DepthRaster(mesh, X, Y, "area").pressed(torch.zeros(len(mesh.nodes), 3, 1, dtype=torch.float64), [at])
     offsets = np.linspace(-0.09, 0.09, 10)
     mean = np.mean([Sphere(2.0).profile(GRID[0] + a, GRID[1] + b) for a in offsets for b in offsets], axis=0)
     assert found.numpy()[13, 13] == pytest.approx(0.1 - mean[13, 13], abs=1e-4)
@@ -182,19 +182,27 @@ def test_maps_are_the_same_on_every_device(mesh, device, shape, sampling):
     touching = np.clip(1.5 - np.hypot(*contact_places(mesh).T), 0.0, 1.0)
     at = PressedShape(shape, np.array([0.2, 0.1, 1.93]), EVEN, 1.93, touching, around(touching, slots_of(mesh)))
     found, expected = (
-        DepthRaster(mesh, X, Y, sampling, where).pressed(u.to(where), at).cpu().numpy() for where in (device, "cpu")
+        DepthRaster(mesh, X, Y, sampling, each).pressed(u.to(each), [at])[0].cpu().numpy() for each in (device, "cpu")
     )
     assert found == pytest.approx(expected, abs=1e-9)
     bare = DepthRaster(mesh, X, Y, sampling).depth(u)[0].numpy()
     assert (found > bare + 1e-3).any() and (found < bare - 1e-3).any(), "moved both ways"
 
 
+def test_maps_of_many_states_at_once_are_those_of_each_alone(slab):
+    request = PressRequest(Sphere(2.0), 0.13, -0.07, 0.0, (0.2, 0.4))
+    depths, states = zip(*slab.states(request), strict=True)
+    together = slab.figures(request, depths, list(states)).surface
+    alone = [slab.figures(request, [d], [s]).surface[0] for d, s in zip(depths, states, strict=True)]
+    assert np.array_equal(together, alone) and together[1].max() > together[0].max()
+
+
 @pytest.mark.parametrize("shape", [FlatPunch(1.2, 0.3), Sphere(3.0)])
 def test_a_solved_label_is_the_shape_where_it_touches_and_nowhere_inside_it(slab, shape):
     request = PressRequest(shape, 0.13, -0.07, 0.0, (0.3,))
     [(depth, state)] = slab.states(request)
-    at, raw = slab.pressed_shape(request, depth, state), slab.skin.face.depth_map(X, Y, state.displacement)
-    found = slab.skin.face.depth_map(X, Y, state.displacement, shape=at)
+    [at], raw = slab.pressed_shapes(request, [depth], [state]), slab.skin.face.depth_map(X, Y, state.displacement)
+    [found] = slab.skin.face.pressed_maps(X, Y, [state.displacement], "point", [at])
     under = depth - shape.profile(GRID[0] - 0.13, GRID[1] + 0.07)
     inner = np.hypot(GRID[0] - 0.13, GRID[1] + 0.07) < (0.8 if shape.shape == "flat_punch" else 0.5)
     off, bare = np.abs(found - under)[inner], np.abs(raw - under)[inner]
