@@ -32,6 +32,11 @@ def solved(skin):
     return skin.solve(PRESS)
 
 
+@pytest.fixture(scope="module")
+def known(skin, solved):
+    return with_uncertainty(skin, PRESS, solved)
+
+
 def test_a_press_takes_the_spreads_that_it_has(skin):
     assert set(spreads_of(skin.sensor, PRESS.indenter)) == {"x", "z", "youngs_modulus", "indenter/radius"}
     rough = replace(skin.sensor, contact=replace(skin.sensor.contact, friction=0.2), uncertainty={**SPREADS, "z": 0.0})
@@ -42,8 +47,7 @@ def test_a_press_takes_the_spreads_that_it_has(skin):
     assert "thickness" in refusal.value.allowed
 
 
-def test_all_states_get_the_companions_loading_branch(skin, solved):
-    known = with_uncertainty(skin, PRESS, solved)
+def test_all_states_get_the_companions_loading_branch(skin, solved, known):
     assert np.array_equal(known.surface, solved.surface)
     spreads = spreads_of(skin.sensor, PRESS.indenter)
     first, second = (u for _, _, u in uncertainties(skin.companion, replace(PRESS, depths=(0.15, 0.4)), spreads))
@@ -60,8 +64,8 @@ def test_all_states_get_the_companions_loading_branch(skin, solved):
     assert said["spreads"] == spreads and said["units"]["youngs_modulus"] == "MPa"
 
 
-def test_states_that_the_companion_solved_before_are_not_solved_again(skin, solved, monkeypatch):
-    apart = with_uncertainty(skin, PRESS, solved)
+def test_states_that_the_companion_solved_before_are_not_solved_again(skin, solved, known, monkeypatch):
+    apart = known
     meshes = {"mesh": skin.mesh, "companion": skin.companion.mesh}
     asking = SkinModel(skin.sensor, replace(skin.settings, error_estimate=True), **meshes)
     beside = replace(PRESS, x=0.4, depths=(0.0, 0.2, 0.0))
@@ -80,8 +84,7 @@ def test_states_that_the_companion_solved_before_are_not_solved_again(skin, solv
     assert silent.solve_coarsely([PRESS])[0].passages == ()
 
 
-def test_the_companions_spread_is_nearly_the_meshs_own(skin, solved):
-    known = with_uncertainty(skin, PRESS, solved)
+def test_the_companions_spread_is_nearly_the_meshs_own(skin, known):
     [(_, _, own)] = uncertainties(skin, replace(PRESS, depths=(0.4,)), spreads_of(skin.sensor, PRESS.indenter))
     difference = np.sqrt(((known.uncertainty[2] - own.surface) ** 2).mean() / (own.surface**2).mean())
     assert 0 < difference < 0.25
@@ -96,16 +99,15 @@ def test_without_spreads_or_contact_nothing_is_said(skin, solved):
     assert apart.uncertainty is None and apart.provenance["uncertainty"]["remark"] == "no contact"
 
 
-def test_derivatives_steeper_than_the_shape_give_way_to_whole_presses(skin, solved, monkeypatch):
+def test_derivatives_steeper_than_the_shape_give_way_to_whole_presses(skin, solved, known, monkeypatch):
     monkeypatch.setattr(path_uncertainty, "_STEEPER", 0.5)
     drawn = with_uncertainty(skin, PRESS, solved)
     monkeypatch.undo()
     said = drawn.provenance["uncertainty"]
     assert said["method"] == "sampled" and said["remark"].count("mm a mm of") == 2
     assert said["mesh"] == skin.companion.mesh.content_hash
-    first = with_uncertainty(skin, PRESS, solved)
-    assert drawn.force_uncertainty[2, 2] == pytest.approx(first.force_uncertainty[2, 2], rel=0.6)
-    assert drawn.uncertainty[2].mean() == pytest.approx(first.uncertainty[2].mean(), rel=0.6)
+    assert drawn.force_uncertainty[2, 2] == pytest.approx(known.force_uncertainty[2, 2], rel=0.6)
+    assert drawn.uncertainty[2].mean() == pytest.approx(known.uncertainty[2].mean(), rel=0.6)
 
 
 def test_what_is_not_found_is_said_and_the_path_kept(skin, solved, monkeypatch):
