@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 import schemas
 from tacdata.tags.board import Board
-from tacdata.tags.calibration.board_view import LEAST_CORNERS, find_board
+from tacdata.tags.calibration.board_view import LEAST_CORNERS, BoardView, Markers, find_board, find_markers
 from tacdata.tags.detection.detector import to_grey
 
 LEAST_MARKERS = 4
@@ -43,12 +43,12 @@ def mismatch(images: Sequence[np.ndarray], board: Board) -> Mismatch | None:
         images: A few images, grey or BGR, uint8.
         board: The board of the file.
     """
-    grey = [to_grey(image) for image in images]
-    seen = {name: [change(image) for image in grey] for name, change in _CHANGES.items()}
+    seen = _Seen(images)
     best: tuple[int, Mismatch] | None = None
-    for candidates in (_usual(seen, board), _other_sizes(seen, board)):
+    own, others = _usual([board.dictionary], board), _usual(seen.dictionaries(board), board)
+    for candidates in (own, others, _other_sizes(seen, board)):
         for name, candidate in candidates:
-            views = [find_board(image, candidate) for image in seen[name]]
+            views = seen.views(name, candidate)
             corners = sum(len(view.ids) for view in views if view is not None)
             if corners > (best[0] if best else LEAST_CORNERS - 1):
                 best = corners, _in_words(board, candidate, name)
@@ -57,9 +57,42 @@ def mismatch(images: Sequence[np.ndarray], board: Board) -> Mismatch | None:
     return None
 
 
-def _usual(seen: dict[str, list[np.ndarray]], board: Board) -> Iterator[tuple[str, Board]]:
+class _Seen:
+    """Images, as they are and changed, with the markers in them: boards of one dictionary share their markers."""
+
+    def __init__(self, images: Sequence[np.ndarray]) -> None:
+        grey = [to_grey(image) for image in images]
+        self._images = {name: [change(image) for image in grey] for name, change in _CHANGES.items()}
+        self._markers: dict[tuple[str, str], list[Markers]] = {}
+
+    def markers(self, change: str, dictionary: str) -> list[Markers]:
+        """Return a dictionary's markers in each image."""
+        if (change, dictionary) not in self._markers:
+            found = [find_markers(image, dictionary) for image in self._images[change]]
+            self._markers[change, dictionary] = found
+        return self._markers[change, dictionary]
+
+    def views(self, change: str, board: Board) -> list[BoardView | None]:
+        """Return a board's corners in each image."""
+        pairs = zip(self._images[change], self.markers(change, board.dictionary), strict=True)
+        return [find_board(image, board, markers=markers) for image, markers in pairs]
+
+    def dictionaries(self, board: Board) -> Iterator[str]:
+        """Yield other dictionaries whose markers the images show, most frequent first."""
+        needed = board.columns * board.rows // 2
+        names = schemas.load("calibration_board")["properties"]["dictionary"]["enum"]
+        names = [name for name in names if name != board.dictionary and int(name.split("_")[1]) >= needed]
+        counts = {
+            name: max(len(each.ids) for change in _CHANGES for each in self.markers(change, name)) for name in names
+        }
+        # The larger dictionaries of a size include the smaller ones: of equals the smallest is named.
+        ranked = sorted(names, key=lambda name: (-counts[name], int(name.split("_")[1])))
+        yield from (name for name in ranked if counts[name] >= LEAST_MARKERS)
+
+
+def _usual(dictionaries: Iterable[str], board: Board) -> Iterator[tuple[str, Board]]:
     """Yield how images are changed, and boards with as many squares to try in them."""
-    for dictionary in (board.dictionary, *_dictionaries_seen(seen, board)):
+    for dictionary in dictionaries:
         named = replace(board, dictionary=dictionary)
         for name in _CHANGES:
             for is_turned in (False, True):
@@ -70,9 +103,9 @@ def _usual(seen: dict[str, list[np.ndarray]], board: Board) -> Iterator[tuple[st
                         yield name, changed
 
 
-def _other_sizes(seen: dict[str, list[np.ndarray]], board: Board) -> Iterator[tuple[str, Board]]:
+def _other_sizes(seen: _Seen, board: Board) -> Iterator[tuple[str, Board]]:
     """Yield boards of other sizes that have as many markers as the images show."""
-    markers = 1 + max((max(each) for each in _markers(seen[""], board.dictionary) if len(each)), default=-1)
+    markers = 1 + max((int(each.ids.max()) for each in seen.markers("", board.dictionary) if len(each.ids)), default=-1)
     if markers < LEAST_MARKERS:
         return
     for columns in range(_FEWEST, 2 * markers // _FEWEST + 1):
@@ -103,22 +136,3 @@ def _in_words(board: Board, changed: Board, change: str) -> Mismatch:
     others = [text for text in remedy if ":" not in text]
     words = others + ([f"write {', '.join(settings)} in the board file"] if settings else [])
     return Mismatch(", ".join(found), ", and ".join(words))
-
-
-def _dictionaries_seen(seen: dict[str, list[np.ndarray]], board: Board) -> list[str]:
-    """Return other dictionaries whose markers the images show, most frequent first."""
-    needed = board.columns * board.rows // 2
-    names = schemas.load("calibration_board")["properties"]["dictionary"]["enum"]
-    names = [name for name in names if name != board.dictionary and int(name.split("_")[1]) >= needed]
-    counts = {name: max(len(ids) for images in seen.values() for ids in _markers(images, name)) for name in names}
-    # The larger dictionaries of a size include the smaller ones: of equals the smallest is named.
-    return sorted((n for n in names if counts[n] >= LEAST_MARKERS), key=lambda n: (-counts[n], int(n.split("_")[1])))
-
-
-def _markers(images: Sequence[np.ndarray], dictionary: str) -> list[list[int]]:
-    """Return the numbers of a dictionary's markers in each image."""
-    import cv2
-
-    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{dictionary}")))
-    found = [detector.detectMarkers(image)[1] for image in images]
-    return [[] if ids is None else [int(number) for number in np.ravel(ids)] for ids in found]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,21 +33,47 @@ class BoardView:
         return float(np.median(np.linalg.norm(self.corners[here] - other.corners[there], axis=1)))
 
 
-def find_board(image: np.ndarray, board: Board, name: str = "") -> BoardView | None:
+@dataclass(frozen=True, eq=False)
+class Markers:
+    """Markers of one dictionary in one image."""
+
+    corners: Sequence[np.ndarray]
+    """Positions of each marker's corners [px], shape (1, 4, 2) a marker."""
+    ids: np.ndarray
+    """Numbers of the markers [1], shape (m,)."""
+
+
+def find_markers(image: np.ndarray, dictionary: str) -> Markers:
+    """Return a dictionary's markers in an image; see `find_board`."""
+    import cv2
+
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{dictionary}")))
+    corners, ids, _ = detector.detectMarkers(to_grey(image))
+    return Markers(corners, np.zeros(0, np.int32) if ids is None else np.ravel(ids))
+
+
+def find_board(
+    image: np.ndarray, board: Board, name: str = "", markers: Markers | None = None
+) -> BoardView | None:
     """Return a board's corners to a fraction of a pixel, or None if fewer than `LEAST_CORNERS` are seen.
 
     Args:
         image: Grey (height, width) or BGR (height, width, 3), uint8.
         board: The board.
         name: Name of the view.
+        markers: Those of the board's dictionary in the image, if they are known already.
 
     Raises:
         UsageError: If the image has another shape or type.
     """
     import cv2
 
-    detector = cv2.aruco.CharucoDetector(board.opencv)
-    found, ids, _, _ = detector.detectBoard(to_grey(image))
+    known = {}
+    if markers is not None:
+        if not len(markers.ids):
+            return None
+        known = {"markerCorners": markers.corners, "markerIds": markers.ids[:, None]}
+    found, ids, _, _ = cv2.aruco.CharucoDetector(board.opencv).detectBoard(to_grey(image), **known)
     if found is None or ids is None or len(ids) < LEAST_CORNERS:
         return None
     return BoardView(name, np.asarray(ids).ravel(), np.asarray(found, float).reshape(-1, 2))
