@@ -13,8 +13,10 @@ The backward pass is H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965)
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -200,27 +202,38 @@ def _predicted(
     step = np.eye(len(known))
     step[:3, :3] = turn
     step[:3, 6:9] = step[3:6, 9:MOTION] = dt * _EYE
-    noise = np.zeros_like(known)
-    for begin, density in ((0, wander.turning), (3, wander.velocity)):
-        at, rate = slice(begin, begin + 3), slice(begin + 6, begin + 9)
-        noise[at, at] = density * dt**3 / 3 * _EYE
-        noise[at, rate] = noise[rate, at] = density * dt**2 / 2 * _EYE
-        noise[rate, rate] = density * dt * _EYE
+    of_rates, mixed, of_places = _noise_parts(len(known), wander.turning, wander.velocity)
+    noise = dt * of_rates + dt**2 / 2 * mixed + dt**3 / 3 * of_places
     place = state.position + state.velocity * dt
     expected = _State(turn @ state.rotation, place, state.turning, state.velocity, state.cameras)
     return expected, step @ known @ step.T + noise, step
+
+
+@lru_cache(maxsize=64)
+def _noise_parts(size: int, turning: float, velocity: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what of the process noise goes with dt, dt^2 / 2 and dt^3 / 3, each of shape (size, size)."""
+    of_rates, mixed, of_places = (np.zeros((size, size)) for _ in range(3))
+    for begin, density in ((0, turning), (3, velocity)):
+        at, rate = slice(begin, begin + 3), slice(begin + 6, begin + 9)
+        of_places[at, at] = of_rates[rate, rate] = mixed[at, rate] = mixed[rate, at] = density * _EYE
+    return of_rates, mixed, of_places
 
 
 def _updated(
     expected: _State, spread: np.ndarray, seen: Sightings, n: int, wrong: bool
 ) -> tuple[_State, np.ndarray, float, float]:
     """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes neither."""
-    seen_as = _observed(expected, seen, n)
     surprise = np.concatenate([
         logarithm(seen.rotation[n] @ expected.rotation.T), seen.position[n] - expected.position
-    ]) - seen_as[:, MOTION:] @ expected.cameras  # fmt: skip
-    across = spread @ seen_as.T
-    total = seen_as @ across + seen.covariance[n]
+    ])  # fmt: skip
+    if seen.cameras:
+        seen_as = _observed(expected, seen, n)
+        surprise = surprise - seen_as[:, MOTION:] @ expected.cameras
+        across = spread @ seen_as.T
+        total = seen_as @ across + seen.covariance[n]
+    else:  # a sighting shows the pose itself
+        across = spread[:, :6]
+        total = across[:6] + seen.covariance[n]
     inverse = np.linalg.inv(total)
     distance = float(surprise @ inverse @ surprise)
     gained = -0.5 * ((GATE if wrong else min(distance, GATE)) + np.linalg.slogdet(total)[1])
@@ -255,19 +268,20 @@ def _go_back(nodes: list[_Node]) -> None:
 
 def exponential(vector: np.ndarray) -> np.ndarray:
     """Return the rotation matrix, shape (3, 3), of a rotation vector [rad], shape (3,) (Rodrigues)."""
-    angle = float(np.sqrt(vector @ vector))
-    x, y, z = vector
+    x, y, z = map(float, vector)
+    angle = math.sqrt(x * x + y * y + z * z)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     if angle < 1e-8:
         return _EYE + cross + cross @ cross / 2
-    return _EYE + np.sin(angle) / angle * cross + (1 - np.cos(angle)) / angle**2 * cross @ cross
+    return _EYE + math.sin(angle) / angle * cross + (1 - math.cos(angle)) / angle**2 * cross @ cross
 
 
 def logarithm(matrix: np.ndarray) -> np.ndarray:
     """Return the rotation vector [rad], shape (3,), of a rotation matrix, shape (3, 3)."""
-    axis = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
-    sine, cosine = float(np.sqrt(axis @ axis)) / 2, (float(np.trace(matrix)) - 1) / 2
-    angle = float(np.arctan2(sine, cosine))
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix.tolist()
+    axis = np.array([zy - yz, xz - zx, yx - xy])
+    sine, cosine = math.hypot(zy - yz, xz - zx, yx - xy) / 2, (xx + yy + zz - 1) / 2
+    angle = math.atan2(sine, cosine)
     if sine > 1e-4:
         return axis * (angle / (2 * sine))
     if cosine > 0:
