@@ -1,7 +1,6 @@
 """The real lerobot opens, compares, deletes from, splits, merges and resumes our folders; no network."""
 
 import json
-import os
 import shlex
 import shutil
 import subprocess
@@ -27,8 +26,7 @@ WINDOW = {features.STATE: centred(9), features.DEPTH: (-1, 0)}
 
 
 @pytest.fixture(scope="module")
-def lerobot(tmp_path_factory):
-    os.environ |= {"HF_HUB_OFFLINE": "1", "HF_HOME": str(tmp_path_factory.mktemp("hf"))}
+def lerobot():
     from lerobot.datasets import dataset_tools, lerobot_dataset
 
     class LeRobot:

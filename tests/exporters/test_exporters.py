@@ -178,9 +178,7 @@ def test_lerobots_info_calls_predictions_predictions(tmp_path):
     assert features["action"]["names"] == [f"{finger}.{part}" for finger in ("thumb", "index") for part in parts]
 
 
-def test_stock_lerobot_opens_the_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
-    monkeypatch.setenv("HF_HOME", str(tmp_path / "cache"))
+def test_stock_lerobot_opens_the_folder(tmp_path):
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
     episodes = [targets_of(demonstration(number=k), GAINS) for k in range(2)]

@@ -18,7 +18,8 @@ from tacdata.replay.targets import targets_of
 from tacdata.replay.trials import Trials
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.demo import VirtualDemo
-from viewers.pictures.replay_film import replay_frames
+from viewers.pictures.page_frames import page_frames
+from viewers.pictures.replay_film import ReplayPage
 from viewers.scenes.hand import demonstration_scene
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "demonstrations"))
@@ -96,7 +97,7 @@ def test_the_ball_is_lifted_and_the_film_shows_three_maps(tracked):
     tried = Trials(tracked, {"chosen": dict.fromkeys(SIZES, 0.008)}, scene)
     ends = {kind: tried.one(kind, scene) for kind in tried.paths}
     assert not ends["direct"].held and ends["chosen"].held
-    first, last = replay_frames(ends, tried.seen, np.array([0.0, 4.0]))
+    first, last = page_frames(ReplayPage(ends, tried.seen), np.array([0.0, 4.0]))
     assert first.shape == last.shape and (first != last).any()
 
 

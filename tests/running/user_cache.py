@@ -1,7 +1,8 @@
 """The user's cache, for all tests of a run one folder: what they keep lies apart from the user's.
 
 The skin's small meshes lie in it from the beginning: fTetWild never gives the same one twice, and figures should not
-scatter. One folder for every room: a second one that a room sets amid the run would take the meshes away.
+scatter. One folder for every room: a second one that a room sets amid the run would take the meshes away. The cache
+of Hugging Face lies there too: lerobot reads where it is once, when the first test imports it.
 """
 
 import shutil
@@ -25,4 +26,6 @@ def user_cache(tmp_path_factory):
         shutil.rmtree(made)  # another process was first
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TACDATA_CACHE", str(folder))
+        patch.setenv("HF_HOME", str(folder / "huggingface"))
+        patch.setenv("HF_HUB_OFFLINE", "1")
         yield folder

@@ -17,7 +17,8 @@ from viewers.backend import Backend
 from viewers.output_file import FILMS, new_file, written_beside
 from viewers.pictures import panels as panels
 from viewers.pictures.backend import STYLE
-from viewers.pictures.hand_film import hand_frames, hand_times
+from viewers.pictures.hand_film import HandPage, hand_times
+from viewers.pictures.page_frames import page_frames
 from viewers.pictures.skin import skin
 from viewers.scene.moments import nearest
 from viewers.scene.scene import Scene
@@ -50,7 +51,7 @@ class FilmBackend(Backend):
         kind = self._path.suffix
         if scene.kind == "hand" and scene.bodies:
             with rc_context(STYLE):
-                write_film(self._path, hand_frames(scene, hand_times(scene, RATE[kind], MOST[kind])))
+                write_film(self._path, page_frames(HandPage(scene), hand_times(scene, RATE[kind], MOST[kind])))
             return
         if scene.kind != "episode":
             given = f"a film of {scene.title}"

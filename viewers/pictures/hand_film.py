@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from scipy.spatial.transform import Rotation
@@ -38,18 +36,6 @@ def hand_times(scene: Scene, rate: float, most: int) -> np.ndarray:
     """
     begin, end = _begin(scene), max(int(body.time_ns[-1]) for body in scene.bodies)
     return np.linspace(begin, end, int(np.clip((end - begin) / 1e9 * rate, 2, most))).astype(np.int64)
-
-
-def hand_frames(scene: Scene, times: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the frames of a film at times [ns], uint8, shape (height, width, 3) each."""
-    page = HandPage(scene)
-    canvas = FigureCanvasAgg(page.figure)
-    canvas.draw()
-    page.figure.set_layout_engine("none")  # laid out once; every frame is alike
-    for time in times.tolist():
-        page.show(time)
-        canvas.draw()
-        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
 class HandPage:

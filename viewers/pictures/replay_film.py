@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from textwrap import fill
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
@@ -20,6 +19,7 @@ from viewers.output_file import FILMS, new_file
 from viewers.pictures.felt_maps import FeltMaps
 from viewers.pictures.film import MOST, RATE, write_film
 from viewers.pictures.hand_film import apart
+from viewers.pictures.page_frames import page_frames
 from viewers.pictures.replay_object import ReplayObjectShape
 from viewers.scene.color_scale import HUES
 
@@ -55,21 +55,7 @@ def film_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: Fingert
     new_file(path, *FILMS)
     rate, longest = RATE[path.suffix], max(float(replay.time[-1]) for replay in replays.values())
     times = np.linspace(0.0, longest, min(max(round(longest * rate), 2), MOST[path.suffix]))
-    write_film(path, replay_frames(replays, seen, times))
-
-
-def replay_frames(
-    replays: Mapping[str, ReplayOutcome], seen: FingertipTargets, times: np.ndarray
-) -> Iterator[np.ndarray]:
-    """Yield the frames of a film at times since the beginning [s], uint8, shape (height, width, 3) each."""
-    page = ReplayPage(replays, seen)
-    canvas = FigureCanvasAgg(page.figure)
-    canvas.draw()
-    page.figure.set_layout_engine("none")  # laid out once; every frame is alike
-    for time in times.tolist():
-        page.show(time)
-        canvas.draw()
-        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+    write_film(path, page_frames(ReplayPage(replays, seen), times))
 
 
 class ReplayPage:
