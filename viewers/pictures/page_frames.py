@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 
-class Page(Protocol):
+class MovingPage(Protocol):
     """A figure of which some things move with time."""
 
     figure: Figure
@@ -20,7 +20,7 @@ class Page(Protocol):
         ...
 
 
-def page_frames(page: Page, times: np.ndarray) -> Iterator[np.ndarray]:
+def page_frames(page: MovingPage, times: np.ndarray) -> Iterator[np.ndarray]:
     """Yield a page at given times, in its own unit, uint8, shape (height, width, 3) each."""
     canvas = FigureCanvasAgg(page.figure)
     canvas.draw()
