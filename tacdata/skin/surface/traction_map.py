@@ -46,8 +46,8 @@ class TractionRaster:
         pitch, result = self._pixels.pixel_pitch, np.zeros((3, nx * ny))
         touching = np.flatnonzero((traction != 0).any(axis=1)[self.slots].any(axis=1))
         faces = self._faces[touching]
-        here = np.einsum("ka,fai->fki", self._shapes, (self._nodes + u)[faces][:, :, :2]).reshape(-1, 2)
-        force = np.einsum("ka,fai->fki", self._hats, traction[self.slots[touching]])
+        here = (self._shapes @ (self._nodes[faces] + u[faces])[:, :, :2]).reshape(-1, 2)
+        force = self._hats @ traction[self.slots[touching]]
         force = (force * self._area[touching][..., None]).reshape(-1, 3)
         place = (here - np.array([self._pixels.x[0], self._pixels.y[0]])) / pitch
         corner = np.floor(place).astype(int)
