@@ -17,7 +17,7 @@ from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.search.find import find
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.race import without_minor
-from tacdata.discrepancy.search.rivals import required_margin
+from tacdata.discrepancy.search.rivals import required_margin, stands_in
 from tacdata.discrepancy.verdict.calibration import BEYOND, gains_beyond_calibration
 from tacdata.discrepancy.verdict.decide import Decision, adequate, decide, settled
 from tacdata.discrepancy.verdict.document import document
@@ -183,6 +183,14 @@ def test_a_single_effect_may_leave_more_where_every_rival_leaves_twice_as_much(s
     left = SimpleNamespace(gain=10.0, t=4.0)
     one = FoundEffect(None, {}, (), (), {}, 9.0, losses={"creep": rival})
     assert adequate(SimpleNamespace(left=left, share_left=share), [one] * (1 + others)) == enough
+
+
+@pytest.mark.parametrize(
+    ("margin", "behind", "rival"),
+    [(1.0, 0.0, True), (3.0, 0.0, False), (1.0, 40.0, False), (-1.0, 40.0, False), (-4.0, 40.0, True)],
+)
+def test_a_rival_with_more_numbers_is_out_unless_the_episodes_prefer_it(margin, behind, rival):
+    assert stands_in(margin, 2.33, behind) == rival
 
 
 def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():

@@ -96,7 +96,8 @@ def try_rivals(
             better = other
         losses[name] = other.loss - current.loss
         richer = len(other.tangent.knobs) > len(current.tangent.knobs)
-        if margins[name] < level and not (richer and other.half_bic > current.half_bic + SIMPLER):
+        behind = other.half_bic - current.half_bic if richer else 0.0
+        if stands_in(margins[name], level, behind):
             rivals.append(best[name].called)
     forms: dict[str, float] = {}
     for name in _forms(mine.effect, best, each):
@@ -114,6 +115,19 @@ def try_rivals(
         bought=without.loss - current.loss, unphysical=_only_unphysical(current, best, models),
     )  # fmt: skip
     return Tried(found, better, RivalModels(begin, current, without, models, pooled))
+
+
+def stands_in(margin: float, level: float, behind: float) -> bool:
+    """Return whether a rival may stand in for an effect.
+
+    More numbers put one out that explains the episodes about as well. One that they prefer stays in.
+
+    Args:
+        margin: By how many standard errors over episodes the effect is better (J test).
+        level: From which on the rival is out.
+        behind: By how much half the BIC of a rival with more numbers is larger.
+    """
+    return margin < level and (behind <= SIMPLER or margin < -RIVAL_Z)
 
 
 def required_margin(mine: Effect, rival: Effect) -> float:
