@@ -1,6 +1,7 @@
 """`tacdata calibrate-camera` as a person uses it."""
 
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -18,6 +19,12 @@ from tacdata.tags.calibration.view_picker import ViewPicker, images_of
 from tacdata.tags.camera import PinholeCamera
 
 
+@cache
+def shots():
+    """Twelve images of the board, drawn once."""
+    return list(images(12))
+
+
 def calibrate(*options):
     return CliRunner().invoke(cli.application(), ["calibrate-camera", *map(str, options)])
 
@@ -27,7 +34,7 @@ def folder(tmp_path_factory):
     """Images of the board, one without it, and the board's file."""
     root = tmp_path_factory.mktemp("images")
     (root / "taken").mkdir()
-    for k, image in enumerate(images(12)):
+    for k, image in enumerate(shots()):
         cv2.imwrite(str(root / "taken" / f"{k:02}.png"), image)
     cv2.imwrite(str(root / "taken" / "empty.png"), np.full((480, 640), 90, np.uint8))
     documents.write(root / "board.yaml", BOARD.document, "calibration_board")
@@ -128,7 +135,7 @@ MIRROR, NEGATIVE, PLAIN = (lambda image: image[:, ::-1]), (lambda image: 255 - i
 def test_why_no_board_is_found_is_looked_for_and_named(changes, seen_as, words):
     pattern = replace(BOARD, **changes)
     picker = ViewPicker(pattern, still=False)
-    for k, image in enumerate(images(2)):
+    for k, image in enumerate(shots()[:2]):
         assert not picker.take(np.ascontiguousarray(seen_as(image)), f"image {k}")
     with pytest.raises(FormatError, match="in the others") as caught:
         picker.check_board()
@@ -137,7 +144,7 @@ def test_why_no_board_is_found_is_looked_for_and_named(changes, seen_as, words):
 
 def test_a_few_odd_images_are_remarked_upon_or_refused_if_too_few_are_left():
     picker = ViewPicker(BOARD, still=False)
-    for k, image in enumerate(images(3)):
+    for k, image in enumerate(shots()[:3]):
         picker.take(np.ascontiguousarray(image[:, ::-1]) if k == 2 else image, f"image {k}")
     assert "in 2 of 3 images; in the others the images are mirrored: switch" in picker.check_board()
     with pytest.raises(FormatError, match="mirrored"):
