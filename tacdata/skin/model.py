@@ -33,6 +33,12 @@ from tacdata.skin.validity.stable_strain import StableStrain
 
 __all__ = ["ModelSettings", "SkinModel"]
 
+_ROUGHER = 4.0
+"""Out-of-balance force that the companion's states may have over that of the mesh's [1].
+
+With it the stated error of eight training presses changes by 0.04 % for maps, and by 1.5 % at most for forces. One
+Newton step in eight is saved."""
+
 
 class SkinModel:
     """A sensor's skin, meshed, factorized and ready for presses; costs seconds to build, so keep it.
@@ -83,7 +89,8 @@ class SkinModel:
     def companion(self) -> SkinModel | None:
         """The same skin on a coarser mesh; None if no coarser mesh can be made."""
         mesh = self._companion_mesh or companion_mesh(self.sensor, self.settings.mesh, self.mesh)
-        settings = replace(self.settings, error_estimate=False)
+        solver = replace(self.settings.solver, residual=_ROUGHER * self.settings.solver.residual)
+        settings = replace(self.settings, error_estimate=False, solver=solver)
         return SkinModel(self.sensor, settings, self.device, mesh) if mesh else None
 
     @cached_property

@@ -15,6 +15,7 @@ stiffness stays symmetric. Tractions are per undeformed area.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import torch
@@ -138,12 +139,8 @@ class ContactSurface:
         """
         count, b = self.count, u.shape[2]
         members = kernels.member_data(conditions, pose)
-        gap, pressed = self._zeros(u), list(self.by_shape(conditions))
-        for distance, chosen in pressed:
-            wp.launch(
-                kernels.gap_kernel(distance), dim=(len(self.faces), len(chosen)),
-                inputs=[argument(u), self.data, members, argument(chosen)], outputs=[argument(gap)], device=self.device,
-            )
+        pressed, place = list(self.by_shape(conditions)), self._mean_place(u, conditions)
+        gap = self._gaps(u, place, pose, members, pressed)
         c = self.activation * conditions.modulus
         active = (multiplier - c * (gap - near) > 0) & self.able[:, None]
         pressure = torch.where(active, multiplier, 0.0)
@@ -157,7 +154,6 @@ class ContactSurface:
                 outputs=[argument(nodal), argument(normal), int(not self.flat), argument(turn)], device=self.device,
             )
         normal = normal / torch.linalg.vector_norm(normal, dim=1, keepdim=True).clamp_min(1e-12)
-        place = self.mortar.means(u) + self._mean_nodes + self._mean_rise * (conditions.thickness - 1)
         local, shear, force, stiffness = (self._zeros(u, size) for size in (3, 3, 3, 6))
         wp.launch(
             kernels.friction, dim=(count, b),
@@ -216,6 +212,25 @@ class ContactSurface:
                 device=self.device,
             )
         return above > 0
+
+    def _mean_place(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor:
+        """Return the mean place under every hat [mm], shape (s, 3, b)."""
+        return self.mortar.means(u) + self._mean_nodes + self._mean_rise * (conditions.thickness - 1)
+
+    def _gaps(
+        self, u: torch.Tensor, place: torch.Tensor, pose: Pose, members: Any,
+        pressed: list[tuple[wp.Function, torch.Tensor]],
+    ) -> torch.Tensor:
+        """Return mean gaps [mm], shape (s, b); above a plane they are those of the mean places."""
+        if self.flat:
+            return torch.einsum("ib,sib->sb", pose.turn[:, 2], place - pose.place)
+        gap = self._zeros(u)
+        for distance, chosen in pressed:
+            wp.launch(
+                kernels.gap_kernel(distance), dim=(len(self.faces), len(chosen)),
+                inputs=[argument(u), self.data, members, argument(chosen)], outputs=[argument(gap)], device=self.device,
+            )
+        return gap
 
     def _zeros(self, like: torch.Tensor, *shape: int) -> torch.Tensor:
         """Return zeros for every contact node of as many members as ``like`` has."""

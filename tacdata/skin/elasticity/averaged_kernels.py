@@ -15,7 +15,7 @@ from tacdata.skin.constitutive import kinematics
 from tacdata.skin.elasticity.element_functions import constant_data, element_data, element_functions
 from tacdata.skin.materials import load_law
 
-_BEARABLE = 1.0
+BEARABLE = 1.0
 """Pressure over Young's modulus beyond which the tangent no longer follows it [1]."""
 
 
@@ -32,7 +32,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
     of_element = element_functions(real)
     gather, slope, gradient, add = of_element.gather, of_element.slope, of_element.gradient, of_element.add
     constants, stretch, Nodal = of_element.constants, of_element.stretch, of_element.Nodal
-    bearable = wp.constant(real(_BEARABLE))
+    bearable = wp.constant(real(BEARABLE))
     Four = wp.types.vector(4, real)
 
     @wp.func

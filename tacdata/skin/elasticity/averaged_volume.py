@@ -29,7 +29,7 @@ from tacdata.skin.member.warp_arrays import REAL, argument, filled
 from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 
-_CORRECTIONS = 3
+CORRECTIONS = 3
 """Steps of Richardson's iteration; each takes two orders of the element's size off the error of lumping."""
 
 
@@ -68,18 +68,19 @@ class AveragedVolume:
         """
         _, weights = mesh.shape_gradients()
         corner, tets = np.unique(mesh.tets[:, :4], return_inverse=True)
-        self._count, self._law, self._device, self._elements = len(corner), law, device, len(mesh.tets)
+        self.law, self.corners, self.elements = law, len(corner), len(mesh.tets)
+        self._device = device
         tets = tets.reshape(-1, 4)
-        mass = [corner_mass(tets, weights * part[:, None], self._count) for part in (~slab, slab)]
-        pattern = sp.csr_matrix(sum(abs(m) for m in mass) + sp.identity(self._count, format="csr") * 0)
+        mass = [corner_mass(tets, weights * part[:, None], self.corners) for part in (~slab, slab)]
+        pattern = sp.csr_matrix(sum(abs(m) for m in mass) + sp.identity(self.corners, format="csr") * 0)
         pattern.sort_indices()
         values = [_on_pattern(m, pattern) for m in mass]
         lumped = np.stack([np.asarray(m.sum(axis=1)).ravel() for m in mass])
-        self._data = data
-        self._pattern = [
+        self.data = data
+        self.pattern = [
             wp.array(a.astype(np.int32), dtype=wp.int32, device=device) for a in (pattern.indptr, pattern.indices)
         ]
-        self._mass = {
+        self.mass = {
             dtype: [
                 wp.array(np.ascontiguousarray(a), dtype=real, device=device) for a in (np.stack(values), lumped)
             ]
@@ -113,18 +114,18 @@ class AveragedVolume:
         self._launch("energy", (u,), own, self.dilatation(u, own), total)
 
     def _sums(self, name: str, fields: tuple[torch.Tensor, ...], own: Conditions) -> torch.Tensor:
-        sums = torch.zeros(self._count, fields[0].shape[2], dtype=fields[0].dtype, device=fields[0].device)
+        sums = torch.zeros(self.corners, fields[0].shape[2], dtype=fields[0].dtype, device=fields[0].device)
         self._launch(name, fields, own, sums)
         return sums
 
     def _average(self, sums: torch.Tensor, own: Conditions) -> torch.Tensor:
         """Return Q times sums over the corners' surroundings, shape (c, b)."""
         average = torch.zeros_like(sums)
-        for _ in range(_CORRECTIONS + 1):
+        for _ in range(CORRECTIONS + 1):
             after = torch.empty_like(sums)
             wp.launch(
                 _mass_kernel(REAL[sums.dtype]), dim=tuple(sums.shape),
-                inputs=[*self._pattern, *self._mass[sums.dtype], *map(argument, (own.thickness, sums, average))],
+                inputs=[*self.pattern, *self.mass[sums.dtype], *map(argument, (own.thickness, sums, average))],
                 outputs=[argument(after)], device=self._device,
             )
             average = after
@@ -136,8 +137,8 @@ class AveragedVolume:
         real = REAL[dtype]
         constants = filled(constant_data(real), law=own.law, modulus=own.modulus, thickness=own.thickness)
         wp.launch(
-            getattr(averaged_kernels(self._law, real), name), dim=(self._elements, fields[0].shape[2]),
-            inputs=[*map(argument, fields), self._data[dtype], constants, *map(argument, rest)], device=self._device,
+            getattr(averaged_kernels(self.law, real), name), dim=(self.elements, fields[0].shape[2]),
+            inputs=[*map(argument, fields), self.data[dtype], constants, *map(argument, rest)], device=self._device,
         )
 
 

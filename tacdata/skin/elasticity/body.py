@@ -18,6 +18,7 @@ import warp as wp
 import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.skin.elasticity.averaged_volume import AveragedVolume, corner_shapes
 from tacdata.skin.elasticity.element_functions import constant_data, element_data, element_functions
+from tacdata.skin.elasticity.prepared_tangent import PreparedTangent
 from tacdata.skin.materials import load_law
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.warp_arrays import REAL, argument, filled
@@ -127,6 +128,10 @@ class Elasticity:
         All products with one tangent have it in common: whoever takes many passes it to `tangent_product`.
         """
         return self._averaged.dilatation(u, conditions.to(u.dtype)) if self._averaged else None
+
+    def prepared(self) -> PreparedTangent | None:
+        """Return what prepares the tangents of a batch; None where products ask the law: on a GPU, or unaveraged."""
+        return PreparedTangent(self._averaged) if self._averaged and self.device == "cpu" else None
 
     def tangent_product(
         self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor,

@@ -1,4 +1,4 @@
-"""The tangent stiffness K of body and contacts at one state, matrix-free."""
+"""The tangent stiffness K of body and contacts at one state, by its products with fields."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from tacdata.skin.elasticity.body import Elasticity
 from tacdata.skin.member.columns import Columns
 from tacdata.skin.member.conditions import Conditions
 
+_FEW = 3
+"""Members for which a tangent is prepared, at the least: eight cost as much as one."""
+
 
 @dataclass(frozen=True)
 class Linearization(Columns):
@@ -25,7 +28,9 @@ class Linearization(Columns):
     contacts: tuple[ContactTangent, ...]
     """Stiffness of each contact."""
     dilatation: torch.Tensor | None
-    """`Elasticity.dilatation` at ``u``."""
+    """`Elasticity.dilatation` at ``u``; None where the tangent is prepared."""
+    member: torch.Tensor | None = None
+    """Which members of the batch these are, shape (b,); None where the tangent is not prepared."""
 
 
 class TangentStiffness:
@@ -33,15 +38,37 @@ class TangentStiffness:
 
     def __init__(self, body: Elasticity, surfaces: Sequence[ContactSurface]) -> None:
         """Bind a body and its contact surfaces."""
-        self.body, self.surfaces = body, tuple(surfaces)
+        self.body, self.surfaces, self._prepared = body, tuple(surfaces), body.prepared()
 
-    def at(self, u: torch.Tensor, conditions: Conditions, contacts: Sequence[ContactTangent]) -> Linearization:
-        """Return the state that `add_product` takes; ``u`` and ``conditions`` in the precision of the solve."""
+    def at(
+        self, u: torch.Tensor, conditions: Conditions, contacts: Sequence[ContactTangent],
+        wanted: torch.Tensor | None = None,
+    ) -> Linearization:
+        """Return the state that `add_product` takes; ``u`` and ``conditions`` in the precision of the solve.
+
+        Where many products will be taken of the members in ``wanted``, shape (b,), bool, the tangent is prepared.
+        """
         own = conditions.to(u.dtype)
+        if self._prepared and wanted is not None and len(some := wanted.nonzero()[:, 0]) >= _FEW:
+            self._prepared.update(u, own, some)
+            return Linearization(u, own, tuple(contacts), None, torch.arange(u.shape[2]))
         return Linearization(u, own, tuple(contacts), self.body.dilatation(u, own))
 
     def add_product(self, at: Linearization, p: torch.Tensor, result: torch.Tensor) -> None:
         """Add K p [N] to ``result``; both of shape (n, 3, b) and of one precision, held nodes included."""
-        self.body.tangent_product(at.u, p, at.conditions, result, at.dilatation)
+        if self._prepared and at.member is not None:
+            self._prepared.add_product(p, at.member, result)
+        else:
+            self.body.tangent_product(at.u, p, at.conditions, result, at.dilatation)
         for surface, contact in zip(self.surfaces, at.contacts, strict=True):
             surface.add_product(contact, p, result)
+
+    def keep(self, which: torch.Tensor) -> None:
+        """Let go of all members but some, by index, shape (k,)."""
+        if self._prepared:
+            self._prepared.keep(which)
+
+    def forget(self, which: torch.Tensor) -> None:
+        """Start members, by index, anew."""
+        if self._prepared:
+            self._prepared.forget(which)

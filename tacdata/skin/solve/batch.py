@@ -361,22 +361,23 @@ class Batch:
         self._at.unknowns.flatten(which)
         self._base.flatten(which)
         self._starts.forget(which)
+        self._newton.tangent.forget(which)
 
     def _shrink(self) -> None:
-        """Halve the batch, as often as it goes, when no press is waiting and half of the columns are idle."""
+        """Let go of idle columns when no press is waiting; on a GPU, which records sizes, by halving the batch."""
         busy = [column for column, press in enumerate(self._presses) if press is not None]
         idle = [column for column, press in enumerate(self._presses) if press is None]
-        width = len(self._presses)
+        width = len(self._presses) if self._at.u.is_cuda else len(busy)
         while 2 * len(busy) <= width:
             width //= 2
         if width == len(self._presses):
             return
         columns = sorted([*busy, *idle[: width - len(busy)]])
-        which = torch.as_tensor(columns, device=self._at.u.device)
-        self._at = self._at.take(which)
-        self._base = self._base.take(which)
+        which = torch.tensor(columns, device=self._at.u.device)
+        self._at, self._base = self._at.take(which), self._base.take(which)
         self._before, self._failed_at = self._before[which], self._failed_at[which]
         self._starts.keep(which)
+        self._newton.tangent.keep(which)
         self._presses = [self._presses[column] for column in columns]
 
     def _press(self, column: int) -> PlacedPress:
@@ -395,6 +396,5 @@ class Batch:
         return torch.as_tensor(mask, device=self._at.u.device)
 
     def _values(self, by_column: dict[int, float]) -> torch.Tensor:
-        values = np.zeros(len(self._presses))
-        values[list(by_column)] = list(by_column.values())
-        return torch.as_tensor(values, device=self._at.u.device)
+        values = [by_column.get(column, 0.0) for column in range(len(self._presses))]
+        return torch.tensor(values, dtype=torch.float64, device=self._at.u.device)

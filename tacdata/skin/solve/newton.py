@@ -106,9 +106,10 @@ class Newton:
     def updated(self, now: Residual, at: Configuration, which: torch.Tensor) -> Residual:
         """Return the residual of all members after a change of some, by index, shape (k,).
 
-        On a GPU, where few have changed, these alone are evaluated, and ``now`` is changed in place.
+        Where few have changed, these alone are evaluated, and ``now`` is changed in place.
         """
-        if self._cuda is None or 2 * len(which) > at.u.shape[2]:
+        few = at.u.shape[2] // 2 if self._cuda else at.u.shape[2] - 1
+        if len(which) > few:
             return self.residual(at)
         now.put(which, self.residual(at.take(which)))
         return now
@@ -140,7 +141,7 @@ class Newton:
         size = now.scale
         r = torch.where(wanted, now.force / size, 0.0).to(_WORK)
         gaps = [torch.where(wanted & own.tangent.active, -own.gap / size, 0.0) for own in now.contacts]
-        here = self.tangent.at(at.u.to(_WORK), at.conditions, contacts)
+        here = self.tangent.at(at.u.to(_WORK), at.conditions, contacts, None if self._cuda else wanted)
         stopping = Stopping(self.settings.forcing, self.settings.cg_limit, _STRAGGLERS, _LONG)
         if self._cuda:
             x, y, used = self._cuda.solve(here, r, gaps, wanted, stopping)

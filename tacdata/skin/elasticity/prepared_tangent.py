@@ -1,0 +1,102 @@
+"""The tangent of a body with averaged volume changes, prepared for many products on a CPU.
+
+Conjugate gradients multiply one tangent with some six fields. So the law is asked for its moduli at every point, and a
+product is linear algebra alone. It is done for eight members at a time, which a CPU does in one instruction. From one
+Newton step to the next most of the skin moves little. There moduli stay as they are.
+
+On a GPU it is memory that costs, and moduli take more of it than displacements: it asks the law anew.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+import warp as wp
+
+from tacdata.skin.elasticity.averaged_volume import CORRECTIONS, AveragedVolume
+from tacdata.skin.elasticity.element_functions import constant_data
+from tacdata.skin.elasticity.point_moduli import LANES, NUMBERS, moduli_kernel, product_kernels
+from tacdata.skin.member.conditions import Conditions
+from tacdata.skin.member.warp_arrays import REAL, argument, filled
+
+_MOVED = 0.003
+"""Change of an entry of F's cofactor up to which a point keeps its moduli [1]."""
+
+
+class PreparedTangent:
+    """K of the members of one batch, as it was at the last `update` but for `_MOVED`."""
+
+    def __init__(self, averaged: AveragedVolume, dtype: torch.dtype = torch.float32) -> None:
+        """Bind a body; its members come with `update`."""
+        self._body, self._dtype, self._real = averaged, dtype, REAL[dtype]
+        self._begin(0)
+
+    def keep(self, which: torch.Tensor) -> None:
+        """Let go of all members but some, by index, shape (k,)."""
+        if len(self._lane):
+            self._lane = self._lane[which]
+
+    def forget(self, which: torch.Tensor) -> None:
+        """Start members, by index, anew: nothing that they do depends on a press before."""
+        if len(self._lane):
+            self._values[:, :, -1, self._lane[which]] = torch.inf
+
+    def update(self, u: torch.Tensor, own: Conditions, member: torch.Tensor) -> None:
+        """Prepare the tangent of some members.
+
+        Args:
+            u: Displacements of all [mm], shape (n, 3, b).
+            own: Conditions of all, in one precision with ``u``.
+            member: Which are to be prepared, by index, shape (k,).
+        """
+        if u.shape[2] != len(self._lane):
+            self._begin(u.shape[2])
+        lane = self._lane[member]
+        u, own = u.index_select(2, member), own.take(member)
+        constants = filled(constant_data(self._real), law=own.law, modulus=own.modulus, thickness=own.thickness)
+        self._launch(
+            moduli_kernel(self._body.law, self._real), self._body.elements, u.shape[2], u, self._body.data[self._dtype],
+            constants, self._body.dilatation(u, own), lane.to(torch.int32), _MOVED, self._values, self._bulk,
+        )
+        self._thickness[lane] = own.thickness
+
+    def add_product(self, p: torch.Tensor, member: torch.Tensor, result: torch.Tensor) -> None:
+        """Add K p [N] of members, by index, shape (k,), to ``result``; both of shape (n, 3, k)."""
+        lane, kernels, body = self._lane[member], product_kernels(self._real), self._body
+        block, place = torch.unique(torch.div(lane, LANES, rounding_mode="floor"), return_inverse=True)
+        place, count = LANES * place + lane % LANES, len(block)
+        lanes = (LANES * block[:, None] + torch.arange(LANES)).ravel()
+        wide = torch.zeros(*p.shape[:2], len(lanes), dtype=p.dtype)
+        wide[:, :, place] = p
+        along, moduli, mesh = self._lanes(wide), self._lanes(self._values), body.data[self._dtype]
+        sums, block = torch.zeros(body.corners, len(lanes), dtype=p.dtype), block.to(torch.int32)
+        self._launch(kernels.swelling, body.elements, count, along, mesh, moduli, block, self._lanes(sums))
+        average, thickness = torch.zeros_like(sums), self._lanes(self._thickness[lanes])
+        for _ in range(CORRECTIONS + 1):
+            after = torch.empty_like(sums)
+            self._launch(
+                kernels.correct, body.corners, count, *body.pattern, *body.mass[self._dtype], thickness,
+                *map(self._lanes, (sums, average, after)),
+            )
+            average = after
+        pressure, total = average * self._bulk[lanes], torch.zeros_like(wide)
+        self._launch(
+            kernels.product, body.elements, count, along, mesh, moduli, block, *map(self._lanes, (pressure, total))
+        )
+        result += total[:, :, place]
+
+    def _begin(self, count: int) -> None:
+        """Make room for so many members."""
+        lanes = -(-count // LANES) * LANES
+        self._values = torch.full((self._body.elements, 4, NUMBERS, lanes), torch.inf, dtype=self._dtype)
+        self._bulk, self._thickness = torch.zeros(lanes, dtype=self._dtype), torch.ones(lanes, dtype=self._dtype)
+        self._lane = torch.arange(count)
+
+    def _lanes(self, values: torch.Tensor) -> Any:
+        """Return a tensor as an array of vectors along its last axis."""
+        shape = *values.shape[:-1], -1, LANES
+        return wp.from_torch(values.view(shape), dtype=wp.types.vector(LANES, self._real), return_ctype=True)
+
+    def _launch(self, kernel: Any, rows: int, columns: int, *values: Any) -> None:
+        wp.launch(kernel, dim=(rows, columns), inputs=[*map(argument, values)], device="cpu")
