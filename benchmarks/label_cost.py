@@ -1,4 +1,4 @@
-"""What a press of the training plan costs as `tacdata label` does it, with the mesh's error: CPU time of one core.
+"""What a press of the training plan costs as `tacdata label` does it.
 
     python benchmarks/label_cost.py [--presses 8] [--spreads]
 

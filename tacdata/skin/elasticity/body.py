@@ -130,7 +130,7 @@ class Elasticity:
         return self._averaged.dilatation(u, conditions.to(u.dtype)) if self._averaged else None
 
     def prepared(self) -> PreparedTangent | None:
-        """Return what prepares the tangents of a batch; None where products ask the law: on a GPU, or unaveraged."""
+        """Return what prepares a batch's tangents. A GPU has none, nor has a body without averages."""
         return PreparedTangent(self._averaged) if self._averaged and self.device == "cpu" else None
 
     def tangent_product(

@@ -1,9 +1,9 @@
 # Warp kernels are Python in form only; their operators have no types that pyright knows.
 # pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
-"""Kernels of a tangent that is prepared once and multiplied often (`tacdata.skin.elasticity.prepared_tangent`).
+"""Kernels of a prepared tangent (`tacdata.skin.elasticity.prepared_tangent`).
 
-Lanes: `LANES` members in one vector, on which a CPU works in one instruction.
+Lanes are members in one vector. A CPU works on them at once.
 """
 
 from functools import cache
@@ -28,7 +28,7 @@ column, then xx, yy, zz, xy, yz, xz of the diagonal's."""
 
 @cache
 def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
-    """Compile the kernel that asks a law for its moduli, in one precision."""
+    """Compile the kernel of moduli."""
     law = load_law(law_name)
     tangent_of, bulk_of = law.tangent_function(real, "H"), law.bulk_function(real)
     volume = kinematics.volume(real)
@@ -103,7 +103,7 @@ def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
 
 @cache
 def product_kernels(real: type) -> SimpleNamespace:
-    """Compile the kernels that multiply with moduli, in one precision; ``block``: of lanes, of each vector of ``p``."""
+    """Compile the kernels of products. ``block`` says which lanes a vector of ``p`` has."""
     ElementData, Lanes, Nine = element_data(real), wp.types.vector(LANES, real), wp.types.matrix((9, LANES), real)
 
     @wp.func

@@ -1,10 +1,10 @@
-"""The tangent of a body with averaged volume changes, prepared for many products on a CPU.
+"""The tangent of a body with averaged volume changes, prepared for a CPU.
 
-Conjugate gradients multiply one tangent with some six fields. So the law is asked for its moduli at every point, and a
-product is linear algebra alone. It is done for eight members at a time, which a CPU does in one instruction. From one
-Newton step to the next most of the skin moves little. There moduli stay as they are.
+Conjugate gradients multiply one tangent with some six fields. So the law is asked once for its moduli. A product is
+linear algebra then. Eight members go at a time. A CPU does that in one instruction. Most of the skin moves little in
+a Newton step. Its moduli stay.
 
-On a GPU it is memory that costs, and moduli take more of it than displacements: it asks the law anew.
+On a GPU memory costs. Moduli take much of it. It asks the law anew.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _MOVED = 0.003
 
 
 class PreparedTangent:
-    """K of the members of one batch, as it was at the last `update` but for `_MOVED`."""
+    """K of the members of one batch."""
 
     def __init__(self, averaged: AveragedVolume, dtype: torch.dtype = torch.float32) -> None:
-        """Bind a body; its members come with `update`."""
+        """Bind a body."""
         self._body, self._dtype, self._real = averaged, dtype, REAL[dtype]
         self._begin(0)
 
@@ -38,7 +38,7 @@ class PreparedTangent:
             self._lane = self._lane[which]
 
     def forget(self, which: torch.Tensor) -> None:
-        """Start members, by index, anew: nothing that they do depends on a press before."""
+        """Start members, by index, anew."""
         if len(self._lane):
             self._values[:, :, -1, self._lane[which]] = torch.inf
 

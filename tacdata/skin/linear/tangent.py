@@ -44,9 +44,9 @@ class TangentStiffness:
         self, u: torch.Tensor, conditions: Conditions, contacts: Sequence[ContactTangent],
         wanted: torch.Tensor | None = None,
     ) -> Linearization:
-        """Return the state that `add_product` takes; ``u`` and ``conditions`` in the precision of the solve.
+        """Return the state that `add_product` takes.
 
-        Where many products will be taken of the members in ``wanted``, shape (b,), bool, the tangent is prepared.
+        ``u`` has the precision of the solve. The tangent is prepared for members in ``wanted``, shape (b,), bool.
         """
         own = conditions.to(u.dtype)
         if self._prepared and wanted is not None and len(some := wanted.nonzero()[:, 0]) >= _FEW:
