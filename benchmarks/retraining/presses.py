@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +22,16 @@ from tacdata import provenance
 from tacdata.dataset import frames as columns
 from tacdata.dataset.format import features
 from training.frames.frames import EpisodeSpan, Frames
+from training.metrics.depth_maps import CONTACT_THRESHOLD
 
 CHUNK = 64
 """Presses in a file of packed frames [count]."""
+MOVED = 0.04
+"""Way of the tip between two frames in contact that are both learned from [mm]."""
+_HELD, _IDLE = 8, 3
+"""Of frames that are alike, one in so many is learned from: while the tip holds, and out of contact [count]."""
+_HELD_MOST = 3
+"""Frames of a hold that are learned from [count]."""
 _KEYS = {
     "taxels": features.STATE, "depth": features.DEPTH, "tip": features.TIP, "phase": features.PHASE,
     "time_ns": features.TIME, "valid": features.VALID, "taxel_force": features.TAXEL_FORCE,
@@ -94,6 +101,32 @@ def read(solved: Path, packed: Path, files: int | None = None) -> Frames:
         **arrays, episodes=tuple(spans), sensor=simulation.sensor, dataset_hash=identity, origin=origin, virtual=False,
         simulated=True,
     )  # fmt: skip
+
+
+def thinned(frames: Frames) -> Frames:
+    """Return frames of which only such are learned from as differ from each other; the others stay in windows.
+
+    A hold gives dozens of frames that differ in noise alone.
+    """
+    kept = np.zeros(len(frames.taxels), bool)
+    for span in frames.episodes:
+        depth = frames.tip[span.start : span.stop, 2]
+        touching = frames.depth[span.start : span.stop].max(axis=(1, 2)) > CONTACT_THRESHOLD
+        kept[span.start : span.stop] = _different(depth, touching)
+    return replace(frames, valid=frames.valid & kept)
+
+
+def _different(depth: np.ndarray, touching: np.ndarray) -> np.ndarray:
+    kept, last, still = np.zeros(len(depth), bool), -np.inf, 0
+    for k, (now, contact) in enumerate(zip(depth.tolist(), touching.tolist(), strict=True)):
+        if not contact:
+            kept[k] = k % _IDLE == 0
+        elif abs(now - last) >= MOVED:
+            kept[k], last, still = True, now, 0
+        else:
+            still += 1
+            kept[k] = still % _HELD == 0 and still <= _HELD * _HELD_MOST
+    return kept
 
 
 def _pack(task: _Task) -> None:

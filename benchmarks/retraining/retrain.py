@@ -115,14 +115,15 @@ def _pack(work: Path, clock: Clock) -> None:
     clock.note("pack", began, presses=packed)
 
 
-def train(work: Path, out: Path, seconds: float, device: str, names: list[str], batch: int) -> None:
-    """Train variants side by side, each in a process of its own."""
+def train(work: Path, out: Path, seconds: float, device: str, names: list[str], batch: int, start: str | None) -> None:
+    """Train variants side by side, each in a process of its own, from random weights or from a network."""
     clock = Clock(out, "train", seconds)
     _pack(work, clock)
     began = time.time()
     context = multiprocessing.get_context("spawn")
     crew = {
-        name: context.Process(target=_train_one, args=(name, work, out, clock.until, device, batch)) for name in names
+        name: context.Process(target=_train_one, args=(name, work, out, clock.until, device, batch, start))
+        for name in names
     }
     for process in crew.values():
         process.start()
@@ -137,15 +138,18 @@ def train(work: Path, out: Path, seconds: float, device: str, names: list[str], 
         clock.note(f"train {name}", began, ended=process.exitcode)
 
 
-def _train_one(name: str, work: Path, out: Path, until: float, device: str, batch: int) -> None:
+def _train_one(name: str, work: Path, out: Path, until: float, device: str, batch: int, start: str | None) -> None:
     import variants
+
+    from training.pretraining.shipped import pretrained
 
     def shown(line: str) -> None:
         print(line, flush=True)
 
     variants.train_one(
-        name, work / "solved" / TRAINING, work / "packed", work / "runs", out, until, device, batch, shown
-    )
+        name, work / "solved" / TRAINING, work / "packed", work / "runs", out, until, device, batch,
+        pretrained(start) if start else None, shown,
+    )  # fmt: skip
 
 
 def score(work: Path, out: Path, seconds: float, names: list[str], final: bool) -> None:
@@ -270,7 +274,8 @@ def main() -> None:
     parser.add_argument("--device", default="cuda", help="cuda or cpu")
     parser.add_argument("--scale", type=float, default=1.0, help="share of the presses to solve, for a trial")
     parser.add_argument("--workers", type=int, default=1, help="processes that solve")
-    parser.add_argument("--variants", default="as-before,narrow,narrow-wide,narrow-wide-absolute")
+    parser.add_argument("--variants", default="broad,narrow")
+    parser.add_argument("--from", dest="start", help="train on from this checkpoint, or from `shipped`")
     parser.add_argument("--batch-size", type=int, default=1024)
     given = parser.parse_args()
     sys.path[:0] = [str(HERE), str(CURVE)]
@@ -281,7 +286,7 @@ def main() -> None:
     if given.part == "solve":
         solve(given.work, given.out, given.seconds, given.device, given.scale, given.workers)
     elif given.part == "train":
-        train(given.work, given.out, given.seconds, given.device, names, given.batch_size)
+        train(given.work, given.out, given.seconds, given.device, names, given.batch_size, given.start)
     else:
         score(given.work, given.out, given.seconds, names, given.part == "final")
 

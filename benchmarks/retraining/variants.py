@@ -7,32 +7,22 @@ import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import presses
 
 from training.frames.frames import Frames
-from training.loss import WeightedLoss
+from training.inference.checkpoint import Checkpoint
 from training.metrics.depth_maps import CONTACT_THRESHOLD
 from training.pretraining.recipe import recipe
 from training.settings import TrainingSettings
 from training.train import Progress, train
 
-WIDE: dict[str, Any] = {"arguments": {"hidden": 512, "layers": 3}}
 BROAD = {"gain_jitter": 0.1, "scale_jitter": 0.25, "exponent_jitter": 0.15}
 """How far a unit may be from the model, as the network that ships was trained until now [1]."""
 NARROW = {"gain_jitter": 0.04, "scale_jitter": 0.12, "exponent_jitter": 0.06}
 """What remains of it after a calibration with ten presses. A network that must allow for more rounds what it sees:
 two shapes whose readings differ by less than the gains' spread get the mean of their maps [1]."""
-VARIANTS: dict[str, dict[str, Any]] = {
-    "as-before": {**BROAD},
-    "narrow": {**NARROW},
-    "narrow-wide": {**NARROW, **WIDE},
-    # Squared errors favour the mean of all maps that fit the readings, absolute ones their median: less rounded.
-    "narrow-wide-absolute": {
-        **NARROW, **WIDE, "loss": WeightedLoss(mixture=0.5, threshold=1 / 30, foreground=3.0),
-    },
-}  # fmt: skip
+VARIANTS = {"broad": BROAD, "narrow": NARROW}
 FEWEST, MOST = 2, 80
 """Epochs, whatever the time allows [count]."""
 _IDLE = 0.3
@@ -47,18 +37,18 @@ _AROUND = 100.0
 """Time for what is before the first epoch and after the last: reading, calibration, intervals, readings seen [s]."""
 
 
-def settings(name: str, epochs: int, batch: int) -> TrainingSettings:
-    """Return the recipe of a variant."""
+def settings(name: str, epochs: int, batch: int, start: Checkpoint | None = None) -> TrainingSettings:
+    """Return the recipe of a variant: large steps from random weights, smaller ones from a network, without a pull."""
     asked = {
-        "network": "pattern", "batch_size": batch, "learning_rate": 2e-3, "idle_share": _IDLE, "epochs": epochs,
-        **VARIANTS[name],
+        "batch_size": batch, "idle_share": _IDLE, "epochs": epochs, "network": "pattern",
+        "learning_rate": 1e-3 if start else 2e-3, "pull": 0.0, **VARIANTS[name],
     }  # fmt: skip
-    return recipe(asked)
+    return recipe(asked, start)
 
 
 def train_one(
     name: str, solved: Path, packed: Path, runs: Path, out: Path, until: float, device: str, batch: int,
-    shown: Callable[[str], None] = print,
+    start: Checkpoint | None = None, shown: Callable[[str], None] = print,
 ) -> None:  # fmt: skip
     """Train a variant until a time; a trial tells how many epochs fit.
 
@@ -71,6 +61,7 @@ def train_one(
         until: When it must be done [s since 1970].
         device: What it trains on.
         batch: Frames a step.
+        start: The network that it goes on from; random weights if left out.
         shown: Called with each line of progress.
     """
     began = time.time()
@@ -88,15 +79,16 @@ def train_one(
     if not resumed:
         runs.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(run, ignore_errors=True)
-        some = presses.read(solved, packed, _TRIED)
-        step = _step_seconds(some, settings(name, MOST, batch), runs / f"{name}-trial", device)
+        some = presses.thinned(presses.read(solved, packed, _TRIED))
+        step = _step_seconds(some, settings(name, MOST, batch, start), runs / f"{name}-trial", device)
         steps = _steps(some, batch) * len(list(packed.glob("*.npz"))) / min(len(list(packed.glob("*.npz"))), _TRIED)
         epochs = int((until - time.time() - _AROUND) / (steps * step + _VALIDATION))
         kept.write_text(str(min(max(epochs, FEWEST), MOST)))
         shown(f"{name}: {1000 * step:.2f} ms a step, {steps:.0f} steps an epoch, so {kept.read_text()} epochs")
-    frames = presses.read(solved, packed)
-    shown(f"{name}: {len(frames.taxels)} frames read after {time.time() - began:.0f} s")
-    best = train(frames, settings(name, int(kept.read_text()), batch), run, device, resumed, threads=2, listener=told)
+    frames = presses.thinned(presses.read(solved, packed))
+    shown(f"{name}: {int(frames.valid.sum())} of {len(frames.taxels)} frames, read after {time.time() - began:.0f} s")
+    asked = settings(name, int(kept.read_text()), batch, start)
+    best = train(frames, asked, run, device, resumed, threads=2, listener=told, pretrained=start)
     out.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(best.path, out / f"{name}.safetensors")
     shown(f"{name}: done, {time.time() - began:.0f} s in all, best epoch {best.document['best']}")
@@ -124,5 +116,5 @@ def _step_seconds(frames: Frames, recipe: TrainingSettings, run: Path, device: s
 
 def _steps(frames: Frames, batch: int) -> float:
     """Return the steps of an epoch [1]."""
-    touching = float((frames.depth.max(axis=(1, 2)) > CONTACT_THRESHOLD).mean())
-    return len(frames.taxels) * _LEARNED * (touching + _IDLE * (1 - touching)) / batch
+    touching = frames.depth[frames.valid].max(axis=(1, 2)) > CONTACT_THRESHOLD
+    return _LEARNED * float(touching.sum() + _IDLE * (~touching).sum()) / batch

@@ -17,6 +17,7 @@ from label_farm.simulated.simulation import Simulation
 from label_farm.simulated.solving import solve_batch
 from tacdata.sensor import default_sensor
 from training.frames.data import read_frames
+from training.pretraining.shipped import pretrained
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
 from bump_skin import SMALL, BumpSkin
@@ -76,6 +77,35 @@ def test_packing_goes_on_where_it_was(solved, tmp_path, monkeypatch):
     first.unlink()
     assert presses.pack(solved.folder, packed, 1) == 6
     assert [os.stat(path).st_ino for path in others] == before
+
+
+def test_of_frames_that_are_alike_few_are_learned_from(solved, tmp_path):
+    presses.pack(solved.folder, tmp_path / "packed", 1)
+    frames = presses.read(solved.folder, tmp_path / "packed")
+    thin = presses.thinned(frames)
+    assert len(thin.taxels) == len(frames.taxels)  # the others stay in windows
+    assert 0 < thin.valid.sum() < 0.7 * frames.valid.sum()
+    held = []
+    for span in frames.episodes:
+        depth, kept = frames.tip[span.start : span.stop, 2], thin.valid[span.start : span.stop]
+        touching = frames.depth[span.start : span.stop].max(axis=(1, 2)) > 0.1
+        full = touching & (depth == depth.max())
+        held.append((int(full.sum()), int((full & kept).sum())))
+        moves = np.abs(np.diff(depth[touching & kept]))
+        # A frame that is kept has moved on from the one before, or is one of a hold.
+        assert (moves >= presses.MOVED - 1e-6).sum() + 3 >= len(moves), span
+    assert any(all_of > 5 for all_of, _ in held)
+    assert all(some <= 4 for _, some in held)
+
+
+def test_a_run_from_a_network_keeps_its_layers_and_takes_smaller_steps():
+    variants = module("variants")
+    start = pretrained("shipped")
+    for name in variants.VARIANTS:
+        fresh, onward = variants.settings(name, 4, 256), variants.settings(name, 4, 256, start)
+        assert onward.learning_rate < fresh.learning_rate
+        assert onward.arguments == start.network.arguments
+        assert (onward.gain_jitter, onward.pull) == (fresh.gain_jitter, 0.0)
 
 
 def test_the_plan_presses_each_of_its_shapes():
