@@ -1,7 +1,6 @@
 """Many presses at once: every column of the batch follows its own load path, and takes the next press when it is done.
 
-No press waits for another. In a Newton iteration one member may be far from its state, while another has just found its
-own and is sent on to the next depth.
+No press waits for another: in one Newton iteration some are far from their state, others go on to the next depth.
 """
 
 from __future__ import annotations
@@ -145,12 +144,13 @@ class Batch:
             while any(press is not None for press in self._presses):
                 self._shrink()
                 yield from self._iterate(waiting, collect, observe)
-        except torch.OutOfMemoryError as error:
-            nodes, _, count = self._at.u.shape
+        except RuntimeError as error:
+            if "out of memory" not in str(error):  # torch and Warp each say it in an error of their own
+                raise
             raise SolveError(
-                f"{count} presses at a time on a mesh of {nodes} nodes",
+                f"{self._at.u.shape[2]} presses at a time on a mesh of {len(self._at.u)} nodes",
                 f"as many as the memory of {self._at.u.device} holds",
-                "ask for fewer at a time, or coarsen the mesh",
+                "ask for fewer at a time or fewer processes a GPU, or coarsen the mesh",
             ) from error
 
     def _iterate(
