@@ -10,6 +10,7 @@ from demo_examples import rig
 
 from tacdata.cli import main
 from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks
+from tacdata.demonstrations.recording.images import stored_images
 from tacdata.demonstrations.recording.reader import read_demo
 from tacdata.demonstrations.recording.recorder import DemoRecorder
 from tacdata.demonstrations.recording.rig import read_demo_rig
@@ -36,10 +37,28 @@ class Now:
         return answer
 
 
+def kept_up(path):
+    """Return whether no second is without an image: an emulated camera that starves falls behind its boards."""
+    times, _ = stored_images(path)
+    ends = read_demo(path).taxels["thumb"].sample_ns[[0, -1]]
+    return np.diff([ends[0], *times, ends[1]]).max() < 1e9
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """Six seconds of a hand with one camera, at half speed; its index finger wears another skin."""
-    folder, paper = tmp_path_factory.mktemp("demo"), default_sensor().document
+    """Six seconds of a hand with one camera, at half speed; its index finger wears another skin.
+
+    Recorded again where the machine stood still meanwhile: all tests here share it, so their second try would not help.
+    """
+    for _ in range(3):
+        made = recording(tmp_path_factory.mktemp("demo"))
+        if kept_up(made[0]):
+            break
+    return made
+
+
+def recording(folder):
+    paper = default_sensor().document
     other = Sensor.from_document({**paper, "taxels": {**paper["taxels"], "columns": 4, "rows": 3}}, "index")
     demo = VirtualDemo(folder / "rig", speed=0.6, seed=3, cameras=1, sensor={"index": other})
     demo.start()
