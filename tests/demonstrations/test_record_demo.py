@@ -46,21 +46,22 @@ def kept_up(path):
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """Six seconds of a hand with one camera, at half speed; its index finger wears another skin.
+    """Five seconds of a hand with one camera, slower than real time; its index finger wears another skin.
 
-    Recorded again where the machine stood still meanwhile: all tests here share it, so their second try would not help.
+    Recorded again, and slower, where the images fell behind: all tests here share it, and a machine that has other
+    things to do may paint fewer of them a second than the rig's clock asks for.
     """
-    for _ in range(3):
-        made = recording(tmp_path_factory.mktemp("demo"))
+    for speed in (0.6, 0.3, 0.1):
+        made = recording(tmp_path_factory.mktemp("demo"), speed)
         if kept_up(made[0]):
-            break
-    return made
+            return made
+    pytest.fail("the images fell behind even at a tenth of real time")
 
 
-def recording(folder):
+def recording(folder, speed):
     paper = default_sensor().document
     other = Sensor.from_document({**paper, "taxels": {**paper["taxels"], "columns": 4, "rows": 3}}, "index")
-    demo = VirtualDemo(folder / "rig", speed=0.6, seed=3, cameras=1, sensor={"index": other})
+    demo = VirtualDemo(folder / "rig", speed=speed, seed=3, cameras=1, sensor={"index": other})
     demo.start()
     try:
         bench = read_demo_rig(demo.path)

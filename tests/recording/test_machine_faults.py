@@ -18,13 +18,12 @@ from tacdata.rig import read_rig
 from tacdata.virtual_rig.rig import VirtualRig
 from tacdata.virtual_rig.world.mounting import mount
 
-SPEED = 10.0
 CLEARANCE = 3.0
 
 
 @pytest.fixture
-def virtual(tmp_path):
-    rig = VirtualRig(tmp_path / "rig", SPEED, seed=5, camera=False)
+def virtual(tmp_path, speed):
+    rig = VirtualRig(tmp_path / "rig", speed, seed=5, camera=False)
     rig.start()
     yield rig
     rig.stop()

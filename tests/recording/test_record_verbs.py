@@ -23,9 +23,9 @@ def tacdata(*arguments, **options):
 
 
 @pytest.fixture
-def bench(tmp_path):
+def bench(tmp_path, speed):
     (tmp_path / "plan.yaml").write_text(yaml.safe_dump(plan_document(2, hold=0.3, rest=0.4)))
-    with running(tmp_path / "rig", speed=10.0, seed=1, camera=False) as rig:
+    with running(tmp_path / "rig", speed=speed, seed=1, camera=False) as rig:
         yield ["record", "--rig", rig, "--plan", tmp_path / "plan.yaml", "--out", tmp_path / "session"]
 
 

@@ -22,8 +22,6 @@ from tacdata.rig import read_rig
 from tacdata.virtual_rig.rig import VirtualRig
 from tacdata.virtual_rig.world.mounting import mount
 
-SPEED = 10.0
-
 
 class Truth:
     """Where the carriage really was, sampled while the rig runs."""
@@ -49,8 +47,8 @@ class Truth:
 
 
 @pytest.fixture
-def virtual(tmp_path):
-    rig = VirtualRig(tmp_path / "rig", SPEED, seed=3, camera=False)
+def virtual(tmp_path, speed):
+    rig = VirtualRig(tmp_path / "rig", speed, seed=3, camera=False)
     rig.start()
     yield rig
     rig.stop()
@@ -112,7 +110,7 @@ def test_two_presses_agree_with_what_really_happened(virtual, tmp_path):
         assert (np.diff(episode.taxels.counter) == 1).all()
         # Late by the link's least delay, which the fast clock multiplies; never early, never adrift.
         device = np.array([timing.sample_ns(int(k)) for k in episode.taxels.counter])
-        error = (episode.taxels.sample_ns - device) / 1e6 / SPEED
+        error = (episode.taxels.sample_ns - device) / 1e6 / virtual.clock.rate
         assert -0.5 < error.min()
         assert error.max() < 10.0, "milliseconds of real time"
         assert np.ptp(error) < 1.0

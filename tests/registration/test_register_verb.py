@@ -31,8 +31,8 @@ def run(monkeypatch, capfd, *arguments):
 
 
 @pytest.fixture
-def virtual(tmp_path):
-    rig = VirtualRig(tmp_path / "rig", 12.0, seed=4, camera=False, rough=True)
+def virtual(tmp_path, speed):
+    rig = VirtualRig(tmp_path / "rig", speed, seed=4, camera=False, rough=True)
     rig.start()
     yield rig
     rig.stop()

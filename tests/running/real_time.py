@@ -18,6 +18,8 @@ RIGS = ("test_closed_loop.py",)
 """Files of other rooms that do: a press that a late machine spoilt stands out there, and nothing is named."""
 STILL = 0.02
 """A thread that wakes so much too late was kept from the machine [s]; an emulated carriage moves 0.2 mm meanwhile."""
+SPEED = 10.0
+"""Rate of an emulated rig's clock at the first try [s a second]."""
 
 
 @functools.cache
@@ -70,6 +72,12 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if in_real_time(item.path):
             item.add_marker(pytest.mark.flaky(reruns=2, condition=WATCH.stood_still))
+
+
+@pytest.fixture
+def speed(request):
+    """Rate of an emulated rig's clock [s a second]; half of it at every further try: a busy machine keeps up."""
+    return SPEED / 2 ** (request.node.execution_count - 1)
 
 
 def pytest_runtest_setup(item):

@@ -17,6 +17,11 @@ real time]. Idle means that nothing runs that could delay the answer; a pause (G
 FLOOR = 3.0
 """Shortest timeout for a line's answer [s, real time], so that an idle controller is recognized as idle first."""
 
+BUSY = 5.0
+"""Shortest timeout for a report where the clock runs faster than real time [s, real time]: the emulated controller
+shares the computer, and a busy one keeps it from answering.
+"""
+
 
 @dataclass(frozen=True)
 class Owed:
@@ -45,7 +50,7 @@ class Watch:
         """Start now."""
         self._owed, self._clock = owed, clock
         self._due_ns = clock.now_ns() + round(min(owed.motion, owed.limit) * 1e9)
-        floor = FLOOR if owed.idle_ends_it else REAL_FLOOR
+        floor = FLOOR if owed.idle_ends_it else min(max(owed.limit, REAL_FLOOR), BUSY)
         self._late = Patience(owed.limit, clock.rate, floor, host=clock.host)
         self._idle = Patience(IDLE, clock.rate, IDLE_FLOOR, host=clock.host)
 
