@@ -22,7 +22,7 @@ class LoadPath:
     depths: tuple[float, ...]
     """Depths of the states wanted [mm]."""
     longest: float
-    """Longest step [mm]."""
+    """Longest step down [mm]."""
     where: str
     """The press in words, for errors."""
     first: float = math.inf
@@ -53,7 +53,8 @@ class LoadPath:
 
     def _propose(self) -> None:
         way = self.depths[self._wanted] - self.depth
-        self.attempt = self.depth + min(max(way, -min(self._step, self.lift)), self._step)
+        step = min(max(way, -min(self._step, self.lift)), min(self._step, self.longest))
+        self.attempt = self.depths[self._wanted] if step == way else self.depth + step
         self.newton, self._best, self._best_at = 0, math.inf, 0
 
     def judge(
@@ -105,9 +106,9 @@ class LoadPath:
         reached = abs(self.depths[self._wanted] - self.depth) <= 1e-12
         if reached:
             self._wanted += 1
-            self._step = self.longest
-        elif self._step < self.longest:
-            self._step = min(2 * self._step, self.longest)
+            self._step = max(self.longest, self.lift)
+        else:
+            self._step = min(2 * self._step, max(self.longest, self.lift))
         return reached
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -42,6 +41,12 @@ _FIRST = 0.3
 
 _LIFT = 0.5
 """Longest load step upward over the range of adhesion [1]."""
+
+_BACK = 3.0
+"""Longest load step upward over that downward, without adhesion [1]: it starts from the way down.
+
+In a slab held from below friction takes 2 to 7 % of the force. Against steps of 0.1 mm, those of 0.4 mm change the
+force by 0.1 to 0.4 %."""
 
 _JUMP = (200, 40)
 """Newton iterations per state, and without progress, that a jump into contact or off it may take."""
@@ -106,7 +111,7 @@ class MeshedSkin:
         adhesion = self.sensor.contact.adhesion
         path = LoadPath(
             request.depths, self.settings.step, f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm",
-            _FIRST * request.indenter.sharpest, _LIFT * adhesion.range if adhesion else math.inf,
+            _FIRST * request.indenter.sharpest, _LIFT * adhesion.range if adhesion else _BACK * self.settings.step,
         )
         origin, own = touch(self.sensor, self.face, request), self.conditions.pressed_by(request.indenter)
         return PlacedPress(number, path, origin, rotation(request), own)

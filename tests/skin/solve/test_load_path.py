@@ -46,8 +46,20 @@ def path(way):
 
 def test_steps_are_bounded_and_end_at_the_depths_wanted():
     tried, wanted = path(walk(0.6, 0.1))
-    assert tried == pytest.approx([0.25, 0.5, 0.6, 0.35, 0.1])
+    assert tried == pytest.approx([0.25, 0.5, 0.6, 0.1])
     assert wanted == [0.6, 0.1]
+
+
+def test_the_way_up_has_a_bound_of_its_own():
+    way = LoadPath((0.5, 0.0), 0.25, "sphere", lift=0.2)
+    assert path(way)[0] == pytest.approx([0.25, 0.5, 0.3, 0.1, 0.0])
+    way = LoadPath((0.5, 0.0), 0.25, "sphere")
+    for _ in range(2):
+        way.found()
+        way.go_on()
+    assert way.attempt == 0.0
+    way.halve()
+    assert way.attempt == pytest.approx(0.25), "also a step up is halved where no equilibrium is found"
 
 
 def test_the_first_step_onto_an_edge_is_a_short_one():
