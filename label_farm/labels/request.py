@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder
+from label_farm.presses.ladder import Ladder, goes_up_otherwise
 from tacdata import provenance
 from tacdata.errors import FormatError
 from tacdata.recording.episode import Episode
@@ -102,7 +102,7 @@ def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> Lab
             x=x,
             y=y,
             yaw=float(episode.press.yaw),
-            depths=ladder.depths(_settled_depth(episode)),
+            depths=ladder.depths(_settled_depth(episode), goes_up_otherwise(sensor.contact)),
             tolerance=ladder.tolerance,
             tilt_x=float(episode.press.tilt_x),
             tilt_y=float(episode.press.tilt_y),

@@ -16,16 +16,21 @@ class Branch:
     depth: np.ndarray
     """Depths of the states [mm], shape (k,), from 0, strictly increasing."""
     values: np.ndarray
-    """The quantity at these depths [mm or N, as in `PathSolution`], shape (k, m)."""
+    """The quantity at these depths [mm or N, as in `PathSolution`], shape (k, m); less that of the way down, if that is
+    given."""
+    down: Branch | None = None
+    """The way down, of a way up: what is interpolated is by how much they differ, which is little."""
+
+    @property
+    def states(self) -> np.ndarray:
+        """The quantity at these depths, shape (k, m)."""
+        return self.values + self.down.at(self.depth) if self.down else self.values
 
     @classmethod
     def of(cls, solution: PathSolution, quantity: str, loading: bool) -> Branch:
         """Take a quantity along the loading branch (up to the deepest state) or the unloading branch."""
-        peak = int(np.argmax(solution.depth))
-        chosen = slice(0, peak + 1) if loading else slice(peak, None)
-        order = slice(None) if loading else slice(None, None, -1)
-        values = getattr(solution, quantity)[chosen][order]
-        return cls(solution.depth[chosen][order], values.reshape(len(values), -1))
+        down, up = branches(solution.depth, getattr(solution, quantity))
+        return down if loading else up
 
     def at(self, depth: np.ndarray) -> np.ndarray:
         """Return the values at depths [mm], shape (n,), as shape (n, m).
@@ -33,6 +38,9 @@ class Branch:
         Piecewise cubic, monotone where the states are: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980)
         238-246. Held constant beyond the deepest state.
         """
+        return self._own(depth) + self.down.at(depth) if self.down else self._own(depth)
+
+    def _own(self, depth: np.ndarray) -> np.ndarray:
         from scipy.interpolate import PchipInterpolator  # here: it would be half of a worker's start
 
         return PchipInterpolator(self.depth, self.values, axis=0)(np.clip(depth, 0.0, self.depth[-1]))
@@ -51,10 +59,14 @@ class Branch:
         return np.stack([np.max(missed[:2], axis=0), *missed, np.max(missed[-2:], axis=0)])
 
     def left_out_beside(self, depth: np.ndarray) -> np.ndarray:
-        """Return the largest `left_out` of the two states beside each of the depths [mm], shape (n,), as shape (n,)."""
+        """Return the largest `left_out` of the two states beside each of the depths [mm], shape (n,), as shape (n,).
+
+        On a way up, that of the way down comes on top.
+        """
         worst = self.left_out().max(axis=1)
         after = np.clip(np.searchsorted(self.depth, depth), 1, len(worst) - 1)
-        return np.maximum(worst[after - 1], worst[after])
+        own = np.maximum(worst[after - 1], worst[after])
+        return own + self.down.left_out_beside(depth) if self.down else own
 
     def bound(self, depth: np.ndarray) -> np.ndarray:
         """Return a bound on the error of `at` at depths [mm], shape (n,), as shape (n, m).
@@ -64,7 +76,7 @@ class Branch:
         from the farther edge of that gap. It is 0 for a path linear in depth, an upper limit on any convex or
         concave stretch, a kink included, and several times the error where the path is smooth. Before contact
         the slope is 0; beyond the deepest state the slope is taken to go on changing as it did, and what `at`
-        leaves out there is added.
+        leaves out there is added. On a way up the bounds of the way down and of the difference add up.
         """
         slope = np.diff(self.values, axis=0) / np.diff(self.depth)[:, None]
         last = slope[-1] if len(slope) < 2 else 2 * slope[-1] - slope[-2]
@@ -72,10 +84,19 @@ class Branch:
         inside = np.clip(depth, 0.0, self.depth[-1])
         i = np.clip(np.searchsorted(self.depth, inside, side="right") - 1, 0, len(slope) - 1)
         after, before = (inside - self.depth[i])[:, None], (self.depth[i + 1] - inside)[:, None]
-        bend = self.at(depth) - self.values[i] - slope[i] * after
+        bend = self._own(depth) - self.values[i] - slope[i] * after
         left, right = (padded[i] - slope[i]) * after, (slope[i] - padded[i + 2]) * before
         nearer = np.where(np.abs(left) < np.abs(right), left, right)
         one_way = np.maximum(np.abs(bend), np.abs(nearer - bend))
         within = np.where(left * right >= 0, one_way, np.abs(bend) + np.abs(nearer))
         beyond = np.maximum(depth - self.depth[-1], 0.0)[:, None] * np.abs(slope[-1])
-        return within + beyond
+        own = within + beyond
+        return own + self.down.bound(depth) if self.down else own
+
+
+def branches(depth: np.ndarray, values: np.ndarray) -> tuple[Branch, Branch]:
+    """Return the ways down and up of a quantity, shape (k, ...), along a path's depths [mm], shape (k,)."""
+    peak, flat = int(np.argmax(depth)), values.reshape(len(depth), -1)
+    down = Branch(depth[: peak + 1], flat[: peak + 1])
+    at = depth[peak:][::-1]
+    return down, Branch(at, flat[peak:][::-1] - down.at(at), down)

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from label_farm.presses.interpolate import Branch
+from label_farm.presses.interpolate import Branch, branches
 from tacdata.errors import UsageError
 
 _SHARPEST = 1.2
@@ -63,13 +63,13 @@ class Tolerance:
             depth: Depths of the states [mm], shape (k,): rising to the deepest, then falling.
             surface: Maps of these states [mm], shape (k, pixels_x, pixels_y).
         """
-        peak = int(np.argmax(depth))
-        load = self._split(depth[: peak + 1], surface[: peak + 1])
-        unload = self._split(depth[peak:][::-1], surface[peak:][::-1])
+        load, unload = (self._split(branch) for branch in branches(depth, surface))
         return (*load, *unload[-2::-1])
 
     def foretold(self, path: tuple[float, ...], depth: np.ndarray, surface: np.ndarray) -> tuple[float, ...]:
-        """Return a path with states added, down and up, where a coarser mesh's loading needs them.
+        """Return a path with states added on its way down, where a coarser mesh needs them.
+
+        The way up is told by its difference from the way down.
 
         Args:
             path: Depths of the states [mm]: rising from 0 to the deepest, then falling.
@@ -81,31 +81,27 @@ class Tolerance:
             return path
         depth = np.concatenate([[0.0], depth[some]])
         surface = np.concatenate([np.zeros_like(surface[:1]), surface[some]])
-        split = set(self._split(depth, surface)) - set(depth.tolist())
+        split = set(self._split(branches(depth, surface)[0])) - set(depth.tolist())
         result = list(path[:1])
         for before, after in pairwise(path):
-            low, high = min(before, after) + _LEAST_STEP, max(before, after) - _LEAST_STEP
-            result += [*sorted((d for d in split if low <= d <= high), reverse=after < before), after]
+            result += [*sorted(d for d in split if before + _LEAST_STEP <= d <= after - _LEAST_STEP), after]
         return tuple(result)
 
     def exceeded(self, depth: np.ndarray, surface: np.ndarray) -> float:
         """Return the largest error of a state over the tolerance [1]; at most 1 where all keep it."""
-        peak = int(np.argmax(depth))
-        load = self._missed(depth[: peak + 1], surface[: peak + 1])
-        unload = self._missed(depth[peak:][::-1], surface[peak:][::-1])
-        return float(max(load.max(), unload.max()))
+        return float(max(self._missed(branch).max() for branch in branches(depth, surface)))
 
-    def _missed(self, depth: np.ndarray, surface: np.ndarray) -> np.ndarray:
+    def _missed(self, branch: Branch) -> np.ndarray:
         """Return the error of each state of a branch if left out, over what is allowed there [1], shape (k,)."""
-        flat = surface.reshape(len(depth), -1)
-        square = Branch(depth, flat).left_out() ** 2
+        depth, flat = branch.depth, branch.states
+        square = branch.left_out() ** 2
         dented = flat > _DENTED * np.maximum(depth, depth[1])[:, None]
         # A shape between the pixels dents none: then all count.
         dented |= ~dented.any(axis=1, keepdims=True)
         return np.sqrt((square * dented).sum(axis=1) / dented.sum(axis=1)) / self.at(depth)
 
-    def _split(self, depth: np.ndarray, surface: np.ndarray) -> list[float]:
-        missed = self._missed(depth, surface)
+    def _split(self, branch: Branch) -> list[float]:
+        depth, missed = branch.depth, self._missed(branch)
         worst = np.maximum(missed[:-1], missed[1:])
         parts = np.clip(np.ceil(worst ** (1 / _SHARPEST)), 1, _MOST_PARTS).astype(int)
         parts = np.minimum(parts, np.maximum(1, np.floor(np.diff(depth) / _LEAST_STEP + 1e-9)).astype(int))

@@ -42,7 +42,7 @@ class SubmissionRequest(BaseModel):
     uncertainty: bool = True
     tolerance: float = Field(0.005, ge=0, le=10)
     load_step: float = Field(0.25, gt=0, le=10)
-    unload_step: float = Field(0.25, gt=0, le=10)
+    unload_step: float = Field(0.75, gt=0, le=10)
 
 
 class PriorityRequest(BaseModel):

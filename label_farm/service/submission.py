@@ -39,8 +39,8 @@ class Submission:
     """States are added where maps between them would be off by more [mm]; 0: none."""
     load_step: float = 0.25
     """Largest depth step while loading [mm]."""
-    unload_step: float = 0.25
-    """Largest depth step while unloading [mm]."""
+    unload_step: float = 0.75
+    """Depth step while unloading [mm] (`label_farm.presses.ladder.Ladder`)."""
     id: str = "000000"
     """Number in its store."""
     submitted_at: str = ""

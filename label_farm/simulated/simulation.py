@@ -10,7 +10,7 @@ from typing import Any
 
 import schemas
 from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder
+from label_farm.presses.ladder import Ladder, goes_up_otherwise
 from label_farm.simulated.plan import SimulationPlan
 from label_farm.simulated.press_draw import draw_press
 from label_farm.simulated.press_effects import specimen_effects
@@ -146,11 +146,11 @@ class Simulation:
 
     def job(self, press: Press, model: str) -> Job:
         """Return what is solved for a press, by a model of its specimen with this content hash."""
-        step = self.plan.load_step
-        ladder = Ladder(first_step=min(0.05, step), load_step=step, unload_step=step, tolerance=None)
+        step, specimen = self.plan.load_step, self.specimen(press.index)
+        ladder = Ladder(first_step=min(0.05, step), load_step=step, unload_step=3 * step, tolerance=None)
         return Job(
-            self.specimen(press.index).content_hash, model, press.indenter.document, press.x, press.y, press.yaw,
-            ladder.depths(press.depth), None, press.tilt_x, press.tilt_y,
+            specimen.content_hash, model, press.indenter.document, press.x, press.y, press.yaw,
+            ladder.depths(press.depth, goes_up_otherwise(specimen.contact)), None, press.tilt_x, press.tilt_y,
         )  # fmt: skip
 
     def missing(self, presses: int, size: int) -> Iterator[tuple[int, list[int]]]:

@@ -35,7 +35,7 @@ def run(
         bool, typer.Option("--follow", help="Begin while `tacdata record` adds presses; end with its plan.")
     ] = False,
     load_step: Annotated[float, typer.Option(help="Largest depth step while loading [mm].")] = 0.25,
-    unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
+    unload_step: Annotated[float, typer.Option(help="Depth step up [mm]; a skin on a board needs few.")] = 0.75,
     uncertainty: Annotated[
         bool,
         typer.Option(help="Say what the spreads that the sensor file states make of pixels; costs two thirds more."),

@@ -29,7 +29,7 @@ def run(
     uncertainty: Annotated[bool, typer.Option(help="Say what the sensor file's spreads make of each pixel.")] = True,
     tolerance: Annotated[float, typer.Option(min=0.0, help="As of `tacdata label` [mm].")] = 0.005,
     load_step: Annotated[float, typer.Option(help="Largest depth step while loading [mm].")] = 0.25,
-    unload_step: Annotated[float, typer.Option(help="Largest depth step while unloading [mm].")] = 0.25,
+    unload_step: Annotated[float, typer.Option(help="Depth step up [mm]; a skin on a board needs few.")] = 0.75,
     wait: Annotated[
         float, typer.Option(min=0.0, help="Longest wait for the service to look at the recordings [s].")
     ] = 10.0,

@@ -12,12 +12,15 @@ from farm_examples import HERE, SENSOR, label_episodes, press_episode
 import tacdata
 from label_farm.labels import make_label
 from label_farm.presses.job import Job
+from label_farm.presses.ladder import Ladder
 from label_farm.store.store import Store
 from tacdata import provenance
 from tacdata.labels import read_label
 
 EARLIER = HERE / "labels" / "earlier_release"
 """A label and its stored solution, written by the commit f8471ad with the fast model."""
+THEN = Ladder(first_step=0.05, growth=1.6, unload_step=0.25)
+"""How its states were spaced."""
 COARSE = replace(SENSOR, map=replace(SENSOR.map, pixels_x=12, pixels_y=12, pixel_pitch=0.8))
 
 
@@ -113,7 +116,8 @@ def test_a_label_of_an_earlier_release_is_read_and_its_solution_used_again(tmp_p
     job = Job.from_document(earlier.provenance["parameters"]["job"])
     solution = Store(tmp_path / "labels" / "store").get(job)
     assert solution is not None and solution.depth.max() == job.deepest == pytest.approx(0.4)
-    summary = label_episodes(tmp_path / "labels", [press_episode(tmp_path, frames=6, depth=0.4)], sensor=COARSE)
+    episodes = [press_episode(tmp_path, frames=6, depth=0.4)]
+    summary = label_episodes(tmp_path / "labels", episodes, sensor=COARSE, ladder=THEN)
     assert (summary.written, solves()) == ([0], [])
     label = read_label(path)
     assert label.provenance["parents"]["label_farm"] == make_label.code_hash()
@@ -128,5 +132,6 @@ def test_a_label_of_an_equal_version_stays_current(tmp_path, solves, monkeypatch
     monkeypatch.setattr(provenance, "EQUAL_VERSIONS", {make_label.code_hash(): (older, "identical on this press")})
     provenance.code_hash.cache_clear()
     before = path.read_bytes()
-    summary = label_episodes(tmp_path / "labels", [press_episode(tmp_path, frames=6, depth=0.4)], sensor=COARSE)
+    episodes = [press_episode(tmp_path, frames=6, depth=0.4)]
+    summary = label_episodes(tmp_path / "labels", episodes, sensor=COARSE, ladder=THEN)
     assert (summary.current, summary.written, solves()) == ([0], [], []) and path.read_bytes() == before

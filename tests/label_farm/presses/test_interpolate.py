@@ -86,7 +86,7 @@ def test_a_state_left_out_is_missed_by_more_than_what_is_lost_between(name, load
     lost = np.abs(branch.at(DEPTH) - Branch.of(path(SENSOR, DEPTH, CURVES[name]), "surface", True).values)
     bound = branch.left_out_beside(DEPTH)
     assert (lost.max(axis=1) <= bound + 1e-12).all()
-    assert bound.max() < 0.08 * np.abs(branch.values).max(), "a bound that says nothing"
+    assert bound.max() < 0.08 * np.abs(branch.states).max(), "a bound that says nothing"
 
 
 def test_a_state_on_a_straight_path_is_foretold_and_one_on_a_kink_is_not():
@@ -169,7 +169,7 @@ def test_finer_steps_shrink_the_bound_at_second_order():
 
 def test_loading_and_unloading_take_their_own_branch(tmp_path):
     episode = press_episode(tmp_path, depth=1.0, frames=400)
-    wish = request(episode, SENSOR, "0" * 64, Ladder())
+    wish = request(episode, SENSOR, "0" * 64, Ladder(unload_step=0.25))
     states = path(SENSOR, wish.job.depths, lambda d: d)
     peak = int(np.argmax(states.depth))
     factor = np.where(np.arange(len(states.depth)) <= peak, 1.0, 0.5)
@@ -196,3 +196,23 @@ def test_what_a_shared_path_leaves_out_is_in_the_error(tmp_path):
     assert exact.error[hold] < 1e-12
     assert deeper.error[hold] == pytest.approx(0.004 * np.sqrt((bump**2).mean()), rel=1e-3)
     assert moved.error[hold] == pytest.approx(np.sqrt(((true - bump) ** 2).mean()), rel=0.05)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.01, 0.05])
+def test_a_way_up_with_one_state_follows_the_way_down_and_owns_up_to_what_it_cannot_know(lag):
+    """Friction's loop is a thin lens: what one state in its middle says of it leaves no frame outside the bound."""
+    depths = Ladder().depths(1.2)
+    peak = int(np.argmax(depths))
+    assert len(depths) - peak == 3, "the deepest, one, and 0"
+    states = path(SENSOR, depths, CURVES["hertz"])
+    lens = lag * np.array(depths) * (1.2 - np.array(depths)) * (np.arange(len(depths)) > peak)
+    branch = Branch.of(replace(states, force=states.force - lens[:, None] * np.array([0.0, 0.0, 1.0])), "force", False)
+    true = -(DEPTH**1.5) - lag * DEPTH * (1.2 - DEPTH)
+    inside = DEPTH <= 1.2
+    error = np.abs(branch.at(DEPTH)[:, 2] - true)[inside]
+    down = Branch.of(states, "force", True)
+    assert (error <= branch.bound(DEPTH)[inside, 2] + 1e-12).all()
+    assert error.max() <= np.abs(down.at(DEPTH)[inside, 2] + DEPTH[inside] ** 1.5).max() + 0.2 * lag * 0.36
+    if lag:
+        wider = branch.bound(DEPTH)[inside, 2] > down.bound(DEPTH)[inside, 2]
+        assert wider.mean() > 0.9, "it is in doubt, and says so"
