@@ -63,6 +63,61 @@ def test_a_verdict_beside_the_truth(known, said, expected):
     assert outcome(known, said) == expected
 
 
+def at_family(status, mechanism, family, *alternatives):
+    """Return a verdict that names a family; the mechanism is the one of it that fits best."""
+    said = verdict("named, incomplete" if status == "named" else status, (mechanism, status, alternatives))
+    said["effects"][0] |= {"level": "family", "family": family}
+    return said
+
+
+FILTERS, MEMORY = "delay and filtering", "memory of the skin"
+
+
+@pytest.mark.parametrize(
+    ("known", "said", "expected"),
+    [
+        (truth("name", "latency"), at_family("named", "low_pass_filter", FILTERS), "right family"),
+        (truth("name", "latency"), at_family("named", "relaxation", MEMORY), "wrong family"),
+        (truth("name", "latency"), at_family("ambiguous", "servo_lag", FILTERS, "scan_skew"), "right family"),
+        (truth("name", "latency"), at_family("ambiguous", "relaxation", MEMORY, "latency"), "wrong family"),
+        (truth("name", "latency"), at_family("ambiguous", "latency", FILTERS, "scan_skew"), "set with the truth"),
+        (truth("part", "latency"), at_family("named", "low_pass_filter", FILTERS), "right family"),
+        (truth("none"), at_family("named", "latency", FILTERS), "false name"),
+        (truth("unknown", "ageing_creep"), at_family("named", "relaxation", MEMORY), "unknown, as it should"),
+        (truth("unknown", "ageing_creep"), at_family("named", "latency", FILTERS), "wrong family"),
+        (truth("unknown", "motor_noise"), at_family("named", "latency", FILTERS), "wrong family"),
+        (
+            truth("set", "latency") | {"facts": {"rival": "low_pass_filter"}},
+            at_family("named", "latency", FILTERS),
+            "set, as it should",
+        ),
+        (
+            truth("set", "latency") | {"facts": {"rival": "relaxation"}},
+            at_family("named", "latency", FILTERS),
+            "overclaim",
+        ),
+    ],
+)
+def test_a_family_is_right_where_the_family_is(known, said, expected):
+    from scoring.outcome import found, outcome
+
+    assert outcome(known, said) == expected
+    if known["expected"] == "name":
+        assert found(known, said, "latency") != "named"
+
+
+def test_everything_hidden_has_families_that_exist():
+    from scoring.outcome import FAMILIES, families
+    from worlds.physics import KNOWN, OUTSIDE
+
+    from tacdata.effects.effect import Family
+
+    known = {f.value for f in Family}
+    assert set(FAMILIES) <= set(OUTSIDE)
+    assert all(families(name) <= known for name in KNOWN)
+    assert all(families(name) for name, hidden in KNOWN.items() if hidden.called)
+
+
 def test_intervals_are_exact_at_the_ends():
     from scoring.measures import interval
 

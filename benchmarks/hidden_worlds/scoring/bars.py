@@ -67,18 +67,20 @@ def _outcomes(rows):
         return [r["outcome"] in outcomes for r in chosen]
 
     yield _bar("false names on nulls", 0.02, True, hits(_of(rows, "nulls"), "false name"))
-    for times, limit in (("3", 0.85), ("10", 0.95)):
+    for times, limit in (("3", 0.75), ("10", 0.95)):
         chosen = _of(rows, f"singles{times}")
         yield _bar(f"singles at {times} x limit: success", limit, False, hits(chosen, "success"))
-        yield _bar(f"singles at {times} x limit: confidently wrong", 0.03, True, hits(chosen, *WRONG))
+        family = [r.get("family", False) for r in chosen]
+        yield _bar(f"singles at {times} x limit: family right", limit, False, family)
+        yield _bar(f"singles at {times} x limit: confidently wrong", 0.02, True, hits(chosen, *WRONG))
     yield _bar("aliases: overclaim", 0.05, True, hits(_of(rows, "aliases"), *WRONG))
     outside = [r for r in rows if r["block"].startswith("outside")]
-    yield _bar("outside the library: confidently wrong", 0.10, True, hits(outside, *WRONG))
+    yield _bar("outside the library: confidently wrong", 0.05, True, hits(outside, *WRONG))
 
 
 def _pairs(rows):
     far = _of(rows, "pairs")
-    yield _bar("pairs, not adversarial: exact", 0.60, False, [r["outcome"] == "success" for r in far])
+    yield _bar("pairs, not adversarial: exact", 0.65, False, [r["outcome"] == "success" for r in far])
     weak = [min(r["times"], key=lambda n: r["times"][n]) for r in far]
     named = [r.get("found", {}).get(w) == "named" for r, w in zip(far, weak, strict=True)]
     yield _bar("pairs, not adversarial: weaker one named", 0.75, False, named)

@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from scoring import measures
-from scoring.outcome import accepted, found, outcome
+from scoring.outcome import accepted, family_right, found, outcome
 
 
 def rows(out, label):
@@ -22,6 +22,7 @@ def rows(out, label):
             "told": verdict and [[m["mechanism"], *m["alternatives"]] for m in verdict["effects"]],
         }  # fmt: skip
         if verdict is not None:
+            row["family"] = family_right(truth, verdict)
             row["parameters"] = measures.parameters(truth, verdict)
             row["confidence"] = measures.confidences(truth, verdict, accepted)
             row["found"] = {name: found(truth, verdict, name) for name in truth["effects"]}

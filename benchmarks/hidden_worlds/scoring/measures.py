@@ -78,7 +78,7 @@ def parameters(truth, verdict):
     made = []
     for name, values in truth["parameters"].items():
         for member in verdict["effects"]:
-            if member["mechanism"] != name or member["status"] != "named":
+            if member["mechanism"] != name or member["status"] != "named" or member.get("level") == "family":
                 continue
             for key, true in values.items():
                 given = member["parameters"].get(key)

@@ -4,14 +4,54 @@ import itertools
 
 from worlds.physics import KNOWN
 
+from tacdata.effects import load
+
 RIGHT = ("right none", "success", "set, as it should", "unknown, as it should")
-WRONG = ("false name", "wrong name", "overclaim")
+WRONG = ("false name", "wrong name", "wrong family", "overclaim")
 """Confidently wrong."""
+FAMILIES = {
+    "cable_pull": ("gain and offset in time",),
+    "stick_slip": ("friction and play",),
+    "ageing_creep": ("memory of the skin",),
+    "lost_and_found": ("kinematics",),
+    "tag_flex": ("kinematics",),
+    "moisture_front": ("gain and offset in time",),
+    "scan_order_change": ("delay and filtering",),
+    "warm_creep": ("memory of the skin",),
+    "loose_tool": ("kinematics", "contact"),
+    "rocking": ("kinematics", "contact"),
+}
+"""What no library holds -> the families that are right for it, by where its law acts; no other has one."""
 
 
 def accepted(name):
     """Return the names that a verdict may rightly give to what is hidden."""
     return set(KNOWN[name].called)
+
+
+def families(name):
+    """Return the families that a verdict may rightly give to what is hidden."""
+    return {load(called).family.value for called in KNOWN[name].called} | set(FAMILIES.get(name, ()))
+
+
+def claims(verdict):
+    """Return what a verdict says for certain: each effect's mechanism and its family, one of them None.
+
+    At the level of a family nothing is claimed of the mechanism that fits best in it.
+    """
+    made = []
+    for m in verdict["effects"]:
+        if m.get("level") == "family" and m["status"] in ("named", "ambiguous"):
+            made.append((None, m["family"]))
+        elif m["status"] == "named":
+            made.append((m["mechanism"], None))
+    return made
+
+
+def holds(claim, name):
+    """Return whether a claim is true of what is hidden."""
+    mechanism, family = claim
+    return family in families(name) if mechanism is None else mechanism in accepted(name)
 
 
 def fits(truths, sets):
@@ -21,6 +61,22 @@ def fits(truths, sets):
     return any(
         all(accepted(t) & s for t, s in zip(order, sets, strict=True)) for order in itertools.permutations(truths)
     )
+
+
+def overclaims(claim, truth):
+    """Return whether a claim about an alias says more than an oracle could: a name, or a family its rival is not of."""
+    mechanism, family = claim
+    rival = truth.get("facts", {}).get("rival")
+    return mechanism is not None or (rival is not None and family not in families(rival))
+
+
+def family_right(truth, verdict):
+    """Return whether every hidden thing is claimed, at least by its family, and nothing else is."""
+    if verdict is None or not verdict["effects"]:
+        return False
+    claimed = [(m, f or load(m).family.value) for m, f in claims(verdict)]
+    true = all(any(f in families(h) for h in truth["effects"]) for _, f in claimed)
+    return true and all(any(f in families(h) for _, f in claimed) for h in truth["effects"])
 
 
 def outcome(truth, verdict):
@@ -33,44 +89,42 @@ def outcome(truth, verdict):
     if verdict is None:
         return "crashed"
     status, members, hidden = verdict["status"], verdict["effects"], list(truth["effects"])
-    certain = [{m["mechanism"]} for m in members if m["status"] == "named"]
+    certain, expected = claims(verdict), truth["expected"]
     whole = [{m["mechanism"], *m["alternatives"]} for m in members]
-    expected = truth["expected"]
     if expected == "none":
         if status == "none":
             return "right none"
         return "false name" if status.startswith("named") and certain else "false alarm without a name"
     if status == "none":
         return "missed"
-    if expected == "part" or status == "named, incomplete":
-        wrong = any(not any(c <= accepted(h) for h in hidden) for c in certain)
-        if wrong or not certain:
-            return "wrong name" if wrong else "unknown"
-        return "overclaim" if expected == "set" else "success" if expected == "part" else "set with the truth"
-    if status == "named":
-        if expected == "set":
-            return "overclaim"
-        return "success" if expected == "name" and fits(hidden, certain) else "wrong name"
     if status == "unknown":
         return "unknown, as it should" if expected == "unknown" else "unknown"
-    if any(not any(c <= accepted(h) for h in hidden) for c in certain):
-        return "wrong name"  # one of several is said to be certain and is not there
-    if expected == "unknown":
-        return "unknown, as it should"
-    if expected == "set" and certain:
+    if false := [c for c in certain if not any(holds(c, h) for h in hidden)]:
+        return "wrong family" if all(mechanism is None for mechanism, _ in false) else "wrong name"
+    if expected == "set" and any(overclaims(c, truth) for c in certain):
         return "overclaim"
+    if expected == "unknown":
+        return "unknown, as it should"  # what is claimed is a family, and it is right
+    if status == "named" and expected != "part":
+        return "success" if fits(hidden, [{m} for m, _ in certain]) else "wrong name"
+    if expected == "part" or status == "named, incomplete":
+        if not certain:
+            return "unknown"
+        if all(mechanism is None for mechanism, _ in certain):
+            return "set, as it should" if expected == "set" else "right family"
+        return "success" if expected == "part" else "set with the truth"
     if fits(hidden, whole):
         return "set, as it should" if expected == "set" else "set with the truth"
     if all(any(accepted(h) & s for s in whole) for h in hidden):
         return "set with the truth and more"
-    return "set without the truth"
+    return "right family" if family_right(truth, verdict) else "set without the truth"
 
 
 def found(truth, verdict, name):
     """Return whether one of several hidden things is among the answer: named, in a set, or no."""
     if verdict is None:
         return "no"
-    if any(m["mechanism"] in accepted(name) and m["status"] == "named" for m in verdict["effects"]):
+    if any(mechanism in accepted(name) for mechanism, _ in claims(verdict)):
         return "named"
     return (
         "in a set" if any(accepted(name) & {m["mechanism"], *m["alternatives"]} for m in verdict["effects"]) else "no"
