@@ -12,7 +12,7 @@ import shutil
 import sys
 import time
 from collections import Counter
-from multiprocessing import TimeoutError, get_context
+from multiprocessing import TimeoutError
 from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
@@ -20,6 +20,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
 from kinds import FRICTION, KINDS, MEMORY  # noqa: E402
+from workers import pool  # noqa: E402
 from written import REMAINDERS, write  # noqa: E402
 
 SHARES = (0.05, 0.15, 0.3, 0.5)
@@ -146,11 +147,11 @@ if __name__ == "__main__":
         begun, tasks = time.monotonic(), list(sets(given.kinds, given.shares, given.count, given.seed))
         random.Random(given.seed).shuffle(tasks)  # the first sets of a run that is stopped are a sample of all
         words = [(given.out, given.engine, *one) for one in tasks]
-        with get_context("spawn").Pool(given.workers, maxtasksperchild=4) as pool:
-            rows = pool.imap_unordered(_one, words)
+        with pool(given.workers) as running:
+            rows = running.imap_unordered(_one, words)
             try:
                 while True:
                     print(line(rows.next(timeout=max(given.limit - (time.monotonic() - begun), 0.0))), flush=True)
             except (StopIteration, TimeoutError):
-                pool.terminate()
+                running.terminate()
     score([json.loads(p.read_text()) for p in sorted(given.out.glob("*.json"))])

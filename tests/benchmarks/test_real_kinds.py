@@ -2,7 +2,10 @@
 
 import importlib.util
 import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -23,7 +26,7 @@ def outcome():
     sys.path[:] = before
     os.environ.clear()
     os.environ.update(environment)
-    for name in {"kinds", "written", "shapes"} & (set(sys.modules) - modules):
+    for name in {"kinds", "workers", "written", "shapes"} & (set(sys.modules) - modules):
         del sys.modules[name]
 
 
@@ -47,3 +50,42 @@ def row(mechanism, family, status, level, alternatives=()):
 )  # fmt: skip
 def test_a_set_of_one_family_tells_the_family_and_answers_for_it(outcome, given, right):
     assert {name for name, true in outcome(given).items() if true} == right
+
+
+RUN = """
+import os, sys, time
+sys.path.insert(0, {room!r})
+from workers import pool
+
+def one(number):
+    print(os.getpid(), flush=True)
+    time.sleep(120)
+
+if __name__ == "__main__":
+    with pool(1) as running:
+        running.map(one, [0])
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_run_that_is_killed_leaves_no_worker(tmp_path):
+    script = tmp_path / "run.py"
+    script.write_text(RUN.format(room=str(ROOM)))
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as run:
+        worker = int(run.stdout.readline())
+        assert there(worker)
+        run.send_signal(signal.SIGKILL)
+        until = time.monotonic() + 30
+        while there(worker) and time.monotonic() < until:
+            time.sleep(0.05)
+        assert not there(worker)
+
+
+def there(process):
+    """Return whether a process runs; one that ended and was not asked for does not."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{process}/stat")
+    return not (state.exists() and state.read_text().rsplit(")", 1)[1].split()[0] == "Z")
