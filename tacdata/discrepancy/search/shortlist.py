@@ -31,8 +31,10 @@ def shortlist(problem: Problem, tested: ScoreTests) -> list[list[Candidate]]:
     taken |= {name for p in problem.placed for name in lookalikes(problem.setting.course, p.effect, p.values)}
     free = [c for c in best.values() if c.called not in taken]
 
-    singles = sorted(((_gain(problem, [c]), c) for c in free), key=lambda item: -item[0])[:TOP]
     significant = {c.effect.name for c, p in zip(problem.candidates, tested.p, strict=True) if p <= ALPHA}
+    ranked = sorted(((_gain(problem, [c]), c) for c in free), key=lambda item: -item[0])
+    # The fee of many numbers, as a drift of each channel has, may hide what the test found.
+    singles = ranked[:TOP] + [one for one in ranked[TOP:] if one[1].effect.name in significant]
     held = {c.effect.name: held_out(problem, [c]) for _, c in singles}
     order = [c for _, c in singles if c.effect.name in significant and held[c.effect.name].sum() > 0]
     pair = _pair(problem, [c for _, c in singles], free)
