@@ -74,7 +74,20 @@ class EpisodeErrors:
         tag = readings.tag_offset_spread(rest, course, known)
         return replace(known, offsets=process, random_walk=walk, walk_rate=rate, tag=tag)
 
-    def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray) -> ErrorSizes:
+    def left(self, known: Noise, errors: np.ndarray) -> np.ndarray:
+        """Return what an over-rich fit leaves of the residual, shape (m, streams), float32.
+
+        Its weights hardly depend on the sizes of the errors beside it: one fit serves all their estimates.
+
+        Args:
+            known: Noise.
+            errors: Of pose, shape (m, streams, kinds).
+        """
+        columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
+        best = self._best(columns, Whitener(self.course, known, self.context, self.features, errors))
+        return (self.residual - self.rich @ best.astype(np.float32)).astype(np.float32)
+
+    def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray, left: np.ndarray) -> ErrorSizes:
         """Return the estimated size of episodes' own errors of pose.
 
         An episode's errors are estimated by generalized least squares as if they were free, all kinds together. The
@@ -86,9 +99,10 @@ class EpisodeErrors:
             known: Noise.
             errors: What errors of one standard deviation of their prior change, shape (m, streams, kinds).
             sizes: Sizes so far [prior's], shape (kinds,).
+            left: What an over-rich fit leaves, shape (m, streams).
         """
         whitener = Whitener(self.course, known, self.context, self.features, errors * sizes)
-        score, information = whitener.episode_scores(self._left(whitener), errors)
+        score, information = whitener.episode_scores(left, errors)
         # Sealed episodes have no information.
         there = np.flatnonzero(np.diagonal(information, axis1=1, axis2=2).min(axis=1) > 0)
         place, score, information = self._places()[there], score[there], information[there]
@@ -110,15 +124,16 @@ class EpisodeErrors:
         far = np.einsum("ek,ek->e", deviation, np.linalg.solve(spread, deviation[:, :, None])[:, :, 0])
         return ErrorSizes(estimated, there[far > ODD_Z**2])
 
-    def gains(self, known: Noise, errors: np.ndarray) -> float:
+    def gains(self, known: Noise, errors: np.ndarray, left: np.ndarray) -> float:
         """Return how far an episode's gain of a stream is off the next one's that repeats it [1].
 
         Args:
             known: Noise without own gains.
             errors: Of pose, shape (m, streams, kinds).
+            left: What an over-rich fit leaves, shape (m, streams).
         """
         whitener = Whitener(self.course, known, self.context, self.features, errors)
-        score, information = whitener.stream_scores(self._left(whitener), self.rise)
+        score, information = whitener.stream_scores(left, self.rise)
         return readings.gain_spread(score, information, self._repeats)
 
     @cached_property
@@ -136,11 +151,6 @@ class EpisodeErrors:
         gram = whitener.episode_grams(columns).of(np.arange(self.course.episodes))
         free = np.full(count, np.inf)
         return solve(gram, np.arange(count), np.ones(count), -free, free)
-
-    def _left(self, whitener: Whitener) -> np.ndarray:
-        """Return what an over-rich fit leaves of the residual, shape (m, streams), float32."""
-        columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
-        return (self.residual - self.rich @ self._best(columns, whitener).astype(np.float32)).astype(np.float32)
 
 
 def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray]:

@@ -177,14 +177,15 @@ def null_model(setting: Setting) -> NullModel:
     rise = streams.rise(predicted, response).astype(np.float32)
     measured = EpisodeErrors(residual, every, reduced, context, features, rise)
     known = measured.noise(errors)
+    left = measured.left(known, errors)
     prior, own = errors, ErrorSizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64))
     before, spread = np.zeros(errors.shape[2] + 1), LEAST_GAIN_ERROR
     for _ in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is estimated beside the other.
         known = replace(known, gain_error=None)
-        spread = measured.gains(known, errors)
+        spread = measured.gains(known, errors, left)
         known = replace(known, gain_error=(rise * max(spread, LEAST_GAIN_ERROR)).astype(np.float32))
-        own = measured.poses(known, prior, own.sizes)
+        own = measured.poses(known, prior, own.sizes, left)
         errors = prior * own.sizes
         now = np.array([*own.sizes, max(spread, LEAST_GAIN_ERROR)])
         if np.all(np.abs(now - before) <= SETTLED * now):
