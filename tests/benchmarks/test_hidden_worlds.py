@@ -99,6 +99,24 @@ def test_limits_are_those_of_the_generator_as_it_is():
         assert found == pytest.approx(known["level"], rel=0.3)
 
 
+def test_an_oracle_knows_all_that_shakes_within_presses_too():
+    from worlds import noise, skin
+    from worlds.follow import wander
+    from worlds.oracle import Oracle
+
+    oracle = Oracle(900, {"episodes": 16})
+    slow = [oracle.signature({name: 0.1}) for name in ("relaxation", "creep", "baseline_tracking")]
+    w, rows, drawn = oracle.w, oracle.rows, []
+    for seed in range(24):
+        rng = np.random.default_rng([900, seed])
+        shift = noise.wandering("plain") * wander(rng, w, 40.0, skin.CHANNELS)[rows]
+        noisy = noise.shaken(rng, w.clock[rows], oracle.still + shift, oracle.settings["noise"], "plain")
+        gram = oracle.gram([*slow, oracle._white(noisy - oracle.still)])
+        drawn.append(gram[:-1, -1] / np.sqrt(np.diag(gram)[:-1]))
+    spread = np.sqrt(np.mean(np.square(drawn), axis=0))
+    assert np.all(spread < 1.3), "a test at 1 % rejects once in a hundred, not once in ten"
+
+
 def test_a_rival_that_is_a_multiple_of_the_truth_cannot_be_told_from_it():
     from worlds.oracle import nearest
 

@@ -35,8 +35,8 @@ TRIED = (10.0, 3.0)
 """Sizes at which an inseparable truth is taken, in detection limits; the largest at which it stays inseparable."""
 
 
-def limits(names):
-    """Return response -> name -> size at the detection limit, or None."""
+def limits(names, before):
+    """Return response -> name -> size at the detection limit, or None; ``before``: what it was, to begin with."""
     made = {"table": {}, "fitted": {}}
     for response, sessions in product(made, (1, 4)):
         wanted = [n for n in names if KNOWN[n].needs.get("sessions", 1) == sessions and n not in BUGS]
@@ -44,7 +44,7 @@ def limits(names):
         if wanted:
             oracles = [Oracle(seed, {"sessions": sessions}, response) for seed in SEEDS]
             for name in wanted:
-                made[response][name] = limit(oracles, name)
+                made[response][name] = limit(oracles, name, before[response].get(name))
                 print(response, name, made[response][name], flush=True)
     return made
 
@@ -118,7 +118,7 @@ def main(only, again):
         FILE.write_text(json.dumps(document, indent=1) + "\n")
         return
     before = json.loads(FILE.read_text()) if FILE.is_file() else {"limits": {"table": {}, "fitted": {}}, "aliases": []}
-    found = limits(only or list(KNOWN))
+    found = limits(only or list(KNOWN), before["limits"])
     for response, values in found.items():
         before["limits"][response] = {**(before["limits"][response] if only else {}), **values}
     if not only:

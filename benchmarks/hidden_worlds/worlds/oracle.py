@@ -1,9 +1,10 @@
 """How far apart two worlds are to one who knows their forms: the likelihood-ratio test of known signatures.
 
 Readings differ between two worlds by a signature d. What shakes anyway is Gaussian with known covariance: coloured
-noise, a gain a channel, offsets that wander, an error of pose a press; with a fitted response also any function of
-depth for each place, tool and channel. The signature's length in that metric, delta, is the mean of the test's normal
-statistic: at a two-sided level of 1 % it is found half the time where delta = 2.58.
+noise, a gain a channel, offsets that wander between presses and within them, an error of pose a press. With a fitted
+response any function of depth for each place, tool and channel comes beside. The signature's length in that metric,
+delta, is the mean of the test's normal statistic: at a two-sided level of 1 % it is found half the time where delta =
+2.58.
 """
 
 import numpy as np
@@ -17,6 +18,8 @@ LEVEL = 2.576
 PHI = 0.3
 FREE = 1e4  # counts, spread of what is not known at all
 POSE = (0.02, 0.02, 0.006)  # mm
+TAU = 40.0  # s, of the wander of offsets
+SPACING = 1.5  # s, most between the times of a press at which its offset is another number, straight in between
 
 
 class Oracle:
@@ -37,14 +40,15 @@ class Oracle:
         shifted = [self._run({}, np.eye(3)[axis] * POSE[axis]) - self.still for axis in range(3)]
         press = np.eye(count, dtype=np.float32)[self.episode]
         self.columns, self.inverse, self.jitter, self.crossed = [], [], [], []
-        apart = np.abs(np.subtract.outer(self.begin, self.begin))
-        prior = np.linalg.inv(noise.wandering("plain") ** 2 * np.exp(-apart / 40.0) + FREE**2)
+        offsets, at = self._offsets()
+        nodes, apart = len(at), np.abs(np.subtract.outer(at, at))
+        prior = np.linalg.inv(noise.wandering("plain") ** 2 * np.exp(-apart / TAU) + FREE**2)
         splines = self._splines() if response == "fitted" else np.zeros((len(press), 0), np.float32)
         for c in range(skin.CHANNELS):
-            a = self._white(np.concatenate([press, 0.03 * self.still[:, c : c + 1], splines], axis=1))
+            a = self._white(np.concatenate([offsets, 0.03 * self.still[:, c : c + 1], splines], axis=1))
             normal = (a.T @ a).astype(float)
-            normal[:count, :count] += prior
-            normal[count, count] += 1.0
+            normal[:nodes, :nodes] += prior
+            normal[nodes, nodes] += 1.0
             normal[np.diag_indices(len(normal))] += 1e-6
             self.columns.append(a)
             self.inverse.append(np.linalg.inv(normal))
@@ -62,8 +66,19 @@ class Oracle:
         world.run(w, self.seed, effects, np.tile(move, (len(w.presses), 1)))
         rows = world.frames(w, self.seed)
         self.episode, self.rows, self.w = w.episode[rows], rows, w
-        self.begin = w.clock[[p[0] for p in w.presses]]
+        self.span = w.clock[[[p[0], p[-1]] for p in w.presses]]
         return world.read(w, w.rise, rows)
+
+    def _offsets(self):
+        """Return the shape of each number that an offset wanders by, straight in between, and its time."""
+        clock, shapes, times = self.w.clock[self.rows], [], []
+        for press, (begin, end) in enumerate(self.span):
+            at = np.linspace(begin, end, max(int(np.ceil((end - begin) / SPACING)), 1) + 1)
+            own = self.episode == press
+            shapes.append(np.zeros((len(clock), len(at)), np.float32))
+            shapes[-1][own] = np.stack([np.interp(clock[own], at, unit) for unit in np.eye(len(at))], axis=1)
+            times.append(at)
+        return np.concatenate(shapes, axis=1), np.concatenate(times)
 
     def _splines(self):
         w, rows = self.w, self.rows
@@ -120,11 +135,17 @@ def nearest(gram, mine, small, large, both=True):
     return float(np.sqrt(max(left.min(), 0.0)))
 
 
-def limit(oracles, name):
-    """Return the size at which an effect is found half the time [1], the median over oracles; None if never."""
+def limit(oracles, name, begin=None):
+    """Return the size at which an effect is found half the time [1], the median over oracles; None if never.
+
+    Args:
+        oracles: Each with presses of its own.
+        name: The effect.
+        begin: About what it is, if that is known.
+    """
     found = []
     for oracle in oracles:
-        size = 0.3
+        size = begin or 0.3
         for _ in range(4):
             delta = oracle.delta({name: size})
             if delta <= 0 or abs(delta / LEVEL - 1) < 0.02:

@@ -11,15 +11,16 @@ from worlds.physics import KNOWN, STAGES
 
 RATE = 30.0
 RADII = (4.0, 2.0)
-SETTINGS = {"protocol": "rich", "episodes": 48, "noise": 4.0, "realism": "plain", "sessions": 1, "streams": ()}
-"""What a world is made with unless told otherwise; streams: tag, force, temperature."""
+SETTINGS = {"protocol": "rich", "episodes": 48, "noise": 4.0, "realism": "plain", "sessions": 1, "streams": (),
+            "more": ()}  # fmt: skip
+"""What a world is made with unless told otherwise; streams: tag, force, temperature; more: presses after its own."""
 TAG_NOISE, FORCE_NOISE, WARM_NOISE = 0.02, 0.01, 0.05  # mm, N, degC
 
 
 def begin(seed, settings):
     """Return the state of a world before anything is hidden in it."""
     rng = np.random.default_rng([seed, 11])
-    presses = protocol.KNOWN[settings["protocol"]](rng, settings["episodes"])
+    presses = [*protocol.KNOWN[settings["protocol"]](rng, settings["episodes"]), *settings["more"]]
     fine, session = protocol.path(presses, settings["sessions"])
     episode = fine[:, 1].astype(int)
     _, site = np.unique([(p["x"], p["y"]) for p in presses], axis=0, return_inverse=True)
