@@ -1,9 +1,11 @@
 """How many presses settle an ambiguous verdict, recommended or random: python run.py OUT [--help].
 
-A line of OUT/worlds.jsonl for each world; worlds that have one are not done again. `--score` prints the figures alone.
+A line of OUT/worlds.jsonl for each world; worlds that have one are not done again. What the workflow answered is kept
+in OUT/asked, so that a run that was stopped in a world goes on there. `--score` prints the figures alone.
 """
 
 import argparse
+import hashlib
 import json
 import os
 import subprocess
@@ -32,9 +34,9 @@ STEADY = (
 """Effects that do not depend on how long the session is: presses added change nothing of those before."""
 EPISODES = 24
 """Presses of a world at first."""
-STEPS = (2, 4, 8, 16)
-"""Numbers of recommended presses after which the workflow is asked again."""
-TIMES = (1, 2, 3, 6)
+STEPS = (4, 12)
+"""Numbers of recommended presses after which the workflow is asked again: one turn of a plan, and all of it."""
+TIMES = (1, 3)
 """Numbers of random presses after which it is, over the number of recommended ones that settled it."""
 MOST = 48
 """Most random presses."""
@@ -51,7 +53,17 @@ def wanted(seed):
 
 
 def asked(case, more, table, count):
-    """Ask the workflow about a world with further presses; return verdict, recommended presses and CPU seconds."""
+    """Ask the workflow about a world with further presses, once; return verdict, recommended presses, CPU seconds."""
+    words = json.dumps([case.identity, engine_of(REPOSITORY)["hash"], more, count])
+    kept = table.parent / "asked" / f"{hashlib.sha256(words.encode()).hexdigest()[:16]}.json"
+    if not kept.exists():
+        kept.parent.mkdir(exist_ok=True)
+        kept.write_text(json.dumps(answered(case, more, table, count)))
+    return json.loads(kept.read_text())
+
+
+def answered(case, more, table, count):
+    """Have the workflow judge a world in a process that sees nothing else."""
     with tempfile.TemporaryDirectory(prefix="ask-") as name:
         folder = Path(name)
         np.savez(folder / "recordings.npz", **recordings(case, more))
