@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "hidden_worlds"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "hidden_worlds"))
 from judge import course_of, guard, spec_of
 
 from tacdata.discrepancy.judge import judge

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 sys.path[:0] = [str(HERE.parent / "hidden_worlds"), str(HERE)]
 
@@ -38,8 +38,6 @@ STEPS = (4, 12)
 """Numbers of recommended presses after which the workflow is asked again: one turn of a plan, and all of it."""
 TIMES = (1, 3)
 """Numbers of random presses after which it is, over the number of recommended ones that settled it."""
-MOST = 48
-"""Most random presses."""
 
 
 def wanted(seed):
@@ -106,7 +104,7 @@ def by_chance(case, like, settle, table):
     """Add random presses as long as recommended ones until a verdict settles it; return the number, and what came."""
     rng, done, more = np.random.default_rng([case.seed, 21]), [], []
     before = protocol.KNOWN[case.settings["protocol"]](np.random.default_rng([case.seed, 11]), EPISODES)
-    counts = [t * settle for t in TIMES if t * settle <= MOST] if settle else [STEPS[-1]]
+    counts = [t * settle for t in TIMES] if settle else [STEPS[-1]]
     for count in counts:
         while len(more) < count:
             more.append(alike(rng, like[len(more) % len(like)], before))
@@ -173,8 +171,8 @@ def main(given):
         if not table.exists():
             skin.write_table(table, world.RADII)
         there = {r["id"] for r in rows}
-        for case in list(wanted(given.seed))[: given.most]:
-            if case.identity not in there:
+        for case in (c for k in range(given.repeats) for c in wanted(given.seed + k)):
+            if case.identity not in there and sum(r["asked"] for r in rows) < given.most:
                 rows.append(line(case, table))
                 with path.open("a") as file:
                     file.write(json.dumps(rows[-1]) + "\n")
@@ -186,6 +184,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, default=1000, help="first seed: 1000 development, 5000 test")
-    parser.add_argument("--most", type=int, default=None, help="stop after so many worlds")
+    parser.add_argument("--repeats", type=int, default=1, help="worlds a case, each with a seed of its own")
+    parser.add_argument("--most", type=int, default=1000, help="stop after so many worlds whose verdict is ambiguous")
     parser.add_argument("--score", action="store_true", help="only print the figures")
     main(parser.parse_args())
