@@ -22,10 +22,10 @@ LONGEST = 300
 """A judge that takes longer is stopped, and scored as crashed [s]."""
 
 
-def engine_of(root):
-    """Return what names an engine: the hash of its files, and the commit they stand in."""
+def engine_of(root, rooms=ROOMS):
+    """Return what names an engine: the hash of its rooms' files, and the commit they stand in."""
     digest = hashlib.sha256()
-    for path in sorted(p for room in ROOMS for p in (root / "tacdata" / room).rglob("*")):
+    for path in sorted(p for room in rooms for p in (root / "tacdata" / room).rglob("*")):
         if path.suffix in (".py", ".yaml", ".json"):
             digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
     head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=root, capture_output=True, text=True, check=False)

@@ -20,12 +20,14 @@ REPOSITORY = HERE.parents[1]
 sys.path[:0] = [str(HERE.parent / "hidden_worlds"), str(HERE)]
 
 from presses import alike, length, recordings  # noqa: E402
-from run import engine_of  # noqa: E402  (hidden_worlds comes first on the path)
+from run import ROOMS, engine_of  # noqa: E402  (hidden_worlds comes first on the path)
 from scoring.measures import interval  # noqa: E402
 from scoring.outcome import claims, holds  # noqa: E402
 from worlds import protocol, skin, world  # noqa: E402
 from worlds.cases import cases, inseparable  # noqa: E402
 
+ENGINE = (*ROOMS, "revision")
+"""What judges and recommends."""
 STEADY = (
     "latency", "low_pass_filter", "servo_lag", "two_pole_filter", "backlash", "elastic_backlash", "hysteresis",
     "relaxation", "creep", "poroelasticity", "nonlinear_relaxation", "baseline_tracking", "softening",
@@ -52,7 +54,7 @@ def wanted(seed):
 
 def asked(case, more, table, count):
     """Ask the workflow about a world with further presses, once; return verdict, recommended presses, CPU seconds."""
-    words = json.dumps([case.identity, engine_of(REPOSITORY)["hash"], more, count])
+    words = json.dumps([case.identity, engine_of(REPOSITORY, ENGINE)["hash"], more, count])
     kept = table.parent / "asked" / f"{hashlib.sha256(words.encode()).hexdigest()[:16]}.json"
     if not kept.exists():
         kept.parent.mkdir(exist_ok=True)
@@ -86,17 +88,15 @@ def settled(case, verdict):
 
 def by_recommendation(case, following, table):
     """Add recommended presses, each time those of the last verdict, until one settles it; return what came."""
-    more, done, queue = [], [], list(following)
+    more, done, plan = [], [], list(following)
     for count in STEPS:
-        while len(more) < count and queue:
-            more.append(queue.pop(0))
-        if len(more) < count:
-            break
+        # A plan of fewer presses is recorded again from its beginning.
+        more += [plan[k % len(plan)] for k in range(count - len(more))]
         verdict, following, _ = asked(case, more, table, STEPS[-1])
         done.append({"presses": count, "status": verdict["status"], "told": told(verdict)})
         if found := settled(case, verdict):
             return more, done, found
-        queue = list(following) or queue
+        plan = list(following) or plan
     return more, done, None
 
 
@@ -125,7 +125,7 @@ def line(case, table):
     verdict, following, _ = asked(case, [], table, STEPS[-1])
     row = {
         "id": case.identity, "name": case.name, "response": case.response, "seed": case.seed,
-        "engine": engine_of(REPOSITORY), "first": {"status": verdict["status"], "told": told(verdict)},
+        "engine": engine_of(REPOSITORY, ENGINE), "first": {"status": verdict["status"], "told": told(verdict)},
         "recommended": [[round(p["depth"], 2), p["speed"], p["hold"], p["purpose"]] for p in following[:4]],
     }  # fmt: skip
     if verdict["status"] != "ambiguous" or not following:

@@ -14,6 +14,7 @@ from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.effects import Placed, load
 from tacdata.plans import Plan
 from tacdata.revision.comparison import Comparison
+from tacdata.revision.next_presses import plan as plan_module
 from tacdata.revision.next_presses.plan import choose, plan_of
 from tacdata.revision.next_presses.rivals import Rival
 from tacdata.revision.next_presses.trial import laid_out, trials
@@ -58,6 +59,20 @@ def test_rivals_that_say_the_same_get_no_press(held):
     same = [rival(held, "backlash", b=0.05), rival(held, "backlash", b=0.05)]
     same[1] = Rival("twin", same[1].placed, same[1].model)
     assert choose(held, same, PLAN, presses=3) == []
+
+
+@pytest.mark.parametrize(("nats", "presses"), [(0.6, 2), (0.2, 1)])
+def test_a_pair_that_one_press_hardly_splits_gets_its_press_with_the_repeats(held, monkeypatch, nats, presses):
+    """Of three rivals, two differ by less than chance in a press, and by more in the plan's three repeats of it."""
+    one, other = trials(held.course, PLAN)[:2]
+    pairs = {one: (9.0, 9.0, 0.0), other: (0.0, 0.0, nats)}
+    names = (("backlash", "latency"), ("backlash", "creep"), ("latency", "creep"))
+    monkeypatch.setattr(plan_module, "trials", lambda course, plan: [one, other])
+    monkeypatch.setattr(
+        plan_module, "_distances", lambda held, found, trial: dict(zip(names, pairs[trial], strict=True))
+    )
+    found = [rival(held, "backlash", b=0.05), rival(held, "latency", L=0.05), rival(held, "creep", f=0.01, tau=2.0)]
+    assert len(choose(held, found, PLAN)) == presses
 
 
 def test_a_trial_is_laid_out_as_the_guide_would_run_it(held):

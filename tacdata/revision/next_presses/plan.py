@@ -30,7 +30,7 @@ JITTER = 0.01
 STEP = 0.01
 """Step of the derivative with respect to depth [mm]."""
 NOISY = 1.0
-"""Whitened distance of two rivals [nats] below which a press is not informative."""
+"""Whitened distance of two rivals [nats] below which a press, with all its repeats, is not informative."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def choose(held: Comparison, found: list[Rival], plan: Plan, presses: int = PRES
             return float(np.sum(gain)) / choice.trial.seconds**0.5
 
         best = max(scored, key=worth)
-        if max(best.nats.values(), default=0.0) < NOISY:
+        if REPEATS * max(best.nats.values(), default=0.0) < NOISY:
             break
         chosen.append(best)
         scored.remove(best)
