@@ -5,6 +5,10 @@ hill: a local maximum that stands out from the pass to the next deeper one (its 
 pixels whose way uphill ends there. Hills are found by flooding from the deepest pixel down, as in a watershed
 (L. Vincent, P. Soille, IEEE Trans. Pattern Anal. 13 (1991) 583). Predicted and labelled contacts are matched one to
 one with the least sum of distances (H. W. Kuhn, Naval Research Logistics 2 (1955) 83).
+
+A prediction is smoother than what was pressed. The pass between near contacts is filled in, and the top of a wide one
+has dents. The region's outline tells these apart: two contacts make it long. So in a long region a low hill counts
+already, in a round one only a high one.
 """
 
 from __future__ import annotations
@@ -12,15 +16,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import label as connected
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from training.metrics.depth_maps import CONTACT_THRESHOLD
 
 PROMINENCE = 0.15
-"""Least prominence of a hill, over its own depth [1]."""
+"""Least prominence of a hill of a label, over its own depth [1]."""
 LEAST_PROMINENCE = 0.03
-"""Least prominence of a hill [mm]: below, noise makes hills."""
+"""Least prominence of a hill of a label [mm]: below, noise makes hills."""
+LONG = 1.4
+"""Elongation from which a predicted region is long [1]: two equal discs reach it a radius apart, one shape seldom."""
+PREDICTED_PROMINENCE, ROUND_PROMINENCE = 0.05, 0.4
+"""Least prominence of a predicted hill in a long and in a round region, over its own depth [1]."""
+PREDICTED_LEAST = 0.02
+"""Least prominence of a predicted hill [mm]."""
 REACH = 2.0
 """Farthest apart that a predicted and a labelled contact may lie to be the same [mm]."""
 
@@ -73,7 +84,7 @@ def match(prediction: np.ndarray, label: np.ndarray, pitch: float) -> ContactMat
         >>> len(found.labelled), found.missed, found.invented, found.error.round(2).tolist()
         (2, 0, 0, [1.0, 1.0])
     """
-    ours, theirs = centroids(prediction), centroids(label)
+    ours, theirs = predicted_centroids(prediction), centroids(label)
     error = np.full(len(theirs), np.nan)
     if len(ours) and len(theirs):
         distance = cdist(theirs, ours)
@@ -86,25 +97,67 @@ def match(prediction: np.ndarray, label: np.ndarray, pitch: float) -> ContactMat
 
 
 def centroids(depth: np.ndarray) -> np.ndarray:
-    """Return the depth-weighted centroid of each contact [px], shape (k, 2), the deepest first.
+    """Return the depth-weighted centroid of each contact of a label [px], shape (k, 2), the deepest first.
 
     Args:
         depth: Depth map [mm], shape (pixels_x, pixels_y).
     """
-    owner = hills(depth)
-    count = int(owner.max(initial=-1)) + 1
+    return _centroids(depth, hills(depth))
+
+
+def predicted_centroids(depth: np.ndarray) -> np.ndarray:
+    """Return the depth-weighted centroid of each contact of a prediction [px], shape (k, 2), the deepest first.
+
+    Args:
+        depth: Predicted depth map [mm], shape (pixels_x, pixels_y).
+    """
+    owner = hills(depth, prominence=PREDICTED_PROMINENCE, least=PREDICTED_LEAST)
+    if owner.max(initial=-1) < 1:
+        return _centroids(depth, owner)
+    high = hills(depth, prominence=ROUND_PROMINENCE)
+    region, count = connected(owner >= 0, np.ones((3, 3)))
+    for number in range(1, count + 1):
+        inside = region == number
+        if elongation(depth, inside) < LONG:
+            owner[inside] = owner.max() + 1 + high[inside]
+    return _centroids(depth, owner)
+
+
+def elongation(depth: np.ndarray, inside: np.ndarray) -> float:
+    """Return how much longer than wide a region is [1], by the second moments of its depth.
+
+    Args:
+        depth: Depth map [mm], shape (pixels_x, pixels_y).
+        inside: Pixels of the region [bool], same shape.
+    """
+    places = np.array(np.nonzero(inside), float)
+    # A pixel is a square, which has a moment of its own.
+    moments = np.cov(places, aweights=depth[inside], ddof=0) + np.eye(2) / 12
+    short, long = np.linalg.eigvalsh(moments)
+    return float(np.sqrt(long / short))
+
+
+def _centroids(depth: np.ndarray, owner: np.ndarray) -> np.ndarray:
     i, j = np.nonzero(owner >= 0)
     where, weight = owner[i, j], depth[i, j].astype(np.float64)
-    moments = np.column_stack([np.bincount(where, weight * axis, count) for axis in (i, j)])
-    return moments / np.bincount(where, weight, count)[:, None]
+    kept, where = np.unique(where, return_inverse=True)
+    top = np.zeros(len(kept))
+    np.maximum.at(top, where, weight)
+    moments = np.column_stack([np.bincount(where, weight * axis, len(kept)) for axis in (i, j)])
+    return (moments / np.bincount(where, weight, len(kept))[:, None])[np.argsort(-top, kind="stable")]
 
 
-def hills(depth: np.ndarray, threshold: float = CONTACT_THRESHOLD) -> np.ndarray:
+def hills(
+    depth: np.ndarray, threshold: float = CONTACT_THRESHOLD, prominence: float = PROMINENCE,
+    least: float = LEAST_PROMINENCE,
+) -> np.ndarray:  # fmt: skip
     """Return which hill each pixel deeper than the threshold belongs to, the deepest hill is 0; -1 elsewhere.
 
     Args:
         depth: Depth map [mm], shape (pixels_x, pixels_y).
         threshold: Depth above which a pixel belongs to a contact [mm].
+        prominence: Least prominence over the hill's own depth [1].
+        least: Least prominence [mm].
     """
     rows, columns = depth.shape
     # A border around the map, so that every pixel has eight neighbours.
@@ -135,7 +188,7 @@ def hills(depth: np.ndarray, threshold: float = CONTACT_THRESHOLD) -> np.ndarray
         beside = {standing(flooded[other]) for other in higher}
         highest = min(beside)  # hills are numbered from the deepest
         for hill in beside - {highest}:
-            if tops[hill] - height < max(PROMINENCE * tops[hill], LEAST_PROMINENCE):
+            if tops[hill] - height < max(prominence * tops[hill], least):
                 joined[hill] = highest
     found = np.array([standing(hill) if hill >= 0 else -1 for hill in flooded])
     _, numbered = np.unique(np.append(found, -1), return_inverse=True)

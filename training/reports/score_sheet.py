@@ -168,13 +168,16 @@ def _contacts(known: dict[str, Any] | None) -> list[str]:
         found, error = entry["all_found"], entry["centroid_error"]
         values = [f"{100 * found['count'] / found['of']:.1f}", str(entry["missed"]), str(entry["invented"])]
         lines.append(row([words, str(entry["presses"]), *values, number(error["median"], 2), number(error["p90"], 2)]))
-    return [
-        *lines,
-        "",
+    words = (
         f"A contact is a hill of depth that stands out by {100 * known['prominence']:g} % of its depth. Distances are "
-        f"between labelled centroids. Contacts more than {known['reach_mm']:g} mm apart are not matched.",
-        "",
-    ]
+        f"between labelled centroids. Contacts more than {known['reach_mm']:g} mm apart are not matched."
+    )
+    if rule_of := known.get("predicted"):
+        words += (
+            f" A predicted hill stands out by {100 * rule_of['prominence_long']:g} % in a region at least "
+            f"{rule_of['long']:g} times as long as wide, and by {100 * rule_of['prominence_round']:g} % in another."
+        )
+    return [*lines, "", words, ""]
 
 
 def _prescribed(table: dict[str, Any]) -> list[str]:

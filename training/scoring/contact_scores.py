@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from training.metrics.contacts import LEAST_PROMINENCE, PROMINENCE, REACH, ContactMatch, match
+from training.metrics.contacts import (
+    LEAST_PROMINENCE, LONG, PREDICTED_LEAST, PREDICTED_PROMINENCE, PROMINENCE, REACH, ROUND_PROMINENCE, ContactMatch,
+    match,
+)  # fmt: skip
 from training.metrics.depth_maps import summarize
 
 DISTANCES = (3.0, 4.0, 5.0)
@@ -27,6 +30,10 @@ def scored(presses: Iterable[tuple[np.ndarray, np.ndarray]], pitch: float) -> di
     found = [match(depth, label, pitch) for depth, label in presses]
     return {
         "prominence": PROMINENCE, "least_prominence_mm": LEAST_PROMINENCE, "reach_mm": REACH,
+        "predicted": {
+            "long": LONG, "prominence_long": PREDICTED_PROMINENCE, "prominence_round": ROUND_PROMINENCE,
+            "least_prominence_mm": PREDICTED_LEAST,
+        },
         "presses": contact_rows(found, pitch),
     }  # fmt: skip
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tacdata import documents
-from training.metrics.contacts import PROMINENCE, centroids, hills, match
+from training.metrics.contacts import LONG, PROMINENCE, centroids, elongation, hills, match, predicted_centroids
 from training.reports.score_sheet import markdown
 from training.scoring.contact_scores import contact_rows
 
@@ -43,6 +43,31 @@ def test_noise_makes_no_contacts():
     noise = np.random.default_rng(0).normal(0, 0.005, (35, 26))
     assert len(centroids(bumps((16, 12), depth=0.5) + noise)) == 1
     assert len(centroids(np.zeros((35, 26)) + noise)) == 0
+
+
+def test_two_discs_a_radius_apart_are_as_long_as_a_long_region_must_be():
+    i, j = np.mgrid[:80, :60]
+    first, second = (np.hypot(i - 30 - shift, j - 30) < 16 for shift in (0, 16))
+    weight = (first.astype(float) + second) * 0.5
+    assert elongation(weight, weight > 0) == pytest.approx(np.sqrt(2), abs=0.02)
+    assert elongation(weight, weight > 0) > LONG
+    assert elongation(np.ones_like(weight), first) == pytest.approx(1.0, abs=0.01), "one disc is round"
+
+
+def test_a_shallow_pass_parts_a_long_prediction_and_not_a_round_one():
+    i, j = np.mgrid[:35, :26]
+    dent = 0.05 * np.exp(-((i - 17) ** 2) / 8)  # mm, across the middle: 8 % of the depth
+    long = 0.6 * np.exp(-(((i - 17) / 8) ** 8) - ((j - 12) / 4) ** 4) - dent
+    round_top = 0.6 * np.exp(-((np.hypot(i - 17, j - 12) / 9) ** 6)) - dent
+    assert len(centroids(long)) == len(centroids(round_top)) == 1, "a label is no mean over what may be"
+    assert len(predicted_centroids(long)) == 2
+    assert len(predicted_centroids(round_top)) == 1
+    flat = 0.6 * np.exp(-(((i - 17) / 8) ** 8) - ((j - 12) / 4) ** 4)
+    assert len(predicted_centroids(flat)) == 1, "length alone makes no second contact"
+
+
+def test_three_contacts_around_a_middle_stay_three():
+    assert len(predicted_centroids(bumps((10, 8), (10, 18), (19, 13)))) == 3
 
 
 def test_each_contact_is_matched_once():
