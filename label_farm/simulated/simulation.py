@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,14 @@ class Simulation:
                 "describe these in the sensor file, as examples/eight_by_eight.yaml does; a flat skin's network learns "
                 "from recorded presses alone (tacdata train)",
             )
-        self.press(0)
+        for shape in self.plan.shapes:
+            # Drawn alone: among others, a shape that never fits would be passed over in silence.
+            try:
+                draw_press(replace(self.plan, shapes=(shape,)), self.sensor, self.seed, 0)
+            except FormatError as error:
+                raise FormatError(
+                    f"shapes/{shape.name}: {error.given}", error.allowed, "correct its sizes, or narrow their ranges"
+                ) from error
         draw_specimen(self.sensor, self.plan.specimens, self.seed, 0)
         specimen_effects(self.plan, self.sensor, self.seed, 0)
 

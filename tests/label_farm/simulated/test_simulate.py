@@ -281,6 +281,11 @@ def test_specimens_vary_as_the_sensor_file_says():
     assert gains.std() == pytest.approx(0.1, rel=0.2)
 
 
+def _beside_ball(other):
+    """A second shape that cannot be pressed: the first one must not hide it."""
+    return {"shapes": {"ball": {"shape": "sphere", "radius": 2.0}, "other": other}}
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -288,6 +293,9 @@ def test_specimens_vary_as_the_sensor_file_says():
         ({"rest": 0.0}, "readings are tared"),
         ({"shapes": {"ball": {"shape": "sphere", "radius": 40.0}}, "depth": 1.0}, "no press in 200 tries"),
         ({"specimens": {"count": 1, "parameters": {"stiffness": 0.1}}}, "stiffness"),
+        (_beside_ball({"shape": "sphere", "radius": [5.0, 1.0]}), "shapes/other: .*radius: 5 to 1"),
+        (_beside_ball({"shape": "sphere", "radus": 2.0}), "shapes/other: .*radus"),
+        (_beside_ball({"shape": "sphere", "radius": 2.0, "depth": 9.0}), "shapes/other: .*a depth of 9 mm"),
     ],
 )
 def test_a_plan_that_cannot_be_drawn_says_why(change, words):
