@@ -19,12 +19,14 @@ if TYPE_CHECKING:
 ORDER = 65
 PANEL = PIPELINE
 PICTURE = "curve.png"
+NONE = "none"
+"""A start without a pretrained network, for a sensor that has none."""
 
 
 def run(
     dataset: Annotated[Path, typer.Argument(help="Dataset folder of recorded presses.")],
     out: Annotated[Path, typer.Option(help="Folder of the runs; run again, it goes on.")],
-    start: Annotated[str, typer.Option("--from", help="The pretrained checkpoint, or `shipped`.")] = "shipped",
+    start: Annotated[str, typer.Option("--from", help="The pretrained checkpoint, `shipped`, or `none`.")] = "shipped",
     presses: Annotated[
         str, typer.Option(help="Numbers of presses, with commas; 0 is the network as it is.")
     ] = "0,3,10,30,100,300",
@@ -53,7 +55,7 @@ def run(
     if not numbers or numbers[0] < 0:
         raise UsageError(f"--presses {presses}", "whole numbers with commas, 0,10,30", "correct the list")
     document = learning_curve(
-        read_frames(dataset), pretrained(start), out, numbers, tuple(range(seeds)), split,
+        read_frames(dataset), None if start == NONE else pretrained(start), out, numbers, tuple(range(seeds)), split,
         tuple(network or ("pattern",)), read_frames(simulated) if simulated else None, device, threads, _told, _begun,
     )  # fmt: skip
     draw(out / PICTURE, document)

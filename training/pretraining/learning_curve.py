@@ -60,7 +60,7 @@ class CurvePoint:
 
 def learning_curve(
     frames: Frames,
-    pretrained: Checkpoint,
+    pretrained: Checkpoint | None,
     out: Path,
     presses: Sequence[int] = PRESSES,
     seeds: Sequence[int] = (0, 1, 2),
@@ -76,7 +76,7 @@ def learning_curve(
 
     Args:
         frames: The recorded dataset.
-        pretrained: The network to start from.
+        pretrained: The network to start from; None for random weights alone.
         out: Folder of the runs and of `FILE`.
         presses: How many presses to train on; 0 is the pretrained network as it is. Too large numbers are left out.
         seeds: Seeds of the presses and of the training.
@@ -92,35 +92,45 @@ def learning_curve(
         The document of the curve (`schemas/learning_curve.schema.json`).
 
     Raises:
-        UsageError: If ``out`` holds another curve, or no number of presses is possible.
+        UsageError: If ``out`` holds another curve, no number of presses is possible, or simulated frames are to be
+            mixed into no pretrained network's training.
         FormatError: If the dataset is of another sensor.
     """
-    pretrained.check_sensor(frames.sensor, frames.origin)
+    if pretrained:
+        pretrained.check_sensor(frames.sensor, frames.origin)
     if frames.simulated:
         raise UsageError(
             f"{frames.origin} is simulated", "recorded presses: the curve says how many of them are needed",
             "give the dataset of a unit",
         )  # fmt: skip
-    pretrained.check_unseen(frames.dataset_hash, frames.origin)
-    parents = {"dataset": frames.dataset_hash, "pretrained": pretrained.content_hash}
+    parents = {"dataset": frames.dataset_hash}
+    if pretrained:
+        pretrained.check_unseen(frames.dataset_hash, frames.origin)
+        parents["pretrained"] = pretrained.content_hash
+    elif simulated:
+        raise UsageError(
+            "simulated frames beside random weights", "simulated frames where a pretrained network is fitted",
+            "leave --simulated out, or name a pretrained network by --from",
+        )  # fmt: skip
     parents |= {"simulated": simulated.dataset_hash} if simulated else {}
     held = divide(frames, split, seeds[0])
     pool = tuple(sorted({*held.train, *held.validation}))
-    possible = [count for count in presses if count <= len(pool) and count != 1]
+    possible = [count for count in presses if count <= len(pool) and count != 1 and (count or pretrained)]
     if not possible:
         raise UsageError(
-            f"{list(presses)} presses of {len(pool)} that are not held out", f"0, or 2 to {len(pool)} presses",
+            f"{list(presses)} presses of {len(pool)} that are not held out",
+            f"{'0, or ' if pretrained else ''}2 to {len(pool)} presses",
             "record more presses, or ask for fewer",
         )  # fmt: skip
     document = _document(out, split, held, parents)
     done = {(point["start"], point["presses"], point["seed"]) for point in document["points"]}
     for count in possible:
         for seed in seeds:
-            for start in ("pretrained", *networks):
+            for start in (*(("pretrained",) if pretrained else ()), *networks):
                 if (start, count, seed) in done or (count == 0 and start != "pretrained"):
                     continue
                 chosen = np.random.default_rng(seed).permutation(pool)[:count].tolist()
-                network = pretrained.network
+                network = pretrained.network if pretrained else None
                 if count:
                     settings = _settings(start, seed, pretrained, simulated)
                     run = out / f"{start}-{count}-{seed}"
@@ -139,7 +149,7 @@ def learning_curve(
     return document
 
 
-def _settings(start: str, seed: int, pretrained: Checkpoint, simulated: Frames | None) -> TrainingSettings:
+def _settings(start: str, seed: int, pretrained: Checkpoint | None, simulated: Frames | None) -> TrainingSettings:
     if start == "pretrained":
         return recipe({"seed": seed}, pretrained, simulated is not None)
     return recipe({"seed": seed, "network": start, "epochs": SCRATCH_EPOCHS, "batch_size": 64})

@@ -102,6 +102,17 @@ def test_wishes_come_before_recipes(known):
         recipe({"network": "paper"}, known)
 
 
+def test_a_sensor_without_a_pretrained_network_has_a_curve_of_random_weights(unit, many, tmp_path):
+    document = learning_curve(unit, None, tmp_path, (0, 3), (0,), networks=("history",), device="cpu", threads=1)
+    assert [(point["start"], point["presses"]) for point in document["points"]] == [("history", 3)]
+    assert "pretrained" not in curve_picture.table(document)
+    curve_picture.draw(tmp_path / "curve.png", document)
+    with pytest.raises(UsageError, match="beside random weights"):
+        learning_curve(unit, None, tmp_path / "mixed", (3,), (0,), simulated=many)
+    with pytest.raises(UsageError, match="allowed: 2 to"):
+        learning_curve(unit, None, tmp_path / "none", (0,), (0,))
+
+
 def test_a_network_of_another_sensor_is_refused(known, unit, tmp_path):
     sensor = replace(unit.sensor, material=replace(unit.sensor.material, youngs_modulus=0.5))
     with pytest.raises(FormatError, match="was trained for sensor"):
