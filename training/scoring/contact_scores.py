@@ -11,7 +11,14 @@ import numpy as np
 from scipy.stats import binomtest
 
 from training.metrics.contacts import (
-    LEAST_PROMINENCE, LONG, PREDICTED_LEAST, PREDICTED_PROMINENCE, PROMINENCE, REACH, ROUND_PROMINENCE, ContactMatch,
+    LEAST_PROMINENCE,
+    LONG,
+    PREDICTED_LEAST,
+    PREDICTED_PROMINENCE,
+    PROMINENCE,
+    REACH,
+    ROUND_PROMINENCE,
+    ContactMatch,
     match,
 )  # fmt: skip
 from training.metrics.depth_maps import summarize
