@@ -20,7 +20,7 @@ from training.metrics.contacts import (
     ROUND_PROMINENCE,
     ContactMatch,
     match,
-)  # fmt: skip
+)
 from training.metrics.depth_maps import summarize
 
 DISTANCES = (3.0, 4.0, 5.0)
