@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from running.in_process import tacdata
-from running.typed_pages import HOW_TO, commands
+from running.typed_pages import HOW_TO, blocks, commands
 from test_training_verbs import BALL, write_dataset
 from training_frames import build_frames
 
@@ -39,6 +39,8 @@ def typed(tmp_path, monkeypatch):
     )
     write_dataset(tmp_path / "dataset", build_frames(16, length=12), indenters=SHAPES)
     documents.write(tmp_path / "sensor.yaml", default_sensor().document, "sensor")
+    [recipe] = blocks(PAGE, "yaml")
+    (tmp_path / "two_balls.yaml").write_text(recipe)
     said = {}
     for words in commands(PAGE):
         done = tacdata(*words, *QUICK.get(words[0], ()), folder=tmp_path)
@@ -49,7 +51,7 @@ def typed(tmp_path, monkeypatch):
 
 @pytest.mark.long("tacdata/commands", "docs/how_to/pretrain.md", reason="a page typed from beginning to end")
 def test_the_page_is_typed_from_its_first_command_to_its_last(typed, tmp_path):
-    assert set(typed) == {"train", "evaluate", "learning-curve", "simulate"}
+    assert set(typed) == {"train", "evaluate", "learning-curve", "simulate", "plan"}
     fitted = checkpoint.load(tmp_path / "network")
     assert fitted.document["pretrained"] == checkpoint.load(shipped.PATH).content_hash
     own = checkpoint.load(tmp_path / "network_of_ours")
@@ -59,6 +61,8 @@ def test_the_page_is_typed_from_its_first_command_to_its_last(typed, tmp_path):
     assert {(point["start"], point["presses"]) for point in curve["points"]} == {
         ("pretrained", 0), ("pretrained", 3), ("pattern", 3), ("pretrained", 10), ("pattern", 10),
     }  # fmt: skip
-    [said] = typed["learning-curve"]
+    said, alone = typed["learning-curve"]
     assert said.count("pretrained") >= 3 and "IoU > 0.2 mm" in said
+    assert "pretrained" not in alone and alone.count("history") == 2
+    assert "12 presses with balls" in typed["plan"][0]
     assert (tmp_path / "curve" / "curve.png").read_bytes()[:4] == b"\x89PNG"
