@@ -42,7 +42,7 @@ def run(
         typer.Option(help="Verdict or model spec whose effects are laid over the readings, beside the plan's own."),
     ] = None,
     column: Annotated[
-        list[str] | None, typer.Option(help="Optional column of the labels to carry along, such as taxel_counts.")
+        list[str] | None, typer.Option(help="Column of the labels to carry along, such as error_map (mm a pixel).")
     ] = None,
 ) -> Result:
     """Make a dataset of random presses by the skin model; stopped and run again, it goes on.

@@ -11,7 +11,7 @@ from tacdata.dataset.format import features
 from tacdata.dataset.pack import pack
 from tacdata.errors import UsageError
 
-ASKED = features.asked_for(["uncertainty", "taxel_counts", "interpolation_error"])
+ASKED = features.asked_for(["uncertainty", "taxel_counts", "interpolation_error", "error_map"])
 
 
 def knowing(episode):
@@ -36,6 +36,8 @@ def test_what_is_asked_for_is_carried_along_and_nothing_else(tmp_path):
     labels = [knowing(episode) for episode in episodes]
     maps = np.concatenate([label.uncertainty for label in labels]).astype(np.float32)
     assert np.array_equal(dataset["tacdata.uncertainty"].reshape(maps.shape), maps)
+    errors = np.concatenate([label.error_map for label in labels]).astype(np.float32)
+    assert np.array_equal(dataset["tacdata.error_map"].reshape(maps.shape), errors)
     assert np.array_equal(dataset["tacdata.taxel_counts"], np.concatenate([label.taxel_counts for label in labels]))
     assert dataset["tacdata.interpolation_error"].shape == (len(maps),)
     assert dataset.units["tacdata.uncertainty"] == "mm" and dataset.units["tacdata.taxel_counts"] == "counts"

@@ -65,10 +65,10 @@ UNITS = {
 }
 """Unit of every column as `read_dataset` gives it."""
 
-EXTRA = {f"tacdata.{name}": name for name in columns.OPTIONAL}
+EXTRA = {f"tacdata.{name}": name for name in ("error_map", *columns.OPTIONAL)}
 """Columns that a dataset has only where they were asked for -> the label's column that they hold, as float32.
 
-Maps, such as the uncertainty of each pixel, are stored flat, shape (pixels_x * pixels_y,), x slowest: LeRobot would
+Maps, such as the error of each pixel, are stored flat, shape (pixels_x * pixels_y,), x slowest: LeRobot would
 take another depth image for a camera."""
 
 DTYPES = {
