@@ -244,7 +244,7 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
         """
         f, c = wp.tid()
         b = chosen[c]
-        some = 0
+        some = wp.int32(0)
         values = Six()
         for a in range(6):
             j = surface.slots[f, a]
@@ -364,7 +364,7 @@ def turn_kernel(real: type) -> wp.Kernel:
     ):
         """Take the turn of normal forces times nodal displacements ``p`` off the nodes; one face."""
         f, b = wp.tid()
-        some = 0
+        some = wp.int32(0)
         for a in range(6):
             if active[slots[f, a], b]:
                 some = 1

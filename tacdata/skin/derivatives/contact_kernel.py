@@ -121,7 +121,7 @@ def normal_change_kernel(distance: wp.Function) -> wp.Kernel:
         4. There, too: change of pressure times normal, to the face's nodes.
         """
         f, b = wp.tid()
-        some = 0
+        some = wp.int32(0)
         values, d_values = Six(), Six()
         for a in range(6):
             j = surface.slots[f, a]
