@@ -57,6 +57,23 @@ def test_a_room_brings_what_it_imports():
     assert not rooms & {"viewers", "training"}
 
 
+@pytest.mark.parametrize("asked", ["tests/wire", "tests"])
+def test_only_files_that_were_asked_for_are_said_to_have_passed_before(asked):
+    option = SimpleNamespace(keyword="", long="changed", maxfail=0)
+    config = SimpleNamespace(args=[asked], option=option, invocation_params=SimpleNamespace(dir=ROOT))
+    passed = long_part.Passed(config)
+    file = next(name for name in long_part.record() if not name.startswith("tests/wire") and (ROOT / name).exists())
+    assert passed.left_as_passed(ROOT / file) == (asked == "tests")
+    assert not passed.left_as_passed(ROOT / "tests" / "test_gone.py")
+
+
+def test_files_without_a_long_test_are_not_imported_for_the_long_part():
+    config = SimpleNamespace(option=SimpleNamespace(long="changed"))
+    ignored = {path for path in (ROOT / "tests").rglob("*.py") if long_part.pytest_ignore_collect(path, config)}
+    assert len(ignored) > 200 and not [path for path in ignored if "mark.long" in path.read_text()]
+    assert all(path.name.startswith("test_") for path in ignored)
+
+
 def test_the_longest_file_of_a_kind_goes_first_and_nobody_idles(monkeypatch):
     files = ["tests/skin/short.py", "tests/skin/long.py", "tests/live/short.py", "tests/live/long.py"]
     monkeypatch.setattr(side_by_side, "recorded", lambda: {file: 9.0 if "long" in file else 1.0 for file in files})

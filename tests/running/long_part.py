@@ -33,8 +33,15 @@ def pytest_configure(config):
     config.addinivalue_line(
         "markers", "long(*rooms, reason): `sh .dev/test --long` runs it, or CI when one of its rooms changed"
     )
-    if config.option.long and not hasattr(config, "workerinput"):
+    if config.option.long and not config.option.collectonly and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Passed(config))
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Import no file that has no long test, if those alone are asked for."""
+    if config.option.long and collection_path.match("test_*.py") and "mark.long" not in collection_path.read_text():
+        return True
+    return None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -77,6 +84,8 @@ class Passed:
 
     def __init__(self, config):
         self.whole = not any("::" in argument for argument in config.args) and not config.option.keyword
+        self.asked = [config.invocation_params.dir / argument.split("::")[0] for argument in config.args]
+        self.changed = config.option.long == "changed" and not config.option.maxfail
         self.files = defaultdict(lambda: {"rooms": set(), "outcomes": set(), "seconds": 0.0})
 
     def pytest_runtest_logreport(self, report):
@@ -92,7 +101,7 @@ class Passed:
         known = record()
         terminalreporter.section("long part")
         for name, file in sorted(known.items()):
-            if name not in self.files:
+            if name not in self.files and self.left_as_passed(ROOT / name):
                 terminalreporter.write_line(f"not run: {name}: passed on {file['on']} with these inputs")
         for name, file in sorted(self.files.items()):
             passed = file["outcomes"] == {"passed"}
@@ -106,6 +115,12 @@ class Passed:
                 }  # fmt: skip
         if self.whole:
             RECORD.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
+
+
+    def left_as_passed(self, path):
+        """Return whether a file with no report was asked for: then it was left out for its inputs alone."""
+        asked = any(path.is_relative_to(place) for place in self.asked)
+        return self.changed and self.whole and asked and path.exists()
 
 
 @functools.cache
