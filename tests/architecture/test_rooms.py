@@ -12,6 +12,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("tacdata", "schemas", "label_farm", "training", "viewers")
 ROOMS = sorted({p.parent for package in PACKAGES for p in (ROOT / package).rglob("__init__.py")} - {ROOT / "tacdata"})
 FILES = sorted(p for package in PACKAGES for p in (ROOT / package).rglob("*.py") if not p.name.endswith("_pb2.py"))
+TESTS = sorted(p for p in (ROOT / "tests").rglob("*") if p.is_dir() and any(p.glob("test_*.py")))
+"""Rooms of tests; `tests` itself has one for each room of the code."""
 MOST_LINES, LONGEST_LINE = 40, 140
 """Of a room's README; a row of a table may be longer."""
 MOST_ENTRIES = 15
@@ -49,7 +51,7 @@ def test_every_room_has_a_short_readme():
 def test_every_room_has_few_entries():
     """Members of a registry are not counted: who adds an effect copies one file and reads no other."""
     known, wrong = members(), {}
-    for room in ROOMS:
+    for room in [*ROOMS, *TESTS]:
         entries = {path.name for path in room.iterdir()} - {"README.md", "__init__.py", "__pycache__"}
         others = {entry for entry in entries if entry.split(".")[0] not in known[name(room)]}
         if len(others) > MOST_ENTRIES:

@@ -20,6 +20,7 @@ from training.frames.data import read_frames
 from training.pretraining.shipped import pretrained
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm" / "simulated"))
 from bump_skin import SMALL, BumpSkin
 
 ROOT = Path(__file__).resolve().parents[2]

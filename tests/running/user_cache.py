@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-MESHES = Path(__file__).parents[1] / "skin" / "meshes"
+MESHES = Path(__file__).parents[1] / "skin" / "mesh" / "meshes"
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,4 +1,4 @@
-"""One small model of each kind for the whole room; their meshes lie in `meshes/` (`running.user_cache`).
+"""One small model of each kind for the whole room; their meshes lie in `mesh/meshes/` (`running.user_cache`).
 
 When `tacdata.skin.mesh.build.RECIPE` changes they are no longer found: replace them then.
 """

@@ -10,6 +10,7 @@ from test_training_verbs import BALL, write_dataset
 from training_frames import build_frames
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm" / "simulated"))
 from bump_skin import BumpSkin
 
 from label_farm.simulated import solving

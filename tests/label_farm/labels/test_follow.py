@@ -3,10 +3,10 @@
 import os
 import threading
 import time
-from pathlib import Path
 
 import pytest
 import session_examples
+from farm_examples import HERE
 from running.in_process import tacdata
 
 from label_farm import growing_session
@@ -79,6 +79,5 @@ def test_a_recorder_that_stopped_leaves_its_labels_and_is_named(half_recorded, q
 @pytest.fixture
 def quick_farm(monkeypatch):
     """Workers find the stand-in model."""
-    here = Path(__file__).resolve().parent
-    monkeypatch.syspath_prepend(here)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(here), str(here.parents[1])]))
+    monkeypatch.syspath_prepend(HERE)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HERE), str(HERE.parent.parent)]))

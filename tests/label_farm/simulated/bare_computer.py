@@ -1,7 +1,9 @@
 """`tacdata`, where the packages of the recorder and of learning are missing; presses are bumps."""
 
 import sys
+from pathlib import Path
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # the fast model lies there
 MISSING = ("foxglove_schemas_protobuf", "mcap", "lerobot", "cv2", "serial", "matplotlib")
 
 

@@ -217,9 +217,8 @@ def test_presses_whose_skin_lies_above_the_shape_are_left_out_and_said(bumps, tm
 def test_presses_are_solved_without_the_recorders_and_the_learners_packages(tmp_path):
     """As on a rented computer with a GPU that has torch, Warp and little else."""
     words = ["simulate", "--presses", "2", "--solved", "presses", "--device", "cpu", "--workers", "1"]
-    done = subprocess.run(
-        [sys.executable, str(HERE / "bare_computer.py"), *words], cwd=tmp_path, capture_output=True, text=True
-    )
+    computer = Path(__file__).with_name("bare_computer.py")
+    done = subprocess.run([sys.executable, str(computer), *words], cwd=tmp_path, capture_output=True, text=True)
     assert "presses solved: 2" in done.stdout, done.stderr
 
 
