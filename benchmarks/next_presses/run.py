@@ -29,11 +29,14 @@ from worlds.cases import cases, inseparable  # noqa: E402
 ENGINE = (*ROOMS, "revision")
 """What judges and recommends."""
 STEADY = (
-    "latency", "low_pass_filter", "servo_lag", "two_pole_filter", "backlash", "elastic_backlash", "hysteresis",
-    "relaxation", "creep", "poroelasticity", "nonlinear_relaxation", "baseline_tracking", "softening",
-    "frame_compliance", "stiffening", "saturation", "gap_curvature", "xy_offset", "tilt",
+    "latency", "low_pass_filter", "servo_lag", "backlash", "hysteresis", "relaxation", "creep", "poroelasticity",
+    "nonlinear_relaxation", "baseline_tracking", "softening", "frame_compliance", "stiffening", "saturation",
+    "gap_curvature", "xy_offset", "tilt",
 )  # fmt: skip
-"""Effects that do not depend on how long the session is: presses added change nothing of those before."""
+"""Effects that do not depend on how long the session is: presses added change nothing of those before.
+
+Each in the library's own form: what is between two names is settled by no press.
+"""
 EPISODES = 24
 """Presses of a world at first."""
 STEPS = (4, 12)
@@ -140,6 +143,11 @@ def line(case, table):
     }  # fmt: skip
 
 
+def names_left(stage):
+    """Return how many names a verdict leaves."""
+    return len({name for names in stage["told"] for name in names})
+
+
 def score(rows):
     """Print how many times fewer presses settle a world by recommendation."""
     done = [r for r in rows if r["asked"]]
@@ -149,7 +157,11 @@ def score(rows):
         names, others = (r[k] and (r[k]["names"], r[k]["right"]) for k in ("settled", "random_settled"))
         rest = "" if others else "not by "
         print(f"  {r['name']:32s}{r['response']:8s} own {by} {names}; random {rest}{r['random_presses']} {others}")
+    left = np.array([(names_left(r["own"][-1]), names_left(r["random"][0])) for r in done])
+    if len(done):
+        print(f"names left after as many presses: {left[:, 0].mean():.1f} recommended, {left[:, 1].mean():.1f} random")
     own = [r for r in done if r["presses"]]
+    print(f"settled by recommendation: {len(own)} of {len(done)}; by chance {sum(bool(r['random_settled']) for r in done)}")
     if not own:
         return
     ratio = np.log([r["random_presses"] / r["presses"] for r in own])
@@ -157,7 +169,7 @@ def score(rows):
     low, high = np.exp(np.percentile(ratio[drawn].mean(axis=1), [2.5, 97.5]))
     thrice = sum(r["random_presses"] >= 3 * r["presses"] for r in own)
     below, above = interval(thrice, len(done))
-    print(f"settled by recommendation: {len(own)} of {len(done)}, right {sum(r['settled']['right'] for r in own)}")
+    print(f"right of those: {sum(r['settled']['right'] for r in own)}")
     print(f"random over recommended, geometric mean: at least {np.exp(ratio.mean()):.1f} ({low:.1f} to {high:.1f})")
     print(f"at least 3 times fewer: {thrice} of {len(done)} ({100 * below:.0f} to {100 * above:.0f} %)")
 
