@@ -161,7 +161,8 @@ def score(rows):
     if len(done):
         print(f"names left after as many presses: {left[:, 0].mean():.1f} recommended, {left[:, 1].mean():.1f} random")
     own = [r for r in done if r["presses"]]
-    print(f"settled by recommendation: {len(own)} of {len(done)}; by chance {sum(bool(r['random_settled']) for r in done)}")
+    chance = sum(bool(r["random_settled"]) for r in done)
+    print(f"settled by recommendation: {len(own)} of {len(done)}; by random presses {chance}")
     if not own:
         return
     ratio = np.log([r["random_presses"] / r["presses"] for r in own])
