@@ -115,8 +115,9 @@ def predicted_centroids(depth: np.ndarray) -> np.ndarray:
     if owner.max(initial=-1) < 1:
         return _centroids(depth, owner)
     high = hills(depth, prominence=ROUND_PROMINENCE)
-    region, count = connected(owner >= 0, np.ones((3, 3)))
-    for number in range(1, count + 1):
+    region = np.zeros(owner.shape, np.int64)
+    connected(owner >= 0, np.ones((3, 3)), output=region)
+    for number in range(1, int(region.max()) + 1):
         inside = region == number
         if elongation(depth, inside) < LONG:
             owner[inside] = owner.max() + 1 + high[inside]
