@@ -68,7 +68,7 @@ def pytest_configure():
 
 
 def pytest_collection_modifyitems(items):
-    """Let tests of real time be tried again; what was is told in the summary."""
+    """Let tests of real time be tried again."""
     for item in items:
         if in_real_time(item.path):
             item.add_marker(pytest.mark.flaky(reruns=2, condition=WATCH.stood_still))
@@ -83,3 +83,14 @@ def speed(request):
 def pytest_runtest_setup(item):
     """Watch anew for every test."""
     WATCH.begin(in_real_time(item.path))
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Print why tests were tried again: the next try may pass, and a fault would hide behind it."""
+    tried = terminalreporter.stats.get("rerun", [])
+    if tried:
+        terminalreporter.section("tried again")
+    for report in tried:
+        crash = getattr(report.longrepr, "reprcrash", None)
+        reason = " ".join((crash.message if crash else str(report.longrepr)).split())
+        terminalreporter.line(f"{report.nodeid} ({report.when}): {reason[:300]}")
