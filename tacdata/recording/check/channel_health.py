@@ -154,13 +154,35 @@ def jumps(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jum
         counts = episode.taxels.counts[rows]
         sudden = _lasting(counts, np.maximum(least, JUMP_SHARE * size_of))
         if len(clear) >= TOGETHER and np.isfinite(counts).all():
-            together = np.median((counts - counts[0])[:, clear] / response[clear], axis=1)
-            sudden += _lasting(counts - together[:, None] * response, np.maximum(least, ALONE_SHARE * size_of))
+            together, error = _together((counts - counts[0])[:, clear], response[clear], usual[clear])
+            own = JUMP * np.sqrt(2) * np.hypot(usual, error * size_of)
+            sudden += _lasting(counts - together[:, None] * response, np.maximum(own, ALONE_SHARE * size_of))
         for channel, place, size in sudden:
             jump = Jump(channel, int(episode.taxels.sample_ns[rows[place]]), size)
             if channel not in found or abs(size) > abs(found[channel].size):
                 found[channel] = jump
     return [found[channel] for channel in sorted(found)]
+
+
+def _together(change: np.ndarray, response: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the share of their answers by which all channels change [1], shape (n,), and its standard error [1].
+
+    A median of the channels' ratios, weighted by the precision of each: a channel of small answer says little of a
+    large one. None has more than half the weight of all others, so that its own jump is not taken for everybody's.
+
+    Args:
+        change: Readings of clear channels less their first [counts], shape (n, m).
+        response: Answers of these channels [counts], shape (m,).
+        noise: Noise of these channels [counts], shape (m,).
+    """
+    ratio, precision = change / response, np.abs(response) / noise
+    weight = np.minimum(precision, (precision.sum() - precision) / 2)
+    order = np.argsort(ratio, axis=1)
+    middle = (np.cumsum(weight[order], axis=1) < weight.sum() / 2).sum(axis=1)[:, None]
+    common = np.take_along_axis(np.take_along_axis(ratio, order, axis=1), middle, axis=1)[:, 0]
+    # A weighted median of Gaussian ratios, for many channels; each ratio errs by the inverse of its precision.
+    error = np.sqrt(np.pi / 2 * (weight**2).sum()) / (weight * precision).sum()
+    return common, float(error)
 
 
 def _usual(noise: np.ndarray) -> np.ndarray:

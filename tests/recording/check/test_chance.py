@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tacdata.recording.check.channel_health import held_by_chance
+from tacdata.recording.check.channel_health import held_by_chance, jumps
 from tacdata.recording.check.session import _drifts
+from tacdata.recording.episode import PHASES
 
 
 def noise(sigma, common=0.0, frames=300):
@@ -28,6 +29,24 @@ def test_noise_that_all_channels_share_or_below_the_resolution_leaves_equal_fram
 def test_a_board_that_sends_each_reading_twice_is_not_accused():
     twice = np.repeat(noise(5.0), 2, axis=0)
     assert held_by_chance(twice, twice[:60], 2) == np.inf
+
+
+def held(rng, answers, step=0.0):
+    """Return a hold of 24 frames in which channel 0, which answers most, jumps by a step half way [counts]."""
+    counts = np.round(9000 + answers + rng.normal(0, 5.0, (24, len(answers))))
+    counts[12:, 0] += step
+    phase = np.full(24, PHASES.index("hold"))
+    taxels = SimpleNamespace(counts=counts, sample_ns=np.arange(24) * 33_333_333)
+    return SimpleNamespace(taxels=taxels, phase_at=lambda times: phase)
+
+
+def test_the_noise_of_channels_of_small_answer_is_no_jump_of_a_large_one():
+    rng, answers = np.random.default_rng(3), np.array([1500.0, 700.0, *(105.0,) * 6, 5.0])
+    quiet = [jumps(held(rng, answers), np.full(9, 5.0), answers) for _ in range(300)]
+    assert sum(map(bool, quiet)) == 0
+    (jump,) = jumps(held(rng, answers, step=120.0), np.full(9, 5.0), answers)
+    assert jump.channel == 0
+    assert jump.size == pytest.approx(120, abs=25)
 
 
 def recorded(name, drift, rate, seconds, lean=0.0):
