@@ -43,9 +43,12 @@ class Grabber(BaseHTTPRequestHandler):
 
 
 class Quick(Pages):
-    """Draws nothing."""
+    """Draws nothing, as soon as it may."""
+
+    may_draw = None
 
     def episode(self, number):
+        self.may_draw.wait(20.0)
         self.listed.numbered(number)
         return self._folder / "empty.rrd", Times("host_time", BEGIN, BEGIN + 2_500_000_000)
 
@@ -65,7 +68,8 @@ def served(tmp_path):
         threading.Thread(target=viewer.serve_forever, daemon=True).start()
         address = f"http://127.0.0.1:{viewer.server_address[1]}"
         pages = Quick(EpisodeList(tmp_path, "session", tuple(entries)), None, None, tmp_path, address)
-        pages.grabbed = grabbed
+        pages.grabbed, pages.may_draw = grabbed, threading.Event()
+        pages.may_draw.set()
         with serving(pages, 0):
             yield pages
         viewer.shutdown()
@@ -198,6 +202,19 @@ def test_shift_and_an_arrow_choose_rows_and_an_arrow_alone_lets_them_go(page, se
     page.wait_for_function("document.querySelectorAll('tr.flagged').length === 4")
     flagged = sorted(flag.file[8:14] for flag in read_flags(served.listed.root).values())
     assert flagged == ["000001", "000002", "000003", "000005"]
+
+
+def test_what_is_said_while_an_episode_is_drawn_stays(page, served):
+    served.may_draw.clear()
+    page.click("tbody tr:nth-child(4)")
+    assert page.inner_text("#said") == "drawing …"
+    page.click("#marks > summary")
+    page.click("#write")
+    served.may_draw.set()
+    page.wait_for_function("document.querySelector('iframe').src.includes('3.rrd')")
+    assert "from when to when" in page.inner_text("#said")
+    page.click("tbody tr:nth-child(5)")
+    page.wait_for_selector("#said:empty", state="attached")
 
 
 def test_a_stretch_is_noted_and_the_note_taken_away(page, served):
