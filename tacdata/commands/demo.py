@@ -22,14 +22,14 @@ START_LIMIT = 60.0
 
 def run(
     out: Annotated[Path, typer.Option(help="Folder to make; if it exists, a numbered one beside it.")] = Path("demo"),
-    presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 48,
-    epochs: Annotated[int, typer.Option(min=1, help="Passes of the training over its frames.")] = 20,
+    presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 96,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes of the training over its frames.")] = 10,
     speed: Annotated[
         float, typer.Option(min=1.0, max=16.0, help="Virtual seconds per second; less on a busy machine.")
     ] = 4.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the plan, the virtual world and the training.")] = 1,
 ) -> Result:
-    """Run the main job once against a virtual rig, in a few minutes, and say where everything lies."""
+    """Run the main job once against a virtual rig, in some eight minutes, and say where everything lies."""
     place = _Place(_new_folder(out))
     recording, learning = place.recording(presses, seed), place.learning(epochs, seed)
     kept = f"what was finished is in {place.folder}; on a busy machine run again with a lower --speed"
