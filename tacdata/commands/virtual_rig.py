@@ -85,7 +85,10 @@ def run(
         rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skins.get("thumb"), rough, secret)
     try:
         rig.start()
-        print("\n".join([*rig.emulates, f"rig file           {rig.path}", "Ctrl-C stops it."]), flush=True)
+        lines = [*rig.emulates, f"rig file           {rig.path}"]
+        if sensor and not demo:
+            lines.append(f"sensor             {sensor[-1]}; give --sensor to register and record too")
+        print("\n".join([*lines, "Ctrl-C stops it."]), flush=True)
         while not stopped.wait(0.5):
             pass
     finally:
