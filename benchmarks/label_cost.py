@@ -57,7 +57,8 @@ def main() -> None:
     spent = time.process_time() - began
     parameters = [solution.provenance["parameters"] for solution in solutions]
     print(f"{spent / len(asked):.2f} CPU s a press, {np.mean([len(s.depth) for s in solutions]):.1f} states")
-    print(f"{np.mean([own['newton'] for own in parameters]):.1f} Newton steps a press")
+    changed = np.mean([np.sum(solution.status_steps) for solution in solutions])
+    print(f"{np.mean([own['newton'] for own in parameters]):.1f} Newton steps a press, {changed:.1f} changed contact")
     for model in models:
         print(f"steps of the batch on {len(model.mesh.nodes)} nodes: {model.last_run}")
 

@@ -22,8 +22,8 @@ TAXEL = ("taxel_force", "taxel_closure", "taxel_area")
 """What a label says of each protrusion."""
 ALWAYS = ("signed", "error_map", "force", "force_error", "interpolation_error")
 """What it says of map and force."""
-TRACTION = ("traction",)
-"""What it says of the contact, where the path has it."""
+CONTACT = ("traction", "taxel_pressure")
+"""What it says of contact with the indenter and the board, where the path has it."""
 UNCERTAIN = ("uncertainty", "force_uncertainty", "taxel_force_uncertainty", "taxel_closure_uncertainty")
 """Standard deviations that a label takes over from its path, where the path has them."""
 
@@ -73,7 +73,8 @@ def _untouched(request: LabelRequest) -> dict[str, np.ndarray]:
 
     Without contact nothing that has a spread acts; that of height is not followed into contact.
     """
-    zeros = _zeros(request, (*TRACTION, *(UNCERTAIN if request.sensor.uncertainty else ())))
+    contact = CONTACT if request.sensor.contact.board else CONTACT[:1]
+    zeros = _zeros(request, (*contact, *(UNCERTAIN if request.sensor.uncertainty else ())))
     doubt = np.maximum(request.tip[:, 2], 0.0)
     return zeros | {"error_map": np.broadcast_to(doubt[:, None, None], zeros["signed"].shape)}
 
@@ -86,7 +87,7 @@ def _zeros(request: LabelRequest, where_known: Sequence[str]) -> dict[str, np.nd
 
 def _along_path(request: LabelRequest, solution: PathSolution) -> dict[str, np.ndarray]:
     """Return each frame's values from the neighbouring states of its branch."""
-    known = [name for name in (*TRACTION, *UNCERTAIN) if getattr(solution, name) is not None]
+    known = [name for name in (*CONTACT, *UNCERTAIN) if getattr(solution, name) is not None]
     values = _zeros(request, known)
     for loading in (True, False):
         chosen = ((request.time_ns <= request.deepest_ns) == loading) & (request.tip[:, 2] > 0)

@@ -9,6 +9,7 @@ from label_farm.store import solution_file
 from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
+from tacdata.sensor.protrusion_pixels import PIXELS
 
 
 def check_solution(job: Job, solution: PathSolution, sensor: Sensor) -> None:
@@ -31,6 +32,9 @@ def check_solution(job: Job, solution: PathSolution, sensor: Sensor) -> None:
         "residual": (states,),
         "penetration": (states,),
         "traction": (states, 3, *sensor.map.shape),
+        "taxel_pressure": (states, sensor.taxels.count, PIXELS, PIXELS),
+        "status_steps": (states,),
+        "equilibrium_steps": (states,),
         "uncertainty": (states, *sensor.map.shape),
         "force_uncertainty": (states, 3),
         "taxel_force_uncertainty": (states, sensor.taxels.count),

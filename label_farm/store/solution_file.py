@@ -33,12 +33,17 @@ UNITS = {
 }
 OPTIONAL = {
     "traction": "MPa",
+    "taxel_pressure": "MPa",
+    "status_steps": "1",
+    "equilibrium_steps": "1",
     "uncertainty": "mm",
     "force_uncertainty": "N",
     "taxel_force_uncertainty": "N",
     "taxel_closure_uncertainty": "mm",
 }
 """Units of arrays that older releases did not write, or that are there where the sensor file states spreads."""
+PACKED = ("traction.npy", "taxel_pressure.npy")
+"""Members that are compressed."""
 REMEDY = "remove it and run `tacdata label` again: results can always be made anew"
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -71,9 +76,9 @@ def encode(job: Job, solution: PathSolution) -> bytes:
     with zipfile.ZipFile(stream, "w") as archive:
         text = json.dumps(header, indent=1, allow_nan=False).encode()
         for name, content in {HEADER: text, **members}.items():
-            # The digits of maps hardly shrink, and trying cost more than all else that is done here. A traction is 0
+            # The digits of maps hardly shrink, and trying cost more than all else that is done here. A pressure is 0
             # where nothing touches: it shrinks to a tenth.
-            kind = zipfile.ZIP_DEFLATED if name == "traction.npy" else zipfile.ZIP_STORED
+            kind = zipfile.ZIP_DEFLATED if name in PACKED else zipfile.ZIP_STORED
             archive.writestr(zipfile.ZipInfo(name, EPOCH), content, kind, compresslevel=1)
     return stream.getvalue()
 

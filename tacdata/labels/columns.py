@@ -6,6 +6,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.labels.label import Label
+from tacdata.sensor.protrusion_pixels import PIXELS
 
 REQUIRED = {
     "time_ns": ("ns", "int64", "frame"),
@@ -22,6 +23,7 @@ REQUIRED = {
 """Unit, type and kind of each column that every label has; the first axis is the frames."""
 OPTIONAL = {
     "traction": ("MPa", "float16", "vector map"),
+    "taxel_pressure": ("MPa", "float16", "taxel maps"),
     "interpolation_error": ("mm", "float32", "frame"),
     "uncertainty": ("mm", "float16", "map"),
     "force_uncertainty": ("N", "float32", "vector"),
@@ -34,7 +36,7 @@ OPTIONAL = {
 ALL = {**REQUIRED, **OPTIONAL}
 UNITS = {name: unit for name, (unit, _, _) in ALL.items()}
 DTYPES = {name: dtype for name, (_, dtype, _) in ALL.items()}
-NDIM = {"frame": 1, "vector": 2, "taxels": 2, "map": 3, "vector map": 4}
+NDIM = {"frame": 1, "vector": 2, "taxels": 2, "map": 3, "vector map": 4, "taxel maps": 4}
 
 
 def present(label: Label) -> tuple[str, ...]:
@@ -44,7 +46,10 @@ def present(label: Label) -> tuple[str, ...]:
 
 def shape(name: str, frames: int, pixels: tuple[int, int], taxels: int) -> tuple[int, ...]:
     """Return a column's shape."""
-    kinds = {"frame": (), "vector": (3,), "taxels": (taxels,), "map": pixels, "vector map": (3, *pixels)}
+    kinds = {
+        "frame": (), "vector": (3,), "taxels": (taxels,), "map": pixels, "vector map": (3, *pixels),
+        "taxel maps": (taxels, PIXELS, PIXELS),
+    }
     return (frames, *kinds[ALL[name][2]])
 
 

@@ -42,6 +42,15 @@ class PathSolution:
     """Contact force on the indenter by area of the map, seen from above [MPa], shape (k, 3, pixels_x, pixels_y): z is
     pressure where the face is level, x and y are shear. Times a pixel's area it sums to ``force``. None in files of
     older releases."""
+    taxel_pressure: np.ndarray | None = None
+    """Pressure of each protrusion on the board, by area of its pixels (`tacdata.sensor.protrusion_pixels`) [MPa], shape
+    (k, taxels, 10, 10). Times a pixel's area it sums to ``taxel_force``. None without a board, and in files of older
+    releases."""
+    status_steps: np.ndarray | None = None
+    """Newton steps since the state before after which contact had another status: a node opened, closed, stuck or
+    slipped [count], shape (k,). None in files of older releases; so are the next."""
+    equilibrium_steps: np.ndarray | None = None
+    """All other Newton steps since the state before [count], shape (k,)."""
     uncertainty: np.ndarray | None = None
     """One standard deviation of ``surface`` by the spreads that the sensor file states [mm], shape (k, pixels_x,
     pixels_y); None if it states none or none was asked for. So are the three below."""
@@ -97,6 +106,9 @@ class Label:
     traction: np.ndarray | None = None
     """Contact force on the indenter by area of the map, seen from above [MPa], shape (n, 3, pixels_x, pixels_y),
     float16: z is pressure where the face is level, x and y are shear. None in labels of older releases."""
+    taxel_pressure: np.ndarray | None = None
+    """Pressure of each protrusion on the board, by area of its pixels (`tacdata.sensor.protrusion_pixels`) [MPa], shape
+    (n, taxels, 10, 10), float16. None without a board, and in labels of older releases."""
     interpolation_error: np.ndarray | None = None
     """How far, at the pixel where it is most, the states beside each frame lie from what their neighbours say of them
     [mm], shape (n,), float32. A state is left out at twice the distance, so this bounds what is lost at the frame."""

@@ -300,6 +300,9 @@ class SkinModel:
             depth=fine.depth,
             surface=fine.surface,
             traction=np.stack([self.skin.tractions.traction(s.displacement, s.traction) for s in states]),
+            taxel_pressure=self._taxel_pressure(states),
+            status_steps=np.array([float(state.changed) for state in states]),
+            equilibrium_steps=np.array([float(state.newton - state.changed) for state in states]),
             numerical=error.surface,
             taxel_force=fine.taxel_force,
             taxel_force_error=error.taxel_force,
@@ -311,3 +314,7 @@ class SkinModel:
             penetration=np.array([state.penetration for state in states]),
             provenance=provenance.stamp("tacdata.skin", self.identity, parameters),
         )
+
+    def _taxel_pressure(self, states: list[Equilibrium]) -> np.ndarray | None:
+        raster = self.skin.protrusions
+        return raster and np.stack([raster.pressure(state.displacement, state.board_pressure) for state in states])

@@ -11,6 +11,7 @@ import numpy as np
 from tacdata import provenance
 from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
+from tacdata.sensor.protrusion_pixels import PIXELS
 
 
 class FastModel:
@@ -77,6 +78,12 @@ def path(sensor, depths, answer, x=0.0, bad=False, numerical=0.0):
         taxel_force_error=np.abs(values)[:, None] * numerical * taxels,
         # As little of the map is in contact as of a real one.
         traction=values[:, None, None, None] * np.maximum(bump - 0.8, 0.0) * np.array([0.1, 0.0, 1.0])[:, None, None],
+        taxel_pressure=(
+            values[:, None, None, None] * np.outer(*2 * [np.hanning(PIXELS)]) * taxels[:, None, None]
+            if sensor.contact.board else None
+        ),
+        status_steps=np.full(len(depth), 2.0),
+        equilibrium_steps=np.full(len(depth), 3.0),
         residual=np.zeros(len(depth)),
         penetration=np.zeros(len(depth)),
         provenance={"law": "bump"},

@@ -13,6 +13,9 @@ from viewers.scene import thinning
 BATCH = 2000
 """Maps in memory at a time [frames]."""
 
+CONTACT = ("traction", "taxel_pressure")
+"""Columns of contact pressure, which not every label has."""
+
 
 @dataclass(frozen=True)
 class ShownLabel:
@@ -31,10 +34,16 @@ class ShownLabel:
     traction: np.ndarray | None = None
     """Their contact force on the indenter by area [MPa], shape (k, 3, pixels_x, pixels_y), float16, if known."""
 
+    taxel_pressure: np.ndarray | None = None
+    """Their pressure of each protrusion on the board [MPa], shape (k, taxels, 10, 10), float16, if known."""
+
     @classmethod
     def of(cls, label: Label) -> ShownLabel:
         """Return all of a label's maps."""
-        return cls(label.time_ns, label.force, label.error, np.arange(len(label.time_ns)), label.signed, label.traction)
+        every = np.arange(len(label.time_ns))
+        return cls(
+            label.time_ns, label.force, label.error, every, label.signed, label.traction, label.taxel_pressure
+        )
 
     @property
     def map_ns(self) -> np.ndarray:
@@ -56,7 +65,7 @@ def shown_label(path: Path, most: int | None = None) -> ShownLabel:
     small = read_label_columns(path, ("time_ns", "force", "error"))
     count = len(small["time_ns"])
     if most is None or count <= most:
-        return ShownLabel(**small, kept=np.arange(count), **read_label_columns(path, ("signed", "traction")))
+        return ShownLabel(**small, kept=np.arange(count), **read_label_columns(path, ("signed", *CONTACT)))
     starts = thinning.stretches(count, most)
     best, row, shown = np.full(most, -np.inf), np.zeros(most, int), {}
     begin = 0
@@ -69,6 +78,6 @@ def shown_label(path: Path, most: int | None = None) -> ShownLabel:
             if depth[deepest] > best[stretch]:
                 best[stretch], row[stretch], shown[stretch] = depth[deepest], begin + deepest, maps[deepest].copy()
         begin += len(maps)
-    traction = read_label_columns(path, ("traction",)).get("traction")
     signed = np.stack([shown[k] for k in range(most)])
-    return ShownLabel(**small, kept=row, signed=signed, traction=None if traction is None else traction[row])
+    contact = {name: values[row] for name, values in read_label_columns(path, CONTACT).items()}
+    return ShownLabel(**small, kept=row, signed=signed, **contact)

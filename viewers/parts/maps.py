@@ -1,4 +1,7 @@
-"""Maps of an episode: depth by label and prediction on one scale, their difference, pressure and shear."""
+"""Maps of an episode: depth by label and prediction on one scale, their difference, pressure and shear.
+
+Pressure is shown twice: that of the indenter on the skin, and that of the protrusions on the board.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.sensor import Sensor
+from tacdata.sensor.protrusion_pixels import PIXELS, ProtrusionPixels
 from viewers.scene import thinning
 from viewers.scene.color_scale import scale_of
 from viewers.scene.scene import Curves, DepthMaps
@@ -59,6 +63,24 @@ def contact_maps(sensor: Sensor, time_ns: np.ndarray, traction: np.ndarray) -> t
         DepthMaps(name, sensor.map.x, sensor.map.y, time_ns, values, scale_of(values, "kPa", floor=CONTACT_FLOOR))
         for name, values in (("pressure", 1e3 * pressure), ("shear", 1e3 * shear))
     )
+
+
+def board_map(sensor: Sensor, time_ns: np.ndarray, pressure: np.ndarray) -> DepthMaps:
+    """Return the map called "board" [kPa]: each protrusion's pressure where it stands, to half of a pixel.
+
+    Args:
+        sensor: Gives the protrusions' places.
+        time_ns: Times [ns], shape (n,).
+        pressure: Of each protrusion on the board [MPa], shape (n, taxels, PIXELS, PIXELS).
+    """
+    pitch, centers = ProtrusionPixels(sensor.skin.protrusion_radius).pitch, sensor.taxels.centers
+    corner = np.rint((centers - centers.min(axis=0)) / pitch).astype(int)
+    shape = corner.max(axis=0) + PIXELS
+    x, y = (pitch * (np.arange(count) - (count - 1) / 2) for count in shape)
+    values = np.zeros((len(time_ns), *shape), np.float32)
+    for (i, j), own in zip(corner, np.moveaxis(pressure, 1, 0), strict=True):
+        values[:, i : i + PIXELS, j : j + PIXELS] += 1e3 * own.astype(np.float32)
+    return DepthMaps("board", x, y, time_ns, values, scale_of(values, "kPa", floor=CONTACT_FLOOR))
 
 
 def error_curves(maps: tuple[DepthMaps, ...]) -> tuple[Curves, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -16,7 +18,7 @@ from viewers.scene.scene import Scene
 Moments = tuple[tuple[str, int], ...]
 TITLES = {
     "label": "Label", "prediction": "Prediction", "error": "Prediction − label",
-    "pressure": "Pressure", "shear": "Shear",
+    "pressure": "Pressure", "shear": "Shear", "board": "Protrusions on the board",
 }
 INK, SHADES = "0.25", ("0.97", "0.91")
 
@@ -119,12 +121,17 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
                     fontsize=8,
                     color=INK,
                 )
+    first = scene.maps[0]
+    for axis, centers in (("x", first.x), ("y", first.y)):
+        # All share axes, and the protrusions' own map is smaller.
+        grid[0, 0].set(**{f"{axis}lim": _ends(centers)})
     for axes, shown in zip(grid[0], scene.maps, strict=True):
         axes.set_title(TITLES.get(shown.name, shown.name))
     for axes in grid[-1]:
         axes.set_xlabel("x [mm]")
-    for scale in dict.fromkeys(m.scale for m in scene.maps):
-        own = [k for k, m in enumerate(scene.maps) if m.scale == scale]
+    # Neighbours on one scale share a bar; maps apart from each other would share it across what lies between.
+    for scale, group in groupby(range(len(scene.maps)), key=lambda k: scene.maps[k].scale):
+        own = list(group)
         # One map alone keeps its proportions, and is narrower than its column.
         part = 0.9 if len(scene.maps) > 1 else 0.3
         bar = figure.colorbar(mappable(scale), ax=grid[:, own], location="bottom", shrink=part, aspect=20 * len(own))
@@ -133,7 +140,7 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
 
 def _bar_label(scale: ColorScale, names: list[str]) -> str:
     if scale.unit == "kPa":
-        return f"{' and '.join(names)} [kPa]"
+        return f"{' and '.join(names)} [kPa]".replace("board", "pressure on the board")
     if not scale.signed:
         return "depth [mm]"
     return "error of depth [mm]" if names == ["error"] else "difference of depth [mm]"
@@ -141,8 +148,7 @@ def _bar_label(scale: ColorScale, names: list[str]) -> str:
 
 def image(axes: Axes, values: np.ndarray, centers: tuple[np.ndarray, np.ndarray], scale: ColorScale) -> None:
     """Draw values, shape (rows, columns), whose centres along x and y [mm] are given."""
-    half = [(c[1] - c[0]) / 2 if len(c) > 1 else 0.5 for c in centers]
-    (left, right), (bottom, top) = ((c[0] - h, c[-1] + h) for c, h in zip(centers, half, strict=True))
+    (left, right), (bottom, top) = map(_ends, centers)
     axes.imshow(
         values,
         origin="lower",
@@ -152,6 +158,12 @@ def image(axes: Axes, values: np.ndarray, centers: tuple[np.ndarray, np.ndarray]
         vmax=scale.high,
     )
     axes.spines[:].set_visible(False)
+
+
+def _ends(centers: np.ndarray) -> tuple[float, float]:
+    """Return where pixels with these centres [mm] begin and end."""
+    half = (centers[1] - centers[0]) / 2 if len(centers) > 1 else 0.5
+    return float(centers[0] - half), float(centers[-1] + half)
 
 
 def tip_mark(axes: Axes, scene: Scene, moment: int) -> None:

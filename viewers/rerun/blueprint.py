@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from viewers.rerun.columns import entity
+from viewers.rerun.columns import entity, marks_of
 from viewers.rerun.timelines import HOST
 from viewers.scene.scene import Scene
 
@@ -14,6 +14,7 @@ MAP_TITLES = {
     "error": "Prediction − label, ±{high:g} mm",
     "pressure": "Pressure, 0 to {high:g} kPa",
     "shear": "Shear, 0 to {high:g} kPa",
+    "board": "Protrusions on the board, 0 to {high:g} kPa",
 }
 SKIN_TITLES = {
     "label": "Skin by the label [mm]",
@@ -96,9 +97,8 @@ def _side(scene: Scene) -> rrb.Container:
 
 
 def _map(name: str, high: float) -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(
-        origin="maps", contents=[entity("maps", name), "maps/marks/**"], name=MAP_TITLES[name].format(high=high)
-    )
+    shown = [entity("maps", name), f"{marks_of(name)}/**"]
+    return rrb.Spatial2DView(origin="maps", contents=shown, name=MAP_TITLES[name].format(high=high))
 
 
 def _heat_map(scene: Scene) -> rrb.Spatial2DView:

@@ -47,6 +47,11 @@ def heat_map_of(array: TaxelArray) -> str:
     return entity("heat_map", array.name) if array.name else "heat_map"
 
 
+def marks_of(name: str) -> str:
+    """Return the entity of the marks over a map: the board's pixels are not those of the others."""
+    return "maps/marks_board" if name == "board" else "maps/marks"
+
+
 class RerunParts:
     """Writes a scene's parts into one recording."""
 
@@ -66,7 +71,8 @@ class RerunParts:
         for maps in scene.maps:
             self._maps(maps)
         if scene.maps and scene.footprint is not None:
-            self._map_marks(scene.maps[0])
+            for maps in {marks_of(own.name): own for own in reversed(scene.maps)}.values():
+                self._map_marks(maps)
         for surface in scene.surfaces:
             self._surface(surface)
         for body in scene.bodies:
@@ -132,15 +138,16 @@ class RerunParts:
         self._image(entity("maps", maps.name), maps.time_ns, maps.pictures, maps.scale)
 
     def _map_marks(self, maps: DepthMaps) -> None:
-        """Write the taxels and the nominal tip, where there are any, as marks over the picture of every map view."""
+        """Write the taxels and the nominal tip, where there are any, as marks over the pictures of a grid of pixels."""
+        marks = marks_of(maps.name)
         for array in self._scene.arrays[:1]:
             fixed = rr.Points2D(maps.pixels(array.centers), radii=[0.12], colors=[OUTLINE_COLOR])
-            self._static("maps/marks/taxels", fixed)
+            self._static(f"{marks}/taxels", fixed)
         tip = self._scene.tip
         if tip is not None:
-            self._static("maps/marks/tip", rr.Points2D.from_fields(radii=[0.4], colors=[TIP_COLOR]))
+            self._static(f"{marks}/tip", rr.Points2D.from_fields(radii=[0.4], colors=[TIP_COLOR]))
             columns = rr.Points2D.columns(positions=maps.pixels(tip.values))
-            self._columns("maps/marks/tip", tip.time_ns, columns)
+            self._columns(f"{marks}/tip", tip.time_ns, columns)
 
     def _taxels(self, taxels: TaxelArray) -> None:
         if len(taxels.time_ns):

@@ -81,7 +81,7 @@ class DepthMaps:
     """Maps on the label's pixel grid."""
 
     name: str
-    """"label", "prediction", "error", "pressure", "shear", or what a comparison calls it."""
+    """"label", "prediction", "error", "pressure", "shear", "board", or what a comparison calls it."""
     x: np.ndarray
     """Pixel centres along x [mm], shape (pixels_x,)."""
     y: np.ndarray

@@ -57,6 +57,8 @@ def episode_scene(
     shown = maps.depth_maps(sensor, label_pair, prediction_pair)
     if label and label.traction is not None:
         shown += maps.contact_maps(sensor, label.map_ns, label.traction)
+    if label and label.taxel_pressure is not None:
+        shown += (maps.board_map(sensor, label.map_ns, label.taxel_pressure),)
     tip = episode.tip_at(time) if len(episode.tip_ns) else None
     cameras = camera_view.camera_views(episode, images)
     curves = signals.episode_curves(episode, unit) + (signals.label_curves(label) if label else ())

@@ -34,6 +34,9 @@ from tacdata.skin.mesh import elements
 SUBDIVISIONS = 2
 """The quadrature rule is repeated on the sub-triangles of the hats, on which these are linear."""
 
+_HELD = 1 - 1e-9
+"""Shear over what friction allows up to which a node sticks [1]; one that slips is returned to 1."""
+
 
 class ContactSurface:
     """Faces of the mesh against rigid shapes, one a member. It holds nothing that changes while presses are solved."""
@@ -200,6 +203,14 @@ class ContactSurface:
         load = now.pressure.abs() * self.area[:, None]
         mean = (load * off).sum(dim=0) / load.sum(dim=0).clamp_min(1e-30)
         return off.amax(dim=0), mean
+
+    def status(self, now: ContactForces, friction: torch.Tensor) -> torch.Tensor:
+        """Return what each node does, shape (s, b), int8: 0 is open, 1 sticks, 2 slips; ``friction``: shape (b,)."""
+        active = now.tangent.active.to(torch.int8)
+        if not self.rough:
+            return active
+        held = _HELD * friction * now.pressure.clamp_min(0.0)
+        return active + (torch.linalg.vector_norm(now.shear, dim=1) > held)
 
     def passed_through(self, u: torch.Tensor, pose: Pose, conditions: Conditions) -> torch.Tensor:
         """Return in which members a point of the face lies above the shape, shape (b,), bool; ``u``: (n, 3, b)."""

@@ -13,12 +13,13 @@ import numpy as np
 import torch
 
 from tacdata.errors import SolveError
-from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.solve.coarse_path import CoarseStart
 from tacdata.skin.solve.configuration import Configuration, Unknowns
+from tacdata.skin.solve.contact_status import ContactStatus
+from tacdata.skin.solve.equilibrium import Equilibria
 from tacdata.skin.solve.load_path import LoadPath
 from tacdata.skin.solve.newton import Newton, Residual
 from tacdata.skin.solve.starts import TOUCHING, Starts
@@ -60,26 +61,6 @@ class PlacedPress:
     """Its states on a coarser mesh, if they are known: its load steps start from there."""
 
 
-@dataclass(frozen=True)
-class Equilibria:
-    """Columns of the batch that have just reached a state that is wanted."""
-
-    column: torch.Tensor
-    """Their indices, shape (k,)."""
-    u: torch.Tensor
-    """Displacements [mm], shape (n, 3, k)."""
-    turn: torch.Tensor
-    """Rotation from the indenter's frame to the sensor's [1], shape (3, 3, k)."""
-    relative: np.ndarray
-    """Out-of-balance force over the contact force [1], shape (k,)."""
-    penetration: np.ndarray
-    """Largest penetration [mm], shape (k,)."""
-    newton: list[int]
-    """Newton iterations since the state before, each."""
-    contacts: tuple[ContactForces, ...]
-    """Forces of each contact, of all columns of the batch."""
-
-
 Collect = Callable[[Equilibria], list[Any]]
 """Makes of every column's state what is to be kept of it."""
 
@@ -114,6 +95,7 @@ class Batch:
         none = torch.zeros_like(u[0, 0])
         self._at = Configuration(u, multipliers, idle.repeat(capacity), poses, histories, none, none.clone())
         self._base = self._at.unknowns
+        self._status = ContactStatus(newton.surfaces)
         self._starts = Starts(self._base, any(surface.attracts for surface in newton.surfaces))
         self._failed_at = torch.full((capacity,), torch.inf, dtype=torch.float64, device=device)
         self._presses: list[PlacedPress | None] = [None] * capacity
@@ -197,11 +179,16 @@ class Batch:
         return self._newton.updated(now, self._at, which)
 
     def _judge(self, now: Residual) -> list[str]:
-        figures = torch.stack([now.relative, now.penetration, now.mean_penetration, now.volume], dim=1).tolist()
-        verdicts = [
-            "idle" if press is None else press.path.judge(*row, settings=self._newton.settings)
-            for press, row in zip(self._presses, figures, strict=True)
-        ]
+        changed = self._status.changed(now.contacts, self._at.conditions.friction).to(now.relative.dtype)
+        # Together, as a GPU is waited for each time that something is read off it.
+        columns = [changed, now.relative, now.penetration, now.mean_penetration, now.volume]
+        figures = torch.stack(columns, dim=1).tolist()
+        verdicts = ["idle"] * len(figures)
+        for column, press in enumerate(self._presses):
+            if press is not None:
+                if figures[column][0]:
+                    press.path.status_changed()
+                verdicts[column] = press.path.judge(*figures[column][1:], settings=self._newton.settings)
         found = self._mask(verdicts, "found").nonzero()[0]
         if len(found):
             at, which = self._at, self._tensor(found)
@@ -239,16 +226,16 @@ class Batch:
         if wanted:
             columns = torch.as_tensor(wanted, device=at.u.device)
             relative, penetration = torch.stack([now.relative, now.penetration])[:, columns].cpu().numpy()
-            spent = [self._press(column).path.spent for column in wanted]
+            changed = [self._press(column).path.changed for column in wanted]
+            spent = [self._press(column).path.taken() for column in wanted]
             states = collect(
                 Equilibria(
                     columns, at.u[:, :, columns], at.poses[0].turn[:, :, columns], relative, penetration, spent,
-                    now.contacts,
+                    changed, now.contacts,
                 )
             )
             for column, state in zip(wanted, states, strict=True):
                 press = self._press(column)
-                press.path.spent = 0
                 yield press.number, press.path.depth, state
         self._release([column for column, path in paths.items() if path.finished])
         for path in paths.values():
@@ -338,6 +325,7 @@ class Batch:
         for press in self._presses:
             if press is not None:
                 press.path.stepped()
+        self._status.note(now.contacts, at.conditions.friction)
         moved, changes, used = self._newton.step(at, now, busy)
         self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
         # The first step of a load step changes the active set: the residual before says little, or nothing.
@@ -377,6 +365,7 @@ class Batch:
         self._at, self._base = self._at.take(which), self._base.take(which)
         self._before, self._failed_at = self._before[which], self._failed_at[which]
         self._starts.keep(which)
+        self._status.keep(which)
         self._newton.tangent.keep(which)
         self._presses = [self._presses[column] for column in columns]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.mesh.skin_mesh import SkinMesh
-from tacdata.skin.solve.batch import Equilibria
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,9 @@ class Equilibrium:
     traction: np.ndarray
     """Contact traction on the indenter at the nodes of the outer face [MPa], by undeformed area, shape (s, 3); empty
     where displacements are. An adhesive attraction is not in it."""
+    board_pressure: np.ndarray
+    """Pressure on the board at the nodes of the protrusions [MPa], by undeformed area, shape (s,); empty without a
+    board, and where displacements are."""
     force: np.ndarray
     """Force of the skin on the indenter [N], shape (3,)."""
     taxel_force: np.ndarray
@@ -35,6 +38,30 @@ class Equilibrium:
     """Largest penetration [mm]."""
     newton: int
     """Newton iterations since the state before."""
+    changed: int
+    """Those of them after which contact had another status: a node opened, closed, stuck or slipped."""
+
+
+@dataclass(frozen=True)
+class Equilibria:
+    """Columns of the batch that have just reached a state that is wanted."""
+
+    column: torch.Tensor
+    """Their indices, shape (k,)."""
+    u: torch.Tensor
+    """Displacements [mm], shape (n, 3, k)."""
+    turn: torch.Tensor
+    """Rotation from the indenter's frame to the sensor's [1], shape (3, 3, k)."""
+    relative: np.ndarray
+    """Out-of-balance force over the contact force [1], shape (k,)."""
+    penetration: np.ndarray
+    """Largest penetration [mm], shape (k,)."""
+    newton: list[int]
+    """Newton iterations since the state before, each."""
+    changed: list[int]
+    """Those of them after which contact had another status."""
+    contacts: tuple[ContactForces, ...]
+    """Forces of each contact, of all columns of the batch."""
 
 
 class StateReader:
@@ -84,12 +111,15 @@ class StateReader:
             value.T.cpu().numpy() for value in (force, load, area, self.closure(found.u))
         )
         u = traction = [np.empty((0, 3))] * len(column)
+        board = [np.empty(0)] * len(column)
         if with_displacement:
+            if self._board:
+                board = found.contacts[1].pressure[:, column].T.cpu().numpy()
             u, traction = (field.permute(2, 0, 1).cpu().numpy() for field in (found.u, _on_indenter(found)))
         return [
             Equilibrium(
-                u[k], traction[k], force[k], load[k], closure[k], area[k], float(found.relative[k]),
-                float(found.penetration[k]), found.newton[k],
+                u[k], traction[k], board[k], force[k], load[k], closure[k], area[k], float(found.relative[k]),
+                float(found.penetration[k]), found.newton[k], found.changed[k],
             )
             for k in range(len(column))
         ]

@@ -39,6 +39,8 @@ class LoadPath:
     """Newton steps of the present attempt."""
     spent: int = 0
     """Newton steps since the last wanted state, failed attempts included."""
+    changed: int = 0
+    """Those of them after which contact had another status: a node opened, closed, stuck or slipped."""
     _wanted: int = 0
     _step: float = 0.0
     _best: float = math.inf
@@ -93,6 +95,15 @@ class LoadPath:
         """Count a Newton step."""
         self.newton += 1
         self.spent += 1
+
+    def status_changed(self) -> None:
+        """Count the last Newton step, if one was taken, as one after which contact had another status."""
+        self.changed += self.newton > 0
+
+    def taken(self) -> int:
+        """Return the Newton steps since the last wanted state, and begin to count anew."""
+        spent, self.spent, self.changed = self.spent, 0, 0
+        return spent
 
     def passed_through(self) -> None:
         """Say why the present iterate, balanced as it is, is no state of this press."""

@@ -34,6 +34,7 @@ from tacdata.skin.solve.load_path import LoadPath
 from tacdata.skin.solve.newton import Newton
 from tacdata.skin.solve.settings import ModelSettings, SolverSettings
 from tacdata.skin.surface.outer_face import OuterFace
+from tacdata.skin.surface.protrusion_pressure import ProtrusionRaster
 from tacdata.skin.surface.traction_map import TractionRaster
 
 _FIRST = 0.3
@@ -85,6 +86,7 @@ class MeshedSkin:
         self.reader = StateReader(self.mesh, sensor.taxels.count, self.board, device)
         self.face = OuterFace(self.mesh)
         self.tractions = TractionRaster(self.mesh, sensor.map)
+        self.protrusions = ProtrusionRaster(self.mesh, sensor) if self.board else None
 
     @cached_property
     def rest(self) -> RestSolver:

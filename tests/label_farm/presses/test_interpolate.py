@@ -140,7 +140,12 @@ def test_tractions_follow_the_frames_where_the_path_knows_them(tmp_path):
     wanted = np.maximum(label.tip[:, 2], 0.0)[:, None, None] * pressed
     np.testing.assert_allclose(label.traction[:, 2], wanted, rtol=2e-3, atol=1e-6)
     np.testing.assert_allclose(label.traction[:, 0], 0.1 * wanted, rtol=2e-3, atol=1e-6)
-    assert make_label(wish, replace(states, traction=None)).traction is None
+    assert label.taxel_pressure.shape == (200, 24, 10, 10) and label.taxel_pressure.dtype == np.float16
+    borne = states.taxel_pressure[states.depth.argmax()] / states.depth.max()
+    wanted = np.maximum(label.tip[:, 2], 0.0)[:, None, None, None] * borne
+    np.testing.assert_allclose(label.taxel_pressure, wanted, rtol=2e-3, atol=1e-6)
+    older = make_label(wish, replace(states, traction=None, taxel_pressure=None))
+    assert older.traction is None and older.taxel_pressure is None
 
 
 def test_a_label_says_what_the_taxels_would_read(tmp_path):

@@ -116,6 +116,21 @@ def test_no_node_under_a_sphere_leaves_coulombs_disc(mesh):
     assert (shear[:, 0] > 0).all()
 
 
+@pytest.mark.parametrize(("friction", "what"), [(0.05, 2), (5.0, 1), (0.0, 1)])
+def test_a_node_is_open_sticks_or_slips(mesh, friction, what):
+    """Dragged by 0.05 mm; without friction a node that touches is said to stick."""
+    pressed = against(mesh, friction)
+    u, before = pressed.flat(), pose_at(depth=0.05)
+    state = pressed.start(before)
+    pressed.press(u, before, state)
+    state.accept(pressed.now, before, everyone(before))
+    pressed.press(u, pose_at(x=0.01 if friction > 1 else 0.05, depth=0.05), state)
+    status = pressed.surface.status(pressed.now, pressed.conditions.friction)[:, 0]
+    touching = pressed.now.pressure[:, 0] > 0
+    assert touching.any() and not status[~touching].any()
+    assert (status[touching] == what).double().mean() > 0.9
+
+
 def test_dragged_to_and_fro_friction_under_a_sphere_is_opposite(mesh):
     there, back = drag(mesh, 0.05, 0.05)[1], drag(mesh, 0.05, -0.05)[1]
     assert there[:, 0].mean() == pytest.approx(-back[:, 0].mean(), rel=0.05)

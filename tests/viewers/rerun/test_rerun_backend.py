@@ -2,6 +2,7 @@
 
 import subprocess
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -78,6 +79,19 @@ def test_maps_keep_their_millimetres_and_both_times(chunks, episode, label):
     assert (picture[::-1].T == label.depth[75]).all()
     assert (host == episode.taxels.sample_ns).all()
     assert (device == episode.taxels.counter).all()
+
+
+def test_marks_lie_on_the_pixels_of_their_own_map(episode, label, tmp_path):
+    """The protrusions' map has other pixels than the others: taxel 0 is marked at its middle in both."""
+    pressed = replace(label, taxel_pressure=np.full((len(label.time_ns), 24, 10, 10), 0.01, np.float16))
+    RerunBackend(tmp_path / "e.rrd").draw(episode_scene(episode, pressed))
+    marks = {}
+    for chunk in RrdReader(tmp_path / "e.rrd").stream():
+        path, batch = str(chunk.entity_path), chunk.to_record_batch()
+        if path.endswith("/taxels") and path.startswith("/maps") and chunk.is_static:
+            marks[path] = batch["Points2D:positions"].to_pylist()[0][0]
+    assert marks["/maps/marks/taxels"] == pytest.approx(((-4.75 + 7.0) / 0.4, 26 - (-3.75 + 5.2) / 0.4))
+    assert marks["/maps/marks_board/taxels"] == pytest.approx((5.0, 53 - 5.0), abs=0.5)
 
 
 def test_curves_keep_their_values(chunks, episode):

@@ -75,6 +75,26 @@ def test_pressure_and_shear_are_drawn_where_the_label_knows_them(episode, label,
     assert page(drawn).axes
 
 
+def test_the_pressure_of_each_protrusion_is_drawn_where_it_stands(episode, label):
+    pressure = np.zeros((len(label.time_ns), 24, 10, 10), np.float16)
+    pressure[:, 7, 2:8, 2:8] = 0.02
+    pressure[9, 16, 5, 5] = 0.1
+    drawn = episode_scene(episode, replace(label, taxel_pressure=pressure))
+    board = drawn.map_named("board")
+    assert board.scale.unit == "kPa" and board.scale.high >= 100 and (board.time_ns == label.time_ns).all()
+    pitch, (x, y) = 0.7 / 4, episode.sensor.taxels.centers[7]
+    assert np.diff(board.x) == pytest.approx(pitch) and np.diff(board.y) == pytest.approx(pitch)
+    there = (np.abs(board.x - x) < 3.6 * pitch)[:, None] & (np.abs(board.y - y) < 3.6 * pitch)
+    assert (board.values[5] > 0).sum() == 36 and not board.values[5][~there].any()
+    assert board.values[5].max() == pytest.approx(20.0, rel=1e-3)
+    [(i, j)] = np.argwhere(board.values[9] > 50)
+    aside = np.array([board.x[i], board.y[j]]) - episode.sensor.taxels.centers[16]
+    assert aside == pytest.approx(pitch / 2, abs=pitch / 2)
+    titled = {axes.get_title(): axes for axes in page(drawn).axes}
+    wide = titled["Label"].get_xlim(), titled["Protrusions on the board"].get_xlim()
+    assert np.ravel(wide) == pytest.approx([-7.0, 7.0] * 2), "the smaller map leaves the shared axes as they were"
+
+
 def test_the_skin_is_the_face_minus_the_signed_map(scene, episode, label):
     surface = scene.surfaces[0]
     thickness = episode.sensor.skin.thickness
