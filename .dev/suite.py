@@ -11,7 +11,6 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -26,8 +25,6 @@ NO_TESTS = 5
 """Pytest's exit status if none was to run."""
 MOST_OF_A_LINE = 1000
 """Characters kept of what pytest says, to find its last line."""
-STAND_BACK = 5
-"""How much pyright is put back beside the tests (nice)."""
 
 
 class Checks:
@@ -61,14 +58,6 @@ class Checks:
                 said = (said + piece)[-MOST_OF_A_LINE:]
         self._note(name, 0 if perhaps_none and done.returncode == NO_TESTS else done.returncode)
         self.summaries.append(said.strip().rpartition("\n")[2])
-
-    def collect(self, name, command, process, said):
-        """Wait for a command that was started beside the tests, and print what it said."""
-        process.wait()
-        self._head(name, command)
-        said.seek(0)
-        print(said.read(), end="", flush=True)
-        self._note(name, process.returncode)
 
     def end(self):
         """Print what failed, and the summaries of all test runs as one; return the exit status."""
@@ -119,33 +108,25 @@ def main(arguments):
     """Return the exit status."""
     checks = Checks()
     ours = {"--long", "--ci"} & set(arguments)
-    types = [str(BIN / "pyright"), "--pythonpath", sys.executable]
-    with tempfile.TemporaryFile("w+") as said:
-        beside = subprocess.Popen(
-            types, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT, preexec_fn=lambda: os.nice(STAND_BACK)
-        )
-        try:
-            # Once for all: else every test process, started at the same time, compiles all that is new here.
-            compiling = [
-                subprocess.Popen([sys.executable, *words], cwd=ROOT, env=_compiling())
-                for words in (["-m", "compileall", "-q", *PACKAGES], ["tests/running/rewritten.py"])
-            ]
-            checks.run("lint", [str(BIN / "ruff"), "check", "."])
-            checks.run("imports", [str(BIN / "lint-imports")])
-            for process in compiling:
-                process.wait()
-            rest = [argument for argument in arguments if argument not in ours]
-            if not arguments or "--ci" in ours:
-                checks.tests("tests", *_side_by_side(min(_cores(), MOST), WAITING), *rest)
-            elif not ours:
-                checks.tests("tests", *arguments)
-            if ours:
-                which = "changed" if "--ci" in ours else "all"
-                # One that holds a rig to the clock or fills the machine with workers, and one that computes beside it.
-                checks.tests("long part", f"--long={which}", *_side_by_side(1, 1), *rest, perhaps_none=True)
-            checks.collect("types", types, beside, said)
-        finally:
-            beside.kill()
+    # Once for all: else every test process, started at the same time, compiles all that is new here.
+    compiling = [
+        subprocess.Popen([sys.executable, *words], cwd=ROOT, env=_compiling())
+        for words in (["-m", "compileall", "-q", *PACKAGES], ["tests/running/rewritten.py"])
+    ]
+    checks.run("lint", [str(BIN / "ruff"), "check", "."])
+    checks.run("imports", [str(BIN / "lint-imports")])
+    checks.run("types", [str(BIN / "ty"), "check", "--no-progress"])
+    for process in compiling:
+        process.wait()
+    rest = [argument for argument in arguments if argument not in ours]
+    if not arguments or "--ci" in ours:
+        checks.tests("tests", *_side_by_side(min(_cores(), MOST), WAITING), *rest)
+    elif not ours:
+        checks.tests("tests", *arguments)
+    if ours:
+        which = "changed" if "--ci" in ours else "all"
+        # One that holds a rig to the clock or fills the machine with workers, and one that computes beside it.
+        checks.tests("long part", f"--long={which}", *_side_by_side(1, 1), *rest, perhaps_none=True)
     return checks.end()
 
 

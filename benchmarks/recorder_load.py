@@ -139,7 +139,7 @@ def run(seconds: float, folder: Path) -> dict:
     board = CapacitiveBoard(clock, mine.recv(), BAUD, layout)
     eyes = {name: Eye(clock) for name in CAMERAS}
     memory, waiting, stopped = [], [], threading.Event()
-    devices = RigDevices(Guide(clock), board, eyes)  # type: ignore[arg-type]
+    devices = RigDevices(Guide(clock), board, eyes)
 
     def watch() -> None:
         while not stopped.wait(1.0):

@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "skin"))
 
-from skin_examples import box_mesh, slab_sensor  # pyright: ignore[reportMissingImports]
+from skin_examples import box_mesh, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
 from tacdata.skin.contact.first_touch import reach

@@ -77,7 +77,7 @@ def _before(
     version: Annotated[
         bool, typer.Option("--version", help="Print release and commit.", is_eager=True, callback=_version)
     ] = False,
-    quiet: OPTIONS[QUIET] = False,  # pyright: ignore[reportInvalidTypeForm]
+    quiet: OPTIONS[QUIET] = False,
 ) -> None:
     context.with_resource(progress.silenced(quiet))
 
@@ -114,7 +114,7 @@ def answering(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
         for option in added
     ]
     parameters = [*signature.parameters.values(), *extra]
-    run.__signature__ = signature.replace(parameters=parameters)  # pyright: ignore[reportAttributeAccessIssue]
+    run.__signature__ = signature.replace(parameters=parameters)  # ty: ignore[missing-attribute]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return run
 

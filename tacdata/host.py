@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import queue
 import signal
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any, BinaryIO
 
 
@@ -19,7 +19,7 @@ class Condition(threading.Condition):
     the plain condition would hide the interrupt behind an error of its own.
     """
 
-    def __exit__(self, *raised: Any) -> None:
+    def __exit__(self, *raised: Any) -> None:  # ty: ignore[incompatible-method-override]
         """Release the lock, if it is held."""
         try:
             super().__exit__(*raised)
@@ -72,9 +72,9 @@ class Host:
         """Return a reentrant lock."""
         return threading.RLock()
 
-    def queue(self) -> queue.SimpleQueue[Any]:
+    def queue(self) -> SimpleQueue[Any]:
         """Return a queue between threads."""
-        return queue.SimpleQueue()
+        return SimpleQueue()
 
     def create(self, path: Path) -> BinaryIO:
         """Open a new file for writing.

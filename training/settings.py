@@ -122,4 +122,5 @@ class TrainingSettings:
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> TrainingSettings:
         """Rebuild settings from `document`."""
-        return cls(**{**document, "loss": WeightedLoss(**document["loss"])})
+        values: dict[str, Any] = {**document, "loss": WeightedLoss(**document["loss"])}
+        return cls(**values)

@@ -154,5 +154,5 @@ def _write(target: Path, numbers: Sequence[int], found: dict[str, list[np.ndarra
     arrays |= {"number": np.array(numbers), "length": np.array([len(part) for part in found["taxels"]])}
     temporary = target.with_suffix(".part")
     with temporary.open("wb") as stream:
-        np.savez(stream, **arrays)  # pyright: ignore[reportArgumentType]
+        np.savez(stream, **arrays)
     os.replace(temporary, target)

@@ -64,10 +64,11 @@ class Job:
     @classmethod
     def of_text(cls, text: str) -> Job:
         """Rebuild a job from JSON that this code wrote itself, so that it is not checked again."""
-        values = json.loads(text)
+        values: dict[str, Any] = json.loads(text)
         del values["version"]
         tolerance = Tolerance(**values["tolerance"]) if "tolerance" in values else None
-        return cls(**{**values, "depths": tuple(values["depths"]), "tolerance": tolerance})
+        values |= {"depths": tuple(values["depths"]), "tolerance": tolerance}
+        return cls(**values)
 
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str = "job") -> Job:
@@ -77,9 +78,10 @@ class Job:
             FormatError: If it breaks the schema.
         """
         documents.check(document, "label_job", origin)
-        values = {k: v for k, v in document.items() if k != "version"}
+        values: dict[str, Any] = {k: v for k, v in document.items() if k != "version"}
         tolerance = Tolerance(**document["tolerance"]) if "tolerance" in document else None
-        return cls(**{**values, "depths": tuple(document["depths"]), "tolerance": tolerance})
+        values |= {"depths": tuple(document["depths"]), "tolerance": tolerance}
+        return cls(**values)
 
     @property
     def deepest(self) -> float:

@@ -76,7 +76,7 @@ def solve_each(model: Model, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSol
     Errors of other kinds end it: what the process holds is not trusted any more.
     """
     if len(jobs) > 1 and hasattr(model, "solve_many"):
-        yield from model.solve_many(jobs)  # pyright: ignore[reportAttributeAccessIssue]
+        yield from model.solve_many(jobs)  # ty: ignore[not-callable]
         return
     for job in jobs:
         try:

@@ -62,7 +62,7 @@ def send(client: Client, folder: Path, name: str, progress: Callable[[int, int],
 def _send_file(client: Client, path: Path, name: str) -> int:
     """Send what is missing of a file; return how many bytes that was."""
     size = path.stat().st_size
-    asked = {"folder": name, "name": path.name, "size": size, "sha256": provenance.file_hash(path)}
+    asked: dict[str, object] = {"folder": name, "name": path.name, "size": size, "sha256": provenance.file_hash(path)}
     answer = _piece(client, asked, 0, b"")
     sent = 0
     with path.open("rb") as stream:

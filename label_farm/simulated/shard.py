@@ -56,7 +56,7 @@ class Shard:
         for name in (*_FIELDS, "force_error", "taxel_force_error"):
             arrays[name] = _joined([getattr(s, name) for s in known], np.float32)
         buffer = io.BytesIO()
-        np.savez_compressed(buffer, **arrays)  # pyright: ignore[reportArgumentType]
+        np.savez_compressed(buffer, **arrays)  # ty: ignore[invalid-argument-type]
         path = folder / f"presses-{self.numbers[0]:07d}-{len(self.numbers):07d}.npz"
         with replacement(path) as stream:
             stream.write(buffer.getvalue())

@@ -181,7 +181,7 @@ class DaskPool(Engine):
                 self._cluster = LocalCluster(
                     n_workers=self.workers, threads_per_worker=1, resources={RESOURCE: 1}, host="127.0.0.1",
                     scheduler_kwargs={"allowed_failures": 0},
-                    dashboard_address=None,  # pyright: ignore[reportArgumentType]
+                    dashboard_address=None,
                 )  # fmt: skip
             self._client = Client(self._cluster or self._address, timeout=CONNECT_SECONDS, set_as_default=False)
             return self._client

@@ -59,8 +59,9 @@ def read_case(path: Path) -> Case:
         check_touch(request.indenter, size, (request.x, request.y), request.yaw, deepest, str(path))
     mesh = mesh_for(sensor, request)
     if "mesh" in document:
-        given = dict(document["mesh"])
-        mesh = MeshSettings(**{**given, "focus": tuple(given["focus"]) if "focus" in given else None})
+        given: dict[str, Any] = dict(document["mesh"])
+        given["focus"] = tuple(given["focus"]) if "focus" in given else None
+        mesh = MeshSettings(**given)
     # The estimate is made apart from the states, so that their times are their own.
     pointwise = document.get("volumes") == "points"
     settings = ModelSettings(mesh=mesh, error_estimate=False, averaged_from=0.5 if pointwise else 0.0)

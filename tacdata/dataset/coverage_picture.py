@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from tacdata.dataset.reader import Dataset
 from tacdata.plans import Press
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Measure = Callable[[Press], float]
 
@@ -26,7 +29,7 @@ def draw(path: Path | BinaryIO, dataset: Dataset) -> None:
     figure = Figure(figsize=(13, 3.8), dpi=100, layout="constrained")
     plane, along_x, along_y = figure.subplots(1, 3, width_ratios=[1.35, 1, 1])
     names = sorted({press.indenter_name for press in presses})
-    views: list[tuple[object, Measure, Measure]] = [
+    views: list[tuple[Axes, Measure, Measure]] = [
         (plane, lambda p: p.x, lambda p: p.y),
         (along_x, lambda p: p.x, lambda p: p.depth),
         (along_y, lambda p: p.y, lambda p: p.depth),
@@ -34,7 +37,7 @@ def draw(path: Path | BinaryIO, dataset: Dataset) -> None:
     for axes, across, up in views:
         for number, name in enumerate(names):
             mine = [press for press in presses if press.indenter_name == name]
-            axes.scatter(  # type: ignore[attr-defined]
+            axes.scatter(
                 [across(p) for p in mine], [up(p) for p in mine], s=14, color=f"C{number % 10}", label=name, alpha=0.75
             )
     centers = sensor.taxels.centers

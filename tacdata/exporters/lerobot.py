@@ -124,7 +124,8 @@ def _features(targets: FingertipTargets, columns: dict[str, np.ndarray]) -> dict
     pose = [f"{name}.{part}" for name in targets.fingers for part in (*AXES, *TURNS)]
     made: dict[str, dict[str, Any]] = {}
     for key, values in columns.items():
-        shape, names, info = list(values.shape[1:]) or [1], None, {}
+        shape, names = list(values.shape[1:]) or [1], None
+        info: dict[str, Any] = {}
         dtype = "bool" if values.dtype == bool else str(values.dtype)
         if key in (ACTION, STATE):
             names, info = pose, {"unit": "m, 1", "frame": targets.frame}
@@ -136,7 +137,7 @@ def _features(targets: FingertipTargets, columns: dict[str, np.ndarray]) -> dict
         elif key != TIME:
             info = {"unit": "1" if "novelty" in key else "counts"}
         if "predicted" in key:
-            info |= {"prediction": True, "checkpoint": (targets.network or {}).get("hash", "")}
+            info |= {"prediction": True, "checkpoint": (targets.network or {}).get("hash", "")}  # ty: ignore[unsupported-operator]
         made[key] = {"dtype": dtype, "shape": shape, "names": names, "info": info}
     return made | {k: {"dtype": dtype, "shape": [1], "names": None} for k, dtype in INDEX_COLUMNS.items()}
 

@@ -143,7 +143,7 @@ class _Import:
         recording_file.write(path, imported)
         trial = imported.record["trial"]
         self.notes += imported.record["notes"]
-        self.presses.append(replace(imported, taxels=None, position=None, measured=()))  # type: ignore[arg-type]
+        self.presses.append(replace(imported, taxels=None, position=None, measured=()))
         rows = len(imported.taxels.time_ns)
         self.progress(f"  {path.name}  {trial or self.mapping['name']}: {rows} rows, {press.depth:.2f} mm deep")
 

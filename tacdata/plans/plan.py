@@ -96,7 +96,8 @@ class Press:
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str = "press") -> Press:
         """Read a press from its `document`."""
-        return cls(**{**document, "indenter": from_document(document["indenter"], origin)})
+        values: dict[str, Any] = {**document, "indenter": from_document(document["indenter"], origin)}
+        return cls(**values)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ SHORT = 0.5
 def touching(targets: FingertipTargets) -> np.ndarray:
     """Return when all fingers touch at once, shape (n,), bool."""
     depth = np.nan_to_num(targets.depth)
-    return (depth > FELT * np.maximum(depth.max(axis=0), LEAST_DEPTH / FELT)).all(axis=1)
+    return (depth > FELT * np.maximum(depth.max(axis=0), LEAST_DEPTH / FELT)).all(axis=1)  # ty: ignore[invalid-explicit-return]
 
 
 def first_grasp(targets: FingertipTargets) -> tuple[int, int, int]:

@@ -113,7 +113,8 @@ def scene_of(task: str, name: str | None = None, width: float | None = None, **v
     body = OBJECTS[chosen]
     if width is not None:
         body = replace(body, sizes=(width, *body.sizes[1:]))
-    return ReplayScene(chosen, body, **{"mass": body.mass, "task": "wipe" if wiped else "grasp", **values})
+    usual: dict[str, Any] = {"mass": body.mass, "task": "wipe" if wiped else "grasp"}
+    return ReplayScene(chosen, body, **usual | values)
 
 
 def drawn(scene: ReplayScene, fingers: int, seed: int) -> ReplayScene:

@@ -223,10 +223,10 @@ def _mesh(path: Path) -> MeshSettings:
 
     with np.load(path, allow_pickle=False) as data:
         told = json.loads(str(data["provenance"])) if "provenance" in data else {}
-    values = told.get("parameters", {}).get("mesh")
-    return MeshSettings(**{**values, "focus": tuple(values["focus"]) if values["focus"] else None}) if values else (
-        MeshSettings()
-    )  # fmt: skip
+    values: dict[str, Any] = told.get("parameters", {}).get("mesh") or {}
+    if values:
+        values["focus"] = tuple(values["focus"]) if values["focus"] else None
+    return MeshSettings(**values)
 
 
 def _added(verdict: dict[str, Any], judged: Path, spec: Spec, answer: list[Placed], out: Path) -> str:

@@ -87,7 +87,7 @@ class Skin:
         if "surface" not in document:
             return cls(**document)
         document = own_surface.complete(document, origin, folder)
-        return cls(**{**document, "surface": OwnSurface.from_document(document["surface"])})
+        return cls(**{**document, "surface": OwnSurface.from_document(document["surface"])})  # ty: ignore[invalid-argument-type]
 
     def outer_height(self, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
         """Return the height z of the undeformed outer face [mm] at (x, y) [mm], of the arguments' shape."""

@@ -148,7 +148,7 @@ class SkinModel:
     def _transfer(self) -> MeshTransfer | None:
         """From the companion's unknowns to those on this mesh."""
         contacts = 2 if self.skin.board else 1
-        return self.companion and MeshTransfer(self.companion.mesh, self.mesh, contacts, self.device)
+        return self.companion and MeshTransfer(self.companion.mesh, self.mesh, contacts, self.device)  # ty: ignore[invalid-explicit-return]
 
     def _start(self, coarse: CoarsePress | None) -> CoarseStart | None:
         return CoarseStart(coarse.path, self._transfer) if coarse and coarse.path and self._transfer else None
@@ -317,4 +317,4 @@ class SkinModel:
 
     def _taxel_pressure(self, states: list[Equilibrium]) -> np.ndarray | None:
         raster = self.skin.protrusions
-        return raster and np.stack([raster.pressure(state.displacement, state.board_pressure) for state in states])
+        return raster and np.stack([raster.pressure(state.displacement, state.board_pressure) for state in states])  # ty: ignore[invalid-explicit-return]

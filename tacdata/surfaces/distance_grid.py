@@ -89,7 +89,6 @@ def distance_grid(vertices: np.ndarray, faces: np.ndarray, top: float) -> Distan
     count = _COARSE * np.ceil((high - origin + 3 * spacing) / (_COARSE * spacing)).astype(int) + 1
     wide = nearest.places(_nodes(origin, _COARSE * spacing, (count - 1) // _COARSE + 1)).distance
     cells = (count - 1) // _COARSE
-    # Not `zoom`, which gives the same: pyright takes 50 s of the processor to find what that returns.
     coarse = wide.reshape(cells + 1)
     d = np.array(affine_transform(coarse, np.full(3, 1 / _COARSE), output_shape=tuple(count), order=1))
     near = np.flatnonzero(np.abs(d) < (_BAND + 1) * spacing)

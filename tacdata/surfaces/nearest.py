@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportAttributeAccessIssue=false, reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Nearest points on a closed triangle surface, with sign."""
 
 from __future__ import annotations
@@ -20,9 +17,9 @@ def _query(
 ):
     i = wp.tid()
     found = wp.mesh_query_point_sign_normal(mesh, points[i], 1.0e6)
-    face[i] = found.face
-    place[i] = wp.vec2(found.u, found.v)
-    side[i] = wp.float64(found.sign)
+    face[i] = found.face  # ty: ignore[missing-attribute]
+    place[i] = wp.vec2(found.u, found.v)  # ty: ignore[missing-attribute]
+    side[i] = wp.float64(found.sign)  # ty: ignore[missing-attribute]
 
 
 @dataclass(frozen=True)

@@ -252,7 +252,7 @@ def _world(camera: str, pose: np.ndarray, rng: np.random.Generator) -> dict[str,
     turn = Rotation.from_rotvec(rng.normal(0, spread[1], 3)) * Rotation.from_matrix(pose[:3, :3])
     return {
         "version": schemas.version("camera_world"), "camera": camera, "frame": "table",
-        "position": (pose[:3, 3] + rng.normal(0, spread[0], 3)).tolist(), "quaternion": turn.as_quat().tolist(),
+        "position": (pose[:3, 3] + rng.normal(0, spread[0], 3)).tolist(), "quaternion": turn.as_quat().tolist(),  # ty: ignore[missing-union-attribute]
         "method": "virtual board", "poses": 1, "residual": {"position": spread[0], "rotation": spread[1]},
         "spread": {"position": spread[0], "rotation": spread[1]}, "date": "2026-01-01",
         "code_version": provenance.code_version(),

@@ -116,7 +116,7 @@ class VirtualRig:
             document["cameras"] = {
                 "side": {
                     "driver": "opencv_camera", "source": self.camera.url, "rate": self.camera.rate,
-                    "intrinsics": dict(INTRINSICS), "cube": {**CUBE, "ids": dict(CUBE["ids"])},
+                    "intrinsics": dict(INTRINSICS), "cube": {**CUBE, "ids": dict(CUBE["ids"])},  # ty: ignore[no-matching-overload]
                 }
             }  # fmt: skip
         return document

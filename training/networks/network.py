@@ -118,7 +118,7 @@ def create(name: str, sensor: Sensor, arguments: dict[str, Any] | None = None) -
     """
     kind = registry.load(ROOM, BASE, name, Network)
     try:
-        return kind(taxels=sensor.taxels.count, map_shape=sensor.map.shape, **(arguments or {}))  # type: ignore[call-arg]
+        return kind(taxels=sensor.taxels.count, map_shape=sensor.map.shape, **(arguments or {}))
     except TypeError as error:
         raise FormatError(
             f"network {name} with arguments {arguments}: {error}",

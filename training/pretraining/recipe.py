@@ -47,5 +47,5 @@ def recipe(asked: Mapping[str, Any], pretrained: Checkpoint | None = None, simul
             f"--network {name} from {pretrained.path}, which is a network {pretrained.network.name}",
             "the same network", "leave --network out, or train without --from",
         )  # fmt: skip
-    fitting = {**FITTING, "arguments": pretrained.network.arguments, "pull": 0.0 if simulated else PULL}
+    fitting: dict[str, Any] = {**FITTING, "arguments": pretrained.network.arguments, "pull": 0.0 if simulated else PULL}
     return TrainingSettings(**{**kind.recipe, **fitting, **wishes})

@@ -166,8 +166,8 @@ def published_rates() -> list[Rate]:
     found = []
     for condition, entry in published.SUCCESS.items():
         for group, moves in (("all", "adjustments"), ("edge", "adjustments_edge")):
-            won, of = entry[group]
-            found.append(Rate(condition, group, won, of, _wilson(won, of), entry.get(moves)))
+            won, of = entry[group]  # ty: ignore[not-iterable]
+            found.append(Rate(condition, group, won, of, _wilson(won, of), entry.get(moves)))  # ty: ignore[invalid-argument-type]
     return found
 
 

@@ -141,7 +141,7 @@ def _write_gif(path: Path, frames: Iterator[np.ndarray], rate: float) -> None:
     from PIL import Image
 
     # Median cut, the default, spends its colours on large areas and loses those of the curves.
-    how = {"colors": 160, "method": Image.Quantize.MAXCOVERAGE, "dither": Image.Dither.NONE}
+    how: dict[str, Any] = {"colors": 160, "method": Image.Quantize.MAXCOVERAGE, "dither": Image.Dither.NONE}
     pictures = [Image.fromarray(f).quantize(**how) for f in frames]
     pictures[0].save(
         path, save_all=True, append_images=pictures[1:], duration=round(1000 / rate), loop=0, optimize=True

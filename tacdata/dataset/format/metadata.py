@@ -88,8 +88,9 @@ class EpisodeRecord:
             FormatError: If the line breaks the schema.
         """
         documents.check(document, "dataset_record", origin)
-        values = {k: v for k, v in document.items() if k != "version"}
-        return cls(**{**values, "baseline": tuple(values["baseline"]), "notes": tuple(values["notes"])})
+        values: dict[str, Any] = {k: v for k, v in document.items() if k != "version"}
+        values |= {"baseline": tuple(values["baseline"]), "notes": tuple(values["notes"])}
+        return cls(**values)
 
 
 def write_main(root: Path, sensors: dict[str, dict[str, Any]], rate: float) -> None:

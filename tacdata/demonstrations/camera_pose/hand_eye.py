@@ -88,7 +88,7 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
     mean = np.eye(4)
     rotations = Rotation.from_matrix(inverse[:, :3, :3])
     mean[:3, :3], mean[:3, 3] = rotations.mean().as_matrix(), inverse[:, :3, 3].mean(axis=0)
-    turns = (rotations * Rotation.from_matrix(mean[:3, :3]).inv()).magnitude()
+    turns = (rotations * Rotation.from_matrix(mean[:3, :3]).inv()).magnitude()  # ty: ignore[missing-union-attribute]
     distance = max(float(np.linalg.norm(mean[:3, 3])), 0.1)
     places = np.array([pose[:3, 3] for pose in poses])
     apart = np.linalg.norm(places - np.median(places, axis=0), axis=1)
@@ -111,7 +111,7 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
 def _check_turns(grippers: np.ndarray) -> None:
     from scipy.spatial.transform import Rotation
 
-    turns = (Rotation.from_matrix(grippers[1:, :3, :3]) * Rotation.from_matrix(grippers[0, :3, :3]).inv()).as_rotvec()
+    turns = (Rotation.from_matrix(grippers[1:, :3, :3]) * Rotation.from_matrix(grippers[0, :3, :3]).inv()).as_rotvec()  # ty: ignore[missing-union-attribute]
     about = np.linalg.svd(turns, compute_uv=False)
     if len(about) < 2 or np.abs(turns).max() < LEAST_TURN or about[1] < LEAST_TURN:
         raise UsageError(

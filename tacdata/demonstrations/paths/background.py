@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -116,12 +117,12 @@ def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
     if len(corners) < FEWEST:
         return []
     made, most = [_Look(images[0][0], 0.0)], COVERED * _cells(corners[:, 0], first.shape)
-    lk = {"winSize": (21, 21), "maxLevel": 4}
+    lk: dict[str, Any] = {"winSize": (21, 21), "maxLevel": 4}
     for time, image in images[1:]:
         if image.shape != first.shape:
             continue
-        there, there_too, _ = cv2.calcOpticalFlowPyrLK(first, image, corners, None, **lk)  # type: ignore[call-overload]
-        back, back_too, _ = cv2.calcOpticalFlowPyrLK(image, first, there, None, **lk)  # type: ignore[call-overload]
+        there, there_too, _ = cv2.calcOpticalFlowPyrLK(first, image, corners, None, **lk)  # ty: ignore[no-matching-overload]
+        back, back_too, _ = cv2.calcOpticalFlowPyrLK(image, first, there, None, **lk)  # ty: ignore[no-matching-overload]
         kept = (there_too.ravel() > 0) & (back_too.ravel() > 0)
         kept &= np.linalg.norm((back - corners)[:, 0], axis=1) < RETURNED
         made.append(_Look(time, _shift(corners[kept, 0], there[kept, 0], most, first.shape)))

@@ -108,7 +108,7 @@ def exchanges(seen: dict[str, Sightings], paths: dict[str, Smoothed], times_ns: 
         found = [_on_the_others_path(seen[a], paths[a], paths[b], times_ns) for a, b in ((one, other), (other, one))]
         if all(len(times) >= 2 for times in found):
             both = np.sort(np.concatenate(found))
-            first, last = (both[[0, -1]] - begin_ns) * 1e-9
+            first, last = (both[[0, -1]] - begin_ns) * 1e-9  # ty: ignore[unsupported-operator]
             remarks.append(
                 f"{one} and {other} change places {first:.1f} s after the beginning (seen so until {last:.1f} s): "
                 "the numbers of their cubes are exchanged"

@@ -92,7 +92,7 @@ class FittedResponse(Response):
         other._bases, other._weights = [self._bases[context]], [self._weights[context]]
         other._air = [self._air[context]]
         vars(other).pop("air", None)  # that of all places
-        other.context, other._rows = np.zeros(course.rows, dtype=np.int64), [np.arange(course.rows)]
+        other.context, other._rows = np.zeros(course.rows, dtype=np.int64), [np.arange(course.rows)]  # ty: ignore[invalid-assignment]
         other._course, other._read, other._designs, other._answers = course, np.arange(course.rows), [], []
         return other
 

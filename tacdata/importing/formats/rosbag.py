@@ -134,7 +134,7 @@ def _flat(message: Any, longer: Counter[str], prefix: str = "") -> Iterator[tupl
         value, name = getattr(message, field.name), f"{prefix}{field.name}"
         if is_dataclass(value):
             if hasattr(value, "nanosec"):
-                yield name, int(value.sec) * 1_000_000_000 + int(value.nanosec)  # pyright: ignore[reportAttributeAccessIssue]
+                yield name, int(value.sec) * 1_000_000_000 + int(value.nanosec)
             else:
                 yield from _flat(value, longer, f"{name}.")
         elif isinstance(value, list) and value and is_dataclass(value[0]):

@@ -90,7 +90,7 @@ def training_plan(
                 "hold": round(float(rng.uniform(*HOLDS)), 2),
             }
         )
-    entries.sort(key=lambda entry: mountings.index((entry["indenter"], entry["yaw"])))
+    entries.sort(key=lambda entry: mountings.index((entry["indenter"], entry["yaw"])))  # ty: ignore[invalid-argument-type]
     used = [name for name in indenters if any(entry["indenter"] == name for entry in entries)]
     document = {
         "version": schemas.version("plan"), "name": f"training-{presses}-{seed}",

@@ -40,7 +40,7 @@ def _placed_elsewhere(episodes: Sequence[Episode], placed: Sequence[Placed]) -> 
         return ordered
     course = _course(ready)
     empty = np.empty(0)
-    state = State(course, None, course.tip, empty, empty, empty)  # type: ignore[arg-type]
+    state = State(course, None, course.tip, empty, empty, empty)  # ty: ignore[invalid-argument-type]
     for effect in sorted(kinematic, key=lambda p: not p.seen_by_tag):
         state = effect.act(state)
     cut = np.cumsum([len(e.tip_ns) for e in ready])[:-1]

@@ -1,5 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportCallIssue=false
 """What a file on adhesion holds.
 
 ``tacdata/skin/adhesions/my_law.py`` defines one class derived from `AdhesionLaw`, without parameters of its own: work w

@@ -1,5 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportCallIssue=false, reportReturnType=false
 """Strongest where the surfaces touch, falling exponentially: t = w/d exp(-gap/d)."""
 
 from functools import cache

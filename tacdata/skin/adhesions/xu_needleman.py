@@ -1,5 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportCallIssue=false, reportReturnType=false
 """Nothing where the surfaces touch, strongest at a gap of one range: t = w/d (gap/d) exp(-gap/d)."""
 
 from functools import cache

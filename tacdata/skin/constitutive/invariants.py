@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """The isochoric invariants I1bar = J^(-2/3) I1 and I2bar = J^(-4/3) I2, their derivatives and second derivatives.
 
 Notation as in `kinematics.py`. With C = F^T F = c (I + D), D traceless, both invariants follow from D alone. With

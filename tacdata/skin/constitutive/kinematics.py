@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Volume change, isochoric invariants and their derivatives, as Warp functions of the displacement gradient.
 
 With H = F - I every quantity that vanishes at rest is summed from small terms, never taken as a difference of numbers

@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Adhesion of the outer face to a rigid shape: attractive traction by gap, integrated over the faces.
 
 Traction pulls along the shape's normal and is per undeformed area. Contact (`contact_surface`) keeps the surfaces from

@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Warp kernels of `tacdata.skin.contact.contact_surface`: gaps, normal forces, friction.
 
 Indices: f a face, k a point of its quadrature rule, a a node of the face, j a contact node, b a batch member.

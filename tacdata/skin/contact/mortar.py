@@ -1,5 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportAssignmentType=false, reportGeneralTypeIssues=false, reportReturnType=false
 """Weighted means over the hats of contact nodes, and the forces that do the same work: a mortar projection.
 
 A hat is the piecewise linear function of one node on the four sub-triangles of each quadratic face. Row j holds

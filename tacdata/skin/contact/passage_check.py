@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Whether skin has come out on the far side of a thin shape.
 
 A point that a long step carries past the middle of a thin shape is pushed out above it. There is an equilibrium there

@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Warp kernels of `tacdata.skin.derivatives.contact`: how gaps, normal forces and friction change along a direction.
 
 Indices as in `tacdata.skin.contact.kernels`, whose structs hold the changes too.

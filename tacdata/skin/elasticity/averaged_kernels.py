@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Kernels of a body whose volume changes are averaged at the corners (`tacdata.skin.elasticity.averaged_volume`).
 
 Each element reads its nodes once and adds to them once: on a GPU it is these accesses that cost, not the arithmetic.

@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Volume change averaged at the corners of the elements, so that quadratic tetrahedra do not lock.
 
 Four points an element constrain as many volumes as the nodes have motions to give. Near incompressibility the mesh is

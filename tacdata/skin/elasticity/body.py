@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Internal forces of the skin and their linearization, matrix-free, for a batch of states of one mesh.
 
 Fields are laid out (nodes, 3, batch), the batch innermost. Neighbouring threads of a GPU then read neighbouring

@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """What every element kernel is made of: the mesh and the members as structs, gather, gradient, scatter.
 
 Indices: e an element, q a point of its quadrature rule, a a node of it, b a batch member.

@@ -24,7 +24,7 @@ class CholmodFactor:
     def __init__(self, matrix: sp.csr_matrix) -> None:
         """Factorize a symmetric matrix, all its entries stored."""
         # A compiled module without type stubs.
-        from cholespy import CholeskySolverF, MatrixType  # pyright: ignore[reportAttributeAccessIssue]
+        from cholespy import CholeskySolverF, MatrixType  # ty: ignore[missing-module-member]
 
         rows = sp.csr_matrix(matrix).sorted_indices()
         starts, columns = rows.indptr.astype(np.int32), rows.indices.astype(np.int32)

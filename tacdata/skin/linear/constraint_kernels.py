@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """Kernels of `tacdata.skin.linear.constraint_rows`: constraints of batch members by the mortar rows that they join.
 
 Indices: j a contact node, b a batch member, s a constraint of it. A constraint joins up to three neighbouring rows of

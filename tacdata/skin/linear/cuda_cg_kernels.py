@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Kernels of `tacdata.skin.linear.cuda_cg`: what conjugate gradients do to fields, each field read and written once.
 
 Fields are (3n, batch); ``order`` says for which degree of freedom each row of the rest state's inverse stands.

@@ -110,7 +110,7 @@ class _MortarRows:
     """M and its transpose."""
 
     def __init__(self, rows: sp.csr_matrix, device: str) -> None:
-        self.count = rows.shape[0]  # pyright: ignore[reportOptionalSubscript]
+        self.count = rows.shape[0]
         self.down, self.up = (compressed_rows(matrix, device) for matrix in (rows, sp.csr_matrix(rows.T)))
 
 

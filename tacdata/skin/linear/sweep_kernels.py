@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Kernels of `tacdata.skin.linear.batched_inverse`, which keeps of symmetric matrices the lower triangle alone.
 
 Blocks on the diagonal are inverted at once on a GPU, each by one block of threads.

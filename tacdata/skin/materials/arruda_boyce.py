@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Arruda-Boyce, eight chains: the inverse Langevin function to five terms in I1bar, + kappa/2 (J - 1)^2."""
 
 from dataclasses import dataclass

@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Gent: W = -mu Jm/2 ln(1 - (I1bar - 3)/Jm) + kappa/2 (J - 1)^2: chains that cannot be stretched without end."""
 
 from dataclasses import dataclass

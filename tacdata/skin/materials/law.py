@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportInvalidTypeForm=false
 """What a material law's file holds.
 
 ``tacdata/skin/materials/my_law.py`` defines one frozen dataclass derived from `Law`. A sensor or case file names it by

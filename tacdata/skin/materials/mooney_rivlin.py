@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Mooney-Rivlin: W = C10 (I1bar - 3) + C01 (I2bar - 3) + kappa/2 (J - 1)^2."""
 
 from dataclasses import dataclass

@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Neo-Hookean, coupled logarithmic form: W = mu/2 (I1 - 3) - mu ln J + lambda/2 (ln J)^2."""
 
 from dataclasses import dataclass

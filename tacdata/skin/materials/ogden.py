@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """Ogden: W = sum_p 2 mu s_p / a_p^2 (l1^a_p + l2^a_p + l3^a_p - 3) + kappa/2 (J - 1)^2, l_i isochoric stretches."""
 
 from dataclasses import dataclass

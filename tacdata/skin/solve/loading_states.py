@@ -14,7 +14,7 @@ class LoadingStates:
         """Make room for unknowns such as ``like``."""
         batch, device = like.u.shape[2], like.u.device
         self._shapes = [field.shape[:-1] for field in (like.u, *like.multipliers)]
-        self._sizes = [shape.numel() for shape in self._shapes]
+        self._sizes = [shape.numel() for shape in self._shapes]  # ty: ignore[missing-attribute]
         self._depth = torch.full((4, batch), torch.inf, dtype=torch.float64, device=device)
         self._values = torch.zeros(4, sum(self._sizes), batch, dtype=torch.float32, device=device)
         self._count = torch.zeros(batch, dtype=torch.int64, device=device)

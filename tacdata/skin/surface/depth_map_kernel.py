@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false
 """The Warp kernel that finds the height of deformed quadratic triangles above sample points.
 
 One thread takes one triangle of one state. Seen from above, a quadratic triangle is the map

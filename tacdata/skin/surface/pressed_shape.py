@@ -1,6 +1,3 @@
-# Warp kernels are Python in form only; their operators have no types that pyright knows.
-# pyright: reportOperatorIssue=false, reportArgumentType=false, reportIndexIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false, reportAssignmentType=false, reportInvalidTypeForm=false
 """The rigid shape under a depth map: where the skin touches, its surface is the shape's.
 
 Contact closes gaps in the mean under each hat. Between nodes the mesh lies inside the shape or off it, by some

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def find_board(
     """
     import cv2
 
-    known = {}
+    known: dict[str, Any] = {}
     if markers is not None:
         if not len(markers.ids):
             return None

@@ -124,7 +124,7 @@ def draw_hand(seed: int, task: str = "grasp", thing: str | None = None) -> Hand:
     depth = {name: float(rng.uniform(0.7, 1.2)) for name in DIRECTIONS}
     skew = {name: tuple(rng.uniform(-1.0, 1.0, 2).tolist()) for name in DIRECTIONS}
     held = thing or ("eraser" if task == "wipe" else "ball")
-    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)), task, thing=held)  # type: ignore[arg-type]
+    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)), task, thing=held)
 
 
 def _blend(t: float, begin: float, end: float) -> float:

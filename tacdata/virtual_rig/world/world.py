@@ -89,7 +89,7 @@ def draw(seed: int, sensor: Sensor, nominal: Registration, rough: bool = False) 
     modulus = sensor.material.youngs_modulus / (1 - sensor.material.poisson_ratio**2)
     error = rng.normal(0, (0.05, 0.05, 0.02))
     careful = Registration(
-        tuple(float(a + b) for a, b in zip(nominal.origin, error, strict=True)),  # type: ignore[arg-type]
+        tuple(float(a + b) for a, b in zip(nominal.origin, error, strict=True)),  # ty: ignore[invalid-argument-type]
         float(nominal.yaw + rng.normal(0, 0.25)),
     )
     return Truth(

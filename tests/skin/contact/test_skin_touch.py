@@ -178,7 +178,7 @@ def test_another_code_presses_a_tilted_punch_alike(model, tmp_path):
     model = SkinModel(model.sensor, replace(model.settings, averaged_from=0.5), mesh=model.mesh)
     request = press(PUNCH, 0.2, tilt_x=2.0, tilt_y=5.0, yaw=20.0)
     [(_, ours)] = model.states(request)
-    theirs = PEER.solve(SimpleNamespace(sensor=model.sensor, request=request), model.mesh, tmp_path)  # pyright: ignore
+    theirs = PEER.solve(SimpleNamespace(sensor=model.sensor, request=request), model.mesh, tmp_path)
     top = np.unique(model.mesh.outer)
     off = theirs.displacement[0][:, 2] - ours.displacement[top, 2]
     print(ours.force, theirs.force, np.sqrt((off**2).mean()))

@@ -61,7 +61,7 @@ def main(asked: str, made: str) -> None:
 
     os.chdir(Path(made).parent)  # fTetWild leaves a file of its own in the working folder
     with np.load(asked) as given:
-        vertices, tets = pytetwild.tetrahedralize(  # pyright: ignore[reportPrivateImportUsage]
+        vertices, tets = pytetwild.tetrahedralize(
             given["vertices"], given["faces"].astype(np.int32), edge_length_abs=float(given["edge"]),
             epsilon=float(given["envelope"]), num_threads=1, bg_vertices=given["points"], bg_tets=given["cells"],
             bg_values=given["size"],

@@ -57,6 +57,6 @@ def with_middles(vertices: np.ndarray, tets: np.ndarray) -> Quadratic:
     edges, inverse = np.unique(
         np.sort(tets[:, elements.EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True
     )
-    nodes = np.concatenate([vertices, vertices[edges].mean(axis=1)])
+    nodes = np.concatenate([vertices, vertices[edges].mean(axis=1)])  # ty: ignore[invalid-argument-type]
     tet10 = np.concatenate([tets, len(vertices) + inverse.reshape(-1, 6)], axis=1).astype(np.int32)
     return Quadratic(nodes, tet10, edges)
