@@ -34,6 +34,9 @@ TOLERANCE = 1e-5
 _LAW_STEP = 1e-5
 """Step of the central difference of internal forces by a law's numbers, over these [1]."""
 
+_WORK = torch.float32
+"""Precision of the linear solves' spaces; residuals are in double."""
+
 Slack = Callable[[torch.Tensor], torch.Tensor]
 """From reactions of held nodes to how they move."""
 
@@ -57,10 +60,14 @@ class _Point:
     """Young's modulus [MPa]."""
 
     def changes(
-        self, du: torch.Tensor, pressures: Sequence[torch.Tensor], history: tuple[ContactHistory, ...]
+        self, du: torch.Tensor, pressures: Sequence[torch.Tensor], history: tuple[ContactHistory, ...],
+        whole: bool = True,
     ) -> list[ContactChange]:
-        """Return each contact's change along the directions, with displacements, pressures and history."""
-        return [self._change(k, du, pressures[k], self.along[k], past) for k, past in enumerate(history)]
+        """Return each contact's change along the directions, with displacements, pressures and history.
+
+        Without ``whole`` gaps far from contact are left out.
+        """
+        return [self._change(k, du, pressures[k], self.along[k], past, whole) for k, past in enumerate(history)]
 
     def product(self, du: torch.Tensor, pressures: Sequence[torch.Tensor]) -> list[ContactChange]:
         """Return each contact's change with displacements and pressures alone."""
@@ -135,6 +142,7 @@ class PathDerivatives:
         self.products = 0
         """Products with the tangent so far, for benchmarks."""
         self._history: tuple[ContactHistory, ...] = ()
+        self._prepared = newton.body.prepared()
 
     def advance(self, reached: Configuration, along: ConditionsChange) -> None:
         """Take the derivatives on to the next equilibrium; the first call: the touch.
@@ -183,16 +191,22 @@ class PathDerivatives:
         """Find du, at held nodes ``held``, and return the changes of the pressures."""
         body, free, at = self._newton.body, self._free, point.at
         known: dict[tuple[int, torch.dtype], tuple[torch.Tensor, Conditions, torch.Tensor | None]] = {}
+        if self._prepared:
+            first = torch.zeros(1, dtype=torch.long)
+            self._prepared.update_one(at.u[:, :, :1].to(_WORK), at.conditions.take(first).to(_WORK), at.u.shape[2])
 
         def product(field: torch.Tensor) -> torch.Tensor:
             du, pressures = point.parted(field)
             key = field.shape[2], field.dtype
-            if key not in known:
-                u, own = at.u[:, :, : key[0]].to(key[1]).contiguous(), at.conditions.to(key[1])
-                known[key] = u, own, body.dilatation(u, own)
-            u, own, dilatation = known[key]
-            internal = torch.zeros_like(u)
-            body.tangent_product(u, du.to(key[1]), own, internal, dilatation)
+            internal = torch.zeros(du.shape, dtype=field.dtype, device=du.device)
+            if self._prepared and field.dtype == _WORK:
+                self._prepared.add_product(du.to(_WORK), torch.arange(key[0]), internal)
+            else:
+                if key not in known:
+                    u, own = at.u[:, :, : key[0]].to(key[1]).contiguous(), at.conditions.to(key[1])
+                    known[key] = u, own, body.dilatation(u, own)
+                u, own, dilatation = known[key]
+                body.tangent_product(u, du.to(key[1]), own, internal, dilatation)
             changes = point.product(du, pressures)
             return point.residual((internal - _force(changes)) * free, changes)
 
@@ -202,7 +216,7 @@ class PathDerivatives:
             return torch.cat([z, normal / point.modulus])[:, None]
 
         none = [torch.zeros_like(contact.pressure) for contact in point.now]
-        still = point.changes(torch.zeros_like(at.u), none, self._history)
+        still = point.changes(torch.zeros_like(at.u), none, self._history, whole=False)
         rhs = -point.residual((self._internal(point) - _force(still)) * free, still)
         if self._slack:
             rhs -= product(point.joined(held, none))
@@ -227,16 +241,18 @@ class PathDerivatives:
         own, along = point.at.conditions, point.along[0].conditions
         share = (along.law / torch.where(own.law != 0, own.law, 1.0)).abs().amax(dim=0)
         share = share.maximum((along.thickness / own.thickness).abs())
-        moves = share > 0
-        if not bool(moves.any()):
-            return torch.zeros_like(point.at.u)
-        step = torch.where(moves, _LAW_STEP / share.clamp_min(1e-30), 0.0)
+        change, moves = torch.zeros_like(point.at.u), (share > 0).nonzero()[:, 0]
+        if not len(moves):
+            return change
+        step, u = _LAW_STEP / share[moves], point.at.u.index_select(2, moves)
+        own, along = own.take(moves), along.take(moves)
         ends = [
             replace(own, law=own.law + e * along.law, thickness=own.thickness + e * along.thickness)
             for e in (step, -step)
         ]
-        upper, lower = (self._newton.body.internal_force(point.at.u, end)[0] for end in ends)
-        return torch.where(moves, (upper - lower) / (2 * torch.where(moves, step, 1.0)), 0.0)
+        upper, lower = (self._newton.body.internal_force(u, end)[0] for end in ends)
+        change[:, :, moves] = (upper - lower) / (2 * step)
+        return change
 
 
 def _force(changes: Sequence[ContactChange]) -> torch.Tensor:

@@ -61,6 +61,23 @@ class PreparedTangent:
         )
         self._thickness[lane] = own.thickness
 
+    def update_one(self, u: torch.Tensor, own: Conditions, fields: int) -> None:
+        """Prepare the tangent of one state for products with so many fields at a time.
+
+        Args:
+            u: Displacements [mm], shape (n, 3, 1).
+            own: Conditions of one member, in one precision with ``u``.
+            fields: How many; `add_product` takes the first of them as members 0, 1, ...
+        """
+        self._begin(1)
+        self.update(u, own, self._lane)
+        blocks = -(-fields // LANES)
+        self._values = self._values[..., :1].expand(-1, -1, -1, LANES * blocks).contiguous()
+        self._bulk, self._thickness = (
+            values[:1].expand(LANES * blocks).contiguous() for values in (self._bulk, self._thickness)
+        )
+        self._lane = torch.arange(fields)
+
     def add_product(self, p: torch.Tensor, member: torch.Tensor, result: torch.Tensor) -> None:
         """Add K p [N] of members, by index, shape (k,), to ``result``; both of shape (n, 3, k)."""
         lane, kernels, body = self._lane[member], product_kernels(self._real), self._body

@@ -102,5 +102,18 @@ def test_a_new_press_finds_nothing_of_the_one_before(body, members):
     assert not torch.equal(found[:, :, 5], right[:, :, 5])
 
 
+@pytest.mark.parametrize("fields", [1, 8, MEMBERS])
+def test_one_state_serves_many_fields_at_a_time(body, members, fields):
+    """Of another state nothing is left, whatever has moved; fewer fields than were said may come."""
+    tangent, p = prepared(body), field(body, 2)[:, :, :fields].contiguous()
+    for seed in (1, 4):
+        u, one = field(body, seed, 0.03)[:, :, :1].contiguous(), members.take(torch.tensor([3]))
+        tangent.update_one(u, one, fields)
+        right = by_the_law(body, u.repeat(1, 1, fields), p, one.repeat(fields))
+        assert off(of(tangent, p, torch.arange(fields)), right) < 1e-5
+        few = max(1, fields - 2)
+        assert off(of(tangent, p[:, :, :few].contiguous(), torch.arange(few)), right[:, :, :few]) < 1e-5
+
+
 def test_without_averages_nothing_is_prepared():
     assert Elasticity(box_mesh(slab_sensor(size=3.0), 2, 2, 1), "neo_hookean").prepared() is None
