@@ -15,12 +15,15 @@ from judge import course_of, guard, spec_of
 
 from tacdata.discrepancy.judge import judge
 from tacdata.plans import Plan
+from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.revision.comparison import Comparison
 from tacdata.revision.next_presses.plan import choose, plan_of
 from tacdata.revision.next_presses.rivals import named, rivals
 
 TRAVEL = 6.0
 """What the guide does at most [mm/s]."""
+LIMITS = AxisLimits(np.full(3, 1e4), np.full(3, TRAVEL))
+"""The worlds' guide turns at once [mm/s^2, mm/s]."""
 
 
 def plan_for(course):
@@ -37,7 +40,7 @@ def recommended(course, spec, verdict, count):
     """Return the presses that the workflow recommends next, in their order, with the pairs that they tell apart."""
     held, plan = Comparison(course, spec, tuple(named(verdict))), plan_for(course)
     found = rivals(held, verdict)
-    chosen = choose(held, found, plan) if len(found) > 1 else []
+    chosen = choose(held, found, plan, limits=LIMITS) if len(found) > 1 else []
     if not chosen:
         return []
     tools = [t.name for t in course.tools]
@@ -46,7 +49,8 @@ def recommended(course, spec, verdict, count):
     entries.sort(key=lambda e: e["repeat"])
     return [
         {"tool": tools.index(e["indenter"]), "purpose": e["purpose"],
-         **{k: float(e.get(k, 0.0)) for k in ("x", "y", "depth", "speed", "hold", "recovery", "overshoot")}}
+         **{k: float(e.get(k, 0.0)) for k in ("x", "y", "depth", "speed", "hold", "recovery", "overshoot",
+                                           "strokes", "stroke")}}
         for e in entries
     ][:count]  # fmt: skip
 

@@ -14,6 +14,7 @@ KEYS = ("time", "episode", "readings", "path_time", "path_episode", "path", "for
 def added(press):
     """Return a press as a world runs it."""
     asked = {k: press[k] for k in ("x", "y", "depth", "speed", "hold", "overshoot")}
+    asked |= {"strokes": int(press.get("strokes", 0)), "stroke": press.get("stroke", 0.0), "on_rows": True}
     recovery = max(press["recovery"], LEAST)
     return {**asked, "tool": press["tool"], "recovery": recovery, "from": np.array([protocol.SIDE, 0.0])}
 

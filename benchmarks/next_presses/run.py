@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from scoring.measures import interval  # noqa: E402
 from scoring.outcome import claims, holds  # noqa: E402
 from worlds import protocol, skin, world  # noqa: E402
 from worlds.cases import cases, inseparable  # noqa: E402
+from worlds.physics import KNOWN  # noqa: E402
 
 ENGINE = (*ROOMS, "revision")
 """What judges and recommends."""
@@ -37,6 +39,8 @@ STEADY = (
 
 Each in the library's own form: what is between two names is settled by no press.
 """
+SIZES = (1.0, 4.0)
+"""Sizes of effects, in those of the aliases, which are a few micrometres and milliseconds."""
 EPISODES = 24
 """Presses of a world at first."""
 STEPS = (4, 12)
@@ -49,10 +53,13 @@ def wanted(seed):
     """Yield worlds that their presses leave open, and that other presses at their places tell from any rival."""
     found = [c for c in cases("aliases", seed) if c.settings.get("protocol", "rich") not in ("rich", "one_site")]
     for case in sorted(found, key=lambda c: c.identity):
-        times = next(iter(case.times.values()))
-        if case.name.rsplit("-", 1)[0] in STEADY and not inseparable(next(iter(case.effects)), case.response, times):
+        [(name, size)], [times] = case.effects.items(), case.times.values()
+        if case.name.rsplit("-", 1)[0] in STEADY and not inseparable(name, case.response, times):
             case.settings["episodes"] = EPISODES
-            yield case
+            for many in SIZES:
+                if many * size <= KNOWN[name].most:
+                    yield replace(case, name=f"{case.name} x {many:g}", effects={name: many * size},
+                                  times={name: many * times})  # fmt: skip
 
 
 def asked(case, more, table, count):

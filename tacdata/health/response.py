@@ -50,9 +50,10 @@ class PressResponse:
 
     @property
     def key(self) -> tuple[str, float, float, float, float]:
-        """Indenter with angles and overshoot, place [mm], depth [mm], speed [mm/s]: presses that share it compare."""
+        """Indenter with angles and turns, place [mm], depth [mm], speed [mm/s]: presses that share it compare."""
         p = self.press
-        shape = provenance.content_hash({"shape": p.indenter.document, "angles": p.angles, "overshoot": p.overshoot})
+        turns = [p.overshoot, p.strokes, p.stroke]
+        shape = provenance.content_hash({"shape": p.indenter.document, "angles": p.angles, "turns": turns})
         return shape, round(p.x, 2), round(p.y, 2), round(p.depth, 2), round(p.speed, 3)
 
 

@@ -57,6 +57,10 @@ class Press:
     """Side from which the guide comes over the site: "+x", "-x", "+y" or "-y"; empty for any."""
     overshoot: float = 0.0
     """How much deeper than ``depth`` the guide goes before it comes back up to it [mm]."""
+    strokes: int = 0
+    """How often the guide comes up by ``stroke`` and goes back to ``depth``, before it holds [1]."""
+    stroke: float = 0.0
+    """By how much it comes up each time [mm]."""
     purpose: str = ""
     """Purpose of the press, as text; presses with the same purpose belong together."""
     tilt_x: float = 0.0
@@ -90,6 +94,7 @@ class Press:
     def document(self) -> dict[str, Any]:
         """The press as plain data (JSON types)."""
         left_out = {"indenter", *({"tilt_x", "tilt_y"} - self.angles.keys())}
+        left_out |= set() if self.strokes else {"strokes", "stroke"}
         values = {k: v for k, v in vars(self).items() if k not in left_out}
         return {**values, "indenter": self.indenter.document}
 
@@ -212,7 +217,8 @@ def _press(index: int, entry: dict[str, Any], indenter: Indenter, motion: Motion
         yaw=entry.get("yaw", 0.0), depth=entry["depth"], speed=entry.get("speed", motion.press_speed),
         hold=entry.get("hold", motion.hold), repeat=entry.get("repeat", 0), rest=entry.get("rest"),
         recovery=entry.get("recovery", 0.0), approach_from=entry.get("approach_from", ""),
-        overshoot=entry.get("overshoot", 0.0), purpose=entry.get("purpose", ""),
+        overshoot=entry.get("overshoot", 0.0), strokes=entry.get("strokes", 0), stroke=entry.get("stroke", 0.0),
+        purpose=entry.get("purpose", ""),
         tilt_x=entry.get("tilt_x", 0.0), tilt_y=entry.get("tilt_y", 0.0),
     )  # fmt: skip
 

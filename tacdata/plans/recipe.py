@@ -15,7 +15,7 @@ from tacdata.plans.plan import Plan
 from tacdata.plans.sites import sites
 from tacdata.sensor import Sensor
 
-COPIED = ("rest", "recovery", "overshoot", "purpose")
+COPIED = ("rest", "recovery", "overshoot", "strokes", "stroke", "purpose")
 """Entries of a block that hold for all of its presses."""
 
 

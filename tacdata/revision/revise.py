@@ -32,7 +32,7 @@ from tacdata.revision.labels.confirm import Confirmed, confirm, touches_fem
 from tacdata.revision.labels.realised import TipError, tip_error
 from tacdata.revision.labels.relabel import Moved, moves_labels, paths_moved, relabelled
 from tacdata.revision.labels.retrain import Recipe, Retrained, retrained
-from tacdata.revision.next_presses.plan import choose, plan_of
+from tacdata.revision.next_presses.plan import choose, left_open, plan_of, standard_errors
 from tacdata.revision.next_presses.rivals import named, rivals
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.surrogate.pressed import pressed
@@ -270,12 +270,13 @@ def _next(
     Plan.from_document(document, PLAN).check_against(read_session(sessions[-1]).sensor)
     told = []
     for c in chosen:
-        pair = max(c.nats, key=lambda p: c.nats[p])
+        apart = standard_errors(c.nats[c.best])
         told.append(
-            f"{c.trial.in_words(held.course.tools[c.trial.tool].name)}: {c.nats[pair]:.3g} nats between "
-            f"{pair[0]} and {pair[1]} in one press"
+            f"{c.trial.in_words(held.course.tools[c.trial.tool].name)}: one press tells {c.best[0]} from {c.best[1]} "
+            f"by {apart:.1f} standard errors"
         )
-    return {"plan": PLAN, "presses": told, "remark": "judge the new session together with those there are"}
+    remarks = ["judge the new session together with those there are", left_open(chosen)]
+    return {"plan": PLAN, "presses": told, "remark": "; ".join(r for r in remarks if r)}
 
 
 def _gap(found: GapReduction | None, slices: list[ResidualChange]) -> dict[str, Any] | None:

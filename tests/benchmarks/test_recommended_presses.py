@@ -55,6 +55,26 @@ def test_what_was_recorded_stays_and_presses_come_after_it(bench):
     assert np.all(np.diff(more["time"]) > 0) and more["path"][more["path_episode"] == count][:, 2].max() > 0.75
 
 
+def test_the_path_has_a_row_at_each_turn_of_a_stroke(bench):
+    """Between rows a turn would be cut by more than a lag of a millisecond moves the tip."""
+    case = next(c for c in bench.wanted(1000) if c.effects.keys() == {"low_pass_filter"})
+    press = {**PRESS, "overshoot": 0.0, "strokes": 5, "stroke": 0.2}
+    made = bench.recordings(case, [press])
+    own = made["path_episode"] == bench.EPISODES
+    time, depth = made["path_time"][own] - made["path_time"][own][0], made["path"][own, 2]
+    at, *_, wanted = bench.protocol.breakpoints(sys.modules["presses"].added(press)).T
+    np.testing.assert_allclose(np.interp(at[:-1], time, depth), wanted[:-1], atol=1e-9)
+    assert np.count_nonzero(np.isclose(wanted, 0.5)) == 2 * press["strokes"]
+    assert bench.length(press) > bench.length(PRESS), "random presses take as long"
+
+
+def test_each_alias_comes_in_two_sizes(bench):
+    cases = list(bench.wanted(1000))
+    assert len({c.identity for c in cases}) == len(cases)
+    sizes = [next(iter(c.effects.values())) for c in cases if c.name.startswith("low_pass_filter-poor")]
+    assert max(sizes) == pytest.approx(4 * min(sizes))
+
+
 @pytest.mark.parametrize(
     ("verdict", "right"),
     [

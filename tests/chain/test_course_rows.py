@@ -1,7 +1,9 @@
 """Rows of an episode: none invented, none lost, dense where the tip moves fast."""
 
 import numpy as np
+import pytest
 
+from tacdata.chain import Course, Tool
 from tacdata.chain.rows import rows_of
 
 PATH_TIME = np.array([0.0, 1.0, 1.5, 11.5, 12.0, 13.0])
@@ -59,3 +61,27 @@ def test_means_stand_at_their_mean_tip_where_the_path_turns():
     assert rows.averaged.max() > 2
     read = rows.averaged > 0
     np.testing.assert_allclose(rows.values[read, 0], rows.tip[read, 2], atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["commanded", "measured"])
+def test_turns_of_a_path_are_no_noise_of_it(kind):
+    """A path that goes up and down bends in a tenth of its rows and more; only a measured one is noisy."""
+    corners, depths = [0.0, 0.5], [0.0, 1.0]
+    for depth in (0.8, 1.0) * 30:
+        corners += [corners[-1] + 0.05, corners[-1] + 0.1]
+        depths += [depths[-1], depth]
+    time = np.unique(np.concatenate([np.arange(0.003, corners[-1], 1 / 50), corners]))
+    depth = np.interp(time, corners, depths)
+    if kind == "measured":
+        depth = depth + np.random.default_rng(2).normal(0, 0.003, len(time))
+    rows = len(time)
+    course = Course(
+        time=time, episode=np.zeros(rows, dtype=int), tip=np.column_stack([0 * depth, 0 * depth, depth]),
+        tool=np.zeros(rows, dtype=int), readings=np.zeros((rows, 1)), averaged=np.ones(rows),
+        session=np.zeros(1, dtype=int), site=np.zeros(1, dtype=int), tools=(Tool("ball", "sphere", 4.0),),
+        names=("one",),
+    )  # fmt: skip
+    if kind == "commanded":
+        assert course.dither == 0.0
+    else:
+        assert 0.003 <= course.dither < 0.006, "turns are in it, too"

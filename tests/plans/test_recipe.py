@@ -6,7 +6,7 @@ import yaml
 from running.in_process import tacdata
 
 from tacdata.errors import FormatError
-from tacdata.plans import Plan, read_plan
+from tacdata.plans import Plan, Press, read_plan
 from tacdata.plans.recipe import write_out
 from tacdata.recording.motion.plan_time import plan_time
 from tacdata.recording.motion.press_steps import steps
@@ -133,6 +133,26 @@ def test_sides_overshoot_and_recovery_are_driven():
     assert plan_time(plan).seconds == pytest.approx(
         3.0 + 4.0 + 0.5 + (0.7 + 0.3) / 1.0 + 0.2 / 1.0 + (0.3 + 0.5) / 1.0 + 2 * 2.7 / 5.0 + 0.5, abs=1.2
     )
+
+
+def test_strokes_are_driven_before_the_hold():
+    """The guide goes to its depth, comes up and goes back twice, then holds; it stands where it turns."""
+    block = {"indenter": "ball", "at": {"kind": "center"}, "depths": [0.5], "strokes": 2, "stroke": 0.2, "holds": [3.0]}
+    plan = Plan.from_document(write_out(recipe(block), SENSOR, "mine"), "mine")
+    press = plan.presses[0]
+    path = steps(press, plan.motion, Registration((0.0, 0.0, 0.0), 0.0))
+    moves = [round(step.target[2], 6) for step in path if step.target]
+    assert moves[2:] == [-0.5, -0.3, -0.5, -0.3, -0.5, 0.3, 3.0]
+    [hold] = [k for k, step in enumerate(path) if step.phase == "hold"]
+    assert path[hold].seconds == 3.0 and path[hold - 1].target == path[hold - 5].target
+    assert all((a.target is None) != (b.target is None) for a, b in pairwise(path)), "a pause after each move"
+    assert "strokes" in press.document and Press.from_document(press.document).stroke == 0.2
+
+
+def test_a_press_without_strokes_is_written_as_before():
+    press = Plan.from_document(write_out(recipe({"indenter": "ball", "at": {"kind": "center"}, "depths": [0.5]}),
+                                         SENSOR, "mine"), "mine").presses[0]  # fmt: skip
+    assert not {"strokes", "stroke"} & press.document.keys()
 
 
 def run(*arguments):

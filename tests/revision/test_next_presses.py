@@ -1,6 +1,7 @@
 """The presses that come next tell the rivals apart, stay within what was recorded, and can be run."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,15 +10,17 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "discrepancy"))
 from pressing import course
 
+from tacdata.chain import predict
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.effects import Placed, load
 from tacdata.plans import Plan
+from tacdata.recording.motion.plan_time import USUAL_LIMITS
 from tacdata.revision.comparison import Comparison
 from tacdata.revision.next_presses import plan as plan_module
-from tacdata.revision.next_presses.plan import choose, plan_of
+from tacdata.revision.next_presses.plan import choose, left_open, plan_of
 from tacdata.revision.next_presses.rivals import Rival
-from tacdata.revision.next_presses.trial import laid_out, trials
+from tacdata.revision.next_presses.trial import elsewhere, laid_out, trials
 
 PLAN = Plan.from_document(
     {"version": "1.1", "name": "one speed", "indenters": {"ball": {"shape": "sphere", "radius": 4.0}},
@@ -69,10 +72,52 @@ def test_a_pair_that_one_press_hardly_splits_gets_its_press_with_the_repeats(hel
     names = (("backlash", "latency"), ("backlash", "creep"), ("latency", "creep"))
     monkeypatch.setattr(plan_module, "trials", lambda course, plan: [one, other])
     monkeypatch.setattr(
-        plan_module, "_distances", lambda held, found, trial: dict(zip(names, pairs[trial], strict=True))
+        plan_module, "_distances", lambda held, found, trial, limits: dict(zip(names, pairs[trial], strict=True))
     )
     found = [rival(held, "backlash", b=0.05), rival(held, "latency", L=0.05), rival(held, "creep", f=0.01, tau=2.0)]
     assert len(choose(held, found, PLAN)) == presses
+
+
+def test_a_delay_is_told_from_a_filter_by_strokes(held):
+    """Both shift a steady move by as much; only where the tip starts and stops do they differ."""
+    found = [rival(held, "latency", L=0.02), rival(held, "low_pass_filter", tau=0.02)]
+    chosen = choose(held, found, PLAN, presses=2)
+    assert chosen and all(c.trial.strokes and c.trial.speed == 2.0 for c in chosen)
+    pair = ("latency", "low_pass_filter")
+    bare = replace(chosen[0].trial, strokes=0, stroke=0.0)
+    assert chosen[0].nats[pair] > 5 * plan_module._distances(held, found, bare, USUAL_LIMITS)[pair]
+    entry = plan_of(chosen, held, PLAN, "next")["presses"][0]
+    assert entry["strokes"] == chosen[0].trial.strokes and 0 < entry["stroke"] < entry["depth"]
+    assert left_open(chosen) == ""
+
+
+def test_play_shows_in_strokes(held):
+    """The strokes' turns are no noise of the path, which any play would take up."""
+    [trial] = [t for t in trials(held.course, PLAN) if t.strokes and t.speed == 2.0 and t.site == 0][:1]
+    own = laid_out(held.course, trial)
+    assert own.dither == 0.0
+    response = elsewhere(held.before.response, held.course, own, trial)
+    moved = predict(own, response, rival(held, "backlash", b=0.05).placed)
+    assert np.abs(moved.pose[:, 2] - own.tip[:, 2]).max() == pytest.approx(0.05)
+
+
+def test_a_pair_that_no_press_settles_is_said_to_be_beyond_the_guide(held, monkeypatch):
+    """Of three rivals two differ by too little for any number of plans: presses are chosen for the others alone."""
+    one, other = trials(held.course, PLAN)[:2]
+    names = (("backlash", "latency"), ("backlash", "creep"), ("latency", "creep"))
+    pairs = {one: (3.0, 0.0, 0.01), other: (0.0, 1.2, 0.15)}
+    monkeypatch.setattr(plan_module, "trials", lambda course, plan: [one, other])
+    monkeypatch.setattr(
+        plan_module, "_distances", lambda held, found, trial, limits: dict(zip(names, pairs[trial], strict=True))
+    )
+    found = [rival(held, "backlash", b=0.05), rival(held, "latency", L=0.05), rival(held, "creep", f=0.01, tau=2.0)]
+    chosen = choose(held, found, PLAN)
+    assert [c.trial for c in chosen] == [one, other]
+    told = left_open(chosen)
+    assert "record it 3 times to tell backlash from creep" in told
+    assert "no press of this guide tells latency from creep" in told
+    pairs[one], pairs[other] = (0.01, 0.01, 0.01), (0.01, 0.01, 0.15)
+    assert choose(held, found, PLAN) == []
 
 
 def test_a_trial_is_laid_out_as_the_guide_would_run_it(held):

@@ -7,10 +7,14 @@ SITES = np.array([[-2.85, -1.25], [0.0, 0.0], [2.4, 1.9], [-0.95, 2.5], [3.8, -2
 SIDE = 1.2  # mm, how far aside a press is approached from
 PAUSE = 2.5  # s, travel between presses
 REST = 1200.0  # s, between sessions
+STOP = 0.05  # s, for which the guide stands where it turns in a stroke
 
 
 def breakpoints(p):
-    """Return one press as times [s] and x, y, depth [mm] between which it moves straight."""
+    """Return one press as times [s] and x, y, depth [mm] between which it moves straight.
+
+    Presses that are added may have `strokes`, each up by `stroke` and back, and corners `on_rows` of the fine clock.
+    """
     clearance = p.get("clearance", 0.35)
     x, y, top = p["x"], p["y"], p["depth"] + p["overshoot"]
     points = [(0.0, x - p["from"][0], y - p["from"][1], -clearance), (0.25, x, y, -clearance)]
@@ -23,10 +27,17 @@ def breakpoints(p):
     if p["overshoot"]:
         on(0.3, top)
         on(p["overshoot"] / p["speed"], p["depth"])
+    for _ in range(p.get("strokes", 0)):
+        for depth in (p["depth"] - p["stroke"], p["depth"]):
+            on(STOP, points[-1][3])
+            on(p["stroke"] / p["speed"], depth)
     on(p["hold"], p["depth"])
     on((p["depth"] + clearance) / p["speed"], -clearance)
     on(p["recovery"], -clearance)
-    return np.array(points)
+    found = np.array(points)
+    if p.get("on_rows"):
+        found[:, 0] = np.round(found[:, 0] * FINE) / FINE
+    return found
 
 
 def rich(rng, episodes):

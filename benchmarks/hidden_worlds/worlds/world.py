@@ -79,6 +79,18 @@ def frames(w, seed):
     return np.concatenate([np.arange(r[0] + rng.integers(8), r[-1] + 1, int(protocol.FINE / RATE)) for r in w.presses])
 
 
+def path_rows(w, count):
+    """Return the rows of the fine clock that the path is said at: every other, and corners of presses that were added.
+
+    A lab's path has a row at each of its corners.
+    """
+    bend = np.zeros(len(w.clock), dtype=bool)
+    bend[1:-1] = np.any(np.abs(np.diff(w.command, 2, axis=0)) > 1e-9, axis=1)
+    bend &= w.episode >= count
+    bend[::2] = True
+    return np.flatnonzero(bend)
+
+
 def make(seed, effects, **given):
     """Return a world's recordings, its truth, and what its table is written with.
 
@@ -99,11 +111,12 @@ def make(seed, effects, **given):
     readings = noise.shaken(rng, w.clock[rows], clean, settings["noise"], settings["realism"])
     again = np.flatnonzero(said != rows)
     readings[again] = readings[again - 1]  # a frame said twice has the noise of the first time
+    way = path_rows(w, settings["episodes"])
     data = {
         "time": w.clock[rows], "episode": w.episode[rows], "readings": readings,
         "tool": w.tool[[r[0] for r in w.presses]], "session": w.session,
         "site": w.site[[r[0] for r in w.presses]], "centers": skin.centers(), "radii": np.array(RADII),
-        "path_time": w.clock[::2], "path_episode": w.episode[::2], "path": w.command[::2],
+        "path_time": w.clock[way], "path_episode": w.episode[way], "path": w.command[way],
     }  # fmt: skip
     if "tag" in settings["streams"]:
         data["tag"] = (w.carriage + w.tag_error)[rows] + TAG_NOISE * rng.normal(size=(len(rows), 3))

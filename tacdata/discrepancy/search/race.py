@@ -127,8 +127,9 @@ def physical_first(tried: list[Refined], current: Refined) -> list[Refined]:
     """
     ordered = sorted(tried, key=lambda model: model.half_bic)
     worth = PHYSICAL * (current.half_bic - ordered[0].half_bic)
-    ahead = [m for m in ordered if not _at_bound(m, current) and current.half_bic - m.half_bic >= worth]
-    return [*ahead, *(m for m in ordered if m not in ahead)]
+    ahead = [not _at_bound(m, current) and current.half_bic - m.half_bic >= worth for m in ordered]
+    # Two models of the same effects are compared by no number: arrays have no one truth.
+    return [m for first in (True, False) for m, is_ahead in zip(ordered, ahead, strict=True) if is_ahead == first]
 
 
 def _at_bound(model: Refined, current: Refined) -> bool:

@@ -129,7 +129,7 @@ def _back(search: StepSearch, known: np.ndarray) -> StepSearch:
 
 def _explained(presses: list[Press]) -> np.ndarray:
     """Return the columns for site, time, speed and kind of press, scaled to about 1, shape (presses, columns)."""
-    kinds = [(p.mounting, p.approach_from, p.overshoot > 0) for p in presses]
+    kinds = [(p.mounting, p.approach_from, p.overshoot > 0, p.strokes > 0) for p in presses]
     table = np.array([(p.x, p.y, np.log(p.speed), p.overshoot) for p in presses], float)
     table = (table - table.mean(axis=0)) / np.maximum(table.std(axis=0), 1e-9)
     each = [[float(kind == known) for known in sorted(set(kinds))] for kind in kinds]

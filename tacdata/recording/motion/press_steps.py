@@ -12,7 +12,9 @@ from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.rig import Registration
 
 SYNC = 0.01
-"""Pause that makes the controller finish its moves before it answers [s]; GRBL rounds up to 0.05 s."""
+"""Pause that makes the controller finish its moves before it answers [s]."""
+SHORTEST_PAUSE = 0.05
+"""What GRBL rounds such a pause up to [s]."""
 
 SIDES = {"": (0.0, 0.0), "+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
 """Direction from a site to where the guide comes from, for each value of `Press.approach_from`."""
@@ -39,7 +41,7 @@ def steps(press: Press, motion: MotionSettings, registration: Registration) -> t
 
     A pause stands behind every move. So the next move starts from rest, as `trapezoid` assumes, and the pause's
     acknowledgement bounds the move's end. A press with negative depth stops above the skin. One with ``approach_from``
-    rests ``run_up`` beside its site and comes over it from there.
+    rests ``run_up`` beside its site and comes over it from there. Strokes come before the hold.
     """
     # Above the standoff the way down is halved, so that approach and press are both moves.
     high = -press.depth >= motion.standoff
@@ -57,9 +59,14 @@ def steps(press: Press, motion: MotionSettings, registration: Registration) -> t
     if press.overshoot:
         beyond = registration.to_machine(press.x, press.y, press.deepest)
         path += [Step("press", beyond, press.speed), Step("press", seconds=SYNC)]
+    up = registration.to_machine(press.x, press.y, press.depth - press.stroke)
+    turn = [Step("press", seconds=SYNC), Step("press", up, press.speed), Step("press", seconds=SYNC),
+            Step("press", target, press.speed)]  # fmt: skip
+    turns = turn * press.strokes
     return (
         *path,
         Step("press", target, press.speed),
+        *turns,
         Step("hold", seconds=max(press.hold, SYNC)),
         Step("release", standoff, press.speed),
         Step("release", seconds=SYNC),

@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 
 import schemas
-from tacdata.chain import predict
+from tacdata.chain import Course, predict
 from tacdata.plans import Plan
+from tacdata.recording.motion.plan_time import USUAL_LIMITS
+from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.revision.comparison import Comparison
 from tacdata.revision.next_presses.rivals import Rival
 from tacdata.revision.next_presses.trial import CandidatePress, elsewhere, laid_out, predicted_readings, trials
@@ -31,6 +33,15 @@ STEP = 0.01
 """Step of the derivative with respect to depth [mm]."""
 NOISY = 1.0
 """Whitened distance of two rivals [nats] below which a press, with all its repeats, is not informative."""
+SETTLES = 4.0
+"""By so many expected standard errors two rivals are told apart; `RIVAL_Z`, with a reserve for what no model has [1].
+"""
+PLANS = 4
+"""A pair that a plan settles only if it is recorded more often than this is beyond the guide [1]."""
+
+
+Pair = tuple[str, str]
+"""Two mechanisms."""
 
 
 @dataclass(frozen=True)
@@ -38,23 +49,35 @@ class Choice:
     """One press and its purpose."""
 
     trial: CandidatePress
-    nats: dict[tuple[str, str], float]
+    nats: dict[Pair, float]
     """Half the whitened squared distance of each pair of rivals [nats], for one press."""
 
+    @property
+    def best(self) -> Pair:
+        """The pair that it tells apart best."""
+        return max(self.nats, key=lambda pair: self.nats[pair])
 
-def choose(held: Comparison, found: list[Rival], plan: Plan, presses: int = PRESSES) -> list[Choice]:
+
+def choose(
+    held: Comparison, found: list[Rival], plan: Plan, presses: int = PRESSES, limits: AxisLimits = USUAL_LIMITS
+) -> list[Choice]:
     """Return the most informative presses, the best first; fewer if no press tells the rivals apart.
+
+    Pairs that `PLANS` plans of the best press would leave open earn nothing.
 
     Args:
         held: Recordings and model.
         found: The rivals, fitted.
         plan: The plan of one of the sessions.
         presses: Number of different presses.
+        limits: What the guide accelerates by.
     """
-    scored = [Choice(t, _distances(held, found, t)) for t in trials(held.course, plan)]
+    scored = [Choice(t, _distances(held, found, t, limits)) for t in trials(held.course, plan)]
     weight = _probabilities(found)
     pairs = [(a, b) for i, a in enumerate(found) for b in found[i + 1 :]]
     have = {(a.mechanism, b.mechanism): 0.0 for a, b in pairs}
+    most = {pair: max((c.nats[pair] for c in scored), default=0.0) for pair in have}
+    have = {pair: 0.0 for pair in have if standard_errors(PLANS * presses * REPEATS * most[pair]) >= SETTLES}
     chosen: list[Choice] = []
     while scored and len(chosen) < presses:
 
@@ -63,13 +86,38 @@ def choose(held: Comparison, found: list[Rival], plan: Plan, presses: int = PRES
             return float(np.sum(gain)) / choice.trial.seconds**0.5
 
         best = max(scored, key=worth)
-        if REPEATS * max(best.nats.values(), default=0.0) < NOISY:
+        if REPEATS * max((best.nats[pair] for pair in have), default=0.0) < NOISY:
             break
         chosen.append(best)
         scored.remove(best)
-        for pair, nats in best.nats.items():
-            have[pair] += nats
+        for pair in have:
+            have[pair] += best.nats[pair]
     return chosen
+
+
+def standard_errors(nats: float) -> float:
+    """Return by how many standard errors a likelihood ratio is expected to tell two models apart."""
+    return float(np.sqrt(2 * nats))
+
+
+def left_open(chosen: list[Choice], repeats: int = REPEATS) -> str:
+    """Return what a plan will not settle, in words; empty if it settles every pair.
+
+    Args:
+        chosen: Its presses.
+        repeats: Repeats of each.
+    """
+    told, beyond = [], []
+    for pair in chosen[0].nats:
+        z = standard_errors(repeats * sum(c.nats[pair] for c in chosen))
+        plans = int(np.ceil((SETTLES / max(z, 1e-9)) ** 2))
+        if plans > PLANS:
+            beyond.append(f"{pair[0]} from {pair[1]}")
+        elif plans > 1:
+            told.append(f"record it {plans} times to tell {pair[0]} from {pair[1]}")
+    if beyond:
+        told.append(f"no press of this guide tells {', '.join(beyond)}: another kind of measurement is needed")
+    return "; ".join(told)
 
 
 def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repeats: int = REPEATS) -> dict[str, Any]:
@@ -89,8 +137,7 @@ def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repea
         for c in chosen:
             tool = held.course.tools[c.trial.tool].name
             angles = next((p.angles for p in plan.presses if p.indenter_name == tool), {"yaw": 0.0})
-            best = max(c.nats, key=lambda pair: c.nats[pair])
-            purpose = f"tells {best[0]} from {best[1]}"
+            purpose = f"tells {c.best[0]} from {c.best[1]}"
             entries.append({**c.trial.entry(tool, angles["yaw"]), **angles, "repeat": turn, "purpose": purpose})
     tools = list(dict.fromkeys(e["indenter"] for e in entries))
     entries.sort(key=lambda e: tools.index(e["indenter"]))
@@ -109,14 +156,14 @@ def _probabilities(found: list[Rival]) -> dict[str, float]:
     return {r.mechanism: float(w) for r, w in zip(found, weight / weight.sum(), strict=True)}
 
 
-def _distances(held: Comparison, found: list[Rival], trial: CandidatePress) -> dict[tuple[str, str], float]:
+def _distances(held: Comparison, found: list[Rival], trial: CandidatePress, limits: AxisLimits) -> dict[Pair, float]:
     course, noise = held.course, held.null.noise
-    given, predicted = list(held.setting.given), []
-    for rival in found:
-        _, signal = predicted_readings(course, rival.model.response, [*given, *rival.placed], trial)
-        predicted.append(signal / noise.scale[: course.channels])
-    own = laid_out(course, trial)
-    slope = _slope(held, found[0], trial) / noise.scale[: course.channels]
+    given, own = list(held.setting.given), laid_out(course, trial, limits)
+    predicted = [
+        predicted_readings(course, r.model.response, [*given, *r.placed], trial, own) / noise.scale[: course.channels]
+        for r in found
+    ]
+    slope = _slope(held, found[0], trial, own) / noise.scale[: course.channels]
     # Correlated noise is less informative: AR(1) noise of correlation m has (1 - m) / (1 + m) of the information on
     # slow differences.
     worth = (1 - noise.memory) / (1 + noise.memory)
@@ -127,16 +174,13 @@ def _distances(held: Comparison, found: list[Rival], trial: CandidatePress) -> d
             apart = apart - apart.mean(axis=0)
             share = (apart * slope).sum() / ((slope**2).sum() + JITTER**-2)
             left = apart - share * slope
-            nats[a.mechanism, found[j].mechanism] = float(
-                0.5 * worth * np.square(left).sum() * len(own.time) / own.rows
-            )
+            nats[a.mechanism, found[j].mechanism] = float(0.5 * worth * np.square(left).sum())
     return nats
 
 
-def _slope(held: Comparison, rival: Rival, trial: CandidatePress) -> np.ndarray:
+def _slope(held: Comparison, rival: Rival, trial: CandidatePress, own: Course) -> np.ndarray:
     """Return the derivative of readings by the press's depth [counts/mm], each channel's mean subtracted."""
-    own = laid_out(held.course, trial)
     response = elsewhere(rival.model.response, held.course, own, trial)
     deeper = replace(own, tip=np.where(own.tip[:, 2:] > 0, own.tip + np.array([0.0, 0.0, STEP]), own.tip))
-    slope = (predict(deeper, response, []).signal - predict(own, response, []).signal) / STEP
+    slope = (predict(deeper, response, []).signal - predict(own, response, []).signal)[own.read] / STEP
     return slope - slope.mean(axis=0)

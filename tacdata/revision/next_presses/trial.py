@@ -13,16 +13,26 @@ from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.effects import Placed
 from tacdata.plans import Plan
+from tacdata.recording.motion.plan_time import USUAL_LIMITS
+from tacdata.recording.motion.press_steps import SHORTEST_PAUSE
+from tacdata.recording.motion.trapezoid import AxisLimits
 
 RATES, HOLDS = (0.15, 0.5, 2.0, 6.0), (0.0, 2.0, 20.0)
 """Speeds [mm/s] and times at full depth [s] to choose from."""
 DEPTHS, OVERSHOOT = (0.5, 1.0), 0.8
 """Depths as shares of the deepest recorded press; presses with overshoot go to its full depth and stay at this share.
 """
+STROKES, STROKE = 30, (0.1, 0.3)
+"""How often presses with strokes come up and go down again, and how far, as shares of their depth.
+
+A delay, a filter and play differ where the tip starts, stops or turns, and nowhere else.
+"""
 RECOVERY = 10.0
 """Time after the release that may be recorded [s]."""
 FRAME = 1 / 30
 """Time between readings if it is unknown [s]."""
+CLEAR = 0.3
+"""Height from which the guide goes down, and to which it comes back [mm]."""
 PLACES = 2
 """Places tried for each tool, the most informative first."""
 
@@ -48,16 +58,22 @@ class CandidatePress:
     """[s]"""
     overshoot: float
     """[mm]"""
+    strokes: int = 0
+    """[1]"""
+    stroke: float = 0.0
+    """[mm]"""
 
     @property
     def seconds(self) -> float:
         """Expected duration [s]."""
-        return 4.0 + 2 * (self.depth + self.overshoot + 0.3) / self.speed + self.hold + self.recovery
+        turns = 2 * self.strokes * (self.stroke / self.speed + SHORTEST_PAUSE)
+        return 4.0 + 2 * (self.depth + self.overshoot + 0.3) / self.speed + turns + self.hold + self.recovery
 
     def in_words(self, indenter: str) -> str:
         """Describe it."""
         told = f"{indenter} at ({self.x:.2f}, {self.y:.2f}) mm, {self.depth:.2f} mm deep at {self.speed:g} mm/s"
         told += f", from {self.overshoot:.2f} mm below" if self.overshoot else ""
+        told += f", {self.strokes} times up by {self.stroke:.2f} mm and back" if self.strokes else ""
         told += f", hold {self.hold:g} s" if self.hold else ""
         return told + (f", {self.recovery:g} s after the release" if self.recovery else "")
 
@@ -71,6 +87,8 @@ class CandidatePress:
             found["recovery"] = self.recovery
         if self.overshoot:
             found["overshoot"] = round(self.overshoot, 3)
+        if self.strokes:
+            found |= {"strokes": self.strokes, "stroke": round(self.stroke, 3)}
         return found
 
 
@@ -101,6 +119,10 @@ def trials(course: Course, plan: Plan) -> list[CandidatePress]:
                 if share == DEPTHS[-1] and hold != HOLDS[-1]:
                     over = (1 - OVERSHOOT) * deepest
                     found.append(CandidatePress(*common, OVERSHOOT * deepest, speed, hold, 0.0, over))
+                if share == DEPTHS[-1] and hold == HOLDS[0]:
+                    found += [
+                        CandidatePress(*common, deepest, speed, hold, 0.0, 0.0, STROKES, s * deepest) for s in STROKE
+                    ]
     return found
 
 
@@ -115,35 +137,71 @@ def _most_variable(course: Course, episodes: np.ndarray) -> list[int]:
     return sorted(spread, key=lambda s: -spread[s])
 
 
-def laid_out(course: Course, trial: CandidatePress) -> Course:
-    """Return the course of one press that was not recorded; its readings are 0."""
-    deep = trial.depth + trial.overshoot
-    corners = [(-0.3, 1.0), (deep, (deep + 0.3) / trial.speed)]
-    if trial.overshoot:
-        corners.append((trial.depth, trial.overshoot / trial.speed))
-    corners += [(trial.depth, trial.hold), (-0.3, (trial.depth + 0.3) / trial.speed), (-0.3, 0.5 + trial.recovery)]
-    at = np.concatenate([[0.0], np.cumsum([seconds for _, seconds in corners])])
-    depth = np.array([-0.3, *(d for d, _ in corners)])
+def laid_out(course: Course, trial: CandidatePress, limits: AxisLimits = USUAL_LIMITS) -> Course:
+    """Return the course of one press that was not recorded; its readings are 0.
+
+    Args:
+        course: The recordings: readings come as often.
+        trial: The press.
+        limits: What the guide accelerates by: it rounds the corners of the path.
+    """
+    at, depth = _path(trial, limits)
     inside = course.reduced.step[~course.reduced.first]
     frame = float(np.clip(np.median(inside), 1e-3, 0.1)) if len(inside) else FRAME
-    time = np.unique(np.concatenate([np.arange(0.0, at[-1], frame), at]))
+    at, frames = np.round(at, 9), np.round(np.arange(0.0, at[-1], frame), 9)
+    time = np.unique(np.concatenate([frames, at]))
     tip = np.column_stack([np.full(len(time), trial.x), np.full(len(time), trial.y), np.interp(time, at, depth)])
     rows = len(time)
     return replace(
         course, time=time, episode=np.zeros(rows, dtype=np.int64), tip=tip,
         tool=np.full(rows, trial.tool, dtype=np.int64), readings=np.zeros((rows, course.channels)),
-        averaged=np.ones(rows), session=np.zeros(1, dtype=np.int64), site=np.array([trial.site]), names=("trial",),
-        recording=None, force=None, tag=None, temperature=None if course.temperature is None else np.full(
-            rows, float(np.median(course.temperature))),
+        averaged=np.isin(time, frames).astype(float), session=np.zeros(1, dtype=np.int64), site=np.array([trial.site]),
+        names=("trial",), recording=None, force=None, tag=None,
+        temperature=None if course.temperature is None else np.full(rows, float(np.median(course.temperature))),
     )  # fmt: skip
 
 
+def _path(trial: CandidatePress, limits: AxisLimits) -> tuple[np.ndarray, np.ndarray]:
+    """Return times [s] and depths [mm] of a press, straight in between."""
+    times, depths = [np.zeros(1)], [np.array([-CLEAR])]
+
+    def stay(seconds: float) -> None:
+        times.append(times[-1][-1:] + seconds)
+        depths.append(depths[-1][-1:])
+
+    def go(depth: float) -> None:
+        begin = np.array([0.0, 0.0, float(depths[-1][-1])])
+        at, places = limits.straight_move(begin, np.array([0.0, 0.0, depth]), trial.speed).knots()
+        times.append(times[-1][-1] + at)
+        depths.append(places[:, 2])
+
+    stay(1.0)
+    go(trial.depth + trial.overshoot)
+    if trial.overshoot:
+        go(trial.depth)
+    for _ in range(trial.strokes):
+        for depth in (trial.depth - trial.stroke, trial.depth):
+            stay(SHORTEST_PAUSE)
+            go(depth)
+    stay(trial.hold)
+    go(-CLEAR)
+    stay(0.5 + trial.recovery)
+    return np.concatenate(times), np.concatenate(depths)
+
+
 def predicted_readings(
-    course: Course, response: Response, placed: Sequence[Placed], trial: CandidatePress
-) -> tuple[Course, np.ndarray]:
-    """Return the trial's course and its predicted readings, shape (rows, channels)."""
-    own = laid_out(course, trial)
-    return own, predict(own, elsewhere(response, course, own, trial), placed).signal
+    course: Course, response: Response, placed: Sequence[Placed], trial: CandidatePress, own: Course
+) -> np.ndarray:
+    """Return what would be read in a trial, shape (readings, channels).
+
+    Args:
+        course: The recordings.
+        response: A model's response.
+        placed: Its effects.
+        trial: The press.
+        own: Its course (`laid_out`).
+    """
+    return predict(own, elsewhere(response, course, own, trial), placed).signal[own.read]
 
 
 def elsewhere(response: Response, course: Course, own: Course, trial: CandidatePress) -> Response:
