@@ -7,6 +7,9 @@ Presses of every shape that ships (`random_presses.yaml`) on skins drawn at rand
 at most 0.25 mm and up again. All skins have the default mesh, stretched.
 
     python benchmarks/random_presses.py [--device cuda:0] [--presses 2000] [--skins 20] [--seed 0] [--json FILE]
+
+With `--hardest 40` only so many of them are solved, one by one: those that come first when depth, sharpness, lean,
+friction and Poisson's ratio are added up. It prints the CPU seconds of the slowest, too.
 """
 
 from __future__ import annotations
@@ -16,16 +19,19 @@ import json
 import math
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from scipy.stats import binomtest
 
-from label_farm.simulated.plan import read_simulation_plan
+from label_farm.simulated.plan import SimulationPlan, read_simulation_plan
 from label_farm.simulated.press_draw import draw_press
 from label_farm.simulated.specimen import stretched
 from tacdata.errors import SolveError
+from tacdata.plans import Press
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.mesh.build import MeshSettings, build_mesh
@@ -53,6 +59,33 @@ def path(depth: float) -> tuple[float, ...]:
     return tuple(round(float(d), 4) for d in [*down, *down[-2::-1], 0.0])
 
 
+def hardness(press: Press, sensor: Sensor) -> float:
+    """Return how hard a press is: 1 for each of depth, sharpness and lean, a half for friction and Poisson's ratio."""
+    lean = math.hypot(press.tilt_x, press.tilt_y) / 14
+    sharp = min(0.1 / press.indenter.sharpest, 1.0)
+    skin = sensor.contact.friction / 0.8 + (sensor.material.poisson_ratio - 0.45) / 0.049
+    return press.depth / 1.5 + sharp + lean + skin / 2
+
+
+def hardest(plan: SimulationPlan, seed: int, skins: int, each: int, count: int) -> set[int]:
+    """Return the numbers of the hardest presses that are possible."""
+    found = []
+    for number in range(skins):
+        sensor = skin(seed, number)
+        for k in range(number * each, (number + 1) * each):
+            press = draw_press(plan, sensor, seed, k)
+            if possible(asked(press), sensor):
+                found.append((hardness(press, sensor), k))
+    return {k for _, k in sorted(found, reverse=True)[:count]}
+
+
+def asked(press: Press) -> PressRequest:
+    """Return a press as the model takes it."""
+    return PressRequest(
+        press.indenter, press.x, press.y, press.yaw, path(press.depth), tilt_x=press.tilt_x, tilt_y=press.tilt_y
+    )
+
+
 def possible(request: PressRequest, sensor: Sensor) -> bool:
     """Return whether a press is one that a skin can take."""
     try:
@@ -62,6 +95,22 @@ def possible(request: PressRequest, sensor: Sensor) -> bool:
     return True
 
 
+def walk(
+    model: SkinModel, requests: list[PressRequest], capacity: int, seconds: list[float] | None
+) -> Iterator[tuple[int, float, Any]]:
+    """Yield the states of presses; one by one where their CPU seconds are to be noted."""
+    if seconds is None:
+        yield from model.states_many(requests, min(capacity, len(requests)), with_displacement=False)
+        return
+    _ = model.skin.rest
+    for index, request in enumerate(requests):
+        began = time.process_time()
+        for _, depth, state in model.states_many([request], with_displacement=False):
+            yield index, depth, state
+        seconds.append(time.process_time() - began)
+        print(f"  {request.indenter.shape} {max(request.depths):.2f} mm: {seconds[-1]:.1f} CPU s", flush=True)
+
+
 def main() -> None:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -69,6 +118,7 @@ def main() -> None:
     parser.add_argument("--presses", type=int, default=2000)
     parser.add_argument("--skins", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--hardest", type=int, default=0, help="solve only so many of the presses, one by one")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     torch.set_num_threads(1)
@@ -79,25 +129,30 @@ def main() -> None:
     refused = 0
     steps: list[int] = []
     of_press: list[int] = []
+    seconds: list[float] = []
+    chosen = hardest(plan, arguments.seed, arguments.skins, each, arguments.hardest) if arguments.hardest else None
+    solved = 0
     shapes: Counter[str] = Counter()
     began = time.perf_counter()
     for number in range(arguments.skins):
         sensor = skin(arguments.seed, number)
+        mine = [k for k in range(number * each, (number + 1) * each) if chosen is None or k in chosen]
+        if not mine:
+            continue
         own = stretched(mesh, design.skin.thickness, sensor.skin.thickness)
         model = SkinModel(sensor, settings, arguments.device, own)
-        drawn = [draw_press(plan, sensor, arguments.seed, number * each + k) for k in range(each)]
-        requests = [
-            PressRequest(p.indenter, p.x, p.y, p.yaw, path(p.depth), tilt_x=p.tilt_x, tilt_y=p.tilt_y) for p in drawn
-        ]
-        total = np.zeros(each, int)
-        for index, depth, state in model.states_many(requests, min(capacity, each), with_displacement=False):
+        drawn = [draw_press(plan, sensor, arguments.seed, k) for k in mine]
+        requests = [asked(press) for press in drawn]
+        total, solved = np.zeros(len(mine), int), solved + len(mine)
+        for index, depth, state in walk(model, requests, capacity, seconds if chosen else None):
             if isinstance(state, SolveError):
                 press = drawn[index]
                 if not possible(requests[index], sensor):
                     refused += 1
                     continue
                 lost.append({
-                    "skin": number, "friction": sensor.contact.friction, "nu": sensor.material.poisson_ratio,
+                    "skin": number, "press": mine[index], "friction": sensor.contact.friction,
+                    "nu": sensor.material.poisson_ratio,
                     "thickness": sensor.skin.thickness, "indenter": press.indenter.document, "x": press.x, "y": press.y,
                     "yaw": press.yaw, "tilt": [press.tilt_x, press.tilt_y], "depth": press.depth, "at": depth,
                     "reason": state.given,
@@ -108,7 +163,7 @@ def main() -> None:
         of_press += total.tolist()
         shapes.update(press.indenter_name for press in drawn)
         print(f"skin {number}: {time.perf_counter() - began:.0f} s, {len(lost)} lost", flush=True)
-    count = arguments.skins * each - refused
+    count = solved - refused
     print(f"{refused} presses refused before they were solved")
     low, high = binomtest(len(lost), count).proportion_ci(method="wilson")
     median, p95 = np.percentile(steps, [50, 95])
@@ -116,6 +171,8 @@ def main() -> None:
           f" ({100 * low:.2f} to {100 * high:.2f} %)")
     print(f"Newton steps a state: median {median:.0f}, 95th percentile {p95:.0f}; a press: median"
           f" {np.median(of_press):.0f}, most {max(of_press)}")
+    if seconds:
+        print(f"CPU seconds a press: median {np.median(seconds):.1f}, most {max(seconds):.1f}")
     for name, one in Counter(entry["indenter"]["shape"] for entry in lost).most_common():
         print(f"  {name}: {one}")
     for entry in lost:
@@ -124,7 +181,7 @@ def main() -> None:
         result = {
             "presses": count, "refused": refused, "lost": lost,
             "newton": {"median": median, "p95": p95, "most": max(of_press)},
-            "shapes": shapes, "device": arguments.device,
+            "shapes": shapes, "device": arguments.device, "cpu_seconds": seconds,
         }
         arguments.json.write_text(json.dumps(result, indent=1))
 
