@@ -26,6 +26,8 @@ LEFT_T = 2.0
 """Leftovers: they count from so many standard errors over episodes on [1]."""
 GAP_T = 3.0
 """Leftovers: without any effect that helps, they are a gap from so many standard errors on [1]."""
+LENDS = 0.01
+"""Several names: what another explains this much less than may be its form, off by a tenth of its size [1]."""
 SAME_SIZE = 0.1
 """Constancy: an effect whose size spreads by so little over all conditions is a mechanism, whatever is left [1]..."""
 ALIKE_SIZE = 0.2
@@ -171,11 +173,15 @@ def _within_bounds(finding: FoundEffect) -> FoundEffect:
 
 
 def stands_in(found: Findings, finding: FoundEffect) -> bool:
-    """Return whether what is left is large beside what an effect explains beyond the others: it may be a part of that.
+    """Return whether an effect may be a part of what another leaves by its form, or of what all leave.
 
-    A single effect is held against what is left by `adequate`.
+    It explains little beside that, beyond the others. A single effect is held against what is left by `adequate`.
     """
-    if len(found.effects) < 2 or found.left.t < LEFT_T or finding.corrected_p is None:
+    if len(found.effects) < 2 or finding.corrected_p is None:
+        return False
+    if finding.bought < LENDS * max(f.bought for f in found.effects if f.corrected_p is not None):
+        return True
+    if found.left.t < LEFT_T:
         return False
     return found.left.gain >= SHARE_LEFT_ALONE * (found.left.gain + max(finding.bought, 0.0))
 

@@ -185,10 +185,22 @@ def test_chance_is_no_spread():
 )
 def test_a_further_name_may_stand_in_for_what_is_left(bought, left, t, part):
     """What it explains beyond the others must be large beside what nothing explains."""
-    found = cast(Any, SimpleNamespace(effects=(ONE, ONE), left=SimpleNamespace(t=t, gain=left)))
-    assert stands_in(found, replace(ONE, bought=bought)) == part
+    mine = replace(ONE, bought=bought)
+    found = cast(Any, SimpleNamespace(effects=(mine, mine), left=SimpleNamespace(t=t, gain=left)))
+    assert stands_in(found, mine) == part
     alone = cast(Any, SimpleNamespace(effects=(ONE,), left=SimpleNamespace(t=t, gain=left)))
     assert not stands_in(alone, replace(ONE, bought=bought))
+
+
+@pytest.mark.parametrize(("bought", "part"), [(50, True), (200, False)])
+def test_a_further_name_may_stand_in_for_the_form_of_another(bought, part):
+    """A form that is off by a tenth leaves a hundredth of what it explains, though nothing stands out."""
+    large, small = replace(ONE, bought=10000.0), replace(ONE, bought=float(bought))
+    found = cast(Any, SimpleNamespace(effects=(large, small), left=SimpleNamespace(t=0.0, gain=0.0)))
+    assert stands_in(found, small) == part and not stands_in(found, large)
+    gain = replace(ONE, bought=float("inf"), corrected_p=None)
+    found = cast(Any, SimpleNamespace(effects=(gain, small), left=SimpleNamespace(t=0.0, gain=0.0)))
+    assert not stands_in(found, small), "what calibration shows has no such figure"
 
 
 @pytest.mark.parametrize(
