@@ -9,6 +9,7 @@ import re
 import unicodedata
 from collections.abc import Hashable
 from contextlib import suppress
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -125,13 +126,30 @@ def parsed(text: str, origin: str) -> Any:
         content = json.loads(text, object_pairs_hook=_unique)
         return content if plain else _referring(content)
     # In JSON tabs are white space between the values, which YAML does not allow.
-    loader = _Loader(text.expandtabs(4) if text.lstrip().startswith(("{", "[")) else text)
+    content = _content(text.expandtabs(4) if text.lstrip().startswith(("{", "[")) else text, origin)
+    return content if plain else _referring(content)
+
+
+def _content(text: str, origin: str) -> Any:
+    """Return what a YAML text holds: by libyaml, ten times as fast, unless it stumbles or could run out of stack."""
+    if _QuickLoader is not None and _nested(text) < DEEP:
+        with suppress(yaml.YAMLError):  # the loader in Python says it in its words
+            return _loaded(_QuickLoader(text), origin)
+    return _loaded(_Loader(text), origin)
+
+
+def _loaded(loader: Any, origin: str) -> Any:
     loader.origin = origin
     try:
-        content = loader.get_single_data()
-        return content if plain else _referring(content)
+        return loader.get_single_data()
     finally:
         loader.dispose()
+
+
+def _nested(text: str) -> int:
+    """Return a bound on how deep brackets and rows of dashes go; deeper by indentation alone is a long text."""
+    levels = list(accumulate((1 if bracket in "[{" else -1 for bracket in _BRACKETS.findall(text)), initial=0))
+    return max(levels) - min(levels) + max((len(row) for row in _DASHES.findall(text)), default=0)
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -170,10 +188,12 @@ def _referring(content: Any) -> Any:
     return named(content) if collect(content) else content
 
 
-class _Loader(yaml.SafeLoader):
+class _Constructor:
     """YAML 1.2's numbers (``1e-7``, ``010`` is ten, ``1:30`` is a text), and no duplicate keys."""
 
     origin = ""
+    construct_object: Any
+    construct_scalar: Any
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Return the mapping.
@@ -200,7 +220,7 @@ class _Loader(yaml.SafeLoader):
                     "delete or rename one of the two",
                 )
             lines[name] = line
-        return super().construct_mapping(node, deep)
+        return super().construct_mapping(node, deep)  # ty: ignore[missing-attribute]
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
         """Return a whole number: decimal, 0x hexadecimal or 0o octal."""
@@ -208,24 +228,41 @@ class _Loader(yaml.SafeLoader):
         return int(text, 0) if text.lstrip("-+").startswith(("0x", "0o")) else int(text)
 
 
-# YAML 1.1 read 010 as eight, 1:30 as ninety and 1_0 as ten; YAML 1.2 does not.
-_Loader.yaml_implicit_resolvers = {
-    letter: [entry for entry in entries if entry[0] not in ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")]
-    for letter, entries in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
+class _Loader(_Constructor, yaml.SafeLoader):
+    """In Python: it says what is wrong."""
+
+
 _NUMBERS = list("-+0123456789.")
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:int", re.compile(r"(?:[-+]?[0-9]+|0x[0-9a-fA-F]+|0o[0-7]+)$"), _NUMBERS
-)
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(
+_INT, _FLOAT = (f"tag:yaml.org,2002:{kind}" for kind in ("int", "float"))
+_RESOLVERS = {
+    _INT: re.compile(r"(?:[-+]?[0-9]+|0x[0-9a-fA-F]+|0o[0-7]+)$"),
+    _FLOAT: re.compile(
         r"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)$|[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"
         r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$"
     ),
-    _NUMBERS,
-)
-_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+}
+
+
+def _with_numbers(loader: Any) -> Any:
+    """Give a loader the numbers of YAML 1.2: YAML 1.1 read 010 as eight, 1:30 as ninety and 1_0 as ten."""
+    loader.yaml_implicit_resolvers = {
+        letter: [entry for entry in entries if entry[0] not in _RESOLVERS]
+        for letter, entries in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+    for tag, pattern in _RESOLVERS.items():
+        loader.add_implicit_resolver(tag, pattern, _NUMBERS)
+    loader.add_constructor(_INT, loader.construct_yaml_int)
+    return loader
+
+
+_with_numbers(_Loader)
+_QuickLoader: Any = None
+if yaml.__with_libyaml__:
+    _QuickLoader = _with_numbers(type("_QuickLoader", (_Constructor, yaml.CSafeLoader), {}))
+"""The same by libyaml, where PyYAML was built with it."""
+DEEP = 200
+"""Levels from which libyaml could run out of stack; the loader in Python ends in words."""
+_BRACKETS, _DASHES = re.compile(r"[\[{}\]]"), re.compile(r"(?:[-?] +)+")
 
 
 def check(document: Any, schema: str, origin: str) -> None:

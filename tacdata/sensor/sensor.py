@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 import schemas
 from tacdata import documents, provenance
@@ -278,4 +277,4 @@ def default_sensor() -> Sensor:
         0.102
     """
     text = (files("tacdata.sensor") / "tacprint.yaml").read_text()
-    return Sensor.from_document(yaml.safe_load(text), "tacprint.yaml")
+    return Sensor.from_document(documents.parsed(text, "tacprint.yaml"), "tacprint.yaml")

@@ -166,7 +166,7 @@ def _path(trial: CandidatePress, limits: AxisLimits) -> tuple[np.ndarray, np.nda
     times, depths = [np.zeros(1)], [np.array([-CLEAR])]
 
     def stay(seconds: float) -> None:
-        times.append(times[-1][-1:] + seconds)
+        times.append(times[-1][-1:] + seconds)  # ty: ignore[invalid-argument-type]
         depths.append(depths[-1][-1:])
 
     def go(depth: float) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import yaml
 
 from tacdata import documents
 from tacdata.errors import FormatError
@@ -167,4 +166,4 @@ def read_format(path: Path) -> FrameFormat:
 def default_format() -> FrameFormat:
     """Return the default format of a 24-channel board (`tacdata/wire/cap24.yaml`)."""
     text = (files("tacdata.wire") / "cap24.yaml").read_text()
-    return from_document(yaml.safe_load(text), "cap24.yaml")
+    return from_document(documents.parsed(text, "cap24.yaml"), "cap24.yaml")
