@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,14 +15,20 @@ from tacdata.discrepancy.statistics.gram_fit import FOLDS, fold_of
 
 TOUCHES = np.linspace(-0.05, 0.1, 7)
 """Where the skin may begin, below what the recordings say [stroke]."""
-INTERVALS = 12
+INTERVALS = (6, 12, 25, 50)
 """Of the splines that laws are held against."""
 RIDGE = 1e-9
 """Share of the mean diagonal added to it."""
 FEWEST = 2 * FOLDS
 """Fewer episodes say nothing of it."""
+EACH = 3
+"""Fewer episodes of a place say nothing of it."""
+DEEPER = 0.02
+"""Episodes deeper than those fitted to by more are not asked [1]."""
 FOLLOWS = 0.05
 """A law that leaves more of the change of the readings is none worth telling [1]."""
+MIDDLE = (0.1, 0.9)
+"""Quantiles of the channels' numbers that are told [1]."""
 
 
 @dataclass(frozen=True)
@@ -29,38 +36,85 @@ class ResponseCurve:
     """The contact law that follows best, and splines beside it."""
 
     law: ContactLaw
-    shape: float
-    """Its own number [1]."""
+    numbers: tuple[float, float]
+    """Its own number, of most channels and places: from, to [1]."""
     left: float
     """Share of the readings' change in left-out episodes that it does not follow [1]."""
     splines: float
     """The same of splines [1]."""
+    worse: bool
+    """Whether that is more than splines leave, by more than one standard error over episodes."""
 
     def __str__(self) -> str:
         """Return it in words."""
-        better = "no worse" if self.left <= self.splines else f"splines leave {100 * self.splines:.2g} %"
+        better = "" if self.worse else ", no better"
         return (
-            f"of the contact laws, {self.law.said(self.shape)} follows best: held out, it leaves "
-            f"{100 * self.left:.2g} % of the readings' change, {better}"
+            f"of the contact laws, {self.law.said(*self.numbers)} follows best: held out, it leaves "
+            f"{_percent(self.left)} of the readings' change (splines, the base: {_percent(self.splines)}{better})"
         )
 
 
 def response_curve(course: Course) -> ResponseCurve | None:
-    """Return the law that predicts left-out episodes best; None where none follows, or episodes are few."""
+    """Return the law that predicts left-out episodes best; None where none follows, or episodes are few.
+
+    Each channel and place has a factor and a number of its own. A law without such a number goes before one that has
+    it and is better by less than one standard error over episodes.
+    """
+    places = list(_places(course))
+    if sum(len(place.asked) for place in places) < FEWEST:
+        return None
+    power = sum(float(np.square(place.change[place.folds >= 0]).sum()) for place in places)
+    tried = [_held_out(law, places) for law in laws()]
+    best = min((left for _, _, left in tried), key=np.sum)
+    law, numbers, left = min(
+        (one for one in tried if not _worse(one[2], best)), key=lambda one: (len(one[0].shapes) > 1, one[2].sum())
+    )
+    if float(left.sum()) > FOLLOWS * power:
+        return None
+    splines = min((np.concatenate([_splines(place, n) for place in places]) for n in INTERVALS), key=np.sum)
+    low, high = np.quantile(numbers, MIDDLE, method="nearest")
+    share = max(power, 1e-300)
+    return ResponseCurve(
+        law, (float(low), float(high)), float(left.sum()) / share, float(splines.sum()) / share, _worse(left, splines)
+    )
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Rows of one place and tool."""
+
+    depth: np.ndarray
+    """[stroke], shape (n,)."""
+    change: np.ndarray
+    """Readings less their mean in each episode, shape (n, channels)."""
+    episode: np.ndarray
+    """Counted from 0, shape (n,), int64."""
+    folds: np.ndarray
+    """Fold in which each row is asked, -1 in none, shape (n,), int64."""
+
+    @property
+    def asked(self) -> np.ndarray:
+        """Episodes that are asked, shape (k,), int64."""
+        return np.unique(self.episode[self.folds >= 0])
+
+
+def _places(course: Course) -> Iterator[_Place]:
+    """Give the places of a course whose episodes tell a law."""
     reduced = course.reduced
     whole = np.isfinite(reduced.readings).all(axis=1)
-    episode, kept = np.unique(reduced.episode[whole], return_inverse=True)
-    if len(episode) < FEWEST:
-        return None
-    place = np.zeros(len(episode), dtype=np.int64)
-    place[kept] = contexts(reduced)[whole]
-    change = _centred(reduced.readings[whole], kept)
-    depth = reduced.tip[whole, 2] / course.stroke
-    found = [(law, *_held_out(law, depth, change, kept, place)) for law in laws()]
-    law, shape, left = min(found, key=lambda one: one[2])
-    if left > FOLLOWS:
-        return None
-    return ResponseCurve(law, shape, left, _splines(depth, change, kept, place))
+    context = contexts(reduced)
+    for number in np.unique(context):
+        rows = whole & (context == number)
+        _, episode = np.unique(reduced.episode[rows], return_inverse=True)
+        count = int(episode.max(initial=-1)) + 1
+        if count < EACH:
+            continue
+        depth, deepest = reduced.tip[rows, 2] / course.stroke, np.full(count, -np.inf)
+        np.maximum.at(deepest, episode, depth)
+        folds = fold_of(count)
+        others = np.array([deepest[folds != fold].max() for fold in folds])
+        folds = np.where(deepest <= others + DEEPER * np.abs(others), folds, -1)
+        yield _Place(depth, _centred(reduced.readings[rows], episode), episode, folds[episode])
 
 
 def _centred(values: np.ndarray, episode: np.ndarray) -> np.ndarray:
@@ -70,34 +124,31 @@ def _centred(values: np.ndarray, episode: np.ndarray) -> np.ndarray:
     return values - (sums / np.bincount(episode)[:, None])[episode]
 
 
-def _held_out(
-    law: ContactLaw, depth: np.ndarray, change: np.ndarray, episode: np.ndarray, place: np.ndarray
-) -> tuple[float, float]:
-    """Return the shape that most folds choose, and the share of the change that the law leaves of left-out episodes."""
+def _worse(left: np.ndarray, best: np.ndarray) -> bool:
+    """Return whether more is left of episodes than by the best, by over one standard error, shapes (episodes,)."""
+    more = left - best
+    return float(more.mean()) > float(more.std(ddof=1) / np.sqrt(len(more)))
+
+
+def _held_out(law: ContactLaw, places: list[_Place]) -> tuple[ContactLaw, np.ndarray, np.ndarray]:
+    """Return a law, its number in each channel of each place, and what it leaves of each left-out episode."""
     grid = [(touch, shape) for touch in TOUCHES for shape in law.shapes]
-    columns = np.stack([_risen(law, depth - touch, shape) for touch, shape in grid], axis=1)
-    columns = _centred(columns, episode)
-    count, all_of = len(place), np.square(change)
-    own, with_change = np.zeros((count, len(grid))), np.zeros((count, len(grid), change.shape[1]))
-    power = np.zeros((count, change.shape[1]))
-    for e in range(count):
-        rows = episode == e
-        own[e], power[e] = np.square(columns[rows]).sum(axis=0), all_of[rows].sum(axis=0)
-        with_change[e] = columns[rows].T @ change[rows]
-    folds, left, chosen = fold_of(count), 0.0, []
-    for fold in np.unique(folds):
-        train, test = folds != fold, folds == fold
-        fits, misses = np.zeros(len(grid)), np.zeros(len(grid))
-        for p in np.unique(place):
-            a, b = train & (place == p), test & (place == p)
-            factor = with_change[a].sum(axis=0) / np.maximum(own[a].sum(axis=0), 1e-300)[:, None]
-            fits += (factor * with_change[a].sum(axis=0)).sum(axis=1)
-            square = np.square(factor) * own[b].sum(axis=0)[:, None]
-            misses += power[b].sum() + (square - 2 * factor * with_change[b].sum(axis=0)).sum(axis=1)
-        best = int(np.argmax(fits))
-        left += float(misses[best])
-        chosen.append(grid[best][1])
-    return float(np.median(chosen)), left / max(float(power.sum()), 1e-300)
+    shapes, numbers, every = np.array([shape for _, shape in grid]), [], []
+    for place in places:
+        columns = np.stack([_risen(law, place.depth - touch, shape) for touch, shape in grid], axis=1)
+        columns, channels = _centred(columns, place.episode), np.arange(place.change.shape[1])
+        left, chosen = np.zeros(int(place.episode.max()) + 1), []
+        for fold in np.unique(place.folds[place.folds >= 0]):
+            out = place.folds == fold
+            own = np.square(columns[~out]).sum(axis=0)[:, None]
+            factor = columns[~out].T @ place.change[~out] / np.maximum(own, 1e-300)
+            at = np.argmax(np.square(factor) * own, axis=0)
+            missed = place.change[out] - columns[out][:, at] * factor[at, channels]
+            left += np.bincount(place.episode[out], np.square(missed).sum(axis=1), minlength=len(left))
+            chosen.append(shapes[at])
+        every.append(left[place.asked])
+        numbers.append(np.median(chosen, axis=0) if chosen else np.zeros(0))
+    return law, np.concatenate(numbers), np.concatenate(every)
 
 
 def _risen(law: ContactLaw, depth: np.ndarray, shape: float) -> np.ndarray:
@@ -107,18 +158,21 @@ def _risen(law: ContactLaw, depth: np.ndarray, shape: float) -> np.ndarray:
     return rise / max(float(rise.max()), 1e-12)
 
 
-def _splines(depth: np.ndarray, change: np.ndarray, episode: np.ndarray, place: np.ndarray) -> float:
-    """Return the share of the change that splines leave of left-out episodes."""
-    inner = np.linspace(float(depth.min()), float(depth.max()) + 1e-9, INTERVALS + 1)
-    basis = BSpline.design_matrix(depth, np.r_[[inner[0]] * 3, inner, [inner[-1]] * 3], 3).toarray()
-    columns = _centred(basis, episode)
-    folds, left = fold_of(len(place)), 0.0
-    for fold in np.unique(folds):
-        for p in np.unique(place):
-            own = place[episode] == p
-            train, test = own & (folds[episode] != fold), own & (folds[episode] == fold)
-            gram = columns[train].T @ columns[train]
-            gram = gram + RIDGE * max(float(np.trace(gram)) / len(gram), 1e-300) * np.eye(len(gram))
-            weights = np.linalg.solve(gram, columns[train].T @ change[train])
-            left += float(np.square(change[test] - columns[test] @ weights).sum())
-    return left / max(float(np.square(change).sum()), 1e-300)
+def _splines(place: _Place, intervals: int) -> np.ndarray:
+    """Return what splines leave of each left-out episode, shape (episodes asked,)."""
+    left = np.zeros(int(place.episode.max()) + 1)
+    for fold in np.unique(place.folds[place.folds >= 0]):
+        out = place.folds == fold
+        low, high = float(place.depth[~out].min()), float(place.depth[~out].max()) + 1e-9
+        knots = np.r_[[low] * 3, np.linspace(low, high, intervals + 1), [high] * 3]
+        basis = BSpline.design_matrix(np.clip(place.depth, low, high), knots, 3).toarray()
+        columns = _centred(basis, place.episode)
+        gram = columns[~out].T @ columns[~out]
+        gram = gram + RIDGE * max(float(np.trace(gram)) / len(gram), 1e-300) * np.eye(len(gram))
+        missed = place.change[out] - columns[out] @ np.linalg.solve(gram, columns[~out].T @ place.change[~out])
+        left += np.bincount(place.episode[out], np.square(missed).sum(axis=1), minlength=len(left))
+    return left[place.asked]
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.discrepancy.model.laws.law import ContactLaw
+from tacdata.discrepancy.model.laws.law import ContactLaw, between
 
 SERIES = (1.0, 1.133, 1.283, 0.769, 0.0975)
 """Coefficients of the powers of contact radius over thickness [1]."""
@@ -15,13 +15,13 @@ class BondedLayer(ContactLaw):
 
     title = "a bonded layer under a sphere"
     source = "Dimitriadis et al., Biophys. J. 82 (2002) 2798"
-    shapes = (0.3, 0.6, 1.0, 1.5, 2.5)
+    shapes = (0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5)
 
     def rise(self, depth: np.ndarray, shape: float) -> np.ndarray:
         """Return the rise [1]; the shape is the contact radius over the thickness at the deepest point [1]."""
         wide = shape * np.sqrt(depth)
         return depth**1.5 * sum(c * wide**k for k, c in enumerate(SERIES))
 
-    def said(self, shape: float) -> str:
+    def said(self, least: float, most: float) -> str:
         """Return the law with its number, in words."""
-        return f"{self.title} (at the deepest, the contact's radius is {shape:g} times its thickness)"
+        return f"{self.title} (at the deepest, the contact's radius is {between(least, most)} times its thickness)"

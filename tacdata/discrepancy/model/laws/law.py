@@ -31,9 +31,14 @@ class ContactLaw(ABC):
             shape: Its own number [1].
         """
 
-    def said(self, shape: float) -> str:
-        """Return the law with its number, in words."""
+    def said(self, least: float, most: float) -> str:
+        """Return the law with its own number [1] in most channels and places, in words."""
         return self.title
+
+
+def between(least: float, most: float) -> str:
+    """Return a range of numbers, or one where they are the same."""
+    return f"{least:.2g}" if least == most else f"{least:.2g} to {most:.2g}"
 
 
 def laws() -> tuple[ContactLaw, ...]:

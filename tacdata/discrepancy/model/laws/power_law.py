@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.discrepancy.model.laws.law import ContactLaw
+from tacdata.discrepancy.model.laws.law import ContactLaw, between
 
 
 class PowerLaw(ContactLaw):
@@ -12,12 +12,12 @@ class PowerLaw(ContactLaw):
 
     title = "a power of depth"
     source = "self-similar contact: Johnson, Contact Mechanics, sec. 5.3"
-    shapes = (0.5, 0.7, 0.85, 1.15, 1.3, 1.7, 2.0, 2.5, 3.0)
+    shapes = tuple(round(0.05 * k, 2) for k in range(10, 61))
 
     def rise(self, depth: np.ndarray, shape: float) -> np.ndarray:
         """Return the rise [1]; the shape is the power [1]."""
         return depth**shape
 
-    def said(self, shape: float) -> str:
+    def said(self, least: float, most: float) -> str:
         """Return the law with its number, in words."""
-        return f"depth to the power {shape:g}"
+        return f"depth to the power {between(least, most)}"
