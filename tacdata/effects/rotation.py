@@ -19,7 +19,7 @@ class Rotation(Effect):
     moves = ("label", "signal")
     group = "lateral"
     family = Family.KINEMATICS
-    equation = "(x, y) -> (x - theta y, y + theta x)"
+    equation = "(x, y) -> (x cos theta - y sin theta, y cos theta + x sin theta)"
     source = "standard form"
     experiment = "presses far from the centre at all four corners"
     form_error = 0.02
@@ -28,8 +28,8 @@ class Rotation(Effect):
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         x, y, depth = state.pose.T
-        turn = values["theta"]
-        return replace(state, pose=np.stack([x - turn * y, y + turn * x, depth], axis=-1))
+        along, across = np.cos(values["theta"]), np.sin(values["theta"])
+        return replace(state, pose=np.stack([along * x - across * y, along * y + across * x, depth], axis=-1))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         """Return why such recordings cannot show it; empty if they may."""

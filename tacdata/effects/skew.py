@@ -19,17 +19,18 @@ class Skew(Effect):
     moves = ("tag", "label", "signal")
     group = "lateral"
     family = Family.KINEMATICS
-    equation = "x -> x + g y"
+    equation = "(x, y) -> (x + g y, y sqrt(1 - g^2)): y's axis leans and is as long as before"
     source = "standard form"
     experiment = "corner presses with a tag"
     form_error = 0.02
-    parameters = (Parameter("g", "1", "shear of x with y", 0.02, -0.3, 0.3),)
+    parameters = (Parameter("g", "1", "sine of the lean", 0.02, -0.3, 0.3),)
     seen_by_tag = True
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         pose = state.pose.copy()
         pose[:, 0] += values["g"] * pose[:, 1]
+        pose[:, 1] *= np.sqrt(1 - values["g"] ** 2)
         return replace(state, pose=pose)
 
     def unjudgeable(self, course: Course, response: Response) -> str:

@@ -26,8 +26,6 @@ LEFT_T = 2.0
 """Leftovers: they count from so many standard errors over episodes on [1]."""
 GAP_T = 3.0
 """Leftovers: without any effect that helps, they are a gap from so many standard errors on [1]."""
-LENDS = 0.01
-"""Several names: what another explains this much less than may be its form, off by a tenth of its size [1]."""
 SAME_SIZE = 0.1
 """Constancy: an effect whose size spreads by so little over all conditions is a mechanism, whatever is left [1]..."""
 ALIKE_SIZE = 0.2
@@ -175,11 +173,13 @@ def _within_bounds(finding: FoundEffect) -> FoundEffect:
 def stands_in(found: Findings, finding: FoundEffect) -> bool:
     """Return whether an effect may be a part of what another leaves by its form, or of what all leave.
 
-    It explains little beside that, beyond the others. A single effect is held against what is left by `adequate`.
+    It explains little beside that, beyond the others. A form that is off by a tenth leaves a hundredth. A single effect
+    is held against what is left by `adequate`.
     """
     if len(found.effects) < 2 or finding.corrected_p is None:
         return False
-    if finding.bought < LENDS * max(f.bought for f in found.effects if f.corrected_p is not None):
+    lent = [f.placed.effect.form_error**2 * f.bought for f in found.effects if f.corrected_p is not None]
+    if finding.bought < max(lent):
         return True
     if found.left.t < LEFT_T:
         return False

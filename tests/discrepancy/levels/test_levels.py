@@ -194,10 +194,12 @@ def test_a_further_name_may_stand_in_for_what_is_left(bought, left, t, part):
 
 @pytest.mark.parametrize(("bought", "part"), [(50, True), (200, False)])
 def test_a_further_name_may_stand_in_for_the_form_of_another(bought, part):
-    """A form that is off by a tenth leaves a hundredth of what it explains, though nothing stands out."""
+    """A law of a material is off by a tenth and leaves a hundredth, though nothing stands out. A delay is exact."""
     large, small = replace(ONE, bought=10000.0), replace(ONE, bought=float(bought))
     found = cast(Any, SimpleNamespace(effects=(large, small), left=SimpleNamespace(t=0.0, gain=0.0)))
     assert stands_in(found, small) == part and not stands_in(found, large)
+    exact = replace(large, placed=Placed(load("latency"), {}))
+    assert not stands_in(cast(Any, SimpleNamespace(effects=(exact, small), left=found.left)), small)
     gain = replace(ONE, bought=float("inf"), corrected_p=None)
     found = cast(Any, SimpleNamespace(effects=(gain, small), left=SimpleNamespace(t=0.0, gain=0.0)))
     assert not stands_in(found, small), "what calibration shows has no such figure"
