@@ -87,6 +87,15 @@ def test_the_longest_file_of_a_kind_goes_first_and_nobody_idles(monkeypatch):
     assert given == [files[1], files[3], files[2], files[0]]
 
 
+def test_rooms_that_compile_the_same_go_to_one_process():
+    scheduler = object.__new__(side_by_side.ByKind)
+    tests = ["tests/skin/mesh/test_a.py::a", "tests/skin/solve/test_b.py::b", "tests/live/test_c.py::c"]
+    files = [test[:-3] for test in tests]
+    for long, scopes in ((None, ["tests/skin", "tests/skin", files[2]]), ("all", files)):
+        scheduler.config = SimpleNamespace(option=SimpleNamespace(long=long))
+        assert [scheduler._split_scope(test) for test in tests] == scopes
+
+
 def test_pytest_takes_what_was_rewritten_before_it_started(tmp_path):
     """What was written says something else than the file: whoever runs it, took it."""
     path, other = tmp_path / "test_a.py", tmp_path / "b" / "test_a.py"

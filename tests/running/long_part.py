@@ -2,9 +2,9 @@
 
 A test says which rooms decide it and why it is long: `@pytest.mark.long("label_farm", reason="workers die at random")`.
 `pytest --long=all` runs these tests alone. `--long=changed` runs the files whose inputs differ from those at which they
-last passed. Inputs are the rooms named, what they import in turn, the test, its helpers and the pinned versions; no
-docstrings or comments. Of a page that is named they are what it shows to type. A run in which all long tests of a file
-pass writes a hash of its inputs to `long_runs.json`.
+last passed. Inputs are the rooms named, what they import in turn, the test, its helpers and pinned versions. Left out
+are docstrings, comments and the versions of checkers. Of a page that is named they are what it shows to type. A run in
+which all long tests of a file pass writes a hash of its inputs to `long_runs.json`.
 """
 
 import ast
@@ -21,6 +21,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 RECORD = Path(__file__).with_name("long_runs.json")
 PACKAGES = ("tacdata", "label_farm", "training", "viewers", "schemas")
+CHECKERS = ("grimp", "import-linter", "ruff", "ty")
+"""Pinned packages that decide no test."""
 
 
 def pytest_addoption(parser):
@@ -128,10 +130,11 @@ def inputs(file, rooms):
     """Return a hash of all that decides the long tests of a file."""
     room = ROOT / "tests" / (ROOT / file).relative_to(ROOT / "tests").parts[0]
     beside = {path for path in _texts(room) if not path.name.startswith("test_")}
-    paths = {ROOT / ".dev" / "constraints.txt", ROOT / file, *beside}
+    paths = {ROOT / file, *beside}
     for room in sorted(closure(rooms)):
         paths |= _texts(ROOT / room)
-    whole = hashlib.sha256()
+    pinned = (ROOT / ".dev" / "constraints.txt").read_text().splitlines()
+    whole = hashlib.sha256("\n".join(line for line in pinned if line.split("==")[0] not in CHECKERS).encode())
     for path in sorted(paths):
         whole.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + _content(path) + b"\0")
     return whole.hexdigest()

@@ -2,7 +2,8 @@
 
 `pytest --numprocesses 4 --waiting 2`: two of four processes take files that hold devices to the clock. The others stand
 back (nice): an emulated device is then seldom late. Whoever has no file of its kind left takes one of the other. Files
-that took longest go first (`durations.csv`, of the long part `long_runs.json`).
+that took longest go first (`durations.csv`, of the long part `long_runs.json`). Rooms whose files compile or import the
+same things go to one process.
 """
 
 import os
@@ -20,6 +21,8 @@ STAND_BACK = 3
 """How much computing processes are put back (nice): more would leave them next to nothing on a busy machine."""
 PORTS = 7
 """How far apart processes ask for a viewer's ports: two that begin at the same time would both find one free."""
+TOGETHER = {"skin": "skin", "dataset": "dataset", "exporters": "dataset"}
+"""Rooms whose quick tests are handed out as one: a second process would compile their kernels and import lerobot."""
 UNKNOWN = 15.0
 """What a file counts that has not been timed yet [s]: it begins before the many short ones, after the long."""
 
@@ -60,12 +63,18 @@ class ByKind(LoadFileScheduling):
             self.config.option.loadscopereorder = False
         super().schedule()
 
+    def _split_scope(self, nodeid):
+        file = super()._split_scope(nodeid)
+        together = TOGETHER.get(file.split("/")[1])
+        return f"tests/{together}" if together and not self.config.option.long else file
+
     def _assign_work_unit(self, node):
         own = waits(node.gateway.id, self.config)
         seconds = long_part.seconds() if self.config.option.long else recorded()
 
-        def order(file):
-            return in_real_time(ROOT / file) != own, -seconds.get(file, UNKNOWN)
+        def order(scope):
+            files = {nodeid.split("::")[0] for nodeid in self.workqueue[scope] or [scope]}
+            return in_real_time(ROOT / scope) != own, -sum(seconds.get(file, UNKNOWN) for file in files)
 
         self.workqueue.move_to_end(min(self.workqueue, key=order), last=False)
         super()._assign_work_unit(node)
