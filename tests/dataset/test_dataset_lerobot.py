@@ -290,6 +290,7 @@ def older(root: Path) -> None:
         (root / f"meta/{name}.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in entries))
 
 
+@pytest.mark.long("tacdata/dataset", reason="lerobot converts a folder in a process of its own")
 def test_a_folder_of_the_version_before_is_refused_with_the_command_that_converts_it(lerobot, tmp_path: Path) -> None:
     root = tmp_path / "my set"
     older(root)

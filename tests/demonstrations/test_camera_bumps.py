@@ -52,8 +52,12 @@ def spreads(made):
     return 1000 * np.sqrt(np.concatenate(parts))
 
 
+MORE = pytest.mark.long("tacdata/demonstrations", "tacdata/tags", reason="more bumps of the same two cameras")
+
+
 @pytest.mark.parametrize(
-    ("camera", "millimetres", "degrees"), [("eye", 3.0, 0.0), ("other", 10.0, 1.5), ("other", 2.0, 0.0)]
+    ("camera", "millimetres", "degrees"),
+    [pytest.param("eye", 3.0, 0.0, marks=MORE), pytest.param("other", 10.0, 1.5, marks=MORE), ("other", 2.0, 0.0)],
 )
 def test_the_bumped_one_of_two_cameras_is_named_and_the_path_stays_right(tmp_path, camera, millimetres, degrees):
     made = track(recording(tmp_path, views=two(camera, millimetres, degrees), **TWO))

@@ -54,6 +54,7 @@ def record(virtual, tmp_path, out, *more):
     return ["record", "--rig", virtual.path, "--plan", tmp_path / "plan.yaml", "--out", out, "--yes", *more]
 
 
+@pytest.mark.long("tacdata/commands", "tacdata/virtual_rig", reason="a rig recorded, registered and recorded again")
 def test_register_then_record_presses_where_the_sensor_really_is(virtual, tmp_path, monkeypatch, capfd):
     truth = virtual.truth.registration
     code, said, loud = run(monkeypatch, capfd, *record(virtual, tmp_path, tmp_path / "blind"))

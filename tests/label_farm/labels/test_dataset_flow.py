@@ -50,6 +50,7 @@ def test_labels_without_spreads_are_not_stale(tmp_path):
     assert "2 complete, 0 stale" in label(tmp_path, "farm", "dataset", "data").stdout
 
 
+@pytest.mark.long("label_farm", "tacdata/dataset", reason="a service and its workers are killed and started again")
 def test_the_dataset_grows_while_others_are_computed_and_survives_kills(tmp_path):
     names = ["a", "b"]
     for k, name in enumerate(names):

@@ -202,6 +202,7 @@ def test_failures_keep_their_reason_and_a_broken_session_is_refused(tmp_path):
         assert shown.returncode == 0 and "is filed" in shown.stdout
 
 
+@pytest.mark.long("label_farm", reason="a service is killed and started again")
 def test_a_killed_service_goes_on_where_it_stood(tmp_path):
     record(tmp_path, 1, 8)
     gate = Gate(tmp_path / "gate")

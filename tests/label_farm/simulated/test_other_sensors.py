@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from bump_skin import BumpSkin
 from running.in_process import tacdata
 
@@ -19,6 +20,7 @@ def simulate(folder, sensor, *more):
     return tacdata(*words, "--out", "simulated", "--device", "cpu", "--workers", 1, *more, folder=folder)
 
 
+@pytest.mark.long("label_farm", "training", reason="simulated presses become a dataset and a network")
 def test_the_example_of_eight_by_eight_taxels_becomes_a_pretrained_network(tmp_path, monkeypatch):
     monkeypatch.setattr(
         solving, "specimen_model", lambda simulation, number, device: BumpSkin(simulation.specimens[number], 99.0)

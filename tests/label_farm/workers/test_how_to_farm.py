@@ -47,6 +47,9 @@ def typed(folder, words, *more, code=0, **variables):
     return done.stdout
 
 
+PAGE = pytest.mark.long("label_farm", "docs/how_to/label_farm.md", reason="a page typed, each verb a process")
+
+
 @contextmanager
 def started(folder, words, *more, says="", **variables):
     """A command of the page that runs until it is ended, once it has said something; yields that line."""
@@ -94,6 +97,7 @@ def test_every_command_of_the_page_has_its_test():
     ]
 
 
+@PAGE
 def test_a_session_and_a_service_of_one_computer(bench):
     assert "labels written: 2" in typed(bench, PARTS[0][0], "--workers", "1", *FACTORY)
     up, submit, status = PARTS[1]
@@ -106,6 +110,7 @@ def test_a_session_and_a_service_of_one_computer(bench):
     assert "complete" in listed, listed
 
 
+@PAGE
 def test_recordings_go_to_another_computer_and_labels_come_back(bench):
     export, up = PARTS[2]
     made = subprocess.run(
@@ -125,6 +130,7 @@ def test_recordings_go_to_another_computer_and_labels_come_back(bench):
     assert len(list((bench / "sessions" / "monday" / "labels").glob("episode-*.parquet"))) == 3
 
 
+@PAGE
 def test_workers_of_more_computers(bench):
     """The service has no worker of its own: who labels came by the page's command."""
     _, submit, _ = PARTS[1]
@@ -137,7 +143,7 @@ def test_workers_of_more_computers(bench):
             assert all(row["owner"].startswith("remote:") for row in state["workers"])
 
 
-@pytest.mark.long("label_farm", "docs/how_to/label_farm.md", reason="a cluster of Dask and its workers, each a process")
+@PAGE
 def test_workers_of_a_cluster(bench):
     scheduler, up, worker = PARTS[5]
     port = free_port()
