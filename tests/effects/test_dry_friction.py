@@ -84,3 +84,12 @@ def test_loops_that_change_with_the_rate_are_unknown_where_only_friction_is_trie
     named, values = judged(strokes(relaxed=0.3), FRICTION)
     assert values, "friction comes closest"
     assert not named
+
+
+def test_friction_inside_the_skin_whose_equation_ends_before_the_loops_do_is_not_named():
+    """Loops of a seal open at once: the shortest way that the other's equation knows is too long."""
+    made = strokes(seal=0.05)
+    setting = Setting(made, FittedResponse(made), [load("bouc_wen")])
+    found = find(setting)
+    assert [f.at_bound for f in found.effects] == [("w",)]
+    assert not [e for e in decide(found, check(setting)).effects if e.status == "named"]

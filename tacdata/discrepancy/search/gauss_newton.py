@@ -26,7 +26,8 @@ SMALL_GAIN = 0.2
 """Gauss-Newton: it ends when half the sum of squares falls by less [1]."""
 HOPELESS = 0.01
 """Gauss-Newton: a step is not tried if to first order half the sum of squares falls by less [1]."""
-
+KNOWN = 0.5
+"""A shape is known if its standard error is smaller [its value]."""
 LARGEST_LEVERAGE = 0.9
 """CR3: largest leverage of an episode [1]."""
 
@@ -81,6 +82,17 @@ class Refined:
             elif value >= p.high * 0.999:
                 bound.append(p.name)
         return error, tuple(bound)
+
+    def narrowest(self, at: int) -> tuple[str, ...]:
+        """Return the shapes of one effect that are at their lower bound, and are known there: its form ends at it.
+
+        One that is not known makes no difference below, as a time constant that is shorter than a reading lasts.
+        """
+        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return tuple(
+            knob.parameter.name for knob, error in zip(self.tangent.knobs, spread, strict=True)
+            if knob.at == at and knob.shape and error < KNOWN and knob.value(self.placed) <= knob.parameter.low * 1.001
+        )  # fmt: skip
 
 
 def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: int = MOST_STEPS) -> Refined:

@@ -109,7 +109,7 @@ def try_rivals(
     error, bounds = current.errors(at)
     chosen = _chosen(bare, best, each)
     found = FoundEffect(
-        mine, error, bounds, tuple(dict.fromkeys(rivals)), margins, need, losses,
+        mine, error, (*bounds, *current.narrowest(at)), tuple(dict.fromkeys(rivals)), margins, need, losses,
         _share(chosen, lambda e: e.called == mine.effect.called),
         selected_family=_share(chosen, lambda e: e.family is mine.effect.family), forms=forms,
         bought=without.loss - current.loss, unphysical=_only_unphysical(current, best, models),

@@ -225,10 +225,13 @@ def borne_out(shown: Gap | None) -> bool:
 
 
 def finest(finding: FoundEffect) -> Level | None:
-    """Return the finest level at which an effect may be named; None if none holds."""
-    if not _needed(finding) or finding.at_bound or not _of_one_family(finding):
+    """Return the finest level at which an effect may be named; None if none holds.
+
+    A shape at its bound leaves the family: the form is another one.
+    """
+    if not _needed(finding) or _unphysical(finding) or not _of_one_family(finding):
         return None
-    if finding.rivals:
+    if finding.rivals or finding.at_bound:
         return Level.FAMILY
     return Level.MECHANISM if any(by < RIVAL_Z for by in finding.forms.values()) else Level.FORM
 
@@ -261,7 +264,7 @@ def beside_much(
     How exactly its size is the same in all conditions says how fine the name may be.
     """
     bare = _within_bounds(finding)
-    level = Level.FAMILY if finding.at_bound and _of_one_family(bare) else finest(bare)
+    level = finest(bare)
     if level is not None and bare.rivals != finding.rivals:
         level = Level.FAMILY
     if level is None or beside is None or not stands(found, finding, beside, shown):

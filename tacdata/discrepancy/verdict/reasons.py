@@ -123,12 +123,15 @@ def _nameless(found: Findings, least: float) -> str:
 def _undecided(decision: Decision) -> str:
     """Return what is open: rivals, bounds, episodes that are too few; and what is not: a family that all share."""
     answer = [e.finding for e in decision.effects]
-    bounds = [f.placed.effect.called for f in answer if f.at_bound]
+    shapes = [{p.name for p in f.placed.effect.shapes} & set(f.at_bound) for f in answer]
+    bounds = [f.placed.effect.called for f, own in zip(answer, shapes, strict=True) if set(f.at_bound) - own]
+    formed = [f.placed.effect.called for f, own in zip(answer, shapes, strict=True) if own]
     weak = [f.placed.effect.called for f in answer if f.necessity < f.needed]
     words = _best(answer)
     shared = [e.finding.placed.effect.family.value for e in decision.effects if e.level is Level.FAMILY]
     words += f"; either way it is {_listed(list(dict.fromkeys(shared)), 'and')}" if shared else ""
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
+    words += f"; {', '.join(formed)} fits best where its equation ends: the form is another one" if formed else ""
     return words + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
 
 

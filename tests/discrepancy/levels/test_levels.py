@@ -63,6 +63,7 @@ def test_a_form_between_two_is_named_as_a_mechanism():
 
 def test_an_effect_that_is_not_surely_there_is_not_named():
     assert finest(replace(ONE, at_bound=("f",))) is None
+    assert finest(replace(ONE, at_bound=("tau",))) is Level.FAMILY, "a shape at its bound: the form is another one"
     assert finest(replace(ONE, necessity=3.0, corrected_p=0.02)) is None
 
 
@@ -205,9 +206,7 @@ def test_a_further_name_may_stand_in_for_the_form_of_another(bought, part):
     assert not stands_in(found, small), "what calibration shows has no such figure"
 
 
-@pytest.mark.parametrize(
-    ("bought", "left", "named"), [(100, 0, True), (100, 50, False), (5, 0, False)]
-)
+@pytest.mark.parametrize(("bought", "left", "named"), [(100, 0, True), (100, 50, False), (5, 0, False)])
 def test_what_explains_most_is_named_beside_one_that_is_open(bought, left, named):
     """An effect that may be another one counts as left over: beside little of that, the large one is sure."""
     found = cast(Any, SimpleNamespace(left=SimpleNamespace(t=5.0, gain=left)))

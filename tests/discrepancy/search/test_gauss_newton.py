@@ -1,10 +1,15 @@
-"""Intervals of numbers hold what they say, however few episodes tell them and however these scatter."""
+"""Intervals of numbers hold what they say, however few episodes tell them; where an equation ends is told."""
+
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from tacdata.discrepancy.noise.gram import EpisodeGrams
-from tacdata.discrepancy.search.gauss_newton import _covariance
+from tacdata.discrepancy.regressors.tangent import knobs_of
+from tacdata.discrepancy.search.gauss_newton import Refined, _covariance
+from tacdata.effects import Placed, load
 
 Z90 = 1.645
 
@@ -34,3 +39,15 @@ def test_intervals_hold_nine_in_ten(episodes, heavy):
 
 def test_nothing_placed_has_no_covariance():
     assert _covariance(EpisodeGrams(np.zeros((4, 1, 1)), np.ones(4)), np.zeros(0), np.zeros(0), 0).shape == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("w", "error", "told"), [(0.01, 0.2, ("w",)), (0.01, 0.9, ()), (0.02, 0.2, ())], ids=["known", "unknown", "inside"]
+)
+def test_an_equation_ends_at_a_lower_bound_that_is_known(w, error, told):
+    """What is not known there makes no difference below."""
+    placed = (Placed(load("bouc_wen"), {"a": np.array(0.2), "w": np.array(w)}),)
+    model = SimpleNamespace(
+        placed=placed, tangent=SimpleNamespace(knobs=knobs_of(placed, 1)), covariance=np.diag([0.1**2, error**2])
+    )
+    assert Refined.narrowest(cast(Any, model), 0) == told

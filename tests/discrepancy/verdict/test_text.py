@@ -1,5 +1,6 @@
 """A verdict reads plainly: what it says agrees with its own numbers, and each number says what it is."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -172,6 +173,18 @@ def test_a_family_that_all_rivals_share_is_said():
     decision = Decision("ambiguous", Reason.RIVALS, (decided,))
     found = cast(Findings, SimpleNamespace(until="decide", share_left=0.1, left=SimpleNamespace(t=3.0)))
     assert reason_in_words(decision, found, DataChecks(8)).endswith("; either way it is delay and filtering")
+
+
+def test_an_equation_that_ends_too_early_is_no_unphysical_size():
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.0, left=SimpleNamespace(t=0.0)))
+    words = []
+    for bound in ("w", "a"):
+        one = replace(finding("bouc_wen"), at_bound=(bound,))
+        decision = Decision("ambiguous", Reason.RIVALS, (Decided(one, "ambiguous", {}, None, Level.FAMILY),))
+        words.append(reason_in_words(decision, found, DataChecks(8)))
+    assert "the form is another one" in words[0]
+    assert "unphysical" not in words[0]
+    assert "unphysical size" in words[1]
 
 
 def test_what_stays_named_is_told_from_what_stands_in():
