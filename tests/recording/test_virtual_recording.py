@@ -128,6 +128,21 @@ def test_two_presses_agree_with_what_really_happened(virtual, tmp_path):
     assert not amiss(check(tmp_path / "session"))
 
 
+def test_strokes_are_recorded_and_the_controller_is_not_accused_of_standing_still(virtual, tmp_path):
+    """A report is too rare to show the end of each: the answer to the pause behind it does."""
+    document = plan_document(1)
+    document["presses"] = [{**document["presses"][0], "speed": 6.0, "strokes": 12, "stroke": 0.2}]
+    strokes = Plan.from_document(document, "strokes")
+    session = recorder(virtual, tmp_path / "session", plan=strokes).run(lambda summary: True)
+    recording = read_recording(session.episodes[0])
+    depth = recording.episode.tip[:, 2]
+    turns = (depth[1:-1] < depth[:-2] - 1e-9) & (depth[1:-1] <= depth[2:])
+    assert np.count_nonzero(turns & np.isclose(depth[1:-1], 0.6, atol=1e-3)) == 12
+    assert depth.max() == pytest.approx(0.8, abs=1e-3)
+    assert [p.name for p in recording.episode.phases] == list(PHASES)
+    assert not amiss(check(tmp_path / "session"))
+
+
 def test_solids_from_files_are_pressed_like_any_other(virtual, tmp_path, monkeypatch):
     # A coarse grid of distances; no other test presses this ball, so that none finds it in the cache.
     monkeypatch.setattr(distance_grid, "NODES", 100_000)

@@ -129,16 +129,20 @@ def stood_still(figures: RecordingFigures, rate: float) -> float:
     if len(arrival) < 2:
         return 0.0
     usual = float(np.median(np.diff(arrival))) + UNKNOWN_MS * 1e6 * rate
-    for move in recording.moves if recording.episode.complete else recording.moves[:-1]:
-        later = _ended_by(recording, move) - move.end_ns
+    moves = recording.moves if recording.episode.complete else recording.moves[:-1]
+    for move, following in zip(moves, [*recording.moves[1:], None], strict=False):
+        later = _ended_by(recording, move, following) - move.end_ns
         inside = move.command.phase in ("press", "release") and move.profile.length
         if inside and usual < later < np.inf and not _host_was_late(recording, move, later):
             found = max(found, later / 1e6)
     return found
 
 
-def _ended_by(recording: Recording, move: AnchoredMove) -> float:
-    """Return the host time by which a move is known to have ended [ns]; infinite if nothing shows it."""
+def _ended_by(recording: Recording, move: AnchoredMove, following: AnchoredMove | None) -> float:
+    """Return the host time by which a move is known to have ended [ns]; infinite if nothing shows it.
+
+    The next one is sent when the pause behind it was answered. Strokes are over before a report shows their ends.
+    """
     episode, stream = recording.episode, recording.episode.cnc
     off = np.linalg.norm(stream.position - move.profile.target, axis=1)
     shown = stream.arrival_ns[(off < NEAR + recording.height_resolution) & (stream.arrival_ns > move.start_ns)]
@@ -146,6 +150,8 @@ def _ended_by(recording: Recording, move: AnchoredMove) -> float:
     hold = next((phase for phase in episode.phases if phase.name == "hold"), None)
     if hold is not None and move.command.phase == "press":
         ends.append(hold.end_ns - episode.press.hold * 1e9)
+    if following is not None:
+        ends.append(following.command.sent_ns)
     return min(ends, default=np.inf)
 
 
