@@ -128,6 +128,7 @@ def main() -> None:
     lost: list[dict] = []
     refused = 0
     steps: list[int] = []
+    changed = 0
     of_press: list[int] = []
     seconds: list[float] = []
     chosen = hardest(plan, arguments.seed, arguments.skins, each, arguments.hardest) if arguments.hardest else None
@@ -159,6 +160,7 @@ def main() -> None:
                 })
             else:
                 steps.append(state.newton)
+                changed += state.changed
                 total[index] += state.newton
         of_press += total.tolist()
         shapes.update(press.indenter_name for press in drawn)
@@ -171,6 +173,7 @@ def main() -> None:
           f" ({100 * low:.2f} to {100 * high:.2f} %)")
     print(f"Newton steps a state: median {median:.0f}, 95th percentile {p95:.0f}; a press: median"
           f" {np.median(of_press):.0f}, most {max(of_press)}")
+    print(f"{100 * changed / sum(steps):.0f} % of the steps changed the contact")
     if seconds:
         print(f"CPU seconds a press: median {np.median(seconds):.1f}, most {max(seconds):.1f}")
     for name, one in Counter(entry["indenter"]["shape"] for entry in lost).most_common():

@@ -54,13 +54,13 @@ def main() -> None:
     list(model.states_many(requests[: max(1, arguments.batch // 8)], arguments.batch, False))
     built = time.perf_counter() - began
     clock = time.perf_counter if on_gpu else time.process_time
-    began, states, failures, residual, newton = clock(), 0, 0, [], 0
+    began, states, failures, residual, newton, changed = clock(), 0, 0, [], 0, 0
     for _, _, state in model.states_many(requests, arguments.batch, False):
         if isinstance(state, SolveError):
             failures += 1
             print(state)
             continue
-        states, newton = states + 1, newton + state.newton
+        states, newton, changed = states + 1, newton + state.newton, changed + state.changed
         residual.append(state.residual)
     if on_gpu:
         torch.cuda.synchronize()
@@ -68,7 +68,8 @@ def main() -> None:
     figures = {
         "device": arguments.device, "nodes": len(model.mesh.nodes), "presses": len(requests), "batch": arguments.batch,
         "states": states, "failures": failures, "seconds": seconds, "states_per_second": states / seconds,
-        "newton_per_state": newton / max(states, 1), "largest_residual": max(residual), "build_seconds": built,
+        "newton_per_state": newton / max(states, 1), "changed_contact_per_state": changed / max(states, 1),
+        "largest_residual": max(residual), "build_seconds": built,
         **model.last_run,
     }
     for name, value in figures.items():
