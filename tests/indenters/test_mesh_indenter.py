@@ -18,6 +18,7 @@ from tacdata.indenters.sphere import Sphere
 from tacdata.plans import Plan, read_plan
 from tacdata.plans.beside_skin import tip_aside
 from tacdata.sensor import default_sensor
+from tacdata.surfaces import distance_grid
 
 
 def tessellated_punch(steps, sections):
@@ -213,8 +214,10 @@ def tipped_aside(place):
     [(lambda: tipped_aside(35.0), 33.0), (lambda: trimesh.creation.annulus(r_min=55.0, r_max=60.0, height=4.0), 55.0)],
     ids=["tip aside", "wide ring"],
 )
-def test_a_solid_that_would_never_touch_the_skin_is_refused_by_plans_and_cases(solid, aside, tmp_path):
+def test_a_solid_that_would_never_touch_the_skin_is_refused_by_plans_and_cases(solid, aside, tmp_path, monkeypatch):
     """Its axis may pass through the solid's box, and its lowest part still lie beside the skin."""
+    # A coarse grid of distances; no other test asks these solids, so that none finds it in the cache.
+    monkeypatch.setattr(distance_grid, "NODES", 300_000)
     part = indenter_of(solid(), tmp_path)
     with pytest.raises(FormatError, match="does not touch the skin") as caught:
         Plan.from_document(plan_of(part.document), "plan").check_against(default_sensor())

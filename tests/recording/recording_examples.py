@@ -10,8 +10,11 @@ from tacdata.recording.files.writer import CubePoseRecord, EpisodeWriter, Header
 from tacdata.recording.motion.move_times import Command
 from tacdata.recording.motion.press_steps import steps
 from tacdata.recording.motion.trapezoid import AxisLimits
+from tacdata.recording.recorder import Recorder
+from tacdata.rig import read_rig
 from tacdata.rig import rig as rig_file
 from tacdata.sensor import default_sensor
+from tacdata.virtual_rig.world.mounting import mount
 
 T0 = 1_760_000_000_000_000_000
 LIMITS = AxisLimits(np.array([200.0, 200.0, 100.0]), np.array([50.0, 50.0, 20.0]))
@@ -64,6 +67,15 @@ def plan_document(presses=2, **motion):
 
 def plan(presses=2, **motion):
     return Plan.from_document(plan_document(presses, **motion), "two")
+
+
+def recorder(virtual, out, **options):
+    """A recorder of two presses, or those of the `plan` given, on an emulated rig."""
+    bench = read_rig(virtual.path)
+    return Recorder(
+        bench, SENSOR, options.pop("plan", plan(2)), out,
+        mount=lambda press: mount(bench.document, press.indenter.document, press.yaw), **options,
+    )  # fmt: skip
 
 
 def header(number=0, camera=False):

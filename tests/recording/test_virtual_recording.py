@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 import trimesh
-from recording_examples import SENSOR, plan, plan_document
+from recording_examples import plan_document, recorder
 
 from tacdata.errors import DeviceError
 from tacdata.plans import Plan
@@ -17,11 +17,8 @@ from tacdata.recording.episode import PHASES
 from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.live.interruption import Interruption
-from tacdata.recording.recorder import Recorder
 from tacdata.rig import read_rig
 from tacdata.surfaces import distance_grid
-from tacdata.virtual_rig.rig import VirtualRig
-from tacdata.virtual_rig.world.mounting import mount
 
 
 class Truth:
@@ -45,22 +42,6 @@ class Truth:
     def __exit__(self, *exception):
         self._stop.set()
         self._thread.join()
-
-
-@pytest.fixture
-def virtual(tmp_path, speed):
-    rig = VirtualRig(tmp_path / "rig", speed, seed=3, camera=False)
-    rig.start()
-    yield rig
-    rig.stop()
-
-
-def recorder(virtual, out, **options):
-    rig = read_rig(virtual.path)
-    return Recorder(
-        rig, SENSOR, options.pop("plan", plan(2)), out,
-        mount=lambda press: mount(rig.document, press.indenter.document, press.yaw), **options,
-    )  # fmt: skip
 
 
 def amiss(report):

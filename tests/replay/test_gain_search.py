@@ -38,6 +38,7 @@ def test_one_trial_that_slides_presses_too_hard_or_drops_refuses_a_gain(worse):
         GripSearch(lambda gain, seed: made(**worse)).find()
 
 
+@pytest.mark.long("tacdata/replay", reason="a gain is looked for among whole trials, then tried on ten more")
 def test_the_gain_that_is_found_holds_scenes_that_the_search_has_not_seen():
     _, centre = grasp()
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recording_examples import SENSOR, plan
+from recording_examples import SENSOR, plan, recorder
 
 from tacdata.errors import DeviceError, UsageError
 from tacdata.recording import read_session
@@ -15,26 +15,8 @@ from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.recorder import Recorder
 from tacdata.rig import read_rig
-from tacdata.virtual_rig.rig import VirtualRig
-from tacdata.virtual_rig.world.mounting import mount
 
 CLEARANCE = 3.0
-
-
-@pytest.fixture
-def virtual(tmp_path, speed):
-    rig = VirtualRig(tmp_path / "rig", speed, seed=5, camera=False)
-    rig.start()
-    yield rig
-    rig.stop()
-
-
-def recorder(virtual, out, **options):
-    rig = read_rig(virtual.path)
-    return Recorder(
-        rig, SENSOR, options.pop("plan", plan(2)), out,
-        mount=lambda press: mount(rig.document, press.indenter.document, press.yaw), **options,
-    )  # fmt: skip
 
 
 def place(virtual):

@@ -11,7 +11,7 @@ import time
 import numpy as np
 import pytest
 import yaml
-from recording_examples import SENSOR, plan, plan_document
+from recording_examples import plan_document, recorder
 
 from tacdata import documents
 from tacdata.errors import DeviceError
@@ -20,29 +20,10 @@ from tacdata.recording.check.report import check
 from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.files.recover import recover
-from tacdata.recording.recorder import Recorder
 from tacdata.recording.session import resume_session
 from tacdata.rig import read_rig
-from tacdata.virtual_rig.rig import VirtualRig
-from tacdata.virtual_rig.world.mounting import mount
 
 CLEARANCE = 3.0
-
-
-@pytest.fixture
-def virtual(tmp_path, request, speed):
-    rig = VirtualRig(tmp_path / "rig", speed, seed=5, camera=getattr(request, "param", False))
-    rig.start()
-    yield rig
-    rig.stop()
-
-
-def recorder(virtual, out, **options):
-    rig = read_rig(virtual.path)
-    return Recorder(
-        rig, SENSOR, plan(2), out,
-        mount=lambda press: mount(rig.document, press.indenter.document, press.yaw), **options,
-    )  # fmt: skip
 
 
 def height(virtual):
@@ -139,6 +120,8 @@ def test_a_full_disk_is_said_and_the_session_goes_on(bench, virtual, tmp_path, r
 
 def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(bench, virtual, tmp_path):
     out = tmp_path / "session"
+    # A long hold: a busy machine that kills late does not find the press done and no file open.
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(plan_document(2, hold=8.0, rest=0.4)))
     child = subprocess.Popen(bench, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     while height(virtual) > -0.2:
         time.sleep(0.002)
