@@ -79,5 +79,8 @@ def shown_label(path: Path, most: int | None = None) -> ShownLabel:
                 best[stretch], row[stretch], shown[stretch] = depth[deepest], begin + deepest, maps[deepest].copy()
         begin += len(maps)
     signed = np.stack([shown[k] for k in range(most)])
-    contact = {name: values[row] for name, values in read_label_columns(path, CONTACT).items()}
+    # One after the other: each is as large as all maps of the label.
+    contact = {
+        name: values[row] for only in CONTACT for name, values in read_label_columns(path, (only,)).items()
+    }
     return ShownLabel(**small, kept=row, signed=signed, **contact)
