@@ -54,7 +54,7 @@ class Rehearsal:
         if network.is_calibrated:
             known = pretrained.calibration if pretrained else None
             known = known or calibrate(frames, tuple(span.number for span in frames.episodes))
-            source.set_calibration(known.gain, known.exponent)
+            source.set_calibration(known.gain, known.exponent, known.mixing)
         settings = pretrained.settings if pretrained else TrainingSettings()
         self._source, self._varied = source, Variation(source, frames.sensor, settings)
 

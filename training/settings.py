@@ -45,6 +45,9 @@ class TrainingSettings:
     """Standard deviation of a factor drawn for each frame, all channels alike [1]: a unit's gain is uncertain."""
     exponent_jitter: float = 0.0
     """Standard deviation of a change of the exponent drawn for each frame [1]: a unit's law is uncertain."""
+    spread_jitter: float = 0.0
+    """Standard deviation of a variance by which each frame's loads are spread over neighbours [mm^2]: a unit's skin may
+    spread them less far than the model's, or farther."""
     calibrate: bool = False
     """Turn readings into forces first, by a calibration fitted on the training presses."""
     pull: float = 0.0
@@ -74,7 +77,7 @@ class TrainingSettings:
                 raise UsageError(f"{name} = {getattr(self, name)!r}", ", ".join(allowed), f"change --{name}")
         if not 0.0 <= self.idle_share <= 1.0:
             raise UsageError(f"idle_share = {self.idle_share}", "0 to 1", "change --idle-share")
-        for name in ("gain_jitter", "scale_jitter", "exponent_jitter"):
+        for name in ("gain_jitter", "scale_jitter", "exponent_jitter", "spread_jitter"):
             if not 0.0 <= (value := getattr(self, name)) < 1.0:
                 option = f"--{name.replace('_', '-')}"
                 raise UsageError(f"{name} = {value}", "0 or more, less than 1", f"change {option}")
@@ -107,6 +110,7 @@ class TrainingSettings:
             "gain_jitter",
             "scale_jitter",
             "exponent_jitter",
+            "spread_jitter",
             "calibrate",
             "pull",
             "idle_share",

@@ -223,7 +223,7 @@ def _started(
     readings, calibration = frames.taxels[frames.indices(split.train)], {}
     if settings.calibrate:
         fitted = calibrate(frames, split.train)
-        network.set_calibration(fitted.gain, fitted.exponent)
+        network.set_calibration(fitted.gain, fitted.exponent, fitted.mixing)
         calibration, readings = {"calibration": fitted.document}, fitted.force(readings)
     if pretrained:
         pretrained.check_sensor(frames.sensor, frames.origin)

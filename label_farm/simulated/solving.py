@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -54,8 +56,34 @@ def solve(
         simulation.check_model(specimen, model.content_hash)
         for number, numbers in batches:
             if number == specimen:
-                solve_batch(simulation, model, numbers, device, settled).write(simulation.folder)
+                with _undisturbed(kind):
+                    shard = solve_batch(simulation, model, numbers, device, settled)
+                shard.write(simulation.folder)
         del model
+        _freed(kind)
+
+
+@contextmanager
+def _undisturbed(kind: str) -> Iterator[None]:
+    """Collect no garbage inside, on a card: memory that is given back amid a captured graph ends the process."""
+    collected = kind == "cuda" and gc.isenabled()
+    if collected:
+        gc.collect()
+        gc.disable()
+    try:
+        yield
+    finally:
+        if collected:
+            gc.enable()
+
+
+def _freed(kind: str) -> None:
+    """Give a card's memory back that torch keeps: the next skin asks the card what is free."""
+    if kind == "cuda":
+        import torch
+
+        gc.collect()
+        torch.cuda.empty_cache()
 
 
 def solve_batch(

@@ -51,6 +51,9 @@ def run(
     gain_jitter: Annotated[float | None, typer.Option(help="Vary each channel's gain at random by this share.")] = None,
     scale_jitter: Annotated[float | None, typer.Option(help="Vary the common gain at random by this share.")] = None,
     exponent_jitter: Annotated[float | None, typer.Option(help="Vary the exponent at random by this much.")] = None,
+    spread_jitter: Annotated[
+        float | None, typer.Option(help="Vary how far loads spread at random, by this variance [mm²].")
+    ] = None,
     precision: Annotated[str, typer.Option(help="float32 or bfloat16, for cards.")] = "float32",
     compiled: Annotated[bool, typer.Option("--compile", help="Let torch compile the network; for cards.")] = False,
     leave_out: Annotated[
@@ -81,6 +84,7 @@ def run(
         "network": network, "split": split, "seed": seed, "epochs": epochs, "batch_size": batch_size,
         "learning_rate": learning_rate, "schedule": schedule, "mirror": mirror, "calibrate": calibrate,
         "gain_jitter": gain_jitter, "scale_jitter": scale_jitter, "exponent_jitter": exponent_jitter,
+        "spread_jitter": spread_jitter,
         "idle_share": idle_share, "precision": precision,
     }  # fmt: skip
     settings = recipe(asked, begun, simulated is not None)
@@ -122,6 +126,12 @@ def _say_calibration(best: Checkpoint, frames: Frames) -> None:
         f"calibration: {mean:.3g} N at 1000 counts, each channel to {100 * error:.0f} %; "
         f"exponent {known.exponent:.2f} ± {known.exponent_error:.2f}; {known.presses} presses"
     )
+    if known.mixing is not None:
+        wider = "farther" if known.spread >= 0 else "less far"
+        print(
+            f"the model spreads a load {wider} than this skin, and its forces are spread alike: variance "
+            f"{known.spread:+.2f} ± {known.spread_error:.2f} mm²"
+        )
     for words in doubts(known, frames, best.split.train):
         print(f"note: {words}")
 

@@ -1,11 +1,12 @@
 """Calibration of a unit's channels: the force on each protrusion from its reading, fitted on labelled presses.
 
-    force = gain_k sign(c) (|c| / 1000 counts)^exponent
+    force = spread(gain_k sign(c) (|c| / 1000 counts)^exponent)
 
 The gain is the channel's own, the exponent common. The labels know the force on each protrusion from the skin model.
 So a few presses that touch every taxel are enough. Gains are shrunk towards their mean by what the presses tell: a
-channel that was hardly touched takes the mean, one that was touched often its own value. The exponent's standard error
-comes from the jackknife over presses.
+channel that was hardly touched takes the mean, one that was touched often its own value. A unit's skin may spread a
+load less far than the model's. So its forces are spread over neighbours, by one variance (`training.frames.spreading`).
+The errors of exponent and variance come from the jackknife over presses.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
+from training.frames.spreading import laplacian, spreading
 from training.networks.network import CALIBRATION_UNIT
 
 if TYPE_CHECKING:
+    from tacdata.sensor.sensor import Taxels
     from training.frames.frames import Frames
 
 SPREAD = 0.1
@@ -33,6 +36,10 @@ _TOUCHED = 0.1
 """Least force on a channel that some press touched, over the largest force on the median channel [1]."""
 _GROUPS = 20
 """Groups of presses that the jackknife leaves out, one after the other, where there are more presses [1]."""
+_TURNS = 8
+"""How often gains and spreading are fitted after each other [count]."""
+FARTHEST = 4.0
+"""Largest variance of the spreading, of either sign [mm^2]: about a pitch; a pattern is lost beyond."""
 _SWAPPED = 0.2
 """By how much the correlation with another channel's force must be the larger one, both ways, for a swap [1]."""
 
@@ -60,25 +67,36 @@ class ChannelCalibration:
     """Standard error of the exponent [1]."""
     presses: int
     """Presses that it was fitted on."""
+    spread: float = 0.0
+    """Variance by which the model spreads a load farther than the unit [mm^2], along each axis."""
+    spread_error: float = 0.0
+    """Its standard error [mm^2]."""
+    mixing: np.ndarray | None = None
+    """What spreads the unit's forces as the model does [1], shape (taxels, taxels); None without."""
 
     def force(self, counts: np.ndarray) -> np.ndarray:
         """Return forces [N] of tared readings [counts], shapes (n, taxels)."""
-        return _power(counts, self.exponent) * self.gain
+        own = _power(counts, self.exponent) * self.gain
+        return own if self.mixing is None else own @ self.mixing.T
 
     @property
     def document(self) -> dict[str, Any]:
         """The calibration as plain data (in `schemas/checkpoint.schema.json`)."""
         return {
             "gain": self.gain.tolist(), "gain_error": self.gain_error.tolist(), "exponent": self.exponent,
-            "exponent_error": self.exponent_error, "presses": self.presses,
+            "exponent_error": self.exponent_error, "presses": self.presses, "spread": self.spread,
+            "spread_error": self.spread_error,
         }  # fmt: skip
 
     @classmethod
-    def from_document(cls, document: dict[str, Any]) -> ChannelCalibration:
-        """Rebuild a calibration from `document`."""
-        gains = (np.asarray(document[name], float) for name in ("gain", "gain_error"))
-        gain, error = gains
-        return cls(gain, document["exponent"], error, document["exponent_error"], document["presses"])
+    def from_document(cls, document: dict[str, Any], taxels: Taxels) -> ChannelCalibration:
+        """Rebuild a calibration of these taxels from `document`."""
+        gain, error = (np.asarray(document[name], float) for name in ("gain", "gain_error"))
+        variance = document.get("spread", 0.0)
+        return cls(
+            gain, document["exponent"], error, document["exponent_error"], document["presses"], variance,
+            document.get("spread_error", 0.0), spreading(taxels, variance) if variance else None,
+        )  # fmt: skip
 
 
 def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
@@ -118,13 +136,21 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
     _check_order(presses, frames.origin)
     sums = _sums(presses)
     gain, error, exponent = _fitted(sums)
+    variance = variance_error = 0.0
+    mixing = None
+    if not frames.simulated:  # those spread their loads as the model does
+        variance, variance_error = _spread(presses, frames.sensor.taxels, exponent)
+        mixing = spreading(frames.sensor.taxels, variance)
+        gain, error = _gains(_gathered(presses, frames.sensor.taxels, variance), exponent)
     groups = min(len(presses), _GROUPS)
-    if groups == 1:
-        return ChannelCalibration(gain, exponent, error, 1.0, 1)
-    group = np.arange(len(presses)) % groups
-    left_out = np.array([_fitted([part[..., group != k, :] for part in sums])[2] for k in range(groups)])
-    exponent_error = np.sqrt((groups - 1) / groups * ((left_out - left_out.mean()) ** 2).sum())
-    return ChannelCalibration(gain, exponent, error, float(exponent_error), len(presses))
+    exponent_error = 1.0
+    if groups > 1:
+        group = np.arange(len(presses)) % groups
+        left_out = np.array([_fitted([part[..., group != k, :] for part in sums])[2] for k in range(groups)])
+        exponent_error = _jackknifed(left_out)
+    return ChannelCalibration(
+        gain, exponent, error, exponent_error, len(presses), variance, variance_error, mixing
+    )
 
 
 def doubts(calibration: ChannelCalibration, frames: Frames, episodes: tuple[int, ...]) -> list[str]:
@@ -157,23 +183,67 @@ def doubts(calibration: ChannelCalibration, frames: Frames, episodes: tuple[int,
     return words
 
 
+def _gathered(
+    presses: list[tuple[np.ndarray, np.ndarray]], taxels: Taxels, variance: float
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return presses with the forces that a unit feels whose skin spreads loads less far than the model's."""
+    if not variance:
+        return presses
+    gather = spreading(taxels, -variance).T
+    return [(counts, force @ gather) for counts, force in presses]
+
+
+def _spread(presses: list[tuple[np.ndarray, np.ndarray]], taxels: Taxels, exponent: float) -> tuple[float, float]:
+    """Return the variance of the spreading and its standard error [mm^2].
+
+    Gains are fitted to forces that are gathered again, the variance to what the spread forces then miss. The exponent
+    stays what it is without spreading: together they would trade a steeper law for a wider skin.
+    """
+    change, variance, before = laplacian(taxels) / 2, 0.0, 0.0
+    product, square = np.zeros(len(presses)), np.zeros(len(presses))
+    if len(presses) == 1:  # its place errs as much as a skin differs
+        return 0.0, FARTHEST
+    for _ in range(_TURNS):
+        gain, _ = _gains(_gathered(presses, taxels, variance), exponent)
+        mixing = spreading(taxels, variance)
+        for k, (counts, force) in enumerate(presses):
+            spread = (_power(counts, exponent) * gain) @ mixing.T
+            slope = spread @ change
+            product[k], square[k] = (slope * (force - spread)).mean(), (slope * slope).mean()
+        before = variance
+        variance = float(np.clip(before + product.sum() / max(square.sum(), 1e-300), -FARTHEST, FARTHEST))
+    left_out = before + (product.sum() - product) / np.maximum(square.sum() - square, 1e-300)
+    return variance, _jackknifed(left_out)
+
+
+def _gains(presses: list[tuple[np.ndarray, np.ndarray]], exponent: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return gains and their standard errors [N], shapes (taxels,), at an exponent."""
+    square, product, _ = _sums(presses, np.array([exponent]))
+    return _shrunk(square[0], product[0])
+
+
+def _jackknifed(left_out: np.ndarray) -> float:
+    """Return the standard error of an estimate from those without one part each."""
+    return float(np.sqrt((len(left_out) - 1) / len(left_out) * ((left_out - left_out.mean()) ** 2).sum()))
+
+
 def _power(counts: np.ndarray, exponent: float) -> np.ndarray:
     return np.sign(counts) * (np.abs(counts) / CALIBRATION_UNIT) ** exponent
 
 
-def _sums(presses: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+def _sums(presses: list[tuple[np.ndarray, np.ndarray]], exponents: np.ndarray = EXPONENTS) -> list[np.ndarray]:
     """Return the sums that a least-squares fit of gains needs, over the frames of each press.
 
     Returns:
         Squared readings and readings times forces, shapes (exponents, presses, taxels), and squared forces, shape
-        (presses, taxels); readings to the power of each exponent of `EXPONENTS`.
+        (presses, taxels); readings to the power of each of the ``exponents``.
     """
-    square = np.empty((len(EXPONENTS), len(presses), presses[0][0].shape[1]))
+    square = np.empty((len(exponents), len(presses), presses[0][0].shape[1]))
     product, total = np.empty_like(square), np.empty(square.shape[1:])
     for k, (counts, force) in enumerate(presses):
         weight = 1 / len(counts)
         total[k] = weight * (force * force).sum(axis=0)
-        for j, exponent in enumerate(EXPONENTS):
+        for j, exponent in enumerate(exponents):
             x = _power(counts, exponent)
             square[j, k], product[j, k] = weight * (x * x).sum(axis=0), weight * (x * force).sum(axis=0)
     return [square, product, total]

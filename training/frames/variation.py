@@ -1,10 +1,12 @@
-"""Training frames varied at random: mirrored like the sensor, with gains and exponents of other specimens."""
+"""Training frames varied at random: mirrored like the sensor, with gains, laws and spreading of other specimens."""
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 
 from tacdata.sensor import Sensor
+from training.frames.spreading import laplacian
 from training.networks.network import Network
 from training.settings import TrainingSettings
 
@@ -18,6 +20,10 @@ class Variation:
         self.scale, self.exponent = settings.scale_jitter, settings.exponent_jitter
         self.mean, self.sd = network.get_buffer("mean"), network.get_buffer("sd")
         self.calibrated = network.is_calibrated
+        self.spread = settings.spread_jitter
+        values, modes = np.linalg.eigh(laplacian(sensor.taxels) / 2)
+        to = {"dtype": torch.float32, "device": self.mean.device}
+        self.values, self.modes = torch.as_tensor(values, **to), torch.as_tensor(modes, **to)
         order = torch.arange(sensor.taxels.count, device=self.mean.device)
         grid = order.reshape(sensor.taxels.rows, sensor.taxels.columns)
         self.orders = [grid.flip(dims).reshape(-1) for dims in ([], [1], [0], [0, 1])]
@@ -26,6 +32,9 @@ class Variation:
         """Return signals [counts or N], (b, T, taxels), and labels over D_max, (b, pixels_x, pixels_y), varied."""
         if self.mirror:
             signals, label = self._mirrored(signals, label)
+        if self.spread:
+            variance = self.spread * torch.randn(len(signals), 1, 1, device=signals.device)
+            signals = ((signals @ self.modes) * (variance * self.values).exp()) @ self.modes.T
         if self.exponent:
             change = self.exponent * torch.randn(len(signals), 1, 1, device=signals.device)
             unit = self.sd.square().mean().sqrt()

@@ -57,7 +57,7 @@ class Checkpoint:
     def calibration(self) -> ChannelCalibration | None:
         """How it turns readings into forces; None if it takes readings as they are."""
         found = self.document.get("calibration")
-        return ChannelCalibration.from_document(found) if found else None
+        return ChannelCalibration.from_document(found, self.sensor.taxels) if found else None
 
     @property
     def content_hash(self) -> str:
@@ -146,7 +146,8 @@ def load(path: Path, device: torch.device | str = "cpu") -> Checkpoint:
         )
     network.set_normalization(mean, sd)
     if calibration := document.get("calibration"):
-        network.set_calibration(np.asarray(calibration["gain"]), calibration["exponent"])
+        known = ChannelCalibration.from_document(calibration, sensor.taxels)
+        network.set_calibration(known.gain, known.exponent, known.mixing)
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
     return Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
 

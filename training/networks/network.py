@@ -40,6 +40,7 @@ class Network(nn.Module, ABC):
         self.register_buffer("sd", torch.ones(taxels), persistent=False)
         self.register_buffer("gain", torch.ones(taxels), persistent=False)
         self.register_buffer("exponent", torch.ones(()), persistent=False)
+        self.register_buffer("mixing", torch.eye(taxels), persistent=False)
         self.is_calibrated = False
         """Whether readings are turned into forces before anything else."""
 
@@ -53,13 +54,16 @@ class Network(nn.Module, ABC):
         self.get_buffer("mean").copy_(torch.as_tensor(mean, dtype=torch.float32))
         self.get_buffer("sd").copy_(torch.as_tensor(sd, dtype=torch.float32))
 
-    def set_calibration(self, gain: np.ndarray, exponent: float) -> None:
-        """Turn readings into forces from now on: force = gain sign(c) (|c| / 1000 counts)^exponent.
+    def set_calibration(self, gain: np.ndarray, exponent: float, mixing: np.ndarray | None = None) -> None:
+        """Turn readings into forces from now on: force = mixing gain sign(c) (|c| / 1000 counts)^exponent.
 
         Args:
             gain: Force at 1000 counts [N], shape (taxels,).
             exponent: Exponent of the reading [1].
+            mixing: What spreads forces over neighbours [1], shape (taxels, taxels); none if left out.
         """
+        mixing = np.eye(self.taxels) if mixing is None else mixing
+        self.get_buffer("mixing").copy_(torch.as_tensor(mixing, dtype=torch.float32))
         self.get_buffer("gain").copy_(torch.as_tensor(gain, dtype=torch.float32))
         self.get_buffer("exponent").fill_(exponent)
         self.is_calibrated = True
@@ -73,7 +77,8 @@ class Network(nn.Module, ABC):
         if not self.is_calibrated:
             return windows
         size = (windows.abs() / CALIBRATION_UNIT).clamp(min=1e-9)
-        return self.get_buffer("gain") * torch.sign(windows) * size.pow(self.get_buffer("exponent"))
+        own = self.get_buffer("gain") * torch.sign(windows) * size.pow(self.get_buffer("exponent"))
+        return own @ self.get_buffer("mixing").T
 
     def respond(self, signals: torch.Tensor) -> torch.Tensor:
         """Return maps over D_max from what `calibrated` returned; (b, T, taxels) -> (b, pixels_x, pixels_y)."""

@@ -9,7 +9,8 @@ from training_frames import build_frames
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import default_sensor
-from training.frames.channel_calibration import SPREAD, ChannelCalibration, calibrate, doubts
+from training.frames.channel_calibration import FARTHEST, SPREAD, ChannelCalibration, calibrate, doubts
+from training.frames.spreading import spreading
 from training.networks.network import create
 
 
@@ -113,6 +114,40 @@ def test_the_network_computes_the_same_forces():
     counts = rng.normal(0, 800, (5, 24))
     found = network.calibrated(torch.tensor(counts, dtype=torch.float32)).numpy()
     np.testing.assert_allclose(found, known.force(counts), rtol=1e-4, atol=1e-7)
-    again = ChannelCalibration.from_document(known.document)
+    again = ChannelCalibration.from_document(known.document, default_sensor().taxels)
     np.testing.assert_array_equal(again.gain, known.gain)
     assert again.exponent == 1.4
+    assert again.mixing is None  # as files before 1.3 say
+
+
+def test_a_skin_that_spreads_loads_less_far_is_found():
+    """Of a unit whose loads are gathered by a variance of 1.2 mm^2, forces are the model's again."""
+    taxels = default_sensor().taxels
+    frames = unit(np.random.default_rng(2).normal(1.0, 0.05, 24), episodes=16, noise=0.5)
+    gathered = np.asarray(frames.taxel_force, float) @ spreading(taxels, -1.2).T
+    counts = np.sign(gathered) * 1000 * (np.abs(gathered) / 0.2) ** (1 / 1.5)
+    found = calibrate(replace(frames, taxels=counts.astype(np.float32)), numbers(frames))
+    plain = calibrate(replace(frames, taxels=counts.astype(np.float32), simulated=True), numbers(frames))
+    missed = [np.square(known.force(counts) - frames.taxel_force).sum() for known in (found, plain)]
+    assert abs(found.spread - 1.2) < 3 * found.spread_error + 0.2
+    assert 0.0 < found.spread_error < 0.5
+    assert missed[0] < 0.3 * missed[1]
+    network = create("pattern", default_sensor())
+    network.set_calibration(found.gain, found.exponent, found.mixing)
+    np.testing.assert_allclose(
+        network.calibrated(torch.tensor(counts, dtype=torch.float32)).numpy(), found.force(counts), rtol=1e-3, atol=1e-6
+    )
+    again = ChannelCalibration.from_document(found.document, taxels)
+    np.testing.assert_allclose(again.force(counts), found.force(counts))
+
+
+def test_simulated_presses_spread_as_the_model_does():
+    frames = replace(unit(np.ones(24)), simulated=True)
+    found = calibrate(frames, numbers(frames))
+    assert (found.spread, found.mixing) == (0.0, None)
+
+
+def test_one_press_does_not_tell_how_far_loads_spread():
+    frames = unit(np.ones(24), episodes=6)
+    found = calibrate(frames, numbers(frames)[:1])
+    assert (found.spread, found.spread_error) == (0.0, FARTHEST)

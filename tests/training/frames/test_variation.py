@@ -50,6 +50,19 @@ def test_gains_differ_by_frame_and_channel_and_not_within_a_window():
     assert not label.any()
 
 
+def test_loads_spread_by_a_variance_and_none_is_lost():
+    sensor, _, varied = prepared(spread_jitter=0.4)
+    signals = torch.zeros(3000, 1, 24)
+    signals[:, 0, 8] = 1.0  # amid the grid
+    torch.manual_seed(0)
+    spread, _ = varied(signals, torch.zeros(3000, 35, 26))
+    assert float((spread.sum(dim=2) - 1).abs().max()) < 1e-4
+    centers = torch.tensor(sensor.taxels.centers - sensor.taxels.centers[8], dtype=torch.float32)
+    grown = (spread[:, 0] * centers[:, 1] ** 2).sum(dim=1)  # along y no border is near enough to matter
+    assert float(grown.mean()) == pytest.approx(0.0, abs=0.03)
+    assert float(grown.std()) == pytest.approx(0.4, rel=0.1)
+
+
 def test_without_settings_nothing_changes():
     _, _, varied = prepared()
     signals, label = torch.randn(3, 9, 24), torch.rand(3, 35, 26)
