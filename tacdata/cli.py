@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import functools
 import inspect
+import itertools
 import re
 import sys
 from collections.abc import Callable
@@ -39,12 +40,29 @@ def application() -> typer.Typer:
         callback=_before,
     )
     for module, name in _members(ROOM):
-        if hasattr(module, "__path__"):
+        if _is_group(module):
             app.add_typer(_group(module, name), name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)
         else:
             verb = answering(f"tacdata {name}", module.run)
             app.command(name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)(verb)
     return app
+
+
+def _is_group(verb: ModuleType) -> bool:
+    return hasattr(verb, "__path__")
+
+
+def _verbs(room: str = ROOM) -> tuple[Callable[..., Any], ...]:
+    """Return what the verbs of a room run, those of its groups among them."""
+    modules = [module for module, _ in _members(room)]
+    below = [_verbs(module.__name__) for module in modules if _is_group(module)]
+    return (*(module.run for module in modules), *itertools.chain(*below))
+
+
+@functools.lru_cache(maxsize=1)
+def _command(verbs: tuple[Callable[..., Any], ...]) -> Any:
+    """Return the command line as it is run, built once for a process that runs several verbs, or anew for others."""
+    return typer.main.get_command(application())
 
 
 def _group(room: ModuleType, name: str) -> typer.Typer:
@@ -200,7 +218,7 @@ def main() -> None:
     """Run the command line; an error meant for a person ends in words and a non-zero exit, never a traceback."""
     stages.follow()
     try:
-        ended = application()(prog_name="tacdata", standalone_mode=False)
+        ended = _command(_verbs())(prog_name="tacdata", standalone_mode=False)
         # A verb that ends with a code returns it, a member of Exit.
         raise SystemExit(int(ended) if isinstance(ended, int) else 0)
     except MISTYPED as error:

@@ -42,8 +42,9 @@ def load_module(room: str, base: str, name: str) -> ModuleType:
     Raises:
         UsageError: If no file of that name lies in the room.
     """
-    known = names(room, base)
-    if name not in known:
+    # Asked by its name: listing the folder for each of its members would read it as often as it has members.
+    if name in (base, "__init__") or not name.isidentifier() or find_spec(f"{room}.{name}") is None:
+        known = names(room, base)
         close = difflib.get_close_matches(name, known, n=1)
         kind = room.rsplit(".", 1)[-1]
         raise UsageError(
