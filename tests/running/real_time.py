@@ -31,10 +31,10 @@ def in_real_time(path):
 class Watch:
     """A thread that sleeps, and notes how much too late it ever woke.
 
-    Only beside tests of real time: it takes a hundredth of a core.
+    Only beside tests of real time: it takes half a hundredth of a core.
     """
 
-    PERIOD = 0.005
+    PERIOD = 0.01
 
     def __init__(self):
         self.latest, self._wanted = 0.0, threading.Event()

@@ -53,7 +53,10 @@ def test_nothing_is_taken_from_readings_or_from_recordings_without_a_tag():
     np.testing.assert_array_equal(beside_depth(residual[:, :3], replace(made, tag=None)), residual[:, :3])
 
 
-@pytest.mark.parametrize("power", [1.0, 0.7])
+READ_BY_A_POWER = pytest.mark.long("tacdata/discrepancy", reason="the same verdict on readings of another power")
+
+
+@pytest.mark.parametrize("power", [1.0, pytest.param(0.7, marks=READ_BY_A_POWER)])
 def test_compliance_that_a_gauge_sees_is_named_whatever_power_of_load_is_read(power):
     made = gauged(0.05, power)
     effects = ("carriage_compliance", "carriage_compliance_read", "travel_scale", "screw_error", "backlash", "latency")

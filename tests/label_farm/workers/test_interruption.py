@@ -69,6 +69,7 @@ def alive(process):
     return state != "Z"
 
 
+@pytest.mark.long("label_farm", reason="two runs of processes that take jobs from each other")
 def test_two_runs_on_one_store_share_the_work(tmp_path, solves, monkeypatch):
     monkeypatch.setenv("FAST_MODEL_SECONDS", "0.1")
     episodes(tmp_path, 8)  # recorded before either run reads them
