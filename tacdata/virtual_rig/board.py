@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -39,7 +40,7 @@ class Timing:
     def sample_ns(self, counter: int) -> int:
         """Return the true time of a sample [ns of the host's clock]."""
         seconds = counter * self.period * (1 + self.drift * 1e-6)
-        return self.start_ns + round(1e9 * (seconds + self.wander * np.sin(2 * np.pi * seconds / self.wander_period)))
+        return self.start_ns + round(1e9 * (seconds + self.wander * math.sin(math.tau * seconds / self.wander_period)))
 
 
 def draw_timing(seed: int, start_ns: int, rate: float) -> Timing:
@@ -88,19 +89,17 @@ class VirtualBoard:
     def _run(self) -> None:
         while not self._stopped.is_set():
             now = self.clock.now_ns()
-            while self.timing.sample_ns(self._counter) <= now:
-                self._sample()
-            self._bridge(self.timing.sample_ns(self._counter))
+            while (following := self.timing.sample_ns(self._counter)) <= now:
+                self._sample(following)
+            self._bridge(following)
             while self._packets and self._packets[0][0] <= now:
                 self.port.write(self._packets.popleft()[1])
             if self.port.waiting:
                 self.port.write(b"")
-            due = self.timing.sample_ns(self._counter)
-            due = min(due, self._packets[0][0]) if self._packets else due
+            due = min(following, self._packets[0][0]) if self._packets else following
             self._stopped.wait(max((due - self.clock.now_ns()) / NS / self.clock.rate, 0.0002))
 
-    def _sample(self) -> None:
-        sampled = self.timing.sample_ns(self._counter)
+    def _sample(self, sampled: int) -> None:
         frame = self._encoder.encode(self._read(sampled), self._counter, round(sampled / 1000))
         begin, bit = sampled + int(self.timing.conversion * NS), 10 * NS // self.baud
         begin = max(begin, self._line[-1][0] if self._line else 0)

@@ -32,7 +32,8 @@ class Encoder:
         layout = self.layout
         counts = np.asarray(counts)
         low, high = limits(layout.channel_type)
-        if counts.shape != (layout.channels,) or not np.all((counts >= low) & (counts <= high) | np.isnan(counts)):
+        fits = counts.shape == (layout.channels,)
+        if not fits or np.fmin.reduce(counts) < low or np.fmax.reduce(counts) > high:  # NaN fits
             raise FormatError(
                 f"readings of shape {counts.shape} for format {layout.name}",
                 f"{layout.channels} numbers from {low:g} to {high:g}",
@@ -53,7 +54,7 @@ class Encoder:
                 body += values[name].astype(f"{arrow}f{BITS[kind] // 8}").tobytes()
                 continue
             size, mask = BITS[kind] // 8, (1 << BITS[kind]) - 1
-            body += b"".join((int(v) & mask).to_bytes(size, layout.endianness) for v in values[name])
+            body += b"".join((int(v) & mask).to_bytes(size, layout.endianness) for v in values[name].tolist())
         covered = layout.sync + body if layout.covers == "frame" else body
         width = WIDTHS[layout.checksum]
         check = checksum(layout.checksum, covered).to_bytes(width, layout.checksum_endianness) if width else b""
