@@ -1,27 +1,18 @@
 """The demo goes through the verbs, leaves everything it names, and stops gently."""
 
 import json
-import os
 import re
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
-from running.in_process import tacdata
 
 import schemas
-from tacdata import stages
 from tacdata.commands import demo
 from tacdata.errors import UsageError
 
-FARM = Path(__file__).resolve().parents[1] / "label_farm"
-STAND_INS = {
-    "train": ("--threads", "1"),
-}
-"""What makes a stage short, by its verb."""
 DEMO = [sys.executable, "-m", "tacdata.cli", "demo"]
 
 
@@ -79,32 +70,6 @@ def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
     assert not (tmp_path / "out" / "rig" / "rig.yaml").exists()
 
 
-@pytest.fixture
-def quick_stages(monkeypatch):
-    """Stages run in this process; a stand-in model solves the presses."""
-    monkeypatch.syspath_prepend(FARM)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(FARM), str(FARM.parents[1])]))
-
-    def run(line):
-        arguments = line[line.index("tacdata.cli") + 1 :]
-        ended = tacdata(*arguments, *STAND_INS.get(arguments[0], ()))
-        print(ended.stdout, ended.stderr)
-        return ended.returncode
-
-    labelling, quick = demo._Place.labelling, ("--factory", "fast_model:FastModel", "--workers", "2")
-    monkeypatch.setattr(demo._Place, "labelling", lambda place: [*labelling(place), *quick])
-    # The camera is drawn and looked at in `test_the_whole_job`: it takes half of the processor.
-    rig = demo._Place.virtual_rig
-    monkeypatch.setattr(demo._Place, "virtual_rig", lambda *given: [*rig(*given), "--no-camera"])
-    monkeypatch.setattr(stages, "_run", run)
-
-
-@pytest.mark.timeout(1200)  # a rig in its own time, on a machine that may have other work
-def test_the_whole_job_with_a_stand_in_model(tmp_path, quick_stages, capfd):
-    demo.run(tmp_path / "out", presses=4, epochs=1, speed=4.0)
-    left_behind(tmp_path / "out", capfd.readouterr().out, 4)
-
-
 @pytest.mark.long("tacdata/commands", reason="the whole job, eight presses solved on the default skin")
 @pytest.mark.timeout(2400)
 def test_the_whole_job(tmp_path):
@@ -113,16 +78,16 @@ def test_the_whole_job(tmp_path):
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
-    left_behind(tmp_path / "out", done.stdout, 8)
+    left_behind(tmp_path / "out", done.stdout)
 
 
-def left_behind(out, said, presses):
+def left_behind(out, said):
     """Assert that every verb ran and all is there that the demo names."""
     typed = re.findall(r"^\$ tacdata ([a-z-]+)", said, re.M)
     assert typed == ["virtual-rig", "register", "plan", "label", "record", "check", "pack", "train", "evaluate", "view"]
     assert "MISSING" not in said
-    assert len(list((out / "session").glob("episode-*.mcap"))) == presses
-    assert len(list((out / "session" / "labels").glob("episode-*.parquet"))) == presses
+    assert len(list((out / "session").glob("episode-*.mcap"))) == 8
+    assert len(list((out / "session" / "labels").glob("episode-*.parquet"))) == 8
     scores = json.loads((out / "network" / "scores" / "scores.json").read_text())
     assert scores["version"] == schemas.version("scores")
     for picture in (out / "episode.png", out / "network" / "scores" / "scores.png"):
