@@ -47,7 +47,7 @@ def typed(folder, words, *more, code=0, **variables):
     return done.stdout
 
 
-PAGE = pytest.mark.long("label_farm", "docs/how_to/label_farm.md", reason="a page typed, each verb a process")
+TYPED = pytest.mark.long("label_farm", "docs/how_to/label_farm.md", reason="a page typed, each verb a process")
 
 
 @contextmanager
@@ -97,7 +97,7 @@ def test_every_command_of_the_page_has_its_test():
     ]
 
 
-@PAGE
+@TYPED
 def test_a_session_and_a_service_of_one_computer(bench):
     assert "labels written: 2" in typed(bench, PARTS[0][0], "--workers", "1", *FACTORY)
     up, submit, status = PARTS[1]
@@ -110,7 +110,7 @@ def test_a_session_and_a_service_of_one_computer(bench):
     assert "complete" in listed, listed
 
 
-@PAGE
+@TYPED
 def test_recordings_go_to_another_computer_and_labels_come_back(bench):
     export, up = PARTS[2]
     made = subprocess.run(
@@ -130,7 +130,7 @@ def test_recordings_go_to_another_computer_and_labels_come_back(bench):
     assert len(list((bench / "sessions" / "monday" / "labels").glob("episode-*.parquet"))) == 3
 
 
-@PAGE
+@TYPED
 def test_workers_of_more_computers(bench):
     """The service has no worker of its own: who labels came by the page's command."""
     _, submit, _ = PARTS[1]
@@ -143,7 +143,7 @@ def test_workers_of_more_computers(bench):
             assert all(row["owner"].startswith("remote:") for row in state["workers"])
 
 
-@PAGE
+@TYPED
 def test_workers_of_a_cluster(bench):
     scheduler, up, worker = PARTS[5]
     port = free_port()
